@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+# `make render` and `make test` work on a fresh machine; `make help` lists the rest.
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+
+BUILD := build/editable
+ASAN := build/asan
+VENV := .venv/bin
+JOBS ?= $(shell nproc 2> /dev/null || echo 2)
+# One build at a time per directory, whoever starts it.
+LOCK := $(if $(shell command -v flock),flock build/.lock)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_NO_INPUT := 1
+# The tools of the environment, also where a tool asks PATH.
+export PATH := $(CURDIR)/.venv/bin:$(PATH)
+
+CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
+# Directories too: their time changes when a file comes or goes.
+NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
+CPP_FILES := $(shell find src bindings tests/cpp benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
+
+.PHONY: help setup setup-test build render test test-fast test-cpp test-py test-py-fast test-asan bench lint format clean
+
+help: ## This list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+# ---- set-up and build --------------------------------------------------------------------------------
+
+build/.setup: tools/setup tools/setup_embree cmake/embree_probe.cpp constraints.txt pyproject.toml
+	@mkdir -p build && $(LOCK) tools/setup && touch $@
+
+build/.setup-test: build/.setup
+	@$(LOCK) tools/setup test && touch $@
+
+build/.built: build/.setup $(CMAKE_INPUTS) pyproject.toml $(NATIVE_INPUTS)
+	@echo "build: core and Python module"
+	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
+	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON
+	@touch $@
+
+setup: build/.setup ## Install what building needs (system packages, .venv, Embree 4)
+setup-test: build/.setup-test
+build: build/.built ## Build the core and the Python module into .venv (editable)
+
+# ---- use -----------------------------------------------------------------------------------------------
+
+render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
+	@mkdir -p out
+	@test -e out/mixed.usdc || $(VENV)/wavecomb scene mixed -o out/mixed.usdc
+	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png
+
+# ---- tests ---------------------------------------------------------------------------------------------
+
+test: lint test-cpp test-asan test-py ## Everything: lint, C++ tests, the same under sanitizers, pytest
+	@echo "make test: passed"
+
+test-fast: lint test-cpp test-py-fast ## Lint, C++ tests, pytest without the slow ones
+	@echo "make test-fast: passed"
+
+test-cpp: build build/.setup-test ## C++ tests
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
+	$(VENV)/ctest --test-dir $(BUILD) --verbose --output-on-failure --no-tests=error
+
+test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBehaviorSanitizer
+	@test -e $(ASAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=ON -DWAVECOMB_TESTS=ON
+	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
+	$(VENV)/ctest --test-dir $(ASAN) --verbose --output-on-failure --no-tests=error
+
+test-py: build build/.setup-test ## Python and statistical tests
+	$(VENV)/python -m pytest -q -n $(JOBS)
+
+test-py-fast: build build/.setup-test
+	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
+
+bench: build ## Micro-benchmarks
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_benchmarks -j $(JOBS) -- --quiet
+	@for program in $(BUILD)/benchmarks/micro/micro_*; do [ -x $$program ] || continue; echo "== $$program"; $$program; done
+
+# ---- style ---------------------------------------------------------------------------------------------
+
+lint: build/.setup-test ## Layout, layers, types; changes nothing
+	$(VENV)/ruff check --quiet .
+	$(VENV)/ruff format --check --quiet . || { echo "lint: run make format"; exit 1; }
+	$(VENV)/python tools/check_layers
+	@printf '%s\n' $(CPP_FILES) | xargs -r -P $(JOBS) -n 24 $(VENV)/clang-format --dry-run --Werror \
+	  || { echo "lint: run make format"; exit 1; }
+	$(VENV)/mypy
+
+format: build/.setup-test ## Lay out all sources
+	$(VENV)/ruff check --quiet --fix-only .
+	$(VENV)/ruff format --quiet .
+	@printf '%s\n' $(CPP_FILES) | xargs -r $(VENV)/clang-format -i
+
+clean: ## Remove what was built (keeps .venv and .deps)
+	rm -rf build out

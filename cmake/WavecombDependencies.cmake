@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+# Finds Embree 4, oneTBB, Dr.Jit's headers and Python.
+#
+# Embree: the distribution's first; else the one that tools/setup_embree staged in .deps/embree.
+# oneTBB: from where Embree came, so that one scheduler owns the threads: the distribution's beside the
+# distribution's Embree, the wheels' (tbb, tbb-devel) beside the staged one.
+
+if(NOT DEFINED Python_EXECUTABLE AND EXISTS "${PROJECT_SOURCE_DIR}/.venv/bin/python")
+  set(Python_EXECUTABLE "${PROJECT_SOURCE_DIR}/.venv/bin/python")
+endif()
+set(_python_components Interpreter)
+if(WAVECOMB_PYTHON)
+  list(APPEND _python_components Development.Module)
+endif()
+find_package(Python 3.10 REQUIRED COMPONENTS ${_python_components})
+
+execute_process(
+  COMMAND "${Python_EXECUTABLE}" "${PROJECT_SOURCE_DIR}/cmake/python_hints.py"
+  OUTPUT_VARIABLE _hints
+  OUTPUT_STRIP_TRAILING_WHITESPACE
+  RESULT_VARIABLE _hints_result)
+if(_hints_result EQUAL 0)
+  list(GET _hints 0 _hint_drjit)
+  list(GET _hints 1 _hint_tbb)
+endif()
+
+set(DRJIT_INCLUDE_DIR "" CACHE PATH "Directory that holds drjit/packet.h (default: the drjit wheel's)")
+if(DRJIT_INCLUDE_DIR)
+  set(WAVECOMB_DRJIT_INCLUDE_DIR "${DRJIT_INCLUDE_DIR}")
+else()
+  set(WAVECOMB_DRJIT_INCLUDE_DIR "${_hint_drjit}")
+endif()
+if(NOT EXISTS "${WAVECOMB_DRJIT_INCLUDE_DIR}/drjit/packet.h")
+  message(FATAL_ERROR "Dr.Jit's headers were not found for ${Python_EXECUTABLE}: "
+    "pip install 'drjit==1.5.*', or pass -DDRJIT_INCLUDE_DIR=<directory that holds drjit/packet.h>.")
+endif()
+
+set(WAVECOMB_STAGED_EMBREE "${PROJECT_SOURCE_DIR}/.deps/embree")
+find_package(embree 4 CONFIG QUIET)
+if(NOT embree_FOUND)
+  list(APPEND CMAKE_PREFIX_PATH "${WAVECOMB_STAGED_EMBREE}")
+  find_package(embree 4 CONFIG QUIET)
+endif()
+if(NOT embree_FOUND)
+  message(FATAL_ERROR "Embree 4 was not found. Install your distribution's package (libembree-dev, "
+    "embree-devel) where it is version 4, else run tools/setup_embree, or pass -Dembree_DIR=.")
+endif()
+string(FIND "${embree_DIR}" "${WAVECOMB_STAGED_EMBREE}/" _at)
+if(_at EQUAL 0)
+  set(WAVECOMB_EMBREE_IS_STAGED TRUE)
+else()
+  set(WAVECOMB_EMBREE_IS_STAGED FALSE)
+endif()
+
+if(WAVECOMB_EMBREE_IS_STAGED)
+  find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
+endif()
+if(NOT TBB_FOUND)
+  find_package(TBB CONFIG QUIET COMPONENTS tbb HINTS "${_hint_tbb}")
+endif()
+if(NOT TBB_FOUND)
+  message(FATAL_ERROR "oneTBB was not found: pip install tbb-devel, or install your distribution's "
+    "package (libtbb-dev, tbb-devel), or pass -DTBB_DIR=.")
+endif()
+
+message(STATUS "Embree ${embree_VERSION} (${embree_DIR})")
+message(STATUS "oneTBB ${TBB_VERSION} (${TBB_DIR})")
+message(STATUS "Dr.Jit (${WAVECOMB_DRJIT_INCLUDE_DIR})")

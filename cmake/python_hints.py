@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prints where this Python keeps what the build takes from wheels.
+
+One line: Dr.Jit's include directory, and the directory of oneTBB's CMake config, divided by ';'. A part
+that is not installed is empty. Nothing is imported, so this is quick and works in isolated builds too.
+"""
+
+import importlib.metadata
+import importlib.util
+import pathlib
+
+
+def drjit_include() -> str:
+    """Returns the include directory of the drjit wheel, or ''."""
+    spec = importlib.util.find_spec("drjit")
+    for place in (spec.submodule_search_locations or []) if spec else []:
+        include = pathlib.Path(place) / "include"
+        if (include / "drjit" / "packet.h").is_file():
+            return include.as_posix()
+    return ""
+
+
+def tbb_cmake() -> str:
+    """Returns the directory of TBBConfig.cmake of the tbb-devel wheel, or ''."""
+    try:
+        files = importlib.metadata.distribution("tbb-devel").files or []
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+    for file in files:
+        if file.name == "TBBConfig.cmake":
+            return pathlib.Path(file.locate()).resolve().parent.as_posix()
+    return ""
+
+
+print(drjit_include(), tbb_cmake(), sep=";")

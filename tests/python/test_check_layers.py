@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+TOOL = ROOT / "tools" / "check_layers"
+HEAD = "// SPDX-License-Identifier: Apache-2.0\n"
+
+
+def run(root: pathlib.Path) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, str(TOOL), str(root)], capture_output=True, text=True, check=False
+    )
+
+
+def tree(root: pathlib.Path, files: dict[str, str]) -> pathlib.Path:
+    for name, text in files.items():
+        path = root / "src" / "wavecomb" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(HEAD + text)
+    return root
+
+
+def test_this_tree_is_clean():
+    result = run(ROOT)
+    assert result.returncode == 0, result.stderr
+
+
+def test_downward_includes_pass(tmp_path):
+    files = {
+        "core/lanes.h": "#include <drjit/packet.h>\n",
+        "texture/tile.h": '#include "wavecomb/core/lanes.h"\n',
+        "scene/scene.h": '#include "wavecomb/texture/tile.h"\n#include <tbb/parallel_for.h>\n',
+        "accel/embree.cpp": '#include <embree4/rtcore.h>\n#include "wavecomb/scene/scene.h"\n',
+        "schedule/policies/none.h": '#include "wavecomb/schedule/policy.h"\n',
+        "schedule/policy.h": "#include <span>\n",
+        "integrate/wave.cpp": '#include "wavecomb/schedule/policy.h"\n',
+        "render/renderer.cpp": '#include <oneapi/tbb.h>\n#include "wavecomb/integrate/wave.h"\n',
+        "wavecomb.h": '#include "wavecomb/render/renderer.h"\n',
+    }
+    result = run(tree(tmp_path, files))
+    assert result.returncode == 0, result.stderr
+    assert "9 files, 0 violations" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "message"),
+    [
+        ("core/rng.h", '#include "wavecomb/scene/scene.h"', "above it"),
+        ("scene/scene.h", '#include "wavecomb/film/film.h"', "above it"),
+        ("integrate/wave.h", '#include "wavecomb/render/renderer.h"', "above it"),
+        ("core/rng.h", '#include "wavecomb/wavecomb.h"', "above it"),
+        ("texture/tile.h", '#include "wavecomb/scene/scene.h"', "beside it"),
+        ("material/table.h", '#include "wavecomb/schedule/policy.h"', "beside it"),
+        ("light/sampler.h", '#include  "wavecomb/accel/accelerator.h"', "beside it"),
+        ("schedule/queue.h", '#include "wavecomb/scene/scene.h"', "only core"),
+        ("integrate/wave.cpp", "#include <embree4/rtcore.h>", "Embree"),
+        ("core/warp.h", "# include <drjit/math.h>", "Dr.Jit"),
+        ("schedule/sort.cpp", "#include <tbb/parallel_sort.h>", "oneTBB"),
+        ("integrate/wave.cpp", '#include "oneapi/tbb/task_arena.h"', "oneTBB"),
+        ("render/renderer.h", "#include <nanobind/nanobind.h>", "Python"),
+        ("scene/scene.h", "#include <pxr/usd/usd/stage.h>", "USD"),
+        ("core/rng.h", '#include "hash.h"', "from the root"),
+        ("core/rng.h", '#include "../scene/scene.h"', "from the root"),
+        ("core/rng.h", "#include <wavecomb/core/hash.h>", "write #include"),
+        ("gpu/kernel.h", "#include <span>", "no known layer"),
+        ("core/rng.h", '#include "wavecomb/gpu/kernel.h"', "no known layer"),
+    ],
+)
+def test_a_bad_include_is_refused(tmp_path, name, line, message):
+    result = run(tree(tmp_path, {name: line + "\n"}))
+    assert result.returncode == 1
+    assert f"src/wavecomb/{name}:2:" in result.stderr or "no known layer" in result.stderr
+    assert message in result.stderr
+
+
+def test_a_missing_licence_line_is_refused(tmp_path):
+    path = tmp_path / "src" / "wavecomb" / "core" / "rng.h"
+    path.parent.mkdir(parents=True)
+    path.write_text("#pragma once\n")
+    result = run(tmp_path)
+    assert result.returncode == 1
+    assert "SPDX" in result.stderr
+
+
+def test_an_empty_tree_is_an_error(tmp_path):
+    assert run(tmp_path).returncode == 2
