@@ -35,10 +35,18 @@ build/.setup: tools/setup tools/setup_embree cmake/embree_probe.cpp constraints.
 build/.setup-test: build/.setup
 	@$(LOCK) tools/setup test && touch $@
 
-build/.built: build/.setup $(CMAKE_INPUTS) pyproject.toml $(NATIVE_INPUTS)
-	@echo "build: core and Python module"
+# pip configures, builds and installs once; after a source edit CMake alone is quicker.
+build/.configured: build/.setup $(CMAKE_INPUTS) pyproject.toml
+	@echo "build: configuring; core and Python module"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
 	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON
+	@touch $@ build/.built
+
+build/.built: build/.configured $(NATIVE_INPUTS)
+	@echo "build: core and Python module"
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_python wavecomb_stub -j $(JOBS) -- --quiet
+	@$(VENV)/cmake --install $(BUILD) --component python \
+	  --prefix "$$($(VENV)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" > /dev/null
 	@touch $@
 
 setup: build/.setup ## Install what building needs (system packages, .venv, Embree 4)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Do Embree's headers and library agree? Compiled and run by tools/setup_embree, where the two come from
-// different releases. Checks the version, the compile-time options that change the layout of RTCHit
-// (instance levels, instance arrays) for one ray and for packets of 16, filter functions and ray masks.
+// Do Embree's headers and library agree? Compiled and run by tools/setup_embree, where the two come
+// from different releases. Checks the version, the compile-time options that change the layout of
+// RTCHit (instance levels, instance arrays) for one ray and for packets of 16, filter functions and
+// ray masks.
 #include <embree4/rtcore.h>
 
 #include <cmath>
@@ -39,8 +40,8 @@ RTCGeometry triangle(RTCDevice device) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                         RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3));
-  auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0,
-                                                           RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 1));
+  auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 1));
   const float vertices[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   std::memcpy(v, vertices, sizeof(vertices));
   for (unsigned i = 0; i < 3; ++i) t[i] = i;
@@ -95,7 +96,8 @@ void trace(RTCScene scene, float x, float y, unsigned mask, Expected expected, c
   const bool is_hit = expected.geom != RTC_INVALID_GEOMETRY_ID;
   if (is_hit) {
     ok = ok && one.hit.hit.instID[0] == expected.inst && one.hit.hit.primID == 0 &&
-         std::fabs(one.hit.ray.tfar - 2.0f) < 1e-4f && std::fabs(std::fabs(one.hit.hit.Ng_z) - 1.0f) < 1e-4f;
+         std::fabs(one.hit.ray.tfar - 2.0f) < 1e-4f &&
+         std::fabs(std::fabs(one.hit.hit.Ng_z) - 1.0f) < 1e-4f;
 #if defined(RTC_GEOMETRY_INSTANCE_ARRAY)
     ok = ok && one.hit.hit.instPrimID[0] == expected.inst_prim;
 #endif
@@ -126,7 +128,8 @@ void trace(RTCScene scene, float x, float y, unsigned mask, Expected expected, c
     const bool active = valid[i] != 0;
     ok = ok && many.hit.hit.geomID[i] == (active ? expected.geom : RTC_INVALID_GEOMETRY_ID);
     if (!active || !is_hit) continue;
-    ok = ok && many.hit.hit.instID[0][i] == expected.inst && std::fabs(many.hit.ray.tfar[i] - 2.0f) < 1e-4f;
+    ok = ok && many.hit.hit.instID[0][i] == expected.inst &&
+         std::fabs(many.hit.ray.tfar[i] - 2.0f) < 1e-4f;
 #if defined(RTC_GEOMETRY_INSTANCE_ARRAY)
     ok = ok && many.hit.hit.instPrimID[0][i] == expected.inst_prim;
 #endif
@@ -148,11 +151,14 @@ int main() {
   const long version = static_cast<long>(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION));
   check(version / 10000 == RTC_VERSION_MAJOR, "the library's major version is the headers'");
   check(version >= RTC_VERSION, "the library is at least as new as the headers");
-  check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 1, "ray masks are supported");
+  check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 1,
+        "ray masks are supported");
   check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED) == 1,
         "filter functions are supported");
-  check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_CURVE_GEOMETRY_SUPPORTED) == 1, "curves are supported");
-  check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_TASKING_SYSTEM) == 1, "tasks run on oneTBB");
+  check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_CURVE_GEOMETRY_SUPPORTED) == 1,
+        "curves are supported");
+  check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_TASKING_SYSTEM) == 1,
+        "tasks run on oneTBB");
 
   // The triangle itself, with a filter.
   RTCScene object = rtcNewScene(device);
@@ -179,8 +185,9 @@ int main() {
 #if defined(RTC_GEOMETRY_INSTANCE_ARRAY)
   RTCGeometry array = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE_ARRAY);
   rtcSetGeometryInstancedScene(array, object);
-  auto* transforms = static_cast<float*>(rtcSetNewGeometryBuffer(
-      array, RTC_BUFFER_TYPE_TRANSFORM, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, 12 * sizeof(float), 2));
+  auto* transforms = static_cast<float*>(
+      rtcSetNewGeometryBuffer(array, RTC_BUFFER_TYPE_TRANSFORM, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
+                              12 * sizeof(float), 2));
   for (int i = 0; i < 2; ++i) {
     std::memcpy(transforms + 12 * i, transform, sizeof(transform));
     transforms[12 * i + 9] = i == 0 ? 20.0f : 30.0f;
@@ -202,7 +209,7 @@ int main() {
   rtcReleaseScene(object);
   rtcReleaseDevice(device);
   if (failures != 0) return 1;
-  std::printf("embree probe: headers %s and library %ld.%ld.%ld agree\n", RTC_VERSION_STRING, version / 10000,
-              version / 100 % 100, version % 100);
+  std::printf("embree probe: headers %s and library %ld.%ld.%ld agree\n", RTC_VERSION_STRING,
+              version / 10000, version / 100 % 100, version % 100);
   return 0;
 }

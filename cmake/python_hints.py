@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prints where this Python keeps what the build takes from wheels.
 
-One line: Dr.Jit's include directory, and the directory of oneTBB's CMake config, divided by ';'. A part
-that is not installed is empty. Nothing is imported, so this is quick and works in isolated builds too.
+One line: Dr.Jit's include directory, and the directory of oneTBB's CMake config, divided by ';'.
+A part that is not installed is empty. Nothing is imported, so this is quick and works in isolated
+builds too.
 """
 
 import importlib.metadata
