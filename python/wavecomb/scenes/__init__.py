@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Procedural USD stages: test scenes of our own that need no download.
+
+``write_scene("mixed", Path("mixed.usdc"))`` writes a stage, and textures beside it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
+from wavecomb.scenes.mixed import build_dragon, build_mixed
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.stage import StageWriter
+
+__all__ = ["SCENES", "SceneInfo", "SceneOptions", "write_scene"]
+
+
+@dataclass(frozen=True)
+class SceneInfo:
+    """A scene that can be written.
+
+    Attributes:
+        summary: One line for a list.
+        metres_per_unit: Length of a scene unit.
+        build: Fills a stage.
+    """
+
+    summary: str
+    metres_per_unit: float
+    build: Callable[[StageWriter, SceneOptions], None]
+
+
+SCENES: dict[str, SceneInfo] = {
+    "cornell": SceneInfo("the Cornell box, as measured", 0.001, build_cornell),
+    "cornell-dragon": SceneInfo("the Cornell box with a dragon", 0.001, build_cornell_dragon),
+    "mixed": SceneInfo("45 teapots, 45 dragons and a mirror", 0.1, build_mixed),
+    "dragon": SceneInfo("90 dragons and a mirror", 0.1, build_dragon),
+}
+"""Every scene by name."""
+
+
+def write_scene(name: str, path: Path, **options: Any) -> None:
+    """Writes a procedural stage, and its textures to ``<stem>_textures/`` beside it.
+
+    Args:
+        name: A key of ``SCENES``.
+        path: File to write, by its ending .usda (text), .usdc or .usd (binary).
+        **options: Fields of ``SceneOptions``.
+
+    Raises:
+        ValueError: The name, the file's ending, an option or an imported mesh is no good.
+        OSError: A file cannot be written.
+    """
+    if name not in SCENES:
+        raise ValueError(f"no scene {name!r}; there are {', '.join(SCENES)}")
+    known = [field.name for field in dataclasses.fields(SceneOptions)]
+    for key in options:
+        if key not in known:
+            raise ValueError(f"scene {name!r} has no option {key!r}; there are {', '.join(known)}")
+    settings = SceneOptions(**options)
+    info = SCENES[name]
+    writer = StageWriter(Path(path), info.metres_per_unit, settings.texture_size, settings.seed)
+    info.build(writer, settings)
+    writer.save(f"Wavecomb scene {name}: {info.summary}")

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Cornell box, from the measured data of the original, and one with a dragon in it.
+
+Source: Cornell University Program of Computer Graphics, "The Cornell Box", 1998 (geometry in
+millimetres, camera at (278, 273, -800), lens 35 mm over a film of 25 mm); colours are the usual
+conversions of the measured spectra to linear RGB.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.stage import StageWriter
+
+_WHITE = looks.diffuse((0.725, 0.71, 0.68))
+_RED = looks.diffuse((0.63, 0.065, 0.05))
+_GREEN = looks.diffuse((0.14, 0.45, 0.091))
+_RADIANCE = (17.0, 12.0, 4.0)
+_LIGHT_GAP = 0.5
+"""The light hangs this far under the ceiling (the original ceiling has a hole for it), mm."""
+
+_QUADS: dict[str, tuple[str, list[list[float]]]] = {
+    "Floor": ("White", [[552.8, 0, 0], [0, 0, 0], [0, 0, 559.2], [549.6, 0, 559.2]]),
+    "Ceiling": ("White", [[556, 548.8, 0], [556, 548.8, 559.2], [0, 548.8, 559.2], [0, 548.8, 0]]),
+    "BackWall": (
+        "White",
+        [[549.6, 0, 559.2], [0, 0, 559.2], [0, 548.8, 559.2], [556, 548.8, 559.2]],
+    ),
+    "RightWall": ("Green", [[0, 0, 559.2], [0, 0, 0], [0, 548.8, 0], [0, 548.8, 559.2]]),
+    "LeftWall": ("Red", [[552.8, 0, 0], [549.6, 0, 559.2], [556, 548.8, 559.2], [556, 548.8, 0]]),
+}
+_BLOCKS: dict[str, tuple[float, list[list[float]]]] = {
+    "ShortBlock": (165.0, [[130, 65], [82, 225], [240, 272], [290, 114]]),
+    "TallBlock": (330.0, [[423, 247], [265, 296], [314, 456], [472, 406]]),
+}
+
+
+def _box(writer: StageWriter, aspect: float) -> None:
+    """The walls, the light and the camera."""
+    writer.material("White", _WHITE)
+    writer.material("Red", _RED)
+    writer.material("Green", _GREEN)
+    for name, (colour, corners) in _QUADS.items():
+        writer.polygons(f"/World/Set/{name}", np.array(corners), [[0, 1, 2, 3]], colour)
+    writer.rect_light("Ceiling", (278.0, 548.8 - _LIGHT_GAP, 279.5), 130.0, 105.0, _RADIANCE)
+    fov = math.degrees(2.0 * math.atan(0.5 * 25.0 / 35.0))
+    writer.camera((278.0, 273.0, -800.0), (278.0, 273.0, 0.0), fov, aspect)
+
+
+def _block(writer: StageWriter, name: str) -> None:
+    """One of the two blocks: a top and four sides; it stands on the floor, so it has no bottom."""
+    height, foot = _BLOCKS[name]
+    corners = [[x, height, z] for x, z in foot] + [[x, 0.0, z] for x, z in foot]
+    sides = [[k, k + 4, (k + 1) % 4 + 4, (k + 1) % 4] for k in range(4)]
+    writer.polygons(f"/World/Objects/{name}", np.array(corners), [[0, 1, 2, 3], *sides], "White")
+
+
+def build_cornell(writer: StageWriter, options: SceneOptions) -> None:
+    """The box with its two blocks."""
+    _box(writer, options.aspect or 1.0)
+    for name in _BLOCKS:
+        _block(writer, name)
+
+
+DRAGON_MATERIALS = {
+    "gold": looks.GOLD,
+    "copper": looks.COPPER,
+    "glass": looks.CLEAR_GLASS,
+    "jade": looks.JADE,
+}
+
+
+def build_cornell_dragon(writer: StageWriter, options: SceneOptions) -> None:
+    """The box with a dragon on its floor."""
+    if options.material not in DRAGON_MATERIALS:
+        raise ValueError(
+            f"dragon material must be one of {', '.join(DRAGON_MATERIALS)}, "
+            f"not {options.material!r}"
+        )
+    _box(writer, options.aspect or 1.0)
+    mesh = options.dragon_mesh()
+    writer.material("Dragon", DRAGON_MATERIALS[options.material])
+    prototype = writer.prototype("Dragon", mesh)
+    # The dragon faces +x; the camera looks along +z, with x growing to the left.
+    writer.instance("/World/Objects/Dragon", prototype, "Dragon", (278.0, 0.0, 290.0), 148.0, 195.0)

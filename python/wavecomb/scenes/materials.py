@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials of the generated stages: UsdPreviewSurface plus the name of a Wavecomb program.
+
+``wavecomb:program`` on the Material says which shading program to run. The UsdPreviewSurface inputs
+give its parameters, set so that other renderers show something alike:
+
+- diffuse: ``diffuseColor``.
+- metal: ``diffuseColor`` is the reflectance at normal incidence, ``roughness``, optional
+  ``specularColor`` is the tint near 82 degrees.
+- dielectric: ``ior``, ``roughness``, ``diffuseColor`` tints transmission.
+- plastic: ``diffuseColor`` under a coat of ``ior`` and ``roughness``.
+- emissive: ``emissiveColor``, radiance.
+- principled: everything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+Colour = tuple[float, float, float]
+"""Linear Rec. 709 red, green, blue."""
+
+PROGRAMS = ("diffuse", "metal", "dielectric", "plastic", "emissive", "principled")
+
+
+@dataclass(frozen=True)
+class MaterialInfo:
+    """One material.
+
+    Attributes:
+        program: One of ``PROGRAMS``.
+        inputs: Values of UsdPreviewSurface inputs by name.
+        textures: Names in ``textures.TEXTURES`` by input.
+        repeat: Texture repeats for each unit of uv.
+    """
+
+    program: str
+    inputs: dict[str, float | int | Colour] = field(default_factory=dict)
+    textures: dict[str, str] = field(default_factory=dict)
+    repeat: float = 1.0
+
+
+def diffuse(colour: Colour, texture: str | None = None, repeat: float = 1.0) -> MaterialInfo:
+    """A matt surface; specular reflection is switched off as far as UsdPreviewSurface can."""
+    inputs: dict[str, float | int | Colour] = {
+        "diffuseColor": colour,
+        "useSpecularWorkflow": 1,
+        "specularColor": (0.0, 0.0, 0.0),
+        "roughness": 1.0,
+    }
+    return MaterialInfo(
+        "diffuse", inputs, {} if texture is None else {"diffuseColor": texture}, repeat
+    )
+
+
+def metal(
+    colour: Colour,
+    roughness: float,
+    edge: Colour | None = None,
+    textures: dict[str, str] | None = None,
+) -> MaterialInfo:
+    """A conductor with its reflectance at normal incidence."""
+    inputs: dict[str, float | int | Colour] = {
+        "diffuseColor": colour,
+        "metallic": 1.0,
+        "roughness": roughness,
+    }
+    if edge is not None:
+        inputs["specularColor"] = edge
+    return MaterialInfo("metal", inputs, textures or {})
+
+
+def dielectric(colour: Colour, roughness: float, ior: float = 1.5) -> MaterialInfo:
+    """Glass; the low opacity is what shows it as glass elsewhere."""
+    return MaterialInfo(
+        "dielectric",
+        {"diffuseColor": colour, "roughness": roughness, "ior": ior, "opacity": 0.1},
+    )
+
+
+def plastic(
+    colour: Colour, roughness: float, texture: str | None = None, repeat: float = 1.0
+) -> MaterialInfo:
+    """A diffuse base under a clear coat of index 1.5."""
+    return MaterialInfo(
+        "plastic",
+        {"diffuseColor": colour, "roughness": roughness, "ior": 1.5, "metallic": 0.0},
+        {} if texture is None else {"diffuseColor": texture},
+        repeat,
+    )
+
+
+def emissive(radiance: Colour) -> MaterialInfo:
+    """A surface that glows and reflects nothing."""
+    return MaterialInfo(
+        "emissive",
+        {
+            "emissiveColor": radiance,
+            "diffuseColor": (0.0, 0.0, 0.0),
+            "useSpecularWorkflow": 1,
+            "specularColor": (0.0, 0.0, 0.0),
+            "roughness": 1.0,
+        },
+    )
+
+
+def principled(
+    inputs: dict[str, float | int | Colour],
+    textures: dict[str, str] | None = None,
+    repeat: float = 1.0,
+) -> MaterialInfo:
+    """All of UsdPreviewSurface."""
+    return MaterialInfo("principled", inputs, textures or {}, repeat)
+
+
+GOLD = metal((1.00, 0.71, 0.29), 0.16, (1.0, 0.94, 0.78))
+COPPER = metal((0.93, 0.48, 0.32), 0.24, (1.0, 0.86, 0.78))
+STEEL = metal((0.62, 0.61, 0.60), 0.25, None, {"roughness": "brushed"})
+BRONZE = metal((0.60, 0.39, 0.19), 0.34)
+SILVER = metal((0.95, 0.93, 0.88), 0.08)
+MIRROR = metal((0.94, 0.95, 0.95), 0.0)
+CLEAR_GLASS = dielectric((1.0, 1.0, 1.0), 0.0)
+AMBER_GLASS = dielectric((1.0, 0.66, 0.22), 0.0, 1.54)
+FROSTED_GLASS = dielectric((0.82, 0.95, 0.92), 0.22)
+JADE = principled(
+    {
+        "diffuseColor": (0.09, 0.36, 0.20),
+        "roughness": 0.22,
+        "ior": 1.62,
+        "clearcoat": 0.6,
+        "clearcoatRoughness": 0.05,
+    }
+)
+LACQUER = principled(
+    {
+        "diffuseColor": (0.42, 0.015, 0.02),
+        "roughness": 0.38,
+        "clearcoat": 1.0,
+        "clearcoatRoughness": 0.03,
+        "metallic": 0.15,
+    }
+)
+MARBLE = principled(
+    {"diffuseColor": (0.8, 0.8, 0.8), "roughness": 0.18, "ior": 1.5}, {"diffuseColor": "marble"}
+)
+HAMMERED = principled(
+    {"diffuseColor": (0.88, 0.58, 0.36), "metallic": 1.0, "roughness": 0.22},
+    {"normal": "hammered"},
+    2.0,
+)
+FLOOR = principled(
+    {"diffuseColor": (0.2, 0.2, 0.2), "roughness": 0.4, "ior": 1.5},
+    {"diffuseColor": "tiles", "roughness": "tiles_roughness"},
+)
+TERRACOTTA = diffuse((0.55, 0.20, 0.11))
+CHECKER = diffuse((0.5, 0.5, 0.5), "checker")
+CLOTH = diffuse((0.4, 0.2, 0.1), "weave", 2.0)
+CHALK = diffuse((0.76, 0.74, 0.70))
+BLUE_PLASTIC = plastic((0.02, 0.12, 0.42), 0.08)
+TEAL_PLASTIC = plastic((0.01, 0.30, 0.30), 0.16)
+YELLOW_PLASTIC = plastic((0.83, 0.44, 0.02), 0.12)
+WALNUT = plastic((0.25, 0.12, 0.06), 0.15, "wood")
+PORCELAIN = plastic((0.8, 0.8, 0.78), 0.04, "glaze")
+EMBER = emissive((5.2, 1.9, 0.45))

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The two experiment stages: 90 instanced objects and a mirror in the evening sun."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.materials import MaterialInfo
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.stage import StageWriter
+from wavecomb.scenes.teapot import teapot
+
+_ROWS = 9
+_COLUMNS = 10
+_PITCH_X = 2.9
+_PITCH_Z = 2.75
+_TEAPOT_SCALE = 0.36
+_GROUND_HALF = 90.0
+_TILE_REPEAT_LENGTH = 6.0
+
+_TEAPOT_LOOKS: dict[str, MaterialInfo] = {
+    "Porcelain": looks.PORCELAIN,
+    "Copper": looks.COPPER,
+    "Checker": looks.CHECKER,
+    "BluePlastic": looks.BLUE_PLASTIC,
+    "Marble": looks.MARBLE,
+    "Walnut": looks.WALNUT,
+    "Steel": looks.STEEL,
+    "Terracotta": looks.TERRACOTTA,
+    "Hammered": looks.HAMMERED,
+    "YellowPlastic": looks.YELLOW_PLASTIC,
+    "Cloth": looks.CLOTH,
+    "ClearGlass": looks.CLEAR_GLASS,
+}
+_DRAGON_LOOKS: dict[str, MaterialInfo] = {
+    "Gold": looks.GOLD,
+    "Jade": looks.JADE,
+    "Lacquer": looks.LACQUER,
+    "Bronze": looks.BRONZE,
+    "TealPlastic": looks.TEAL_PLASTIC,
+    "AmberGlass": looks.AMBER_GLASS,
+    "Chalk": looks.CHALK,
+    "Silver": looks.SILVER,
+    "Marble": looks.MARBLE,
+    "FrostedGlass": looks.FROSTED_GLASS,
+    "Walnut": looks.WALNUT,
+    "Ember": looks.EMBER,
+}
+
+
+def _dealt(names: list[str], count: int, rng: np.random.Generator) -> list[str]:
+    """``count`` names, each as often as the others, shuffled hand by hand."""
+    dealt: list[str] = []
+    while len(dealt) < count:
+        dealt += [names[k] for k in rng.permutation(len(names))]
+    return dealt[:count]
+
+
+def _set(writer: StageWriter, aspect: float) -> None:
+    """Ground, mirror, lights and camera."""
+    writer.material("Floor", looks.FLOOR)
+    half = _GROUND_HALF
+    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
+    uv = corners[:, [0, 2]] * np.array([1.0, -1.0]) / _TILE_REPEAT_LENGTH
+    writer.polygons("/World/Set/Ground", corners, [[0, 1, 2, 3]], "Floor", uv)
+
+    writer.material("Mirror", looks.MIRROR)
+    writer.material("Frame", looks.BRONZE)
+    back = -0.5 * (_ROWS - 1) * _PITCH_Z - 3.2
+    width, low, high, lean = 17.0, 0.35, 9.0, 0.55
+    mirror = np.array(
+        [
+            [-width, low, back],
+            [width, low, back],
+            [width, high, back + lean],
+            [-width, high, back + lean],
+        ]
+    )
+    writer.polygons("/World/Set/Mirror", mirror, [[0, 1, 2, 3]], "Mirror")
+    _frame(writer, mirror)
+
+    writer.rect_light("Ceiling", (-3.0, 13.0, 2.0), 16.0, 8.0, (9.0, 8.1, 6.8))
+    writer.dome_light("Sky", 0.0)
+    writer.camera((7.5, 6.6, 21.5), (0.4, 0.7, 0.0), 48.0, aspect)
+
+
+def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
+    """Four bars around the mirror, (4, 3) corners, and a back board: boxes along its edges."""
+    right = mirror[1] - mirror[0]
+    rise = mirror[3] - mirror[0]
+    right, rise = right / np.linalg.norm(right), rise / np.linalg.norm(rise)
+    normal = np.cross(right, rise)
+    bar, depth = 0.35, 0.30
+    for index in range(4):
+        start, end = mirror[index], mirror[(index + 1) % 4]
+        along = (end - start) / np.linalg.norm(end - start)
+        out = np.cross(along, normal)
+        a, b = start - along * bar, end + along * bar
+        section = [
+            -depth * normal,
+            out * bar - depth * normal,
+            out * bar + depth * normal,
+            depth * normal,
+        ]
+        points = np.array([a + s for s in section] + [b + s for s in section])
+        faces = [
+            [0, 1, 2, 3],
+            [7, 6, 5, 4],
+            *[[k, k + 4, (k + 1) % 4 + 4, (k + 1) % 4] for k in range(4)],
+        ]
+        writer.polygons(f"/World/Set/Frame{index}", points, faces, "Frame")
+
+
+def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> None:
+    rng = np.random.default_rng([options.seed, 90])
+    _set(writer, options.aspect or 16.0 / 9.0)
+    dragon_looks = dict(_DRAGON_LOOKS)
+    if not with_teapots:
+        dragon_looks.update(
+            {k: _TEAPOT_LOOKS[k] for k in ("Copper", "Steel", "BluePlastic", "Terracotta")}
+        )
+    used = {**_TEAPOT_LOOKS, **dragon_looks} if with_teapots else dragon_looks
+    for name, info in used.items():
+        writer.material(name, info)
+    dragon = writer.prototype("Dragon", options.dragon_mesh())
+    pot = writer.prototype("Teapot", teapot(options.teapot_level)) if with_teapots else ""
+    count = _ROWS * _COLUMNS
+    teapot_hand = _dealt(list(_TEAPOT_LOOKS), count // 2, rng) if with_teapots else []
+    dragon_hand = _dealt(list(dragon_looks), count - len(teapot_hand), rng)
+    for index in range(count):
+        row, column = divmod(index, _COLUMNS)
+        shift = 0.25 if row % 2 else -0.25
+        x = (column - 0.5 * (_COLUMNS - 1) + shift) * _PITCH_X + rng.uniform(-0.22, 0.22)
+        z = (row - 0.5 * (_ROWS - 1)) * _PITCH_Z + rng.uniform(-0.18, 0.18)
+        scale = math.exp(rng.uniform(-0.13, 0.13))
+        place = (x, 0.0, z)
+        if with_teapots and (row + column) % 2 == 0:
+            turn = rng.uniform(-180.0, 180.0)
+            writer.instance(
+                f"/World/Objects/Teapot_{index:02d}",
+                pot,
+                teapot_hand.pop(),
+                place,
+                turn,
+                _TEAPOT_SCALE * scale,
+            )
+        else:
+            turn = -35.0 + rng.uniform(-50.0, 50.0)
+            writer.instance(
+                f"/World/Objects/Dragon_{index:02d}", dragon, dragon_hand.pop(), place, turn, scale
+            )
+
+
+def build_mixed(writer: StageWriter, options: SceneOptions) -> None:
+    """45 teapots and 45 dragons."""
+    _build(writer, options, with_teapots=True)
+
+
+def build_dragon(writer: StageWriter, options: SceneOptions) -> None:
+    """90 dragons."""
+    _build(writer, options, with_teapots=False)

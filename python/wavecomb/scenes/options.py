@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options of the generated stages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from wavecomb.scenes.dragon import dragon
+from wavecomb.scenes.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What ``write_scene`` takes; a scene ignores what it has no use for.
+
+    Attributes:
+        dragon: OBJ, PLY or USD file to stand in for our dragon, or None.
+        triangles: Triangles of our dragon.
+        teapot_level: Cells along each edge of the teapot's 32 patches.
+        seed: Of the layout and of the texture patterns.
+        texture_size: Edge of the largest textures, texels; the others shrink in proportion.
+        aspect: Width / height of the picture that the camera frames.
+        material: Of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
+    """
+
+    dragon: Path | str | None = None
+    triangles: int = 250_000
+    teapot_level: int = 24
+    seed: int = 1
+    texture_size: int = 2048
+    aspect: float | None = None
+    material: str = "gold"
+
+    def dragon_mesh(self) -> Mesh:
+        """The dragon to use: ours, or the file's, normalised to our size."""
+        if self.dragon is None:
+            return dragon(self.triangles)
+        from wavecomb.scenes.meshfile import load_dragon
+
+        return load_dragon(Path(self.dragon))

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes generated stages: meshes, materials, lights, cameras, instances and texture files."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
+
+from wavecomb.scenes.materials import MaterialInfo
+from wavecomb.scenes.mesh import FloatArray, Mesh
+from wavecomb.scenes.textures import TEXTURES, sky, write_image
+
+SUFFIXES = (".usda", ".usdc", ".usd")
+_INPUT_TYPES = {
+    "diffuseColor": Sdf.ValueTypeNames.Color3f,
+    "specularColor": Sdf.ValueTypeNames.Color3f,
+    "emissiveColor": Sdf.ValueTypeNames.Color3f,
+    "normal": Sdf.ValueTypeNames.Normal3f,
+    "useSpecularWorkflow": Sdf.ValueTypeNames.Int,
+}
+
+
+def _vec(values: Sequence[float] | FloatArray) -> Gf.Vec3f:
+    return Gf.Vec3f(*(float(v) for v in values))
+
+
+class StageWriter:
+    """Builds a Y-up stage in memory; ``save`` writes it, whole or not at all.
+
+    Texture files are written as soon as a material needs them, to ``<stem>_textures/`` beside the
+    stage, and are referenced by relative paths.
+    """
+
+    def __init__(
+        self, path: Path, metres_per_unit: float, texture_size: int = 2048, seed: int = 0
+    ) -> None:
+        """Starts an empty stage.
+
+        Args:
+            path: File to write: .usda, .usdc or .usd (binary).
+            metres_per_unit: Length of a scene unit.
+            texture_size: Edge of the largest textures; the others shrink in proportion.
+            seed: Of the random patterns in textures.
+        """
+        if path.suffix.lower() not in SUFFIXES:
+            raise ValueError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
+        if not 16 <= texture_size <= 16384:
+            raise ValueError(f"texture size must be from 16 to 16384, not {texture_size}")
+        self._path = path
+        self._texture_size = texture_size
+        self._seed = seed
+        self._materials: dict[str, UsdShade.Material] = {}
+        self._written: set[str] = set()
+        self.stage = Usd.Stage.CreateInMemory()
+        UsdGeom.SetStageUpAxis(self.stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(self.stage, metres_per_unit)
+        world = UsdGeom.Xform.Define(self.stage, "/World")
+        self.stage.SetDefaultPrim(world.GetPrim())
+        for scope in ("Looks", "Objects", "Lights", "Set"):
+            UsdGeom.Scope.Define(self.stage, f"/World/{scope}")
+
+    def save(self, comment: str) -> None:
+        """Writes the stage, replacing the file only when all of it is there."""
+        self.stage.GetRootLayer().comment = comment
+        suffix = ".usdc" if self._path.suffix.lower() == ".usd" else self._path.suffix.lower()
+        part = self._path.with_name(f".{self._path.stem}.part{suffix}")
+        try:
+            if not self.stage.GetRootLayer().Export(str(part)):
+                raise OSError(f"{self._path}: cannot write the stage")
+            os.replace(part, self._path)
+        except Tf.ErrorException as error:
+            raise OSError(f"{self._path}: cannot write the stage") from error
+        finally:
+            with contextlib.suppress(FileNotFoundError):
+                part.unlink()
+
+    def mesh(self, path: str, mesh: Mesh) -> UsdGeom.Mesh:
+        """Adds a triangle mesh with vertex normals and ``st``."""
+        prim = UsdGeom.Mesh.Define(self.stage, path)
+        low, high = mesh.bounds
+        prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(mesh.points))
+        prim.CreateFaceVertexCountsAttr(
+            Vt.IntArray.FromNumpy(np.full(len(mesh.faces), 3, np.int32))
+        )
+        prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.faces.reshape(-1)))
+        prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        prim.CreateExtentAttr([_vec(low), _vec(high)])
+        prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(mesh.normals))
+        prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+        st = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(
+            "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
+        )
+        st.Set(Vt.Vec2fArray.FromNumpy(mesh.uv))
+        return prim
+
+    def polygons(
+        self,
+        path: str,
+        points: FloatArray,
+        polygons: Sequence[Sequence[int]],
+        material: str | None = None,
+        uv: FloatArray | None = None,
+    ) -> UsdGeom.Mesh:
+        """Adds flat polygons: points (n, 3), uv (n, 2)."""
+        prim = UsdGeom.Mesh.Define(self.stage, path)
+        prim.CreatePointsAttr([_vec(p) for p in points])
+        prim.CreateFaceVertexCountsAttr([len(p) for p in polygons])
+        prim.CreateFaceVertexIndicesAttr([index for p in polygons for index in p])
+        prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        prim.CreateExtentAttr([_vec(points.min(axis=0)), _vec(points.max(axis=0))])
+        if uv is not None:
+            st = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(
+                "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
+            )
+            st.Set([Gf.Vec2f(float(u), float(v)) for u, v in uv])
+        if material is not None:
+            self.bind(prim.GetPrim(), material)
+        return prim
+
+    def prototype(self, name: str, mesh: Mesh) -> str:
+        """Adds a class prim with one unbound mesh; returns its path for ``instance``."""
+        path = f"/_Prototype_{name}"
+        self.stage.CreateClassPrim(path).SetTypeName("Xform")
+        self.mesh(f"{path}/Mesh", mesh)
+        return path
+
+    def instance(
+        self,
+        path: str,
+        prototype: str,
+        material: str,
+        position: Sequence[float] | FloatArray,
+        turn_degrees: float = 0.0,
+        scale: float = 1.0,
+    ) -> Usd.Prim:
+        """Adds a native instance of a prototype, turned about Y, with its own material."""
+        xform = UsdGeom.Xform.Define(self.stage, path)
+        xform.AddTranslateOp().Set(Gf.Vec3d(*(float(v) for v in position)))
+        xform.AddRotateYOp().Set(float(turn_degrees))
+        xform.AddScaleOp().Set(Gf.Vec3f(scale))
+        prim = xform.GetPrim()
+        prim.GetReferences().AddInternalReference(prototype)
+        prim.SetInstanceable(True)
+        self.bind(prim, material)
+        return prim
+
+    def bind(self, prim: Usd.Prim, material: str) -> None:
+        """Binds a material that ``material`` has made."""
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._materials[material])
+
+    def material(self, name: str, info: MaterialInfo) -> str:
+        """Adds a material, once for each name, with the textures it needs; returns the name."""
+        if name in self._materials:
+            return name
+        material = UsdShade.Material.Define(self.stage, f"/World/Looks/{name}")
+        material.GetPrim().CreateAttribute(
+            "wavecomb:program", Sdf.ValueTypeNames.String, custom=True
+        ).Set(info.program)
+        surface = UsdShade.Shader.Define(self.stage, f"/World/Looks/{name}/Surface")
+        surface.CreateIdAttr("UsdPreviewSurface")
+        for key, value in info.inputs.items():
+            kind = _INPUT_TYPES.get(key, Sdf.ValueTypeNames.Float)
+            surface.CreateInput(key, kind).Set(_vec(value) if isinstance(value, tuple) else value)
+        material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
+        if info.textures:
+            self._textures(f"/World/Looks/{name}", surface, info)
+        self._materials[name] = material
+        return name
+
+    def _textures(self, path: str, surface: UsdShade.Shader, info: MaterialInfo) -> None:
+        reader = UsdShade.Shader.Define(self.stage, f"{path}/St")
+        reader.CreateIdAttr("UsdPrimvarReader_float2")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+        result = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        if info.repeat != 1.0:
+            transform = UsdShade.Shader.Define(self.stage, f"{path}/Repeat")
+            transform.CreateIdAttr("UsdTransform2d")
+            transform.CreateInput("in", Sdf.ValueTypeNames.Float2).ConnectToSource(result)
+            transform.CreateInput("scale", Sdf.ValueTypeNames.Float2).Set(Gf.Vec2f(info.repeat))
+            result = transform.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        for key, name in info.textures.items():
+            texture_info = TEXTURES[name]
+            texture = UsdShade.Shader.Define(self.stage, f"{path}/{key[0].upper()}{key[1:]}Map")
+            texture.CreateIdAttr("UsdUVTexture")
+            texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._texture_file(name))
+            texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(result)
+            space = "sRGB" if texture_info.colour else "raw"
+            texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
+            for wrap in ("wrapS", "wrapT"):
+                texture.CreateInput(wrap, Sdf.ValueTypeNames.Token).Set("repeat")
+            if texture_info.normal:
+                float4 = Sdf.ValueTypeNames.Float4
+                texture.CreateInput("scale", float4).Set(Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
+                texture.CreateInput("bias", float4).Set(Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
+            single = texture_info.channels == "r"
+            kind = Sdf.ValueTypeNames.Float if single else Sdf.ValueTypeNames.Float3
+            output = texture.CreateOutput(texture_info.channels, kind)
+            value = _INPUT_TYPES.get(key, Sdf.ValueTypeNames.Float)
+            surface.CreateInput(key, value).ConnectToSource(output)
+
+    def _texture_path(self, file_name: str) -> tuple[Path, Sdf.AssetPath]:
+        folder = self._path.with_name(f"{self._path.stem}_textures")
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder / file_name, Sdf.AssetPath(f"./{folder.name}/{file_name}")
+
+    def _texture_file(self, name: str) -> Sdf.AssetPath:
+        file, asset = self._texture_path(f"{name}.png")
+        if name not in self._written:
+            info = TEXTURES[name]
+            size = max(16, info.size * self._texture_size // 2048)
+            rng = np.random.default_rng([self._seed, list(TEXTURES).index(name)])
+            write_image(file, info.make(size, rng), "uint8")
+            self._written.add(name)
+        return asset
+
+    def rect_light(
+        self,
+        name: str,
+        position: Sequence[float],
+        width: float,
+        height: float,
+        radiance: Sequence[float],
+        tilt_degrees: float = -90.0,
+    ) -> None:
+        """Adds a rectangle that emits along its -Z, turned about X; -90 shines straight down."""
+        light = UsdLux.RectLight.Define(self.stage, f"/World/Lights/{name}")
+        peak = max(radiance)
+        light.CreateWidthAttr(width)
+        light.CreateHeightAttr(height)
+        light.CreateIntensityAttr(peak)
+        light.CreateColorAttr(_vec([v / peak for v in radiance]))
+        light.AddTranslateOp().Set(Gf.Vec3d(*position))
+        light.AddRotateXOp().Set(tilt_degrees)
+
+    def dome_light(self, name: str, turn_degrees: float, intensity: float = 1.0) -> None:
+        """Adds an environment with the procedural sky, 1024 x 512 at full texture size."""
+        file, asset = self._texture_path("sky.exr")
+        height = max(16, self._texture_size // 4)
+        write_image(file, sky(2 * height, height, self._seed), "half")
+        light = UsdLux.DomeLight.Define(self.stage, f"/World/Lights/{name}")
+        light.CreateTextureFileAttr(asset)
+        light.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
+        light.CreateIntensityAttr(intensity)
+        light.AddRotateYOp().Set(turn_degrees)
+
+    def camera(
+        self,
+        position: Sequence[float],
+        target: Sequence[float],
+        fov_degrees: float,
+        aspect: float,
+        focal_mm: float = 35.0,
+    ) -> None:
+        """Adds ``/World/Camera``, a pinhole that looks at a point, +Y up.
+
+        Args:
+            position: Of the pinhole, (3,), scene units.
+            target: Point in the middle of the picture, (3,), scene units.
+            fov_degrees: Horizontal angle of view.
+            aspect: Width / height of the picture.
+            focal_mm: Focal length; the aperture follows from it and the angle.
+        """
+        camera = UsdGeom.Camera.Define(self.stage, "/World/Camera")
+        # USD's camera units are tenths of a scene unit; only the ratio to the aperture counts.
+        aperture = 2.0 * focal_mm * math.tan(math.radians(0.5 * fov_degrees))
+        camera.CreateFocalLengthAttr(focal_mm)
+        camera.CreateHorizontalApertureAttr(aperture)
+        camera.CreateVerticalApertureAttr(aperture / aspect)
+        distance = math.dist(position, target)
+        camera.CreateClippingRangeAttr(Gf.Vec2f(0.001 * distance, 1000.0 * distance))
+        camera.CreateFocusDistanceAttr(distance)
+        view = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*position), Gf.Vec3d(*target), Gf.Vec3d(0, 1, 0))
+        camera.AddTransformOp().Set(view.GetInverse())

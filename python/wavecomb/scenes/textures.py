@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Procedural images of our own, tileable, and a sky; written through OpenImageIO.
+
+Images are float32 arrays (height, width, channels) with row 0 on top. Colours are display-referred
+sRGB values from 0 to 1; data images (roughness, normals) are linear; the sky is linear radiance.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+Image = NDArray[np.float32]
+"""float32 (height, width, channels)."""
+
+
+@dataclass(frozen=True)
+class TextureInfo:
+    """How to make one texture.
+
+    Attributes:
+        make: Size in texels and random generator -> image.
+        size: Edge in texels at full resolution.
+        colour: True for sRGB colour, False for raw data.
+        channels: Output of UsdUVTexture to use, "rgb" or "r".
+        normal: True for a tangent space normal map (stored as 0.5 + 0.5 n).
+    """
+
+    make: Callable[[int, np.random.Generator], Image]
+    size: int
+    colour: bool
+    channels: str = "rgb"
+    normal: bool = False
+
+
+def _grid(size: int) -> tuple[Image, Image]:
+    """Texel centres x and y in 0 to 1, each (size, size); y grows downwards."""
+    t = (np.arange(size, dtype=np.float32) + 0.5) / size
+    x, y = np.meshgrid(t, t, indexing="xy")
+    return x.astype(np.float32), y.astype(np.float32)
+
+
+def _value_noise(x: Image, y: Image, cells: int, rng: np.random.Generator) -> Image:
+    """Tileable value noise, 0 to 1, with ``cells`` lattice cells to the unit; x, y alike."""
+    lattice = rng.random((cells, cells)).astype(np.float32)
+    px, py = x * cells, y * cells
+    ix, iy = np.floor(px).astype(np.int64), np.floor(py).astype(np.int64)
+    fx, fy = px - ix, py - iy
+    fx, fy = fx * fx * (3 - 2 * fx), fy * fy * (3 - 2 * fy)
+    x0, x1, y0, y1 = ix % cells, (ix + 1) % cells, iy % cells, (iy + 1) % cells
+    top = lattice[y0, x0] * (1 - fx) + lattice[y0, x1] * fx
+    bottom = lattice[y1, x0] * (1 - fx) + lattice[y1, x1] * fx
+    return (top * (1 - fy) + bottom * fy).astype(np.float32)
+
+
+def _fractal(
+    x: Image, y: Image, cells: int, octaves: int, rng: np.random.Generator, gain: float = 0.5
+) -> Image:
+    """Sum of octaves of tileable value noise, 0 to 1."""
+    total = np.zeros(x.shape, np.float32)
+    weight = 1.0
+    weights = 0.0
+    for octave in range(octaves):
+        total += np.float32(weight) * _value_noise(x, y, cells << octave, rng)
+        weights += weight
+        weight *= gain
+    return total / np.float32(weights)
+
+
+def _ramp(t: Image, stops: list[tuple[float, tuple[float, float, float]]]) -> Image:
+    """Colours (h, w, 3) of values (h, w) by linear interpolation between stops."""
+    places = [place for place, _ in stops]
+    return np.stack(
+        [np.interp(t, places, [colour[k] for _, colour in stops]) for k in range(3)], axis=2
+    ).astype(np.float32)
+
+
+def _mix(a: Image, b: Image, weight: Image) -> Image:
+    return a + (b - a) * weight[..., None]
+
+
+def _flat(colour: tuple[float, float, float]) -> Image:
+    return np.array(colour, np.float32).reshape(1, 1, 3)
+
+
+def _step(x: Image, low: float, high: float) -> Image:
+    s = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return (s * s * (3.0 - 2.0 * s)).astype(np.float32)
+
+
+def checker(size: int, rng: np.random.Generator) -> Image:
+    """Ivory and deep blue checks, 8 x 8, a little worn."""
+    x, y = _grid(size)
+    odd = ((np.floor(x * 8) + np.floor(y * 8)) % 2).astype(np.float32)
+    wear = 0.90 + 0.14 * _fractal(x, y, 8, 5, rng)
+    return np.clip(
+        _mix(_flat((0.92, 0.87, 0.76)), _flat((0.10, 0.19, 0.36)), odd) * wear[..., None], 0, 1
+    )
+
+
+def wood(size: int, rng: np.random.Generator) -> Image:
+    """Walnut: growth rings drawn out along v, pores and fibres."""
+    x, y = _grid(size)
+    warp = _fractal(x, y, 3, 4, rng)
+    ring = (x * 5.0 + 1.6 * warp + 0.25 * np.sin(2 * np.pi * y)) % 1.0
+    late = _step(ring, 0.0, 0.75) * (1.0 - _step(ring, 0.88, 1.0))
+    fibre = _value_noise(x, (y * 0.03125) % 1.0, 256, rng)
+    pores = _step(_fractal(x, (y * 0.0625) % 1.0, 128, 2, rng), 0.62, 0.75)
+    base = _ramp(
+        late, [(0.0, (0.66, 0.43, 0.24)), (0.5, (0.53, 0.32, 0.17)), (1.0, (0.33, 0.18, 0.09))]
+    )
+    return np.clip(base * (0.86 + 0.24 * fibre - 0.30 * pores)[..., None], 0, 1)
+
+
+def marble(size: int, rng: np.random.Generator) -> Image:
+    """White marble with grey and gold veins."""
+    x, y = _grid(size)
+    wx, wy = _fractal(x, y, 3, 6, rng), _fractal(x, y, 3, 6, rng)
+    u, v = (x + 0.35 * wx) % 1.0, (y + 0.35 * wy) % 1.0
+    broad = np.abs(2.0 * _fractal(u, v, 4, 6, rng, 0.55) - 1.0)
+    thin = np.abs(2.0 * _fractal(v, u, 6, 6, rng, 0.6) - 1.0)
+    cloud = _fractal(x, y, 4, 6, rng)
+    base = _mix(_flat((0.95, 0.94, 0.92)), _flat((0.80, 0.81, 0.83)), _step(cloud, 0.35, 0.75))
+    base = _mix(base, _flat((0.36, 0.38, 0.42)), 0.85 * (1.0 - _step(broad, 0.0, 0.10)))
+    return np.clip(
+        _mix(base, _flat((0.72, 0.55, 0.28)), 0.8 * (1.0 - _step(thin, 0.0, 0.035))), 0, 1
+    )
+
+
+def weave(size: int, rng: np.random.Generator) -> Image:
+    """Twill cloth: crimson warp, ochre weft."""
+    x, y = _grid(size)
+    threads = 48
+    px, py = x * threads, y * threads
+    ix, iy = np.floor(px), np.floor(py)
+    warp_up = ((ix + iy) % 4 < 2).astype(np.float32)
+    across = np.where(warp_up > 0, px - ix, py - iy) - 0.5
+    along = np.where(warp_up > 0, py - iy, px - ix) - 0.5
+    shade = (1.0 - 2.4 * across**2) * (1.0 - 0.7 * along**2)
+    twist = 0.90 + 0.10 * np.sin(2 * np.pi * (3 * along + 2.5 * across))
+    worn = 0.85 + 0.3 * _fractal(x, y, 16, 4, rng)
+    colour = _mix(_flat((0.80, 0.55, 0.22)), _flat((0.60, 0.10, 0.13)), warp_up)
+    return np.clip(colour * (shade * twist * worn)[..., None], 0, 1).astype(np.float32)
+
+
+def _tile_layout(size: int, rng: np.random.Generator) -> tuple[Image, Image, Image, Image]:
+    """Joint mask, tone of each tile, fine grain, broad stains; each (size, size)."""
+    x, y = _grid(size)
+    count = 4
+    px, py = x * count, y * count
+    ix, iy = np.floor(px).astype(np.int64), np.floor(py).astype(np.int64)
+    chip = 0.012 * (_fractal(x, y, 32, 3, rng) - 0.5)
+    inset = np.minimum(np.minimum(px - ix, ix + 1 - px), np.minimum(py - iy, iy + 1 - py))
+    joint = 1.0 - _step(inset + chip, 0.010, 0.020)
+    tone = rng.random((count, count)).astype(np.float32)[iy, ix]
+    return joint, tone, _fractal(x, y, 32, 6, rng, 0.6), _fractal(x, y, 4, 5, rng)
+
+
+_TILE_SEED = 77
+"""The two tile images share their layout."""
+
+
+def tiles(size: int, rng: np.random.Generator) -> Image:
+    """Slate floor tiles, 4 x 4, with pale joints."""
+    del rng
+    joint, tone, grain, stain = _tile_layout(size, np.random.default_rng(_TILE_SEED))
+    slate = _ramp(
+        0.42 * tone + 0.28 * grain + 0.30 * stain,
+        [(0.15, (0.33, 0.34, 0.36)), (0.5, (0.45, 0.45, 0.45)), (0.85, (0.57, 0.54, 0.50))],
+    )
+    return np.clip(_mix(slate, _flat((0.27, 0.26, 0.25)), joint), 0, 1)
+
+
+def tiles_roughness(size: int, rng: np.random.Generator) -> Image:
+    """Roughness of the floor tiles: honed stone, worn smooth in places, matt joints."""
+    del rng
+    joint, tone, grain, stain = _tile_layout(size, np.random.default_rng(_TILE_SEED))
+    rough = 0.22 + 0.12 * tone + 0.20 * grain + 0.28 * _step(stain, 0.35, 0.7)
+    rough = rough + (0.9 - rough) * joint
+    return np.repeat(np.clip(rough, 0.05, 1.0)[..., None], 3, axis=2).astype(np.float32)
+
+
+def brushed(size: int, rng: np.random.Generator) -> Image:
+    """Roughness of brushed metal: long scratches along u, with a few deep ones."""
+    x, y = _grid(size)
+    fine = _value_noise((x * 0.03125) % 1.0, y, 256, rng)
+    mid = _value_noise((x * 0.0625) % 1.0, y, 96, rng)
+    deep = _step(_value_noise((x * 0.125) % 1.0, y, 192, rng), 0.86, 0.95)
+    rough = 0.16 + 0.20 * fine + 0.14 * mid + 0.25 * deep
+    return np.repeat(np.clip(rough, 0.05, 1.0)[..., None], 3, axis=2).astype(np.float32)
+
+
+def hammered(size: int, rng: np.random.Generator) -> Image:
+    """Normal map of hammered metal: overlapping round dents; n stored as 0.5 + 0.5 n."""
+    x, y = _grid(size)
+    count = 9
+    centres = (
+        np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=2).reshape(-1, 2)
+        + rng.random((count * count, 2))
+    ) / count
+    height = np.zeros((size, size), np.float32)
+    for cx, cy in centres:
+        dx, dy = (x - cx + 0.5) % 1.0 - 0.5, (y - cy + 0.5) % 1.0 - 0.5
+        dent = np.clip(1.0 - (dx * dx + dy * dy) * np.float32((count / 1.05) ** 2), 0.0, None)
+        height = np.maximum(height, dent)
+    height = -0.020 * height
+    slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (0.5 * size)
+    slope_y = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (0.5 * size)
+    normal = np.stack([-slope_x, -slope_y, np.ones_like(height)], axis=2)
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    return (0.5 + 0.5 * normal).astype(np.float32)
+
+
+def glaze(size: int, rng: np.random.Generator) -> Image:
+    """Porcelain with a cobalt pattern of waves and dots."""
+    x, y = _grid(size)
+    wobble = 0.02 * (_fractal(x, y, 6, 4, rng) - 0.5)
+    cx, cy = (x * 6) % 1.0 - 0.5, (y * 12 + 0.5 * (np.floor(x * 6) % 2)) % 1.0
+    arcs = np.abs((np.hypot(cx, cy * 0.6) * 5.0 + wobble * 10) % 1.0 - 0.5)
+    line = 1.0 - _step(arcs, 0.10, 0.16)
+    band = _step(np.sin(2 * np.pi * 2 * y + wobble * 20), 0.25, 0.35)
+    dots = 1.0 - _step(np.hypot((x * 24) % 1.0 - 0.5, (y * 24) % 1.0 - 0.5), 0.16, 0.22)
+    ink = np.clip(
+        line * band + dots * (1 - band) * _step(np.sin(2 * np.pi * 2 * y), -1.0, -0.6), 0, 1
+    )
+    pool = 0.75 + 0.25 * _fractal(x, y, 24, 3, rng)
+    return np.clip(
+        _mix(
+            _flat((0.93, 0.93, 0.90)) * np.ones((size, size, 1), np.float32),
+            _flat((0.07, 0.17, 0.52)),
+            (ink * pool).astype(np.float32),
+        ),
+        0,
+        1,
+    )
+
+
+TEXTURES: dict[str, TextureInfo] = {
+    "checker": TextureInfo(checker, 1024, True),
+    "wood": TextureInfo(wood, 1024, True),
+    "marble": TextureInfo(marble, 2048, True),
+    "weave": TextureInfo(weave, 1024, True),
+    "glaze": TextureInfo(glaze, 1024, True),
+    "tiles": TextureInfo(tiles, 2048, True),
+    "tiles_roughness": TextureInfo(tiles_roughness, 2048, False, "r"),
+    "brushed": TextureInfo(brushed, 1024, False, "r"),
+    "hammered": TextureInfo(hammered, 1024, False, "rgb", True),
+}
+"""The images that materials may ask for, by name; the file is ``<name>.png``."""
+
+
+def sky(width: int, height: int, seed: int) -> Image:
+    """A late afternoon sky as a latitude-longitude map of linear radiance, (height, width, 3).
+
+    Row 0 is the zenith (+Y); the sun is a soft disc of about 8 degrees, 24 degrees over the
+    horizon, so that few texels carry the light and sampling by brightness has something to do.
+    """
+    rng = np.random.default_rng([seed, 5])
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    theta, phi = np.pi * v, 2 * np.pi * (u - 0.5)
+    up = np.cos(theta)
+    sun_theta, sun_phi = np.radians(90.0 - 24.0), np.radians(118.0)
+    to_sun = np.sin(theta) * np.sin(sun_theta) * np.cos(phi - sun_phi) + np.cos(theta) * np.cos(
+        sun_theta
+    )
+    to_sun = np.clip(to_sun, -1.0, 1.0)
+    elevation = np.clip(up, 0.0, 1.0)
+    stops = [0.0, 0.06, 0.2, 0.5, 1.0]
+    colours = np.array(
+        [
+            [1.00, 0.72, 0.50],
+            [0.86, 0.74, 0.66],
+            [0.50, 0.62, 0.80],
+            [0.24, 0.40, 0.70],
+            [0.13, 0.25, 0.52],
+        ]
+    )
+    image = np.stack([np.interp(elevation, stops, colours[:, k]) for k in range(3)], axis=2)
+    facing = (0.5 + 0.5 * to_sun)[..., None]
+    image *= 0.55 + 0.75 * facing**2
+    glow = np.maximum(to_sun, 0.0)[..., None]
+    image += np.array([1.0, 0.62, 0.30]) * (0.9 * glow**14 + 2.5 * glow**110)
+    # Clouds: noise on a plane over the viewer, so that they crowd towards the horizon.
+    reach = 1.0 / np.maximum(up, 0.03)
+    px = (0.11 * reach * np.sin(theta) * np.cos(phi) + 0.5) % 1.0
+    py = (0.11 * reach * np.sin(theta) * np.sin(phi) + 0.5) % 1.0
+    cover = _step(
+        _fractal(px.astype(np.float32), py.astype(np.float32), 5, 6, rng, 0.55), 0.48, 0.72
+    )
+    cover = (cover * _step(up.astype(np.float32), 0.03, 0.22))[..., None]
+    lit = np.array([1.10, 0.95, 0.84]) * (0.55 + 1.3 * facing**6)
+    image = image * (1.0 - 0.75 * cover) + 0.75 * cover * lit
+    disc = _step(
+        to_sun.astype(np.float32), float(np.cos(np.radians(4.4))), float(np.cos(np.radians(3.6)))
+    )[..., None]
+    image = image + disc * np.array([230.0, 165.0, 100.0])
+    ground = np.array([0.20, 0.185, 0.17]) * (0.6 + 0.4 * facing)
+    blend = _step((-up).astype(np.float32), -0.004, 0.015)[..., None]
+    return (image * (1.0 - blend) + ground * blend).astype(np.float32)
+
+
+def write_image(path: Path, image: Image, data_format: str) -> None:
+    """Writes an image whole or not at all.
+
+    Args:
+        path: PNG or EXR file.
+        image: (height, width, channels).
+        data_format: OpenImageIO's name of the stored type: "uint8" or "half".
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    height, width, channels = image.shape
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    spec = oiio.ImageSpec(width, height, channels, data_format)
+    if path.suffix == ".exr":
+        spec.attribute("compression", "zip")
+    else:
+        spec.attribute("png:compressionLevel", 4)
+    output = oiio.ImageOutput.create(str(part))
+    if output is None:
+        raise OSError(f"{path}: OpenImageIO cannot write this kind of file")
+    try:
+        if not output.open(str(part), spec) or not output.write_image(
+            np.ascontiguousarray(image, dtype=np.float32)
+        ):
+            raise OSError(f"{path}: {output.geterror()}")
+        output.close()
+        os.replace(part, path)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            part.unlink()
