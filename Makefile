@@ -37,14 +37,14 @@ build/.setup-test: build/.setup
 
 # pip configures, builds and installs once; after a source edit CMake alone is quicker.
 build/.configured: build/.setup $(CMAKE_INPUTS) pyproject.toml
-	@echo "build: configuring; core and Python module"
+	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
 	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON
-	@touch $@ build/.built
+	@touch $@
 
 build/.built: build/.configured $(NATIVE_INPUTS)
 	@echo "build: core and Python module"
-	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_python wavecomb_stub -j $(JOBS) -- --quiet
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_python -j $(JOBS) -- --quiet
 	@$(VENV)/cmake --install $(BUILD) --component python \
 	  --prefix "$$($(VENV)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" > /dev/null
 	@touch $@

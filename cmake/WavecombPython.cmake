@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python module wavecomb._core, with its stub, and the libraries that travel with it.
+# The Python module wavecomb._core, and the libraries that travel with it.
 # Everything here is in the install component `python`, relative to site-packages.
 
 execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
@@ -21,10 +21,9 @@ set_target_properties(wavecomb_python PROPERTIES
   INSTALL_RPATH_USE_LINK_PATH OFF)
 install(TARGETS wavecomb_python LIBRARY DESTINATION wavecomb COMPONENT python)
 
-nanobind_add_stub(wavecomb_stub MODULE _core OUTPUT "${PROJECT_BINARY_DIR}/_core.pyi"
+# What the bindings really offer, to compare python/wavecomb/_core.pyi with: target wavecomb_stub.
+nanobind_add_stub(wavecomb_stub EXCLUDE_FROM_ALL MODULE _core OUTPUT "${PROJECT_BINARY_DIR}/_core.pyi"
   PYTHON_PATH $<TARGET_FILE_DIR:wavecomb_python> DEPENDS wavecomb_python)
-add_dependencies(wavecomb_stub wavecomb_python)
-install(FILES "${PROJECT_BINARY_DIR}/_core.pyi" DESTINATION wavecomb COMPONENT python)
 
 if(WAVECOMB_EMBREE_IS_STAGED)
   install(FILES "${WAVECOMB_STAGED_EMBREE}/lib/libembree4.so.4" DESTINATION wavecomb/lib
