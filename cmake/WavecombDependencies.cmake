@@ -54,6 +54,9 @@ endif()
 
 if(WAVECOMB_EMBREE_IS_STAGED)
   find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
+else()
+  # Not by way of PATH, which may hold the environment's bin directory.
+  find_package(TBB CONFIG QUIET COMPONENTS tbb NO_SYSTEM_ENVIRONMENT_PATH NO_CMAKE_ENVIRONMENT_PATH)
 endif()
 if(NOT TBB_FOUND)
   find_package(TBB CONFIG QUIET COMPONENTS tbb HINTS "${_hint_tbb}")
@@ -61,6 +64,12 @@ endif()
 if(NOT TBB_FOUND)
   message(FATAL_ERROR "oneTBB was not found: pip install tbb-devel, or install your distribution's "
     "package (libtbb-dev, tbb-devel), or pass -DTBB_DIR=.")
+endif()
+
+if(_hint_tbb AND TBB_DIR STREQUAL _hint_tbb)
+  set(WAVECOMB_TBB_IS_WHEEL TRUE)
+else()
+  set(WAVECOMB_TBB_IS_WHEEL FALSE)
 endif()
 
 message(STATUS "Embree ${embree_VERSION} (${embree_DIR})")

@@ -14,10 +14,15 @@ nanobind_add_module(wavecomb_python NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sou
 target_link_libraries(wavecomb_python PRIVATE wavecomb_core wavecomb_private TBB::tbb)
 
 # In site-packages/wavecomb: `lib` holds what we bring; ../../.. is <venv>/lib, where the tbb wheel puts
-# libtbb.so.12. In the build tree the linked directories are enough.
+# libtbb.so.12 (not looked for when oneTBB is the distribution's). In the build tree the linked
+# directories are enough.
+set(_rpath "$ORIGIN" "$ORIGIN/lib")
+if(WAVECOMB_TBB_IS_WHEEL)
+  list(APPEND _rpath "$ORIGIN/../../..")
+endif()
 set_target_properties(wavecomb_python PROPERTIES
   OUTPUT_NAME _core
-  INSTALL_RPATH "$ORIGIN;$ORIGIN/lib;$ORIGIN/../../.."
+  INSTALL_RPATH "${_rpath}"
   INSTALL_RPATH_USE_LINK_PATH OFF)
 install(TARGETS wavecomb_python LIBRARY DESTINATION wavecomb COMPONENT python)
 
