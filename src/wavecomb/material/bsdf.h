@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What every program's BSDF offers. Directions are local: z is the shading normal, wo and wi point
+/// away from the surface, |w| = 1.
+///
+/// A program is a class template `Bsdf<F>` with
+///   static constexpr ProgramId kProgram; uint32_t kSlots (what it reads); bool kHasNonDelta;
+///   Bsdf(const ShadingParams<F>&, bool schlick);
+///   Color<F> albedo() const;                                  for the AOV: diffuse and specular
+///   colour Mask<F> has_non_delta() const;                            lanes where light sampling
+///   makes sense BsdfEval<F> eval(wo, wi) const; BsdfSample<F> sample(wo, u_lobe, u, v) const;
+///   numbers in [0, 1)
+#pragma once
+
+#include "wavecomb/core/vec.h"
+#include "wavecomb/scene/material_data.h"
+
+namespace wavecomb {
+
+/// f(wo, wi) |cos theta_i| and the solid-angle density with which sample() would have chosen wi.
+/// Delta lobes do not count in either.
+template <typename F>
+struct BsdfEval {
+  Color<F> f_cos;
+  F pdf;
+};
+
+/// A sampled direction. weight = f |cos theta_i| / pdf. A lane without a valid sample has weight 0
+/// and pdf 0. For a delta lobe pdf is the probability of having chosen it.
+template <typename F>
+struct BsdfSample {
+  Vec3<F> wi;
+  Color<F> weight;
+  F pdf;
+  Mask<F> is_delta;
+  /// Relative index of refraction across the surface crossed (eta_t / eta_i); 1 for reflection and
+  /// for straight transmission. Throughput carries radiance scaling; roulette undoes it with this.
+  F eta;
+  /// Perceptual roughness of the lobe chosen (diffuse: 1), for the ray cone.
+  F roughness;
+};
+
+/// No sample: weight 0 and pdf 0.
+template <typename F>
+inline BsdfSample<F> empty_sample() {
+  return {
+      Vec3<F>(F(0.f), F(0.f), F(1.f)), Color<F>(F(0.f)), F(0.f), Mask<F>(false), F(1.f), F(1.f)};
+}
+
+/// `a` where `m`, else `b`.
+template <typename F>
+inline BsdfSample<F> select_sample(const Mask<F>& m, const BsdfSample<F>& a,
+                                   const BsdfSample<F>& b) {
+  return {select<F>(m, a.wi, b.wi), select<F>(m, a.weight, b.weight),
+          select(m, a.pdf, b.pdf),  Mask<F>((m & a.is_delta) | (not_(m) & b.is_delta)),
+          select(m, a.eta, b.eta),  select(m, a.roughness, b.roughness)};
+}
+
+/// Values of all slots at one hit, as fetch_params gives them.
+template <typename F>
+struct ShadingParams {
+  Color<F> base_color, specular_color, emission;
+  F roughness, metallic, clearcoat, clearcoat_roughness, opacity;
+  Vec3<F> normal;  ///< tangent space, unit
+  F ior;
+  Color<F> conductor_eta, conductor_k;
+  UInt<F> flags;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The isotropic GGX distribution of microfacet normals with Smith's masking and shadowing.
+#pragma once
+
+#include "wavecomb/core/math.h"
+#include "wavecomb/core/vec.h"
+
+namespace wavecomb {
+
+/// Below this alpha a microfacet lobe is a delta lobe, in eval, sample and pdf alike: its width is
+/// then less than float directions resolve well. It is a roughness of 0.0316.
+inline constexpr float kDeltaAlpha = 1e-3f;
+
+/// alpha = roughness^2.
+template <typename F>
+inline F alpha_from_roughness(const F& roughness) {
+  return roughness * roughness;
+}
+
+/// All directions are local and unit; masking terms take the side of the surface from |w.z|.
+template <typename F>
+struct Ggx {
+  F alpha;
+
+  /// D(h) of Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007,
+  /// eq. 33, in slopes, which stays exact where h.z is near 1.
+  F d(const Vec3<F>& h) const {
+    const F a2 = alpha * alpha;
+    const F r = fma(h.x, h.x, F(h.y * h.y)) / a2;
+    const F q = fma(h.z, h.z, r);
+    return 1.f / F(kPi * a2 * q * q);
+  }
+
+  /// s(w) = sqrt(z^2 + alpha^2 (x^2 + y^2)) = |z| (1 + 2 Lambda(w)); never 0 for alpha > 0.
+  F s(const Vec3<F>& w) const {
+    const F r2 = fma(w.x, w.x, F(w.y * w.y));
+    return sqrt(fma(F(alpha * alpha), r2, F(w.z * w.z)));
+  }
+
+  /// Masking 1 / (1 + Lambda) (Walter et al. 2007, eq. 34).
+  F g1(const Vec3<F>& w) const {
+    const F z = abs(w.z);
+    return F(2.f * z) / F(z + s(w));
+  }
+
+  /// Height-correlated masking and shadowing 1 / (1 + Lambda(o) + Lambda(i)) over 4 |z_o z_i|
+  /// (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 99).
+  F g2_over_4cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    return 0.5f / fma(abs(wo.z), s(wi), F(abs(wi.z) * s(wo)));
+  }
+
+  /// G2(wo, wi) / G1(wo): the weight that visible-normal sampling leaves.
+  F g2_over_g1(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F zo = abs(wo.z), zi = abs(wi.z);
+    const F so = s(wo);
+    return F(zi * F(zo + so)) / fma(zo, s(wi), F(zi * so));
+  }
+
+  /// Density of sample_visible per unit solid angle of h, divided by the factor (wo . h):
+  /// G1(wo) D(h) / z_o.
+  F visible_density_over_cos(const Vec3<F>& wo, const Vec3<F>& h) const {
+    return F(2.f * d(h)) / F(abs(wo.z) + s(wo));
+  }
+
+  /// A normal that wo (z >= 0) sees, in proportion to its visible area: the reflection of the
+  /// stretched wo by it is uniform on a spherical cap (Dupuy and Benyoub, "Sampling Visible GGX
+  /// Normals with Spherical Caps", HPG 2023, listing 3).
+  Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {
+    const Vec3<F> k = normalize(Vec3<F>(alpha * wo.x, alpha * wo.y, wo.z));
+    const auto [sin_phi, cos_phi] = sincos_2pi(u);
+    // The cap's z = (1 - v)(1 + k.z) - k.z, with 1 - z and z + k.z free of cancellation.
+    const F cap = 1.f + k.z;
+    const F n_z = F(1.f - v) * cap;
+    const F z = n_z - k.z;
+    const F r = safe_sqrt(F(v * cap * F(1.f + z)));
+    const Vec3<F> h(alpha * fma(r, cos_phi, k.x), alpha * fma(r, sin_phi, k.y), n_z);
+    const F len2 = length_squared(h);
+    const Mask<F> good = len2 > 1e-30f;
+    const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
+    return select<F>(good, h * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
+  }
+};
+
+/// wo mirrored at the unit vector h.
+template <typename F>
+inline Vec3<F> reflect(const Vec3<F>& wo, const Vec3<F>& h) {
+  return fma(h, F(2.f * dot(wo, h)), Vec3<F>(-wo));
+}
+
+}  // namespace wavecomb

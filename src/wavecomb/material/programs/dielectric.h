@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program "dielectric": glass and liquids, smooth or rough. wo.z > 0 is outside; inside, the
+/// relative index is 1 / ior and reflection may be total.
+#pragma once
+
+#include "wavecomb/material/lobes/rough_dielectric.h"
+
+namespace wavecomb {
+
+/// base_color tints each crossing.
+template <typename F>
+class DielectricBsdf {
+ public:
+  static constexpr ProgramId kProgram = ProgramId::kDielectric;
+  static constexpr uint32_t kSlots =
+      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
+  static constexpr bool kHasNonDelta = true;
+
+  DielectricBsdf(const ShadingParams<F>& params, bool schlick)
+      : tint_(params.base_color),
+        ior_(params.ior),
+        roughness_(params.roughness),
+        schlick_(schlick) {
+    const F alpha = alpha_from_roughness(roughness_);
+    smooth_ = is_smooth_dielectric(alpha, ior_);
+    ggx_.alpha = max(alpha, F(kDeltaAlpha));
+  }
+
+  Color<F> albedo() const { return tint_; }
+  Mask<F> has_non_delta() const { return not_(smooth_); }
+
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    if (all(smooth_)) return {Color<F>(F(0.f)), F(0.f)};
+    const BsdfEval<F> e = eval_rough_dielectric(ggx_, ior_, tint_, schlick_, wo, wi);
+    return {select<F>(smooth_, Color<F>(F(0.f)), e.f_cos), select(smooth_, F(0.f), e.pdf)};
+  }
+
+  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
+    BsdfSample<F> s = empty_sample<F>();
+    if (any(smooth_)) s = sample_smooth_dielectric(wo, ior_, tint_, schlick_, u_lobe);
+    if (!all(smooth_)) {
+      const BsdfSample<F> rough =
+          sample_rough_dielectric(ggx_, roughness_, ior_, tint_, schlick_, wo, u_lobe, u, v);
+      s = select_sample(smooth_, s, rough);
+    }
+    return s;
+  }
+
+ private:
+  Color<F> tint_;
+  F ior_, roughness_;
+  Ggx<F> ggx_;
+  Mask<F> smooth_;
+  bool schlick_;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program "emissive": emits (see fetch_emission) and reflects nothing.
+#pragma once
+
+#include "wavecomb/material/bsdf.h"
+
+namespace wavecomb {
+
+template <typename F>
+class EmissiveBsdf {
+ public:
+  static constexpr ProgramId kProgram = ProgramId::kEmissive;
+  static constexpr uint32_t kSlots = 0;
+  static constexpr bool kHasNonDelta = false;
+
+  EmissiveBsdf(const ShadingParams<F>& /*params*/, bool /*schlick*/) {}
+
+  Color<F> albedo() const { return Color<F>(F(0.f)); }
+  Mask<F> has_non_delta() const { return Mask<F>(false); }
+  BsdfEval<F> eval(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
+    return {Color<F>(F(0.f)), F(0.f)};
+  }
+  BsdfSample<F> sample(const Vec3<F>& /*wo*/, const F& /*u_lobe*/, const F& /*u*/,
+                       const F& /*v*/) const {
+    return empty_sample<F>();
+  }
+};
+
+}  // namespace wavecomb

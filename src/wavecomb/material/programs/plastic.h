@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program "plastic": a diffuse base under a clear dielectric coat, smooth or rough, alike from
+/// both sides.
+#pragma once
+
+#include "wavecomb/material/bsdf.h"
+#include "wavecomb/material/lobes/coat.h"
+#include "wavecomb/material/lobes/lambert.h"
+#include "wavecomb/material/lobes/microfacet_reflection.h"
+
+namespace wavecomb {
+
+/// f = coat + base_color / pi * seen_through_coat.
+template <typename F>
+class PlasticBsdf {
+ public:
+  static constexpr ProgramId kProgram = ProgramId::kPlastic;
+  static constexpr uint32_t kSlots =
+      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
+  static constexpr bool kHasNonDelta = true;
+
+  PlasticBsdf(const ShadingParams<F>& params, bool schlick)
+      : base_(params.base_color),
+        roughness_(params.roughness),
+        coat_(coat_ior(params.ior), F(schlick ? 0.f : 1.f)) {
+    average_ = coat_.average(coat_.f0_exact);
+    const F alpha = alpha_from_roughness(roughness_);
+    smooth_ = alpha < kDeltaAlpha;
+    ggx_.alpha = max(alpha, F(kDeltaAlpha));
+  }
+
+  Color<F> albedo() const { return lerp(base_, Color<F>(F(1.f)), coat_.f0_exact); }
+  Mask<F> has_non_delta() const { return not_(smooth_) | not_(is_black(base_)); }
+
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F side = side_of(wo);
+    const Vec3<F> o = mirror_z(wo, side);
+    const F coat = reflectance(o.z);
+    return eval_above(o, mirror_z(wi, side), coat, coat_probability(coat));
+  }
+
+  BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
+    const F side = side_of(wo_);
+    const Vec3<F> wo = mirror_z(wo_, side);
+    const F coat = reflectance(wo.z);
+    const F p = coat_probability(coat);
+    const Mask<F> chose_coat = u_lobe < p;
+    const Mask<F> delta = chose_coat & smooth_ & (wo.z > 0.f);
+    const Vec3<F> mirror(-wo.x, -wo.y, wo.z);
+    const Vec3<F> glossy = select<F>(smooth_, mirror, sample_microfacet(ggx_, wo, u, v));
+    const Vec3<F> wi = select<F>(chose_coat, glossy, square_to_cosine_hemisphere(u, v));
+    const BsdfEval<F> e = eval_above(wo, wi, coat, p);
+    const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
+    const F inv_pdf = 1.f / select(valid, e.pdf, F(1.f));
+    BsdfSample<F> s = empty_sample<F>();
+    s.wi = mirror_z(wi, side);
+    s.weight = select<F>(valid, e.f_cos * inv_pdf, Color<F>(F(0.f)));
+    s.weight = select<F>(delta, Color<F>(F(coat / max(p, F(1e-20f)))), s.weight);
+    s.pdf = select(delta, p, select(valid, e.pdf, F(0.f)));
+    s.is_delta = delta;
+    s.roughness = select(chose_coat, select(smooth_, F(0.f), roughness_), F(1.f));
+    return s;
+  }
+
+ private:
+  F reflectance(const F& cos_i) const { return coat_(coat_.f0_exact, cos_i); }
+
+  /// Probability of sampling the coat: its share of what is reflected, kept away from 0 and 1
+  /// unless the other lobe is black.
+  F coat_probability(const F& coat) const {
+    const F diffuse = luminance(base_) * F(1.f - coat);
+    const F share = coat / max(F(coat + diffuse), F(1e-20f));
+    return select(is_black(base_), F(1.f), clamp(share, F(0.05f), F(0.95f)));
+  }
+
+  BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const F& coat_o, const F& p) const {
+    const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
+    const F glossy = select(smooth_, F(0.f), F(m.f_cos * reflectance(m.cos_h)));
+    const F glossy_pdf = select(smooth_, F(0.f), m.pdf);
+    const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
+    const F through = seen_through_coat(coat_o, reflectance(wi.z), average_) * cosine;
+    return {fma(base_, through, Color<F>(glossy)), fma(p, glossy_pdf, F(F(1.f - p) * cosine))};
+  }
+
+  Color<F> base_;
+  F roughness_;
+  CoatFresnel<F> coat_;
+  F average_;
+  Ggx<F> ggx_;
+  Mask<F> smooth_;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program "principled": UsdPreviewSurface.
+#pragma once
+
+#include "wavecomb/material/bsdf.h"
+#include "wavecomb/material/lobes/coat.h"
+#include "wavecomb/material/lobes/lambert.h"
+#include "wavecomb/material/lobes/microfacet_reflection.h"
+
+namespace wavecomb {
+
+/// Clearcoat over specular reflection over { diffuse, straight transmission } ("UsdPreviewSurface
+/// Specification", OpenUSD), alike from both sides:
+///   specular       GGX, F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or
+///   specular_color
+///                  in the specular workflow; F90 = 1;
+///   diffuse        base_color (1 - metallic) opacity, seen through the specular interface;
+///   transmission   (1 - opacity) times what the interface lets pass, straight on;
+///   clearcoat      GGX of index 1.5 times `clearcoat`; what lies below is dimmed by its
+///   reflectance at
+///                  the flatter of the two directions, which is reciprocal and never gains energy.
+template <typename F>
+class PrincipledBsdf {
+ public:
+  static constexpr ProgramId kProgram = ProgramId::kPrincipled;
+  static constexpr uint32_t kSlots =
+      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) | slot_bit(Slot::kRoughness) |
+      slot_bit(Slot::kMetallic) | slot_bit(Slot::kClearcoat) | slot_bit(Slot::kClearcoatRoughness) |
+      slot_bit(Slot::kOpacity) | slot_bit(Slot::kNormal);
+  static constexpr bool kHasNonDelta = true;
+
+  PrincipledBsdf(const ShadingParams<F>& params, bool schlick)
+      : roughness_(params.roughness),
+        coat_roughness_(params.clearcoat_roughness),
+        clearcoat_(params.clearcoat),
+        transparency_(1.f - params.opacity),
+        coat_(F(kCoatIor), F(schlick ? 0.f : 1.f)) {
+    const Mask<F> specular_workflow =
+        Mask<F>((params.flags & UInt<F>(uint32_t{kSpecularWorkflow})) != UInt<F>(0u));
+    const F metallic = select(specular_workflow, F(0.f), params.metallic);
+    const F ior = coat_ior(params.ior);
+    f0_ = lerp(Color<F>(f0_from_ior(ior)), params.base_color, metallic);
+    f0_ = select<F>(specular_workflow, params.specular_color, f0_);
+    diffuse_ = params.base_color * F(F(1.f - metallic) * params.opacity);
+    // Metals and the specular workflow follow Schlick's formula, dielectrics the exact one.
+    const F exact = schlick ? F(0.f) : select(specular_workflow, F(0.f), F(1.f - metallic));
+    interface_ = CoatFresnel<F>(ior, exact);
+    average_ = interface_.average(f0_);
+    const F alpha = alpha_from_roughness(roughness_);
+    smooth_ = alpha < kDeltaAlpha;
+    ggx_.alpha = max(alpha, F(kDeltaAlpha));
+    const F coat_alpha = alpha_from_roughness(coat_roughness_);
+    coat_smooth_ = coat_alpha < kDeltaAlpha;
+    coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
+  }
+
+  Color<F> albedo() const { return min(Color<F>(diffuse_ + f0_), Color<F>(F(1.f))); }
+  Mask<F> has_non_delta() const {
+    return not_(is_black(diffuse_)) | not_(smooth_) | (not_(coat_smooth_) & (clearcoat_ > 0.f));
+  }
+
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F side = side_of(wo);
+    const Vec3<F> o = mirror_z(wo, side);
+    return eval_above(o, mirror_z(wi, side), make_view(o));
+  }
+
+  BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
+    const F side = side_of(wo_);
+    const Vec3<F> wo = mirror_z(wo_, side);
+    const View view = make_view(wo);
+    const F before_specular = view.p_diffuse;
+    const F before_coat = before_specular + view.p_specular;
+    const F before_straight = before_coat + view.p_coat;
+    const Mask<F> specular = (u_lobe >= before_specular) & (u_lobe < before_coat);
+    const Mask<F> coat = (u_lobe >= before_coat) & (u_lobe < before_straight);
+    const Mask<F> straight = (u_lobe >= before_straight) & (view.p_straight > 0.f);
+    const Mask<F> above = wo.z > 0.f;
+    const Mask<F> mirrors = ((specular & smooth_) | (coat & coat_smooth_)) & above;
+    const Mask<F> passes = straight & above;
+
+    Vec3<F> wi = square_to_cosine_hemisphere(u, v);
+    const Mask<F> glossy = (specular & not_(smooth_)) | (coat & not_(coat_smooth_));
+    if (any(glossy)) {
+      const Ggx<F> ggx{select(coat, coat_ggx_.alpha, ggx_.alpha)};
+      wi = select<F>(glossy, sample_microfacet(ggx, wo, u, v), wi);
+    }
+    wi = select<F>(mirrors, Vec3<F>(-wo.x, -wo.y, wo.z), wi);
+    wi = select<F>(passes, -wo, wi);
+
+    const BsdfEval<F> e = eval_above(wo, wi, view);
+    const Mask<F> delta = mirrors | passes;
+    const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
+    const Color<F> zero(F(0.f));
+    BsdfSample<F> s = empty_sample<F>();
+    s.wi = mirror_z(wi, side);
+    s.weight = select<F>(valid, e.f_cos * F(1.f / select(valid, e.pdf, F(1.f))), zero);
+    s.pdf = select(valid, e.pdf, F(0.f));
+    const F p_delta = select(passes, view.p_straight, select(coat, view.p_coat, view.p_specular));
+    const Color<F> mirrored =
+        select<F>(coat, Color<F>(view.coat), view.specular * F(1.f - view.coat));
+    const Color<F> f_delta = select<F>(passes, view.straight, mirrored);
+    s.weight = select<F>(delta, f_delta * F(1.f / max(p_delta, F(1e-20f))), s.weight);
+    s.pdf = select(delta, p_delta, s.pdf);
+    s.is_delta = delta;
+    const F lobe_roughness = select(coat, coat_roughness_, select(specular, roughness_, F(1.f)));
+    s.roughness = select(delta, F(0.f), lobe_roughness);
+    return s;
+  }
+
+ private:
+  static constexpr float kCoatIor = 1.5f;
+
+  /// What depends on wo alone: reflectances towards it and the probabilities of the lobes.
+  struct View {
+    F coat;
+    Color<F> specular, straight;
+    F p_diffuse, p_specular, p_coat, p_straight;
+  };
+
+  F coat_reflectance(const F& cos_i) const { return clearcoat_ * coat_(coat_.f0_exact, cos_i); }
+
+  View make_view(const Vec3<F>& wo) const {
+    View v;
+    v.coat = F(0.f);
+    if (any(Mask<F>(clearcoat_ > 0.f))) v.coat = coat_reflectance(wo.z);
+    v.specular = interface_(f0_, wo.z);
+    const F below = 1.f - v.coat;
+    const Color<F> passed = Color<F>(F(1.f)) - v.specular;
+    v.straight = passed * F(below * transparency_);
+    // Estimated contributions; a lobe that can contribute gets at least 2 % before normalisation.
+    const F floor(0.02f);
+    const F diffuse =
+        select(is_black(diffuse_), F(0.f), max(F(below * luminance(diffuse_ * passed)), floor));
+    const F specular = max(F(below * luminance(v.specular)), floor);
+    const F coat = select(clearcoat_ > 0.f, max(v.coat, floor), F(0.f));
+    const F straight = select(transparency_ > 0.f, max(luminance(v.straight), floor), F(0.f));
+    const F inv = 1.f / F(F(diffuse + specular) + F(coat + straight));
+    v.p_diffuse = diffuse * inv;
+    v.p_specular = specular * inv;
+    v.p_coat = coat * inv;
+    v.p_straight = straight * inv;
+    return v;
+  }
+
+  BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const View& view) const {
+    const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
+    const Color<F> through = seen_through_coat(view.specular, interface_(f0_, wi.z), average_);
+    Color<F> f = diffuse_ * through * cosine;
+    F pdf = view.p_diffuse * cosine;
+    if (!all(smooth_)) {
+      const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
+      f += interface_(f0_, m.cos_h) * select(smooth_, F(0.f), m.f_cos);
+      pdf = fma(view.p_specular, select(smooth_, F(0.f), m.pdf), pdf);
+    }
+    const Mask<F> coated = clearcoat_ > 0.f;
+    if (any(coated)) {
+      f = select<F>(coated, f * F(1.f - coat_reflectance(min(wo.z, abs(wi.z)))), f);
+      const Mask<F> rough = coated & not_(coat_smooth_);
+      if (any(rough)) {
+        const MicrofacetEval<F> m = eval_microfacet(coat_ggx_, wo, wi);
+        const F glossy = m.f_cos * coat_reflectance(m.cos_h);
+        f = select<F>(rough, f + Color<F>(glossy), f);
+        pdf = select(rough, fma(view.p_coat, m.pdf, pdf), pdf);
+      }
+    }
+    return {f, pdf};
+  }
+
+  F roughness_, coat_roughness_, clearcoat_, transparency_;
+  CoatFresnel<F> coat_, interface_;
+  Color<F> f0_, diffuse_, average_;
+  Ggx<F> ggx_, coat_ggx_;
+  Mask<F> smooth_, coat_smooth_;
+};
+
+}  // namespace wavecomb
