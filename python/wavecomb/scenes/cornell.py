@@ -67,7 +67,7 @@ def build_cornell(writer: StageWriter, options: SceneOptions) -> None:
 
 
 DRAGON_MATERIALS = {
-    "gold": looks.GOLD,
+    "gold": looks.metal((1.00, 0.71, 0.29), 0.32, (1.0, 0.94, 0.78)),
     "copper": looks.COPPER,
     "glass": looks.CLEAR_GLASS,
     "jade": looks.JADE,
@@ -86,4 +86,4 @@ def build_cornell_dragon(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Dragon", DRAGON_MATERIALS[options.material])
     prototype = writer.prototype("Dragon", mesh)
     # The dragon faces +x; the camera looks along +z, with x growing to the left.
-    writer.instance("/World/Objects/Dragon", prototype, "Dragon", (278.0, 0.0, 290.0), 148.0, 195.0)
+    writer.instance("/World/Objects/Dragon", prototype, "Dragon", (278.0, 0.0, 280.0), 152.0, 195.0)

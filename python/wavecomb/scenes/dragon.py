@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from wavecomb.scenes.mesh import FloatArray, Mesh, merge, normalized
-from wavecomb.scenes.sweep import Surface, Tube, spline, tube_area, tube_grid, tube_mesh
+from wavecomb.scenes.sweep import Surface, Tube, spline, tube_extent, tube_mesh
 
 MIN_TRIANGLES = 10_000
 MAX_TRIANGLES = 20_000_000
@@ -669,12 +669,12 @@ def dragon_tubes() -> list[Tube]:
 
 def _grids(tubes: list[Tube], triangles: int) -> list[tuple[int, int]]:
     """Rings and columns for each tube, so that the total comes close to ``triangles``."""
-    area = sum(tube_area(tube) for tube in tubes)
-    low, high = 0.0, 4.0 * triangles / area
+    extents = [tube_extent(tube) for tube in tubes]
+    low, high = 0.0, 4.0 * triangles / sum(extent.weight for extent in extents)
     grids = [(4, 5)] * len(tubes)
     for _ in range(24):
         middle = 0.5 * (low + high)
-        grids = [tube_grid(tube, middle) for tube in tubes]
+        grids = [extent.grid(middle) for extent in extents]
         if sum(2 * rings * columns for rings, columns in grids) > triangles:
             high = middle
         else:

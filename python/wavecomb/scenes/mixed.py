@@ -13,12 +13,12 @@ from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.teapot import teapot
 
-_ROWS = 9
-_COLUMNS = 10
-_PITCH_X = 2.9
-_PITCH_Z = 2.75
+_ROW_SIZES = (14, 13, 12, 11, 10, 9, 8, 7, 6)
+"""Objects in each row, from the back: a fan that fills the camera's view, 90 in all."""
+_PITCH_X = 2.65
+_PITCH_Z = 2.55
 _TEAPOT_SCALE = 0.36
-_GROUND_HALF = 90.0
+_GROUND_HALF = 600.0
 _TILE_REPEAT_LENGTH = 6.0
 
 _TEAPOT_LOOKS: dict[str, MaterialInfo] = {
@@ -69,8 +69,8 @@ def _set(writer: StageWriter, aspect: float) -> None:
 
     writer.material("Mirror", looks.MIRROR)
     writer.material("Frame", looks.BRONZE)
-    back = -0.5 * (_ROWS - 1) * _PITCH_Z - 3.2
-    width, low, high, lean = 17.0, 0.35, 9.0, 0.55
+    back = -(len(_ROW_SIZES) - 1) * _PITCH_Z - 3.0
+    width, low, high, lean = 15.5, 0.35, 6.6, 0.15
     mirror = np.array(
         [
             [-width, low, back],
@@ -82,9 +82,9 @@ def _set(writer: StageWriter, aspect: float) -> None:
     writer.polygons("/World/Set/Mirror", mirror, [[0, 1, 2, 3]], "Mirror")
     _frame(writer, mirror)
 
-    writer.rect_light("Ceiling", (-3.0, 13.0, 2.0), 16.0, 8.0, (9.0, 8.1, 6.8))
+    writer.rect_light("Ceiling", (2.0, 15.0, -8.0), 20.0, 10.0, (2.6, 2.5, 2.35))
     writer.dome_light("Sky", 0.0)
-    writer.camera((7.5, 6.6, 21.5), (0.4, 0.7, 0.0), 48.0, aspect)
+    writer.camera((0.9, 5.6, 15.2), (0.0, 1.1, -9.5), 55.0, aspect)
 
 
 def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
@@ -127,17 +127,20 @@ def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> No
         writer.material(name, info)
     dragon = writer.prototype("Dragon", options.dragon_mesh())
     pot = writer.prototype("Teapot", teapot(options.teapot_level)) if with_teapots else ""
-    count = _ROWS * _COLUMNS
+    count = sum(_ROW_SIZES)
     teapot_hand = _dealt(list(_TEAPOT_LOOKS), count // 2, rng) if with_teapots else []
     dragon_hand = _dealt(list(dragon_looks), count - len(teapot_hand), rng)
-    for index in range(count):
-        row, column = divmod(index, _COLUMNS)
-        shift = 0.25 if row % 2 else -0.25
-        x = (column - 0.5 * (_COLUMNS - 1) + shift) * _PITCH_X + rng.uniform(-0.22, 0.22)
-        z = (row - 0.5 * (_ROWS - 1)) * _PITCH_Z + rng.uniform(-0.18, 0.18)
+    spots = [
+        ((column - 0.5 * (size - 1)) * _PITCH_X, (row - len(_ROW_SIZES) + 1) * _PITCH_Z)
+        for row, size in enumerate(_ROW_SIZES)
+        for column in range(size)
+    ]
+    for index, (across, depth) in enumerate(spots):
+        x = across + rng.uniform(-0.2, 0.2)
+        z = depth + rng.uniform(-0.2, 0.2)
         scale = math.exp(rng.uniform(-0.13, 0.13))
         place = (x, 0.0, z)
-        if with_teapots and (row + column) % 2 == 0:
+        if with_teapots and index % 2 == 0:
             turn = rng.uniform(-180.0, 180.0)
             writer.instance(
                 f"/World/Objects/Teapot_{index:02d}",
@@ -148,7 +151,8 @@ def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> No
                 _TEAPOT_SCALE * scale,
             )
         else:
-            turn = -35.0 + rng.uniform(-50.0, 50.0)
+            # Heads turn to the camera's side, most of them to the right.
+            turn = -38.0 + rng.uniform(-40.0, 40.0) - (104.0 if rng.random() < 0.35 else 0.0)
             writer.instance(
                 f"/World/Objects/Dragon_{index:02d}", dragon, dragon_hand.pop(), place, turn, scale
             )

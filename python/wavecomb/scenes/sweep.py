@@ -8,6 +8,7 @@ Everything is evaluated on a grid of rings x columns in NumPy.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -109,7 +110,7 @@ class _Profile:
 def _rounding(arc: FloatArray, start: float, end: float) -> FloatArray:
     """Factor that closes both ends of a tube as ellipsoids: arc (n,), cap lengths -> (n,)."""
     total = arc[-1]
-    start, end = min(start, 0.45 * total), min(end, 0.45 * total)
+    start, end = min(start, 0.5 * total), min(end, 0.5 * total)
     factor = np.ones_like(arc)
     for distance, cap in ((arc, start), (total - arc, end)):
         if cap > 0.0:
@@ -135,24 +136,42 @@ def _perimeter(profile: _Profile) -> FloatArray:
     return 2.0 * np.pi * np.sqrt(0.5 * (profile.width**2 + profile.height**2))
 
 
-def tube_area(tube: Tube) -> float:
-    """Approximate surface area of a tube, without relief, times its ``detail``."""
-    profile = _profile(tube)
-    return float(np.trapezoid(_perimeter(profile), profile.length)) * tube.detail
+@dataclass(frozen=True)
+class Extent:
+    """How large a tube is, to share out triangles.
 
-
-def tube_grid(tube: Tube, density: float) -> tuple[int, int]:
-    """Rings and columns of a tube for a density of triangles per unit area.
-
-    The tube has ``2 * rings * columns`` triangles.
+    Attributes:
+        length: Along its profile, scene units.
+        perimeter: Mean perimeter, scene units.
+        detail: Factor on the density of triangles.
     """
+
+    length: float
+    perimeter: float
+    detail: float
+
+    @property
+    def weight(self) -> float:
+        """Surface area, without relief, times ``detail``."""
+        return self.length * self.perimeter * self.detail
+
+    def grid(self, density: float) -> tuple[int, int]:
+        """Rings and columns for so many triangles per unit of weight.
+
+        The tube has ``2 * rings * columns`` triangles.
+        """
+        spacing = math.sqrt(2.0 / (density * self.detail))
+        columns = max(5, round(self.perimeter / spacing))
+        rings = max(4, round(self.length * self.perimeter / (spacing * spacing * columns)))
+        return rings, columns
+
+
+def tube_extent(tube: Tube) -> Extent:
+    """Measures a tube."""
     profile = _profile(tube)
-    length = profile.length[-1]
-    perimeter = tube_area(tube) / tube.detail / length
-    spacing = np.sqrt(2.0 / (density * tube.detail))
-    columns = max(5, round(perimeter / spacing))
-    rings = max(4, round(length / spacing * perimeter / spacing / columns))
-    return rings, columns
+    length = float(profile.length[-1])
+    area = float(np.trapezoid(_perimeter(profile), profile.length))
+    return Extent(length, area / length, tube.detail)
 
 
 def _tube_faces(rings: int, columns: int) -> np.ndarray:

@@ -8,6 +8,7 @@ sRGB values from 0 to 1; data images (roughness, normals) are linear; the sky is
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,30 +42,45 @@ class TextureInfo:
 
 
 def _grid(size: int) -> tuple[Image, Image]:
-    """Texel centres x and y in 0 to 1, each (size, size); y grows downwards."""
-    t = (np.arange(size, dtype=np.float32) + 0.5) / size
-    x, y = np.meshgrid(t, t, indexing="xy")
-    return x.astype(np.float32), y.astype(np.float32)
+    """Texel centres x (1, size) and y (size, 1) in 0 to 1; y grows downwards."""
+    t = ((np.arange(size) + 0.5) / size).astype(np.float32)
+    return t[None, :], t[:, None]
+
+
+def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Image]:
+    """Lattice neighbours of places 0 to 1, wrapped, and the eased weight of the second."""
+    place = t * cells
+    low = np.floor(place)
+    f = (place - low).astype(np.float32)
+    first = low.astype(np.int64) % cells
+    return first, (first + 1) % cells, f * f * (3 - 2 * f)
 
 
 def _value_noise(x: Image, y: Image, cells: int, rng: np.random.Generator) -> Image:
-    """Tileable value noise, 0 to 1, with ``cells`` lattice cells to the unit; x, y alike."""
+    """Tileable value noise, 0 to 1, with ``cells`` lattice cells to the unit.
+
+    Args:
+        x: Places across, any shape; (1, w) together with y (h, 1) is a grid and much faster.
+        y: Places down.
+        cells: Lattice cells to the unit.
+        rng: Source of the lattice values.
+    """
     lattice = rng.random((cells, cells)).astype(np.float32)
-    px, py = x * cells, y * cells
-    ix, iy = np.floor(px).astype(np.int64), np.floor(py).astype(np.int64)
-    fx, fy = px - ix, py - iy
-    fx, fy = fx * fx * (3 - 2 * fx), fy * fy * (3 - 2 * fy)
-    x0, x1, y0, y1 = ix % cells, (ix + 1) % cells, iy % cells, (iy + 1) % cells
+    x0, x1, fx = _cells(x, cells)
+    y0, y1, fy = _cells(y, cells)
+    if x.shape[0] == 1 and y.shape[1] == 1:
+        rows = lattice[y0[:, 0]] * (1 - fy) + lattice[y1[:, 0]] * fy
+        return np.asarray(rows[:, x0[0]] * (1 - fx) + rows[:, x1[0]] * fx, np.float32)
     top = lattice[y0, x0] * (1 - fx) + lattice[y0, x1] * fx
     bottom = lattice[y1, x0] * (1 - fx) + lattice[y1, x1] * fx
-    return (top * (1 - fy) + bottom * fy).astype(np.float32)
+    return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
 
 
 def _fractal(
     x: Image, y: Image, cells: int, octaves: int, rng: np.random.Generator, gain: float = 0.5
 ) -> Image:
     """Sum of octaves of tileable value noise, 0 to 1."""
-    total = np.zeros(x.shape, np.float32)
+    total = np.zeros(np.broadcast(x, y).shape, np.float32)
     weight = 1.0
     weights = 0.0
     for octave in range(octaves):
@@ -72,6 +88,19 @@ def _fractal(
         weights += weight
         weight *= gain
     return total / np.float32(weights)
+
+
+def _shifted(image: Image, dx: Image, dy: Image) -> Image:
+    """Bilinear lookup of a tileable (n, n) image, each texel moved by dx, dy (in image widths)."""
+    size = image.shape[0]
+    columns = np.arange(size, dtype=np.float32)[None, :] + dx * size
+    rows = np.arange(size, dtype=np.float32)[:, None] + dy * size
+    left, top = np.floor(columns), np.floor(rows)
+    fx, fy = columns - left, rows - top
+    i0, j0 = top.astype(np.int32) % size, left.astype(np.int32) % size
+    i1, j1 = (i0 + 1) % size, (j0 + 1) % size
+    upper = image[i0, j0] * (1 - fx) + image[i0, j1] * fx
+    return upper * (1 - fy) + (image[i1, j0] * (1 - fx) + image[i1, j1] * fx) * fy
 
 
 def _ramp(t: Image, stops: list[tuple[float, tuple[float, float, float]]]) -> Image:
@@ -123,9 +152,9 @@ def marble(size: int, rng: np.random.Generator) -> Image:
     """White marble with grey and gold veins."""
     x, y = _grid(size)
     wx, wy = _fractal(x, y, 3, 6, rng), _fractal(x, y, 3, 6, rng)
-    u, v = (x + 0.35 * wx) % 1.0, (y + 0.35 * wy) % 1.0
-    broad = np.abs(2.0 * _fractal(u, v, 4, 6, rng, 0.55) - 1.0)
-    thin = np.abs(2.0 * _fractal(v, u, 6, 6, rng, 0.6) - 1.0)
+    wx, wy = 0.35 * wx, 0.35 * wy
+    broad = np.abs(2.0 * _shifted(_fractal(x, y, 4, 6, rng, 0.55), wx, wy) - 1.0)
+    thin = np.abs(2.0 * _shifted(_fractal(x, y, 6, 6, rng, 0.6), wy, wx) - 1.0)
     cloud = _fractal(x, y, 4, 6, rng)
     base = _mix(_flat((0.95, 0.94, 0.92)), _flat((0.80, 0.81, 0.83)), _step(cloud, 0.35, 0.75))
     base = _mix(base, _flat((0.36, 0.38, 0.42)), 0.85 * (1.0 - _step(broad, 0.0, 0.10)))
@@ -150,8 +179,16 @@ def weave(size: int, rng: np.random.Generator) -> Image:
     return np.clip(colour * (shade * twist * worn)[..., None], 0, 1).astype(np.float32)
 
 
-def _tile_layout(size: int, rng: np.random.Generator) -> tuple[Image, Image, Image, Image]:
-    """Joint mask, tone of each tile, fine grain, broad stains; each (size, size)."""
+_TILE_SEED = 77
+
+
+@functools.lru_cache(maxsize=1)
+def _tile_layout(size: int) -> tuple[Image, Image, Image, Image]:
+    """Joint mask, tone of each tile, fine grain, broad stains; each (size, size).
+
+    The two tile images share it, so it has its own seed.
+    """
+    rng = np.random.default_rng(_TILE_SEED)
     x, y = _grid(size)
     count = 4
     px, py = x * count, y * count
@@ -163,25 +200,21 @@ def _tile_layout(size: int, rng: np.random.Generator) -> tuple[Image, Image, Ima
     return joint, tone, _fractal(x, y, 32, 6, rng, 0.6), _fractal(x, y, 4, 5, rng)
 
 
-_TILE_SEED = 77
-"""The two tile images share their layout."""
-
-
 def tiles(size: int, rng: np.random.Generator) -> Image:
     """Slate floor tiles, 4 x 4, with pale joints."""
     del rng
-    joint, tone, grain, stain = _tile_layout(size, np.random.default_rng(_TILE_SEED))
+    joint, tone, grain, stain = _tile_layout(size)
     slate = _ramp(
         0.42 * tone + 0.28 * grain + 0.30 * stain,
-        [(0.15, (0.33, 0.34, 0.36)), (0.5, (0.45, 0.45, 0.45)), (0.85, (0.57, 0.54, 0.50))],
+        [(0.15, (0.23, 0.245, 0.27)), (0.5, (0.33, 0.335, 0.34)), (0.85, (0.45, 0.42, 0.385))],
     )
-    return np.clip(_mix(slate, _flat((0.27, 0.26, 0.25)), joint), 0, 1)
+    return np.clip(_mix(slate, _flat((0.17, 0.165, 0.16)), joint), 0, 1)
 
 
 def tiles_roughness(size: int, rng: np.random.Generator) -> Image:
     """Roughness of the floor tiles: honed stone, worn smooth in places, matt joints."""
     del rng
-    joint, tone, grain, stain = _tile_layout(size, np.random.default_rng(_TILE_SEED))
+    joint, tone, grain, stain = _tile_layout(size)
     rough = 0.22 + 0.12 * tone + 0.20 * grain + 0.28 * _step(stain, 0.35, 0.7)
     rough = rough + (0.9 - rough) * joint
     return np.repeat(np.clip(rough, 0.05, 1.0)[..., None], 3, axis=2).astype(np.float32)
@@ -199,17 +232,20 @@ def brushed(size: int, rng: np.random.Generator) -> Image:
 
 def hammered(size: int, rng: np.random.Generator) -> Image:
     """Normal map of hammered metal: overlapping round dents; n stored as 0.5 + 0.5 n."""
-    x, y = _grid(size)
     count = 9
     centres = (
         np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=2).reshape(-1, 2)
         + rng.random((count * count, 2))
     ) / count
     height = np.zeros((size, size), np.float32)
+    reach = int(np.ceil(1.05 / count * size))
     for cx, cy in centres:
-        dx, dy = (x - cx + 0.5) % 1.0 - 0.5, (y - cy + 0.5) % 1.0 - 0.5
-        dent = np.clip(1.0 - (dx * dx + dy * dy) * np.float32((count / 1.05) ** 2), 0.0, None)
-        height = np.maximum(height, dent)
+        columns = np.arange(int(cx * size) - reach, int(cx * size) + reach + 1)
+        rows = np.arange(int(cy * size) - reach, int(cy * size) + reach + 1)
+        dx, dy = (columns + 0.5) / size - cx, ((rows + 0.5) / size - cy)[:, None]
+        dent = np.clip(1.0 - (dx * dx + dy * dy) * (count / 1.05) ** 2, 0.0, None)
+        window = np.ix_(rows % size, columns % size)
+        height[window] = np.maximum(height[window], dent)
     height = -0.020 * height
     slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (0.5 * size)
     slope_y = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (0.5 * size)
@@ -266,7 +302,7 @@ def sky(width: int, height: int, seed: int) -> Image:
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     theta, phi = np.pi * v, 2 * np.pi * (u - 0.5)
     up = np.cos(theta)
-    sun_theta, sun_phi = np.radians(90.0 - 24.0), np.radians(118.0)
+    sun_theta, sun_phi = np.radians(90.0 - 24.0), np.radians(58.0)
     to_sun = np.sin(theta) * np.sin(sun_theta) * np.cos(phi - sun_phi) + np.cos(theta) * np.cos(
         sun_theta
     )
@@ -301,7 +337,7 @@ def sky(width: int, height: int, seed: int) -> Image:
         to_sun.astype(np.float32), float(np.cos(np.radians(4.4))), float(np.cos(np.radians(3.6)))
     )[..., None]
     image = image + disc * np.array([230.0, 165.0, 100.0])
-    ground = np.array([0.20, 0.185, 0.17]) * (0.6 + 0.4 * facing)
+    ground = np.array([0.12, 0.115, 0.11]) * (0.6 + 0.4 * facing)
     blend = _step((-up).astype(np.float32), -0.004, 0.015)[..., None]
     return (image * (1.0 - blend) + ground * blend).astype(np.float32)
 
