@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+/// IEEE 754 binary16 from and to float.
+#pragma once
+
+#include "wavecomb/core/lanes.h"
+
+namespace wavecomb {
+
+/// The float of the half in the low 16 bits; exact, infinities and NaN included. No denormal float takes
+/// part, so that flush-to-zero modes change nothing.
+template <typename F>
+inline F half_to_float(const UInt<F>& half) {
+  const UInt<F> exponent = half & 0x7c00u;
+  const UInt<F> shifted = (half & 0x7fffu) << 13;
+  // Rebias the exponent by 127 - 15 = 112; infinity and NaN once more, from 143 to 255.
+  const UInt<F> again = select(exponent == UInt<F>(0x7c00u), UInt<F>(112u << 23), UInt<F>(0u));
+  const UInt<F> normal = shifted + (112u << 23) + again;
+  const F denormal = F(Int<F>(half & 0x3ffu)) * 0x1p-24f;
+  const UInt<F> bits = select(exponent == UInt<F>(0u), float_bits<F>(denormal), normal);
+  return bits_float<F>(bits | ((half & 0x8000u) << 16));
+}
+
+/// The nearest half, ties to even; overflow gives infinity, NaN stays NaN.
+inline uint16_t float_to_half(float x) {
+  const uint32_t bits = float_bits<float>(x);
+  const uint32_t sign = (bits >> 16) & 0x8000u;
+  const uint32_t magnitude = bits & 0x7fffffffu;
+  if (magnitude > 0x7f800000u) return static_cast<uint16_t>(sign | 0x7e00u);
+  if (magnitude >= 0x477ff000u) return static_cast<uint16_t>(sign | 0x7c00u);  // 65520 and above
+  if (magnitude < 0x38800000u) {  // below 2^-14: a multiple of 2^-24
+    const float scaled = bits_float<float>(magnitude) * 0x1p24f;  // exact
+    const float whole = (scaled + 0x1p23f) - 0x1p23f;             // rounds to even
+    return static_cast<uint16_t>(sign | static_cast<uint32_t>(whole));
+  }
+  const uint32_t rounded = magnitude + 0xfffu + ((magnitude >> 13) & 1u);
+  return static_cast<uint16_t>(sign | ((rounded - (112u << 23)) >> 13));
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Textures: mip pyramids in tiled storage. Plain data here; lane lookup is in lookup.h.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace wavecomb {
+
+inline constexpr uint32_t kNoTexture = 0xffffffffu;
+
+enum class TexelFormat : uint8_t { kU8, kF16, kF32 };
+/// USD's wrap modes: repeat, clamp to edge, mirror, black outside [0, 1].
+enum class Wrap : uint8_t { kRepeat, kClamp, kMirror, kBlack };
+
+/// Pixels as the caller has them: row 0 is the top of the image, `channels` 1 to 4 interleaved
+/// (luminance; luminance, alpha; r, g, b; r, g, b, alpha). Halfs are their 16 bits.
+/// Contract: `data` is only read during Texture's constructor; it needs no alignment.
+struct TextureDesc {
+  std::string name;
+  const void* data = nullptr;
+  uint32_t width = 0, height = 0, channels = 0;
+  TexelFormat format = TexelFormat::kU8;
+  bool srgb = false;  ///< u8 values are sRGB-encoded colour (alpha never is); ignored for half and float
+  Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
+};
+
+/// One mip level inside the storage of a texture.
+struct TextureLevel {
+  uint32_t width, height;  ///< in texels
+  uint32_t tiles_x;        ///< tiles in a row of tiles
+  uint32_t pad;
+  uint64_t offset;         ///< of the level's first tile, in texels from the start of the storage
+};
+static_assert(sizeof(TextureLevel) == 24);
+
+/// What kernels need of a texture, without ownership. Texels are stored in square tiles of
+/// kTile x kTile, row by row; one-channel textures as one value a texel, all others as four.
+/// Every stored value is finite; storage is shorter than 2^31 words of 32 bits.
+struct TextureView {
+  static constexpr uint32_t kTile = 8;
+  static constexpr uint32_t kMaxLevels = 16;
+  const void* texels = nullptr;
+  TexelFormat format = TexelFormat::kU8;
+  uint8_t channels = 4;  ///< as stored: 1 or 4
+  bool srgb = false;
+  bool has_alpha = false;  ///< false: alpha reads as 1
+  Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
+  uint32_t level_count = 0;
+  TextureLevel levels[kMaxLevels] = {};
+};
+
+/// Linear r, g, b, a of the texel in column x, row y (0: top) of a level. For tools and tests; slow.
+std::array<float, 4> texel_at(const TextureView& view, uint32_t level, uint32_t x, uint32_t y);
+
+/// An immutable texture with its mip pyramid: each level is the box filter, in linear light, of the one
+/// before at half its size, rounded down (odd sizes: boxes of 2 1/2 texels and so on, by exact overlap).
+class Texture {
+ public:
+  /// Largest width and height.
+  static constexpr uint32_t kMaxSize = 65536;
+  /// Float values are kept within +-kMaxTexel, so that no filter overflows.
+  static constexpr float kMaxTexel = 1e30f;
+
+  /// Builds the pyramid. Values that are not finite become 0 and are counted. Throws Error naming
+  /// desc.name for sizes of 0 or above kMaxSize, bad channels, no data, or more than 8 GiB.
+  explicit Texture(const TextureDesc& desc);
+
+  const TextureView& view() const { return view_; }
+  const std::string& name() const { return name_; }
+  /// Memory of all levels.
+  size_t bytes() const { return bytes_; }
+  /// Mean of the finest level in linear light (r, g, b, a).
+  const float* mean() const { return mean_; }
+  /// Values of the finest level that were infinite or NaN and read as 0.
+  uint64_t nonfinite_count() const { return nonfinite_count_; }
+
+ private:
+  struct Free {
+    void operator()(std::byte* p) const;
+  };
+
+  std::string name_;
+  TextureView view_;
+  std::unique_ptr<std::byte[], Free> storage_;
+  size_t bytes_ = 0;
+  uint64_t nonfinite_count_ = 0;
+  float mean_[4] = {0, 0, 0, 1};
+};
+
+}  // namespace wavecomb
