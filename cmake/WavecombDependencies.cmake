@@ -52,6 +52,8 @@ else()
   set(WAVECOMB_EMBREE_IS_STAGED FALSE)
 endif()
 
+# A debug build too takes the release library: Embree loads that one, and there is to be one.
+set(TBB_FIND_RELEASE_ONLY ON)
 if(WAVECOMB_EMBREE_IS_STAGED)
   find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
 else()
