@@ -13,7 +13,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
-from wavecomb.scenes import SCENES, write_scene
+from wavecomb.scenes import SCENES, SceneError, write_scene
 from wavecomb.scenes.dragon import MIN_TRIANGLES, dragon
 from wavecomb.scenes.materials import PROGRAMS
 from wavecomb.scenes.mesh import Mesh, face_areas, signed_volume
@@ -501,6 +501,13 @@ def test_an_imported_mesh_takes_the_dragons_place(tmp_path: Path) -> None:
     stage = Usd.Stage.Open(str(tmp_path / "d.usda"))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/_Prototype_Dragon/Mesh"))
     assert len(mesh.GetFaceVertexCountsAttr().Get()) == 12
+
+
+def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SceneError, match="cannot write") as caught:
+        write_scene("cornell", tmp_path / "file" / "c.usda")
+    assert "\n" not in str(caught.value)
 
 
 def test_a_broken_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
 
-__all__ = ["SCENES", "SceneInfo", "SceneOptions", "write_scene"]
+__all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,22 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
         **options: Fields of ``SceneOptions``.
 
     Raises:
-        ValueError: The name, the file's ending, an option or an imported mesh is no good.
-        OSError: A file cannot be written.
+        SceneError: The name, the file's ending, an option or an imported mesh is no good, or a
+            file cannot be written. It is a ValueError, too.
     """
     if name not in SCENES:
-        raise ValueError(f"no scene {name!r}; there are {', '.join(SCENES)}")
+        raise SceneError(f"no scene {name!r}; there are {', '.join(SCENES)}")
     known = [field.name for field in dataclasses.fields(SceneOptions)]
     for key in options:
         if key not in known:
-            raise ValueError(f"scene {name!r} has no option {key!r}; there are {', '.join(known)}")
+            raise SceneError(f"scene {name!r} has no option {key!r}; there are {', '.join(known)}")
     settings = SceneOptions(**options)
     info = SCENES[name]
-    writer = StageWriter(Path(path), info.metres_per_unit, settings.texture_size, settings.seed)
-    info.build(writer, settings)
-    writer.save(f"Wavecomb scene {name}: {info.summary}")
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        writer = StageWriter(path, info.metres_per_unit, settings.texture_size, settings.seed)
+        info.build(writer, settings)
+        writer.save(f"Wavecomb scene {name}: {info.summary}")
+    except OSError as error:
+        raise SceneError(f"{path}: cannot write the scene: {error}") from error

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
 
@@ -77,7 +78,7 @@ DRAGON_MATERIALS = {
 def build_cornell_dragon(writer: StageWriter, options: SceneOptions) -> None:
     """The box with a dragon on its floor."""
     if options.material not in DRAGON_MATERIALS:
-        raise ValueError(
+        raise SceneError(
             f"dragon material must be one of {', '.join(DRAGON_MATERIALS)}, "
             f"not {options.material!r}"
         )

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom
 
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import (
     FloatArray,
     Mesh,
@@ -68,17 +69,17 @@ def load_dragon(path: Path) -> Mesh:
         path: .obj, .ply, either with .gz, or .usd, .usda, .usdc, .usdz.
 
     Raises:
-        ValueError: The file is missing, broken, empty or of another kind.
+        SceneError: The file is missing, broken, empty or of another kind.
     """
     if not path.is_file():
-        raise ValueError(f"{path}: no such mesh file")
+        raise SceneError(f"{path}: no such mesh file")
     try:
         raw = _read(path)
         _check(raw)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, OverflowError) as error:
-        raise ValueError(f"{path}: cannot read the mesh: {_one_line(error)}") from error
+        raise SceneError(f"{path}: cannot read the mesh: {_one_line(error)}") from error
     except (ValueError, IndexError, KeyError, TypeError) as error:
-        raise ValueError(f"{path}: not a usable mesh: {_one_line(error)}") from error
+        raise SceneError(f"{path}: not a usable mesh: {_one_line(error)}") from error
     low, high = raw.points.min(axis=0), raw.points.max(axis=0)
     scale = TARGET_DIAGONAL / float(np.linalg.norm(high - low))
     centre = np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
@@ -90,7 +91,7 @@ def load_dragon(path: Path) -> Mesh:
     empty = np.zeros((len(points), 3), np.float32)
     mesh = without_flat_faces(Mesh(points, faces, empty, uv.astype(np.float32)))
     if not len(mesh.faces):
-        raise ValueError(f"{path}: not a usable mesh: all its faces have no area")
+        raise SceneError(f"{path}: not a usable mesh: all its faces have no area")
     # Removing flat faces may drop the points that spanned the bounds: stand it on the ground.
     points = mesh.points - np.array([0.0, mesh.points[:, 1].min(), 0.0], np.float32)
     return Mesh(points, mesh.faces, smooth_normals(points, mesh.faces), mesh.uv)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wavecomb.scenes.dragon import dragon
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import Mesh
 
 
@@ -35,9 +36,9 @@ class SceneOptions:
     def __post_init__(self) -> None:
         """Refuses what no scene can use."""
         if self.aspect is not None and not 0.01 <= self.aspect <= 100.0:
-            raise ValueError(f"aspect must be from 0.01 to 100, not {self.aspect}")
+            raise SceneError(f"aspect must be from 0.01 to 100, not {self.aspect}")
         if self.seed < 0:
-            raise ValueError(f"seed must not be negative: {self.seed}")
+            raise SceneError(f"seed must not be negative: {self.seed}")
 
     def dragon_mesh(self) -> Mesh:
         """The dragon to use: ours, or the file's, normalised to our size."""

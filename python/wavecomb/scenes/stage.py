@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.materials import MaterialInfo
 from wavecomb.scenes.mesh import FloatArray, Mesh
 from wavecomb.scenes.textures import TEXTURES, sky, write_image
@@ -49,9 +50,9 @@ class StageWriter:
             seed: Of the random patterns in textures.
         """
         if path.suffix.lower() not in SUFFIXES:
-            raise ValueError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
+            raise SceneError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
         if not 16 <= texture_size <= 16384:
-            raise ValueError(f"texture size must be from 16 to 16384, not {texture_size}")
+            raise SceneError(f"texture size must be from 16 to 16384, not {texture_size}")
         self._path = path
         self._texture_size = texture_size
         self._seed = seed

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces, merge, normalized, without_flat_faces
 
 _CIRCLE = 0.56
@@ -185,7 +186,7 @@ def teapot(level: int = 16) -> Mesh:
         The mesh with analytic normals, and uv whose unit is a sixth of the height around.
     """
     if level < 1:
-        raise ValueError(f"teapot level must be at least 1, not {level}")
+        raise SceneError(f"teapot level must be at least 1, not {level}")
     parts = [
         *[_tessellate(_turned(p), 4, level, 2.0) for p in (_RIM, _BODY, _LID, _BOTTOM)],
         _tessellate(_swept(_HANDLE), 2, level, 0.25),

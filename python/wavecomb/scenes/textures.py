@@ -258,11 +258,11 @@ def glaze(size: int, rng: np.random.Generator) -> Image:
     """Porcelain with a cobalt pattern of waves and dots."""
     x, y = _grid(size)
     wobble = 0.02 * (_fractal(x, y, 6, 4, rng) - 0.5)
-    cx, cy = (x * 6) % 1.0 - 0.5, (y * 12 + 0.5 * (np.floor(x * 6) % 2)) % 1.0
-    arcs = np.abs((np.hypot(cx, cy * 0.6) * 5.0 + wobble * 10) % 1.0 - 0.5)
+    cx, cy = (x * 4) % 1.0 - 0.5, (y * 8 + 0.5 * (np.floor(x * 4) % 2)) % 1.0
+    arcs = np.abs((np.hypot(cx, cy * 0.6) * 3.0 + wobble * 10) % 1.0 - 0.5)
     line = 1.0 - _step(arcs, 0.10, 0.16)
     band = _step(np.sin(2 * np.pi * 2 * y + wobble * 20), 0.25, 0.35)
-    dots = 1.0 - _step(np.hypot((x * 24) % 1.0 - 0.5, (y * 24) % 1.0 - 0.5), 0.16, 0.22)
+    dots = 1.0 - _step(np.hypot((x * 10) % 1.0 - 0.5, (y * 10) % 1.0 - 0.5), 0.14, 0.20)
     ink = np.clip(
         line * band + dots * (1 - band) * _step(np.sin(2 * np.pi * 2 * y), -1.0, -0.6), 0, 1
     )
@@ -336,7 +336,7 @@ def sky(width: int, height: int, seed: int) -> Image:
     disc = _step(
         to_sun.astype(np.float32), float(np.cos(np.radians(4.4))), float(np.cos(np.radians(3.6)))
     )[..., None]
-    image = image + disc * np.array([230.0, 165.0, 100.0])
+    image = image + disc * np.array([300.0, 220.0, 135.0])
     ground = np.array([0.12, 0.115, 0.11]) * (0.6 + 0.4 * facing)
     blend = _step((-up).astype(np.float32), -0.004, 0.015)[..., None]
     return (image * (1.0 - blend) + ground * blend).astype(np.float32)
