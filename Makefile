@@ -62,11 +62,15 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 
 # ---- tests ---------------------------------------------------------------------------------------------
 
-test: lint test-cpp test-asan test-py ## Everything: lint, C++ tests, the same under sanitizers, pytest
-	@echo "make test: passed"
+# Every stage runs, so that one slip in layout does not hide what the tests say; any failure fails the whole.
+stages = failed=; for stage in $(1); do $(MAKE) --no-print-directory $$stage || failed+=" $$stage"; done; \
+	if [ -n "$$failed" ]; then echo "make $@: FAILED:$$failed"; exit 1; fi; echo "make $@: passed"
 
-test-fast: lint test-cpp test-py-fast ## Lint, C++ tests, pytest without the slow ones
-	@echo "make test-fast: passed"
+test: ## Everything: lint, C++ tests, the same under sanitizers, pytest
+	@$(call stages,lint test-cpp test-asan test-py)
+
+test-fast: ## Lint, C++ tests, pytest without the slow ones
+	@$(call stages,lint test-cpp test-py-fast)
 
 test-cpp: build build/.setup-test ## C++ tests
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
