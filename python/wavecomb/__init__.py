@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wavecomb: a CPU path tracer for OpenUSD stages.
+
+>>> import wavecomb
+>>> picture = wavecomb.render("mixed.usdc", size=(600, 600), spp=64)  # doctest: +SKIP
+>>> picture.save("mixed.exr")  # doctest: +SKIP
+
+Names are imported when they are first used, so that ``import wavecomb`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+# Eager, for it has the name of its module: a late import of the module would hide the function.
+from wavecomb.compare import compare
+
+if TYPE_CHECKING:
+    from wavecomb._core import Scene, SceneBuilder, Settings
+    from wavecomb.api import Picture, load, render
+    from wavecomb.compare import Comparison
+    from wavecomb.errors import WavecombError
+
+    __version__: str
+
+__all__ = [
+    "Comparison",
+    "Picture",
+    "Scene",
+    "SceneBuilder",
+    "Settings",
+    "WavecombError",
+    "__version__",
+    "compare",
+    "load",
+    "render",
+]
+
+_HOMES = {
+    "Comparison": "wavecomb.compare",
+    "Picture": "wavecomb.api",
+    "Scene": "wavecomb._core",
+    "SceneBuilder": "wavecomb._core",
+    "Settings": "wavecomb._core",
+    "WavecombError": "wavecomb.errors",
+    "load": "wavecomb.api",
+    "render": "wavecomb.api",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from wavecomb.version import version
+
+        value: Any = version()
+    elif name in _HOMES:
+        from importlib import import_module
+
+        value = getattr(import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module 'wavecomb' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

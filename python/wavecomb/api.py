@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stages in, pictures out, from Python."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from wavecomb._core import Result, Scene, Settings
+    from wavecomb.image import Transfer
+    from wavecomb.usd import LoadedStage
+
+Progress = Callable[[int, int], "bool | None"]
+
+MAX_EDGE = 65536
+MAX_SPP = 1 << 24
+# Film with its sums, the layers that are handed out, and a copy while a file is written.
+_BYTES_PER_PIXEL = 200
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered picture. Row 0 is the top.
+
+    Attributes:
+        beauty: (height, width, 3), linear Rec.709.
+        albedo: (height, width, 3).
+        normal: (height, width, 3), world space.
+        depth: (height, width), along the camera's axis; infinite where nothing was hit.
+        samples: (height, width), samples that each pixel got.
+        stats: What was done and how long it took; docs/statistics.md has the schema.
+        cancelled: Progress asked to stop; the picture holds what was done.
+    """
+
+    beauty: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    samples: NDArray[np.uint32]
+    stats: dict[str, Any] = field(default_factory=dict, repr=False)
+    cancelled: bool = False
+
+    def layers(self) -> dict[str, NDArray[Any]]:
+        """The layers by name, in the order of an EXR file."""
+        return {
+            "beauty": self.beauty,
+            "albedo": self.albedo,
+            "normal": self.normal,
+            "depth": self.depth,
+            "samples": self.samples,
+        }
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        half: bool = False,
+        exposure: float = 0.0,
+        tone_map: Transfer = "clamp",
+    ) -> None:
+        """Writes all layers (.exr) or the beauty for display (.png), whole or not at all.
+
+        Args:
+            path: By its ending .exr or .png.
+            half: EXR: 16 bit colours and normals.
+            exposure: PNG: in stops.
+            tone_map: PNG: "clamp" or "neutral".
+
+        >>> picture = wavecomb.render("mixed.usdc")  # doctest: +SKIP
+        >>> picture.save("mixed.exr", half=True)  # doctest: +SKIP
+        >>> picture.save("mixed.png", exposure=0.5)  # doctest: +SKIP
+        """
+        from wavecomb.image import write_exr, write_png
+        from wavecomb.stats import picture_metadata
+
+        kind = Path(path).suffix.lower()
+        if kind == ".exr":
+            write_exr(path, self.layers(), half=half, metadata=picture_metadata(self.stats))
+        elif kind == ".png":
+            write_png(path, self.beauty, exposure=exposure, tone_map=tone_map)
+        else:
+            raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    camera: str | None = None,
+    frame: float | None = None,
+    purposes: tuple[str, ...] | None = None,
+) -> LoadedStage:
+    """Reads a USD stage.
+
+    Args:
+        path: .usd, .usda, .usdc or .usdz.
+        camera: Path of a camera prim; by default the stage's render settings, or its first camera,
+            or one that sees everything.
+        frame: Time code; by default the stage's start.
+        purposes: Of the geometry, as in USD; by default what the loader says.
+
+    Returns:
+        The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
+
+    >>> stage = wavecomb.load("mixed.usdc")  # doctest: +SKIP
+    >>> stage.scene.instanced_triangles  # doctest: +SKIP
+    11547184
+
+    Raises:
+        WavecombError: The stage cannot be rendered; one line that names the file or prim.
+    """
+    from wavecomb.usd import load_stage
+
+    options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
+    return load_stage(Path(path), camera=camera, frame=frame, **options)
+
+
+def render(
+    source: str | os.PathLike[str] | LoadedStage | Scene,
+    *,
+    size: tuple[int, int] = (600, 600),
+    spp: int = 64,
+    progress: Progress | None = None,
+    camera: str | None = None,
+    frame: float | None = None,
+    **settings: Any,
+) -> Picture:
+    """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
+
+    Args:
+        source: A path, what ``load`` gave, or a ``Scene``.
+        size: Width and height, pixels.
+        spp: Samples per pixel.
+        progress: Called as progress(samples_done, samples_total) about ten times a second; return
+            False to stop and keep what is done.
+        camera: As in ``load``; for a path only.
+        frame: As in ``load``; for a path only.
+        **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed ...
+
+    >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
+    >>> picture.beauty.shape  # doctest: +SKIP
+    (540, 960, 3)
+
+    A stage that is rendered more than once is best loaded once:
+
+    >>> stage = wavecomb.load("mixed.usdc")  # doctest: +SKIP
+    >>> for seed in range(4):  # doctest: +SKIP
+    ...     wavecomb.render(stage, spp=4, seed=seed).save(f"mixed{seed}.exr")
+
+    Raises:
+        WavecombError: The stage cannot be rendered.
+        wavecomb._core.Error: A setting is no good.
+    """
+    from wavecomb.stats import make_stats
+
+    chosen = make_settings(size, spp, **settings)
+    scene, loaded, stage = _resolve(source, camera, frame)
+    result = _render(scene, chosen, progress)
+    stats = make_stats(result, stage=stage, loaded=loaded)
+    return picture_of(result, stats)
+
+
+def picture_of(result: Result, stats: dict[str, Any]) -> Picture:
+    """A result of the core as a picture."""
+    return Picture(
+        beauty=result.beauty,
+        albedo=result.albedo,
+        normal=result.normal,
+        depth=result.depth,
+        samples=result.samples,
+        stats=stats,
+        cancelled=result.cancelled,
+    )
+
+
+def make_settings(size: tuple[int, int], spp: int, **settings: Any) -> Settings:
+    """Checked settings; raises WavecombError or _core.Error in one line.
+
+    Checks what the core cannot know: whether the picture fits in the memory of this machine.
+    """
+    from wavecomb import _core
+    from wavecomb.errors import WavecombError
+
+    width, height = (int(edge) for edge in size)
+    if not (1 <= width <= MAX_EDGE and 1 <= height <= MAX_EDGE):
+        raise WavecombError(
+            f"size {width} x {height}: each edge must be from 1 to {MAX_EDGE} pixels"
+        )
+    if not 1 <= int(spp) <= MAX_SPP:
+        raise WavecombError(f"{spp} samples per pixel: must be from 1 to {MAX_SPP}")
+    needed, there = width * height * _BYTES_PER_PIXEL, _memory_bytes()
+    if there is not None and needed > 0.8 * there:
+        raise WavecombError(
+            f"size {width} x {height}: needs about {needed / 2**30:.0f} GiB of memory, "
+            f"this machine has {there / 2**30:.0f}; choose a smaller size"
+        )
+    chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
+    chosen.check()
+    return chosen
+
+
+def _memory_bytes() -> int | None:
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return None
+
+
+def _resolve(
+    source: str | os.PathLike[str] | LoadedStage | Scene, camera: str | None, frame: float | None
+) -> tuple[Scene, LoadedStage | None, str | None]:
+    if isinstance(source, (str, os.PathLike)):
+        loaded = load(source, camera=camera, frame=frame)
+        return loaded.scene, loaded, os.fspath(source)
+    if camera is not None or frame is not None:
+        raise TypeError("camera and frame are chosen when the stage is loaded: give them to load()")
+    scene: Any = getattr(source, "scene", None)
+    if scene is not None:
+        return scene, source, None  # type: ignore[return-value]
+    return source, None, None  # type: ignore[return-value]
+
+
+def _render(scene: Scene, settings: Settings, progress: Progress | None) -> Result:
+    from wavecomb import _core
+
+    return _core.render(scene, settings, progress)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``wavecomb``: one module for each subcommand."""
+
+from __future__ import annotations
+
+import click
+
+from wavecomb.cli.compare import compare_command
+from wavecomb.cli.group import Commands, print_version
+from wavecomb.cli.info import info_command
+from wavecomb.cli.render import render_command
+from wavecomb.cli.scene import scene_command
+
+__all__ = ["main"]
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=print_version,
+    help="Show the version and exit.",
+)
+def main() -> None:
+    r"""Wavecomb: a CPU path tracer for OpenUSD stages.
+
+    \b
+    Examples:
+      wavecomb scene mixed -o mixed.usdc
+      wavecomb info mixed.usdc
+      wavecomb render mixed.usdc -o mixed.exr --png mixed.png
+      wavecomb compare mixed.exr other.exr --heatmap difference.png
+
+    Exit codes: 0 done, 1 pictures differ (compare), 2 an error, 130 stopped by Ctrl-C.
+    `wavecomb COMMAND --help` says more.
+    """
+
+
+main.add_command(render_command)
+main.add_command(info_command)
+main.add_command(scene_command)
+main.add_command(compare_command)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors in one line, exit codes, version."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import click
+
+ERROR = 2
+INTERRUPTED = 130
+
+
+class Commands(click.Group):
+    """A group that turns every exception into one line on stderr and an exit code.
+
+    ``WAVECOMB_DEBUG=1`` shows tracebacks instead.
+    """
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """In the order they were added."""
+        return list(self.commands)
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Runs the command line and exits."""
+        if not standalone_mode:
+            return super().main(args, prog_name, complete_var, False, **extra)
+        try:
+            code = super().main(args, prog_name, complete_var, False, **extra)
+        except click.ClickException as error:
+            _fail(error.format_message(), _help_of(error))
+        except (click.Abort, KeyboardInterrupt):
+            click.echo("stopped", err=True)
+            sys.exit(INTERRUPTED)
+        except Exception as error:
+            if os.environ.get("WAVECOMB_DEBUG"):
+                raise
+            _fail(describe(error))
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def describe(error: Exception) -> str:
+    """An exception as one line for a user."""
+    from wavecomb.errors import WavecombError
+
+    core = sys.modules.get("wavecomb._core")
+    if isinstance(error, WavecombError) or (core is not None and isinstance(error, core.Error)):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "out of memory; choose a smaller --size or a simpler stage"
+    if isinstance(error, OSError):
+        if error.filename is not None and error.strerror:
+            return f"{os.fspath(error.filename)}: {error.strerror}"
+        return str(error)
+    if isinstance(error, ImportError) and (error.name or "").startswith("wavecomb._core"):
+        return f"the native module is missing or broken ({error}); `make build` makes it"
+    return (
+        f"internal: {type(error).__name__}: {error} (please report it; "
+        "WAVECOMB_DEBUG=1 shows where)"
+    )
+
+
+def print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    """Prints the version and exits."""
+    if value and not ctx.resilient_parsing:
+        from wavecomb.version import version
+
+        click.echo(f"wavecomb {version()}")
+        ctx.exit()
+
+
+def _help_of(error: click.ClickException) -> str | None:
+    context = getattr(error, "ctx", None)
+    return f"{context.command_path} --help" if context is not None else None
+
+
+def _fail(message: str, more: str | None = None) -> NoReturn:
+    line = " ".join(message.split()).rstrip(".")
+    if more:
+        line += f" (`{more}` says more)"
+    click.echo(f"error: {line}", err=True)
+    sys.exit(ERROR)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb info``."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from wavecomb.cli.options import load, stage_options, stage_warnings, warn
+
+
+@click.command("info")
+@stage_options
+@click.option("--json", "as_json", is_flag=True, help="For programs.")
+def info_command(
+    stage: str,
+    camera: str | None,
+    frame: float | None,
+    purposes: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    r"""Say what would be rendered of STAGE, and what would not.
+
+    \b
+    Examples:
+      wavecomb info shot.usd
+      wavecomb info shot.usd --json | jq .triangles
+    """
+    from wavecomb.info import print_info, stage_info
+
+    loaded = load(stage, camera, frame, purposes)
+    info = stage_info(loaded, stage)
+    if as_json:
+        click.echo(json.dumps(info, indent=2))
+        return
+    from rich.console import Console
+
+    warn(stage_warnings(loaded))
+    print_info(info, loaded, Console())

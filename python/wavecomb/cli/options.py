@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that more than one command has, and types of option values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Real(click.ParamType):
+    """A finite number, perhaps with a lower bound."""
+
+    name = "number"
+
+    def __init__(self, minimum: float = -math.inf, *, above: bool = False) -> None:
+        self._minimum = minimum
+        self._above = above
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Text to a float; fails with what it must be."""
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number", param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        if number < self._minimum or (self._above and number == self._minimum):
+            bound = "above" if self._above else "at least"
+            self.fail(f"{value} must be {bound} {self._minimum:g}", param, ctx)
+        return number
+
+
+def stage_options(command: F) -> F:
+    """STAGE, --camera, --frame and --purpose."""
+    for option in (
+        click.option(
+            "--purpose",
+            "purposes",
+            multiple=True,
+            type=click.Choice(["default", "render", "proxy", "guide"]),
+            help="Geometry to take, may be given again.  [default: default and render]",
+        ),
+        click.option(
+            "--frame",
+            type=Real(),
+            metavar="T",
+            help="Time code.  [default: the stage's start]",
+        ),
+        click.option(
+            "--camera",
+            metavar="PATH",
+            help="Camera prim.  [default: of the render settings, else the first]",
+        ),
+        click.argument("stage", type=click.Path()),
+    ):
+        command = option(command)
+    return command
+
+
+def load(stage: str, camera: str | None, frame: float | None, purposes: tuple[str, ...]) -> Any:
+    """Loads a stage as the options say."""
+    from wavecomb.api import load as load_stage
+
+    chosen = tuple(dict.fromkeys(("default", *purposes))) if purposes else None
+    return load_stage(stage, camera=camera, frame=frame, purposes=chosen)
+
+
+def warn(lines: list[str]) -> None:
+    """Prints warnings on stderr, each once."""
+    for line in dict.fromkeys(lines):
+        click.echo(f"warning: {' '.join(line.split())}", err=True)
+
+
+def stage_warnings(loaded: Any) -> list[str]:
+    """Warnings of a loaded stage as lines."""
+    return [*(finding.line() for finding in loaded.report.warnings), *loaded.scene.warnings]

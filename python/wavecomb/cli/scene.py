@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb scene``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from wavecomb.cli.options import Real
+
+
+@click.command("scene")
+@click.argument("name", required=False)
+@click.option("-o", "--output", type=click.Path(), metavar="FILE", help=".usda, .usdc or .usd.")
+@click.option("--list", "list_", is_flag=True, help="List the scenes.")
+@click.option("--dragon", type=click.Path(), metavar="FILE", help="OBJ, PLY or USD mesh to use.")
+@click.option("--triangles", type=click.IntRange(min=1), metavar="N", help="Of our own dragon.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of layout and patterns.")
+@click.option("--texture-size", type=click.IntRange(min=16), metavar="N", help="Largest, texels.")
+@click.option("--aspect", type=Real(0, above=True), metavar="X", help="Width / height.")
+@click.option("--material", metavar="NAME", help="cornell-dragon: gold, copper, glass, jade.")
+def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
+    r"""Write one of our own test stages, and its textures beside it.
+
+    \b
+    Examples:
+      wavecomb scene --list
+      wavecomb scene mixed -o mixed.usdc
+      wavecomb scene cornell-dragon -o box.usda --dragon dragon.obj
+    """
+    from wavecomb.errors import WavecombError
+    from wavecomb.scenes import SCENES, write_scene
+
+    if list_:
+        width = max(len(key) for key in SCENES)
+        for key, info in SCENES.items():
+            click.echo(f"{key:{width}}  {info.summary}")
+        return
+    if name is None or output is None:
+        raise click.UsageError("give a NAME and -o FILE, or --list")
+    from wavecomb.files import check_writable
+
+    check_writable(output)
+    chosen = {key: value for key, value in options.items() if value is not None}
+    try:
+        write_scene(name, Path(output), **chosen)
+    except ValueError as error:
+        raise WavecombError(str(error)) from error
+    click.echo(f"wrote {output}")

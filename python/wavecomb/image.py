@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures in and out of files, by OpenImageIO.
+
+Arrays are (height, width, channels), row 0 at the top.
+
+Errors are OSError (the file) or ValueError (the arrays), one line that names the file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.files import replacing
+
+Array = NDArray[np.float32]
+Transfer = Literal["clamp", "neutral"]
+
+_HALF_MAX = 65504.0
+_SUFFIXES = {"beauty": "RGB", "albedo": "RGB", "normal": "XYZ", "depth": "Z"}
+_ALWAYS_FLOAT = ("depth", "samples")
+_NAN_COLOUR = (255, 0, 255)
+
+
+def channel_names(layer: str, channels: int) -> list[str]:
+    """Channel names of a layer in an EXR file: beauty is R, G, B; albedo is albedo.R and so on.
+
+    >>> channel_names("normal", 3)
+    ['normal.X', 'normal.Y', 'normal.Z']
+    >>> channel_names("samples", 1)
+    ['samples']
+    """
+    prefix = "" if layer == "beauty" else f"{layer}."
+    letters = _SUFFIXES.get(layer, "")
+    if len(letters) == channels:
+        return [prefix + letter for letter in letters]
+    if channels == 1:
+        return [layer]
+    if channels in (3, 4):
+        return [prefix + letter for letter in "RGBA"[:channels]]
+    return [f"{layer}.{k}" for k in range(channels)]
+
+
+def write_exr(
+    path: str | os.PathLike[str],
+    layers: Mapping[str, NDArray[Any]],
+    *,
+    half: bool = False,
+    metadata: Mapping[str, str | int | float] | None = None,
+) -> None:
+    """Writes an OpenEXR file with one part, ZIP compressed; whole or not at all.
+
+    Args:
+        path: Ends in .exr.
+        layers: Name -> (height, width) or (height, width, channels); "beauty" becomes R, G, B.
+        half: 16 bit colours and normals; depth and samples stay 32 bit. Finite values beyond the
+            range of a half are clamped to it.
+        metadata: Attributes of the file; "Software" is set if it is not given.
+    """
+    import OpenImageIO as oiio
+
+    name = os.fspath(path)
+    if Path(name).suffix.lower() != ".exr":
+        raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
+    if not layers:
+        raise ValueError(f"{name}: there is nothing to write")
+    planes: list[Array] = []
+    names: list[str] = []
+    formats: list[Any] = []
+    for layer, pixels in layers.items():
+        plane = np.asarray(pixels, dtype=np.float32)
+        plane = plane[:, :, None] if plane.ndim == 2 else plane
+        if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0].shape[:2]):
+            raise ValueError(f"{name}: layer {layer!r} has the shape {np.shape(pixels)}")
+        as_half = half and layer not in _ALWAYS_FLOAT
+        if as_half:
+            clamped = np.clip(plane, -_HALF_MAX, _HALF_MAX)
+            plane = np.where(np.isfinite(plane), clamped, plane)
+        planes.append(plane)
+        names += channel_names(layer, plane.shape[2])
+        formats += [oiio.TypeDesc("half" if as_half else "float")] * plane.shape[2]
+    pixels = np.ascontiguousarray(np.concatenate(planes, axis=2))
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, "float")
+    spec.channelnames = tuple(names)
+    spec.channelformats = tuple(formats)
+    spec.attribute("compression", "zip")
+    for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
+        spec.attribute(key, value)
+    _write(name, spec, pixels)
+
+
+def write_png(
+    path: str | os.PathLike[str],
+    rgb: NDArray[Any],
+    *,
+    exposure: float = 0.0,
+    tone_map: Transfer = "clamp",
+) -> None:
+    """Writes an 8-bit sRGB picture; whole or not at all.
+
+    Args:
+        path: Ends in .png.
+        rgb: Linear Rec.709, (height, width, 3).
+        exposure: In stops: the picture is multiplied by 2^exposure first.
+        tone_map: "clamp" cuts at 1; "neutral" rolls highlights off towards white. See ``display``.
+    """
+    import OpenImageIO as oiio
+
+    name = os.fspath(path)
+    if Path(name).suffix.lower() != ".png":
+        raise ValueError(f"{name}: the name of a PNG file must end in .png")
+    pixels = display(rgb, exposure=exposure, tone_map=tone_map)
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, "uint8")
+    spec.attribute("oiio:ColorSpace", "sRGB")
+    spec.attribute("Software", "Wavecomb")
+    _write(name, spec, pixels)
+
+
+def display(
+    rgb: NDArray[Any], *, exposure: float = 0.0, tone_map: Transfer = "clamp"
+) -> NDArray[np.uint8]:
+    """Linear Rec.709 -> 8-bit sRGB.
+
+    Pixels with a NaN become magenta, so that they are seen; infinities are clamped.
+    """
+    linear = np.asarray(rgb, dtype=np.float32)
+    if linear.ndim != 3 or linear.shape[2] != 3:
+        raise ValueError(f"a colour picture has the shape (height, width, 3), not {linear.shape}")
+    broken = np.isnan(linear).any(axis=2)
+    linear = np.nan_to_num(linear, nan=0.0, posinf=_HALF_MAX, neginf=0.0)
+    linear = np.clip(linear * np.float32(2.0**exposure), 0.0, np.float32(1e30))
+    if tone_map == "neutral":
+        linear = _neutral(linear)
+    elif tone_map != "clamp":
+        raise ValueError(f"tone map {tone_map!r} is none of clamp, neutral")
+    encoded = srgb_from_linear(np.clip(linear, 0.0, 1.0))
+    pixels: NDArray[np.uint8] = np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
+    pixels[broken] = _NAN_COLOUR
+    return pixels
+
+
+def _neutral(rgb: Array) -> Array:
+    """Khronos PBR Neutral: colours below 0.76 keep hue and value, highlights go towards white.
+
+    https://github.com/KhronosGroup/ToneMapping, "PBR Neutral", equations of its reference.
+    """
+    start, desaturation, f90 = 0.8 - 0.04, 0.15, 0.04
+    low = rgb.min(axis=2, keepdims=True)
+    offset = np.where(low < 2 * f90, low - low * low / (4 * f90), f90)
+    rgb = rgb - offset
+    peak = rgb.max(axis=2, keepdims=True)
+    d = 1.0 - start
+    new_peak = 1.0 - d * d / (np.maximum(peak, start) + d - start)
+    g = 1.0 - 1.0 / (desaturation * (np.maximum(peak, start) - new_peak) + 1.0)
+    scaled = rgb * (new_peak / np.maximum(peak, 1e-6))
+    rolled = scaled * (1.0 - g) + new_peak * g
+    return np.where(peak < start, rgb, rolled).astype(np.float32)
+
+
+def srgb_from_linear(linear: Array) -> Array:
+    """The sRGB transfer function (IEC 61966-2-1), for values in [0, 1]."""
+    high = 1.055 * np.power(np.maximum(linear, 0.0031308), np.float32(1 / 2.4)) - 0.055
+    return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)
+
+
+def linear_from_srgb(encoded: Array) -> Array:
+    """The inverse of ``srgb_from_linear``."""
+    high = np.power((np.maximum(encoded, 0.04045) + 0.055) / 1.055, np.float32(2.4))
+    return np.where(encoded <= 0.04045, encoded / 12.92, high).astype(np.float32)
+
+
+def read_image(path: str | os.PathLike[str]) -> Array:
+    """Reads a picture of any format: float32 (height, width, channels), linear.
+
+    Files of whole numbers (PNG, JPEG ...) are taken to be sRGB and are made linear, alpha not.
+    """
+    return _read(path)[0]
+
+
+def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
+    """Reads a picture by layers, as ``write_exr`` names them: {"beauty": (h, w, 3), ...}.
+
+    A layer is the part of a channel's name before the last dot. R, G, B, A and Y without a dot are
+    "beauty"; any other channel without a dot is a layer of its own.
+    """
+    pixels, names = _read(path)
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        layer, dot, _ = name.rpartition(".")
+        if not dot:
+            layer = "beauty" if name in {"R", "G", "B", "A", "Y"} else name
+        groups.setdefault(layer, []).append(k)
+    order = {letter: k for k, letter in enumerate(["R", "G", "B", "A"])}
+    for ids in groups.values():
+        ids.sort(key=lambda k: order.get(names[k].rpartition(".")[2], len(order)))
+    return {layer: np.ascontiguousarray(pixels[:, :, ids]) for layer, ids in groups.items()}
+
+
+def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of a picture file."""
+    source = _open(os.fspath(path))
+    values = {attribute.name: attribute.value for attribute in source.spec().extra_attribs}
+    source.close()
+    return values
+
+
+def _open(name: str) -> Any:
+    import OpenImageIO as oiio
+
+    if not Path(name).exists():
+        raise FileNotFoundError(f"{name}: no such file")
+    if Path(name).is_dir():
+        raise IsADirectoryError(f"{name}: is a folder, not a picture")
+    hints = oiio.ImageSpec()
+    hints.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(name, hints)
+    if source is None:
+        raise OSError(f"{name}: cannot be read as a picture: {_one_line(oiio.geterror(), name)}")
+    return source
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
+    import OpenImageIO as oiio
+
+    name = os.fspath(path)
+    source = _open(name)
+    try:
+        spec = source.spec()
+        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+        if pixels is None:
+            raise OSError(f"{name}: is damaged: {_one_line(source.geterror(), name)}")
+        names = list(spec.channelnames)
+        encoded = spec.format.basetype not in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+        alpha = spec.alpha_channel
+    finally:
+        source.close()
+    image = np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, spec.nchannels)
+    if encoded:
+        colour = [k for k in range(spec.nchannels) if k != alpha]
+        image[:, :, colour] = linear_from_srgb(image[:, :, colour])
+    return image, names
+
+
+def _write(name: str, spec: Any, pixels: NDArray[Any]) -> None:
+    import OpenImageIO as oiio
+
+    with replacing(name) as part:
+        output = oiio.ImageOutput.create(str(part))
+        if output is None:
+            raise OSError(f"{name}: no writer for this kind: {_one_line(oiio.geterror(), name)}")
+        ok = output.open(str(part), spec) and output.write_image(pixels)
+        problem = output.geterror()
+        if not (output.close() and ok):
+            problem = problem or output.geterror()
+            raise OSError(f"{name}: cannot be written: {_one_line(problem, name)}")
+
+
+def _one_line(message: str, name: str) -> str:
+    """A library's message in one line, without the file's name, which the caller gives."""
+    line = " ".join(message.replace(f'"{name}"', "it").split())
+    return line.rstrip(".") or "unknown reason"

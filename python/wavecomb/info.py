@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a stage holds, as Wavecomb would render it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from wavecomb.usd import LoadedStage
+
+
+def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
+    """What would be rendered, as plain data.
+
+    Args:
+        loaded: What ``wavecomb.load`` gave.
+        stage: Name of the file.
+    """
+    scene, report = loaded.scene, loaded.report
+    low, high = scene.bounds
+    programs = Counter(program for _, program in scene.materials)
+    return {
+        "stage": stage,
+        "camera": loaded.camera_path,
+        "seconds": {"load": float(loaded.seconds)},
+        "triangles": {"unique": scene.triangles, "instanced": scene.instanced_triangles},
+        "meshes": scene.mesh_count,
+        "instances": scene.instance_count,
+        "bounds": [list(low), list(high)],
+        "materials": {
+            "count": len(scene.materials),
+            "by_program": dict(sorted(programs.items())),
+        },
+        "textures": {
+            "count": len(scene.textures),
+            "bytes": sum(size for _, size in scene.textures),
+            "files": [{"name": name, "bytes": size} for name, size in scene.textures],
+        },
+        "lights": scene.light_count,
+        "prims": dict(sorted(report.counts.items())),
+        "unsupported": [finding.as_dict() for finding in report.unsupported],
+        "warnings": [finding.as_dict() for finding in report.warnings]
+        + [{"what": line, "count": 1, "places": []} for line in scene.warnings],
+        "notes": [finding.as_dict() for finding in report.notes],
+    }
+
+
+def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> None:
+    """The same for people."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+
+    def row(name: str, text: str) -> None:
+        table.add_row(name, escape(text))
+
+    triangles = info["triangles"]
+    row("stage", info["stage"])
+    row("camera", str(info["camera"] or "none: one that sees everything"))
+    row("triangles", f"{triangles['unique']:,} ({triangles['instanced']:,} with instances)")
+    row("meshes", f"{info['meshes']:,}")
+    row("instances", f"{info['instances']:,}")
+    low, high = info["bounds"]
+    row("bounds", f"{_point(low)} to {_point(high)}")
+    row("materials", f"{info['materials']['count']}{_counts(info['materials']['by_program'])}")
+    textures = info["textures"]
+    row("textures", f"{textures['count']}, {textures['bytes'] / 1e6:.1f} MB")
+    for entry in sorted(textures["files"], key=lambda entry: -int(entry["bytes"]))[:8]:
+        row("", f"{entry['bytes'] / 1e6:8.1f} MB  {entry['name']}")
+    if textures["count"] > 8:
+        row("", f"and {textures['count'] - 8} more (--json has all)")
+    row("lights", str(info["lights"]))
+    row("prims", _counts(info["prims"]).removeprefix(": ") or "none")
+    row("loaded in", f"{info['seconds']['load']:.2f} s")
+    console.print(table)
+    for title, findings in (
+        ("not supported", loaded.report.unsupported),
+        ("notes", loaded.report.notes),
+    ):
+        if findings:
+            console.print(f"[bold]{title}[/bold]")
+            for finding in findings:
+                console.print(f"  {escape(finding.line())}", highlight=False)
+
+
+def _counts(counts: dict[str, int]) -> str:
+    text = ", ".join(f"{count} {name}" for name, count in counts.items())
+    return f": {text}" if text else ""
+
+
+def _point(values: list[float]) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The statistics of a render: docs/statistics.md has the schema."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.files import replacing
+from wavecomb.version import version
+
+if TYPE_CHECKING:
+    from wavecomb._core import Result
+    from wavecomb.usd import LoadedStage
+
+SCHEMA = "wavecomb-statistics/1"
+PHASES = (
+    "generate",
+    "order_rays",
+    "trace",
+    "keys",
+    "sort",
+    "materialize",
+    "shade",
+    "shadow",
+    "resolve",
+)
+COUNTS = ("samples", "rays", "shadow_rays", "records")
+
+
+def make_stats(
+    result: Result, *, stage: str | None = None, loaded: LoadedStage | None = None
+) -> dict[str, Any]:
+    """The statistics of a result, with what the core does not know: stage, load time, machine.
+
+    Every key of the schema is there; a figure that the core did not give is 0. What the core gives
+    beyond the schema is passed on.
+    """
+    core = dict(result.stats)
+    seconds = dict(core.pop("seconds", {}))
+    phases, counts = dict(core.pop("phases_s", {})), dict(core.pop("counts", {}))
+    report = loaded.report if loaded is not None else None
+    return {
+        "schema": SCHEMA,
+        "version": version(),
+        "stage": stage,
+        "camera": loaded.camera_path if loaded is not None else None,
+        "cancelled": bool(result.cancelled),
+        "settings": core.pop("settings", {}),
+        "seconds": {
+            "load": float(loaded.seconds) if loaded is not None else 0.0,
+            "build": 0.0,
+            "render": 0.0,
+            **seconds,
+        },
+        "phases_s": {**dict.fromkeys(PHASES, 0.0), **phases},
+        "counts": {**dict.fromkeys(COUNTS, 0), **counts},
+        "samples_per_s": core.pop("samples_per_s", 0.0),
+        "rays_per_s": core.pop("rays_per_s", 0.0),
+        "peak_rss_bytes": core.pop("peak_rss_bytes", 0),
+        "machine": machine(),
+        "unsupported": [finding.line() for finding in report.unsupported] if report else [],
+        "warnings": [
+            *([finding.line() for finding in report.warnings] if report else []),
+            *(loaded.scene.warnings if loaded is not None else []),
+        ],
+        **core,
+    }
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were made on; nothing that names the machine or its user."""
+    try:
+        cores = len(os.sched_getaffinity(0))
+    except AttributeError:
+        cores = os.cpu_count() or 1
+    return {
+        "cpu": _cpu_name(),
+        "cores": cores,
+        "memory_bytes": _memory_bytes(),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "build": _build_info(),
+    }
+
+
+def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
+    """Writes statistics as JSON, whole or not at all; NaN and infinities become null."""
+    text = json.dumps(_plain(stats), indent=2, allow_nan=False) + "\n"
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def picture_metadata(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
+    """What of the statistics goes into the header of a picture."""
+    metadata: dict[str, str | int | float] = {
+        "Software": f"Wavecomb {stats.get('version', version())}"
+    }
+    if stats.get("stage"):
+        metadata["wavecomb:stage"] = str(stats["stage"])
+    if stats.get("camera"):
+        metadata["wavecomb:camera"] = str(stats["camera"])
+    if stats.get("settings"):
+        metadata["wavecomb:settings"] = json.dumps(_plain(stats["settings"]), sort_keys=True)
+    if "seconds" in stats:
+        metadata["wavecomb:render_seconds"] = float(stats["seconds"].get("render", 0.0))
+    return metadata
+
+
+def _plain(value: Any) -> Any:
+    """Only what JSON has."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, (bool, int, str)) or value is None:
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if hasattr(value, "item"):
+        return _plain(value.item())
+    return str(value)
+
+
+def _cpu_name() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _memory_bytes() -> int | None:
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return None
+
+
+def _build_info() -> dict[str, str]:
+    from wavecomb import _core
+
+    return dict(_core.build_info())
