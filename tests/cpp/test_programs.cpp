@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "bsdf_testing.h"
+#include "wavecomb/material/program_table.h"
+
+namespace wavecomb {
+namespace {
+
+using bsdf_testing::direction;
+using bsdf_testing::kronecker;
+using Vec = Vec3<float>;
+
+/// A material as a program sees it.
+struct Case {
+  std::string name;
+  ProgramId program;
+  ShadingParams<float> params;
+  bool schlick = false;
+  bool two_sided() const { return program != ProgramId::kDielectric; }
+  double ior() const { return static_cast<double>(params.ior); }
+};
+
+ShadingParams<float> plain_params() {
+  ShadingParams<float> p;
+  p.base_color = Vec(0.8f, 0.5f, 0.2f);
+  p.specular_color = Vec(0, 0, 0);
+  p.emission = Vec(0, 0, 0);
+  p.roughness = 0.5f;
+  p.metallic = p.clearcoat = 0;
+  p.clearcoat_roughness = 0.01f;
+  p.opacity = 1;
+  p.normal = Vec(0, 0, 1);
+  p.ior = 1.5f;
+  p.conductor_eta = p.conductor_k = Vec(0, 0, 0);
+  p.flags = 0;
+  return p;
+}
+
+template <typename Edit>
+Case make_case(std::string name, ProgramId program, Edit edit, bool schlick = false) {
+  Case c{std::move(name), program, plain_params(), schlick};
+  edit(c.params);
+  return c;
+}
+
+using P = ShadingParams<float>;
+
+std::vector<Case> all_cases() {
+  std::vector<Case> cases;
+  const auto add = [&](std::string name, ProgramId id, auto edit, bool schlick = false) {
+    cases.push_back(make_case(std::move(name), id, edit, schlick));
+  };
+  add("diffuse", ProgramId::kDiffuse, [](P&) {});
+  add("emissive", ProgramId::kEmissive, [](P&) {});
+  for (float r : {0.f, 0.2f, 0.5f, 1.f}) {
+    const std::string tail = " r" + std::to_string(r).substr(0, 3);
+    add("metal" + tail, ProgramId::kMetal, [&](P& p) { p.roughness = r; });
+    add("gold" + tail, ProgramId::kMetal, [&](P& p) {
+      p.roughness = r;
+      p.flags = kConductorIndex;
+      p.conductor_eta = Vec(0.143f, 0.375f, 1.442f);
+      p.conductor_k = Vec(3.983f, 2.386f, 1.603f);
+    });
+    add("glass" + tail, ProgramId::kDielectric, [&](P& p) {
+      p.roughness = r;
+      p.base_color = Vec(1, 1, 1);
+    });
+    add("plastic" + tail, ProgramId::kPlastic, [&](P& p) { p.roughness = r; });
+    add("principled" + tail, ProgramId::kPrincipled, [&](P& p) { p.roughness = r; });
+  }
+  add(
+      "glass schlick", ProgramId::kDielectric, [](P&) {}, true);
+  add("bubble", ProgramId::kDielectric, [](P& p) { p.ior = 0.75f; });
+  add("diamond", ProgramId::kDielectric, [](P& p) { p.ior = 2.4f, p.roughness = 0.6f; });
+  add(
+      "plastic schlick", ProgramId::kPlastic, [](P&) {}, true);
+  add("principled metal", ProgramId::kPrincipled,
+      [](P& p) { p.metallic = 0.9f, p.roughness = 0.3f; });
+  add("principled specular", ProgramId::kPrincipled, [](P& p) {
+    p.flags = kSpecularWorkflow;
+    p.specular_color = Vec(0.3f, 0.5f, 0.7f);
+  });
+  add("principled coat", ProgramId::kPrincipled, [](P& p) {
+    p.clearcoat = 1;
+    p.clearcoat_roughness = 0.3f;
+    p.roughness = 0.7f;
+  });
+  add("principled smooth coat", ProgramId::kPrincipled, [](P& p) { p.clearcoat = 0.5f; });
+  add("principled pane", ProgramId::kPrincipled,
+      [](P& p) { p.opacity = 0.3f, p.clearcoat = 0.7f; });
+  add(
+      "principled schlick", ProgramId::kPrincipled, [](P&) {}, true);
+  return cases;
+}
+
+/// Calls f(bsdf) with the scalar class of the case's program.
+template <typename Function>
+void with_bsdf(const Case& c, Function f) {
+  visit_program<float>(c.program, [&]<typename Bsdf>() { f(Bsdf(c.params, c.schlick)); });
+}
+
+std::vector<Vec> views(const Case& c) {
+  std::vector<Vec> all;
+  for (double z : {0.02, 0.25, 0.6, 1.0}) {
+    all.push_back(direction(z, 0.4));
+    if (!c.two_sided() || z == 0.6) all.push_back(direction(-z, 2.5));
+  }
+  return all;
+}
+
+TEST(Programs, TableFindsEachProgram) {
+  for (uint32_t i = 0; i < kProgramCount; ++i) {
+    int visits = 0;
+    visit_program<float>(static_cast<ProgramId>(i), [&]<typename Bsdf>() {
+      EXPECT_EQ(static_cast<uint32_t>(Bsdf::kProgram), i);
+      ++visits;
+    });
+    EXPECT_EQ(visits, 1);
+  }
+}
+
+TEST(Programs, SamplesFollowTheirDensity) {
+  struct Result {
+    std::string name;
+    bsdf_testing::ChiSquareResult r;
+  };
+  std::vector<Result> results;
+  uint32_t seed = 1;
+  for (const Case& c : all_cases())
+    with_bsdf(c, [&](const auto& bsdf) {
+      if (!bsdf.has_non_delta()) return;
+      for (const Vec& wo : views(c)) {
+        bsdf_testing::Sampler s;
+        s.pdf = [&](const Vec& wi) { return bsdf.eval(wo, wi).pdf; };
+        s.sample = [&](float l, float u, float v, Vec& wi) {
+          const auto b = bsdf.sample(wo, l, u, v);
+          wi = b.wi;
+          return b.pdf > 0 && !b.is_delta;
+        };
+        results.push_back(
+            {c.name + " z " + std::to_string(wo.z), bsdf_testing::chi_square(s, seed++, 60000)});
+      }
+    });
+  ASSERT_GT(results.size(), 100u);
+  for (const auto& [name, r] : results) {
+    EXPECT_GT(r.p_value, bsdf_testing::sidak(0.01, results.size())) << name;
+    EXPECT_NEAR(r.mass, r.accepted, 0.01) << name;  // 5 sigma of 60000 samples
+  }
+}
+
+TEST(Programs, WeightIsValueOverDensity) {
+  for (const Case& c : all_cases())
+    with_bsdf(c, [&](const auto& bsdf) {
+      for (const Vec& wo : views(c))
+        for (uint32_t i = 0; i < 500; ++i) {
+          const auto [l, u, v] = kronecker(i);
+          const auto s = bsdf.sample(wo, l, u, v);
+          EXPECT_NEAR(length(s.wi), 1, 1e-5f);
+          if (s.pdf <= 0) {
+            EXPECT_TRUE(is_black(s.weight)) << c.name;
+            continue;
+          }
+          const auto e = bsdf.eval(wo, s.wi);
+          if (s.is_delta) {
+            EXPECT_LE(s.pdf, 1.f) << c.name;
+            EXPECT_EQ(s.roughness, 0.f) << c.name;
+            continue;
+          }
+          // Narrow lobes amplify the rounding of wi.
+          EXPECT_NEAR(e.pdf / s.pdf, 1, 5e-3) << c.name << " " << wo.z;
+          EXPECT_NEAR(s.weight.x, e.f_cos.x / e.pdf, 5e-3 * s.weight.x + 1e-5)
+              << c.name << " " << wo.z;
+          EXPECT_NEAR(s.weight.z, e.f_cos.z / e.pdf, 5e-3 * s.weight.z + 1e-5)
+              << c.name << " " << wo.z;
+          EXPECT_EQ(s.eta != 1.f, s.wi.z * wo.z < 0) << c.name;
+        }
+    });
+}
+
+TEST(Programs, ReciprocityHolds) {
+  // f(o, i) / n_o^2 = f(i, o) / n_i^2 (Veach 1997, eq. 5.14).
+  std::mt19937 rng(11);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const Case& c : all_cases())
+    with_bsdf(c, [&](const auto& bsdf) {
+      int compared = 0;
+      for (int i = 0; i < 2000; ++i) {
+        const Vec wo = direction(unit(rng), 4 * unit(rng));
+        const Vec wi = direction(unit(rng), 4 * unit(rng));
+        if (std::abs(wo.z) < 0.02f || std::abs(wi.z) < 0.02f) continue;
+        const auto index = [&](const Vec& w) { return c.two_sided() || w.z > 0 ? 1.0 : c.ior(); };
+        const auto a = bsdf.eval(wo, wi), b = bsdf.eval(wi, wo);
+        const double x = a.f_cos.x / std::abs(wi.z) * std::pow(index(wi), 2);
+        const double y = b.f_cos.x / std::abs(wo.z) * std::pow(index(wo), 2);
+        // The absolute part is for 1 - F near the critical angle, where its slope is infinite.
+        EXPECT_NEAR(x, y, 2e-3 * std::max(x, y) + 1e-5) << c.name << " " << wo.z << " " << wi.z;
+        compared += x > 0;
+      }
+      if (bsdf.has_non_delta()) {
+        EXPECT_GT(compared, 50) << c.name;
+      }
+    });
+}
+
+/// Light seen on a surface in a uniform white surrounding: the mean weight in the brightest
+/// channel, radiance scaling undone.
+template <typename Bsdf>
+double furnace(const Bsdf& bsdf, const Vec& wo, uint32_t samples = 40000) {
+  double sum[3] = {0, 0, 0};
+  for (uint32_t i = 0; i < samples; ++i) {
+    const auto [l, u, v] = kronecker(i);
+    const auto s = bsdf.sample(wo, l, u, v);
+    const Vec w = s.weight * (s.eta * s.eta);
+    sum[0] += static_cast<double>(w.x);
+    sum[1] += static_cast<double>(w.y);
+    sum[2] += static_cast<double>(w.z);
+  }
+  return std::max({sum[0], sum[1], sum[2]}) / samples;
+}
+
+TEST(Programs, WhiteFurnaceNeverGains) {
+  for (Case c : all_cases()) {
+    c.params.base_color = Vec(1, 1, 1);
+    with_bsdf(c, [&](const auto& bsdf) {
+      for (const Vec& wo : views(c)) EXPECT_LE(furnace(bsdf, wo), 1.004) << c.name << " " << wo.z;
+    });
+  }
+}
+
+TEST(Programs, LosslessMaterialsPassTheWhiteFurnace) {
+  const Vec white(1, 1, 1);
+  const auto expect = [](const Case& c, double low) {
+    with_bsdf(c, [&](const auto& bsdf) {
+      for (const Vec& wo : views(c)) {
+        const double energy = furnace(bsdf, wo);
+        EXPECT_GE(energy, low) << c.name << " " << wo.z;
+        EXPECT_LE(energy, 1.004) << c.name << " " << wo.z;
+      }
+    });
+  };
+  expect(make_case("diffuse", ProgramId::kDiffuse, [&](P& p) { p.base_color = white; }), 0.99999);
+  for (float ior : {0.5f, 1.f, 1.33f, 2.f})
+    expect(make_case("glass", ProgramId::kDielectric,
+                     [&](P& p) { p.base_color = white, p.roughness = 0, p.ior = ior; }),
+           0.99999);
+  for (float r : {0.02f, 0.1f, 0.2f})
+    expect(make_case("rough glass", ProgramId::kDielectric,
+                     [&](P& p) { p.base_color = white, p.roughness = r; }),
+           0.9);
+  for (bool schlick : {false, true})
+    expect(make_case(
+               "smooth plastic", ProgramId::kPlastic,
+               [&](P& p) { p.base_color = white, p.roughness = 0; }, schlick),
+           0.996);
+  for (bool schlick : {false, true})
+    expect(make_case(
+               "smooth principled", ProgramId::kPrincipled,
+               [&](P& p) { p.base_color = white, p.roughness = 0; }, schlick),
+           0.996);
+  expect(
+      make_case("mirror", ProgramId::kMetal, [&](P& p) { p.base_color = white, p.roughness = 0; }),
+      0.99999);
+}
+
+/// The values of one sample and one evaluation, as bits.
+template <typename Bsdf, typename F>
+void record_bits(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi, const F& l, const F& u,
+                 const F& v, float* out) {
+  const auto e = bsdf.eval(wo, wi);
+  const auto s = bsdf.sample(wo, l, u, v);
+  const Color<F> a = bsdf.albedo();
+  const F values[] = {e.f_cos.x,   e.f_cos.y,
+                      e.f_cos.z,   e.pdf,
+                      s.wi.x,      s.wi.y,
+                      s.wi.z,      s.weight.x,
+                      s.weight.y,  s.weight.z,
+                      s.pdf,       s.eta,
+                      s.roughness, select(s.is_delta, F(1.f), F(0.f)),
+                      a.x,         a.y,
+                      a.z,         select(bsdf.has_non_delta(), F(1.f), F(0.f))};
+  for (const F& value : values) {
+    wavecomb::store(out, value);
+    out += kWidth<F>;
+  }
+}
+constexpr size_t kRecorded = 18;
+
+/// One random input of every kind, some at the edges.
+struct Inputs {
+  ShadingParams<float> params;
+  Vec wo, wi;
+  float l, u, v;
+};
+Inputs random_inputs(std::mt19937& rng) {
+  std::uniform_real_distribution<float> unit(0, 0x1.fffffep-1f);
+  const auto edgy = [&] {
+    const float x = unit(rng);
+    return x < 0.1f ? 0.f : (x > 0.9f ? 1.f : unit(rng));
+  };
+  Inputs in;
+  in.params = plain_params();
+  in.params.base_color = Vec(edgy(), edgy(), edgy());
+  in.params.specular_color = Vec(edgy(), edgy(), edgy());
+  in.params.roughness = edgy();
+  in.params.metallic = edgy();
+  in.params.clearcoat = edgy();
+  in.params.clearcoat_roughness = edgy();
+  in.params.opacity = edgy();
+  const float iors[] = {0.1f, 0.5f, 0.999f, 1.f, 1.0001f, 1.33f, 1.5f, 2.4f, 10.f};
+  in.params.ior = iors[rng() % 9];
+  in.params.conductor_eta = Vec(3 * edgy(), 3 * edgy(), 3 * edgy());
+  in.params.conductor_k = Vec(5 * edgy(), 5 * edgy(), 5 * edgy());
+  in.params.flags = rng() % 8;
+  const auto any_direction = [&] {
+    const double grazing[] = {0, 1e-7, -1e-7, 1e-3, -1e-3, 1, -1};
+    const double z = rng() % 4 == 0 ? grazing[rng() % 7] : 2.0 * unit(rng) - 1;
+    Vec w = direction(z, 7 * unit(rng));
+    if (z == 0 && rng() % 2) w.z = -0.f;
+    return w;
+  };
+  in.wo = any_direction();
+  in.wi = any_direction();
+  if (rng() % 8 == 0) in.wi = -in.wo;
+  if (rng() % 8 == 0) in.wi = Vec(-in.wo.x, -in.wo.y, in.wo.z);
+  const float ends[] = {0.f, 0x1.fffffep-1f};
+  in.l = rng() % 8 == 0 ? ends[rng() % 2] : unit(rng);
+  in.u = rng() % 8 == 0 ? ends[rng() % 2] : unit(rng);
+  in.v = rng() % 8 == 0 ? ends[rng() % 2] : unit(rng);
+  return in;
+}
+
+template <size_t W>
+void expect_packet_equals_scalar(ProgramId id) {
+  using F = FloatP<W>;
+  std::mt19937 rng(101 + W);
+  for (int round = 0; round < 3000 / static_cast<int>(W) * 4; ++round) {
+    const bool schlick = round % 3 == 0;
+    Inputs in[W];
+    for (Inputs& i : in) i = random_inputs(rng);
+    const auto packet = [&](auto get) {
+      float lanes[W];
+      for (size_t i = 0; i < W; ++i) lanes[i] = get(in[i]);
+      return wavecomb::load<F>(lanes);
+    };
+    const auto vec = [&](auto get) {
+      return Vec3<F>(packet([&](const Inputs& i) { return get(i).x; }),
+                     packet([&](const Inputs& i) { return get(i).y; }),
+                     packet([&](const Inputs& i) { return get(i).z; }));
+    };
+    ShadingParams<F> p;
+    p.base_color = vec([](const Inputs& i) { return i.params.base_color; });
+    p.specular_color = vec([](const Inputs& i) { return i.params.specular_color; });
+    p.emission = vec([](const Inputs& i) { return i.params.emission; });
+    p.roughness = packet([](const Inputs& i) { return i.params.roughness; });
+    p.metallic = packet([](const Inputs& i) { return i.params.metallic; });
+    p.clearcoat = packet([](const Inputs& i) { return i.params.clearcoat; });
+    p.clearcoat_roughness = packet([](const Inputs& i) { return i.params.clearcoat_roughness; });
+    p.opacity = packet([](const Inputs& i) { return i.params.opacity; });
+    p.normal = vec([](const Inputs& i) { return i.params.normal; });
+    p.ior = packet([](const Inputs& i) { return i.params.ior; });
+    p.conductor_eta = vec([](const Inputs& i) { return i.params.conductor_eta; });
+    p.conductor_k = vec([](const Inputs& i) { return i.params.conductor_k; });
+    p.flags =
+        float_bits<F>(packet([](const Inputs& i) { return std::bit_cast<float>(i.params.flags); }));
+    float wide[kRecorded * W], narrow[kRecorded];
+    visit_program<F>(id, [&]<typename Bsdf>() {
+      record_bits<Bsdf, F>(Bsdf(p, schlick), vec([](const Inputs& i) { return i.wo; }),
+                           vec([](const Inputs& i) { return i.wi; }),
+                           packet([](const Inputs& i) { return i.l; }),
+                           packet([](const Inputs& i) { return i.u; }),
+                           packet([](const Inputs& i) { return i.v; }), wide);
+    });
+    for (size_t i = 0; i < W; ++i) {
+      visit_program<float>(id, [&]<typename Bsdf>() {
+        record_bits<Bsdf, float>(Bsdf(in[i].params, schlick), in[i].wo, in[i].wi, in[i].l, in[i].u,
+                                 in[i].v, narrow);
+      });
+      for (size_t k = 0; k < kRecorded; ++k)
+        ASSERT_EQ(std::bit_cast<uint32_t>(narrow[k]), std::bit_cast<uint32_t>(wide[k * W + i]))
+            << kProgramNames[static_cast<int>(id)] << " width " << W << " value " << k << ": "
+            << narrow[k] << " and " << wide[k * W + i];
+    }
+  }
+}
+
+TEST(Programs, PacketEqualsScalarBitForBit) {
+  for (uint32_t i = 0; i < kProgramCount; ++i) {
+    const auto id = static_cast<ProgramId>(i);
+    expect_packet_equals_scalar<4>(id);
+    expect_packet_equals_scalar<8>(id);
+    expect_packet_equals_scalar<16>(id);
+  }
+}
+
+TEST(Programs, NoInputGivesNonsense) {
+  std::mt19937 rng(77);
+  for (uint32_t id = 0; id < kProgramCount; ++id)
+    for (int round = 0; round < 60000; ++round) {
+      const Inputs in = random_inputs(rng);
+      visit_program<float>(static_cast<ProgramId>(id), [&]<typename Bsdf>() {
+        const Bsdf bsdf(in.params, round % 3 == 0);
+        const auto e = bsdf.eval(in.wo, in.wi);
+        const auto s = bsdf.sample(in.wo, in.l, in.u, in.v);
+        for (float x :
+             {e.f_cos.x, e.f_cos.y, e.f_cos.z, e.pdf, s.weight.x, s.weight.y, s.weight.z, s.pdf}) {
+          ASSERT_TRUE(std::isfinite(x)) << kProgramNames[id] << " wo " << in.wo.z << " r "
+                                        << in.params.roughness << " ior " << in.params.ior;
+          ASSERT_GE(x, 0.f) << kProgramNames[id] << " wo " << in.wo.z << " r "
+                            << in.params.roughness << " ior " << in.params.ior;
+        }
+        ASSERT_NEAR(length(s.wi), 1.f, 1e-4f) << kProgramNames[id];
+        // Single-lobe weights are bounded by 1 / eta^2, mixed ones by 1 / least lobe probability.
+        ASSERT_LE(max_component(s.weight) * s.eta * s.eta, 120.f) << kProgramNames[id];
+        ASSERT_TRUE(s.pdf > 0 || is_black(s.weight)) << kProgramNames[id];
+      });
+    }
+}
+
+}  // namespace
+}  // namespace wavecomb
