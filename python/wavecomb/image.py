@@ -200,7 +200,9 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
     order = {letter: k for k, letter in enumerate(["R", "G", "B", "A"])}
     for ids in groups.values():
         ids.sort(key=lambda k: order.get(names[k].rpartition(".")[2], len(order)))
-    return {layer: np.ascontiguousarray(pixels[:, :, ids]) for layer, ids in groups.items()}
+    known = list(_SUFFIXES)
+    names_in_order = sorted(groups, key=lambda name: known.index(name) if name in known else 99)
+    return {name: np.ascontiguousarray(pixels[:, :, groups[name]]) for name in names_in_order}
 
 
 def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:

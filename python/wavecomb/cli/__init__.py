@@ -8,13 +8,23 @@ import click
 from wavecomb.cli.compare import compare_command
 from wavecomb.cli.group import Commands, print_version
 from wavecomb.cli.info import info_command
+from wavecomb.cli.options import examples
 from wavecomb.cli.render import render_command
 from wavecomb.cli.scene import scene_command
 
 __all__ = ["main"]
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Commands,
+    epilog=examples(
+        "wavecomb scene mixed -o mixed.usdc",
+        "wavecomb info mixed.usdc",
+        "wavecomb render mixed.usdc -o mixed.exr --png mixed.png",
+        "wavecomb compare mixed.exr other.exr --heatmap difference.png",
+    ),
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -24,14 +34,7 @@ __all__ = ["main"]
     help="Show the version and exit.",
 )
 def main() -> None:
-    r"""Wavecomb: a CPU path tracer for OpenUSD stages.
-
-    \b
-    Examples:
-      wavecomb scene mixed -o mixed.usdc
-      wavecomb info mixed.usdc
-      wavecomb render mixed.usdc -o mixed.exr --png mixed.png
-      wavecomb compare mixed.exr other.exr --heatmap difference.png
+    """Wavecomb: a CPU path tracer for OpenUSD stages.
 
     Exit codes: 0 done, 1 pictures differ (compare), 2 an error, 130 stopped by Ctrl-C.
     `wavecomb COMMAND --help` says more.

@@ -8,10 +8,17 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import Real
+from wavecomb.cli.options import Real, examples
 
 
-@click.command("compare")
+@click.command(
+    "compare",
+    epilog=examples(
+        "wavecomb compare new.exr reference.exr",
+        "wavecomb compare new.exr reference.exr --heatmap difference.png",
+        "wavecomb compare new.exr reference.exr --tolerance 1e-4 --json",
+    ),
+)
 @click.argument("a", type=click.Path())
 @click.argument("b", type=click.Path())
 @click.option("--heatmap", type=click.Path(), metavar="FILE.png", help="Where they differ.")
@@ -25,13 +32,7 @@ from wavecomb.cli.options import Real
 def compare_command(
     a: str, b: str, heatmap: str | None, as_json: bool, tolerance: float | None
 ) -> None:
-    r"""Say how picture A differs from picture B, the reference.
-
-    \b
-    Examples:
-      wavecomb compare new.exr reference.exr
-      wavecomb compare new.exr reference.exr --heatmap difference.png
-      wavecomb compare new.exr reference.exr --tolerance 1e-4 --json
+    """Say how picture A differs from picture B, the reference.
 
     Equal means bit for bit, in every layer that both have. relMSE is the mean of
     (A - B)^2 / (B^2 + 0.01). Pixels with a NaN or an infinity in A or B are counted and left out of

@@ -7,10 +7,16 @@ import json
 
 import click
 
-from wavecomb.cli.options import load, stage_options, stage_warnings, warn
+from wavecomb.cli.options import examples, load, stage_options, stage_warnings, warn
 
 
-@click.command("info")
+@click.command(
+    "info",
+    epilog=examples(
+        "wavecomb info shot.usd",
+        "wavecomb info shot.usd --json | jq .triangles",
+    ),
+)
 @stage_options
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 def info_command(
@@ -20,13 +26,7 @@ def info_command(
     purposes: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    r"""Say what would be rendered of STAGE, and what would not.
-
-    \b
-    Examples:
-      wavecomb info shot.usd
-      wavecomb info shot.usd --json | jq .triangles
-    """
+    """Say what would be rendered of STAGE, and what would not."""
     from wavecomb.info import print_info, stage_info
 
     loaded = load(stage, camera, frame, purposes)

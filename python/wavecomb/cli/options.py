@@ -37,6 +37,11 @@ class Real(click.ParamType):
         return number
 
 
+def examples(*lines: str) -> str:
+    """The end of a help text."""
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
+
+
 def stage_options(command: F) -> F:
     """STAGE, --camera, --frame and --purpose."""
     for option in (

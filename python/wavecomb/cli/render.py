@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wavecomb.cli.group import INTERRUPTED
-from wavecomb.cli.options import Real, load, stage_options, stage_warnings, warn
+from wavecomb.cli.options import Real, examples, load, stage_options, stage_warnings, warn
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 _INTEGERS = click.IntRange(min=0)
 
 
-@click.command("render")
+@click.command(
+    "render",
+    epilog=examples(
+        "wavecomb render shot.usd -o shot.exr",
+        "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256",
+        "wavecomb render shot.usd -o shot.exr --camera /World/Cam --frame 101 --stats shot.json",
+    ),
+)
 @stage_options
 @click.option(
     "-o",
@@ -101,13 +108,7 @@ def render_command(
     filter_: str | None,
     **options: Any,
 ) -> None:
-    r"""Render STAGE to an OpenEXR file.
-
-    \b
-    Examples:
-      wavecomb render shot.usd -o shot.exr
-      wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256
-      wavecomb render shot.usd -o shot.exr --camera /World/Cam --frame 101 --stats shot.json
+    """Render STAGE to an OpenEXR file.
 
     The file has the layers beauty (R, G, B), albedo, normal, depth and samples. Ctrl-C stops and
     writes what is done (exit code 130). Files are written whole or not at all.

@@ -8,10 +8,17 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import Real
+from wavecomb.cli.options import Real, examples
 
 
-@click.command("scene")
+@click.command(
+    "scene",
+    epilog=examples(
+        "wavecomb scene --list",
+        "wavecomb scene mixed -o mixed.usdc",
+        "wavecomb scene cornell-dragon -o box.usda --dragon dragon.obj",
+    ),
+)
 @click.argument("name", required=False)
 @click.option("-o", "--output", type=click.Path(), metavar="FILE", help=".usda, .usdc or .usd.")
 @click.option("--list", "list_", is_flag=True, help="List the scenes.")
@@ -22,14 +29,7 @@ from wavecomb.cli.options import Real
 @click.option("--aspect", type=Real(0, above=True), metavar="X", help="Width / height.")
 @click.option("--material", metavar="NAME", help="cornell-dragon: gold, copper, glass, jade.")
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
-    r"""Write one of our own test stages, and its textures beside it.
-
-    \b
-    Examples:
-      wavecomb scene --list
-      wavecomb scene mixed -o mixed.usdc
-      wavecomb scene cornell-dragon -o box.usda --dragon dragon.obj
-    """
+    """Write one of our own test stages, and its textures beside it."""
     from wavecomb.errors import WavecombError
     from wavecomb.scenes import SCENES, write_scene
 

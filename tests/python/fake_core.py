@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stand-in for the native module and the loader: the command line alone, in no time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from wavecomb.errors import WavecombError
+
+import wavecomb
+
+
+class Error(ValueError):
+    pass
+
+
+class Settings:
+    def __init__(self, **settings: Any) -> None:
+        self.__dict__.update({"width": 600, "height": 600, "spp": 64, "seed": 0, **settings})
+
+    def check(self) -> None:
+        if self.__dict__.get("lanes") == 4:
+            raise Error("setting lanes: 4 is not built; there are 1, 8")
+
+    def to_dict(self) -> dict[str, Any]:
+        return dict(self.__dict__)
+
+
+class Finding(SimpleNamespace):
+    def line(self) -> str:
+        return f"{self.what}: {self.place}"
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"what": self.what, "count": 1, "places": [self.place]}
+
+
+class Fake:
+    """Knobs of the stand-in."""
+
+    def __init__(self) -> None:
+        self.interrupt_at: float | None = None
+        self.nan_pixels = 0
+        self.fail: Exception | None = None
+        self.loaded: list[dict[str, Any]] = []
+        self.rendered: list[dict[str, Any]] = []
+
+    def load_stage(self, path: Path, **options: Any) -> Any:
+        if not Path(path).exists():
+            raise WavecombError(f"{path}: no such file")
+        if options.get("camera") == "/Nowhere":
+            raise WavecombError("no camera /Nowhere\nthere are: /Camera")
+        self.loaded.append({"path": path, **options})
+        scene = SimpleNamespace(
+            triangles=1000,
+            instanced_triangles=90000,
+            mesh_count=2,
+            instance_count=90,
+            light_count=3,
+            materials=[("Gold", "metal"), ("Silver", "metal"), ("Chalk", "diffuse")],
+            textures=[("wood.png", 4_000_000), ("stone.png", 1_000_000)],
+            warnings=["mesh /Bad: 3 triangles left out"],
+            bounds=((-1.0, 0.0, -1.0), (1.0, 2.0, 1.0)),
+        )
+        report = SimpleNamespace(
+            unsupported=[Finding(what="volumes", place="/Smoke")],
+            warnings=[Finding(what="missing texture", place="./wood.png")],
+            notes=[Finding(what="no light", place="/")],
+            counts={"Mesh": 2, "RectLight": 3, "Camera": 1},
+        )
+        return SimpleNamespace(scene=scene, report=report, camera_path="/Camera", seconds=0.25)
+
+    def render(self, scene: Any, settings: Settings, progress: Any = None) -> Any:
+        if self.fail is not None:
+            raise self.fail
+        self.rendered.append(settings.to_dict())
+        width, height, total = settings.width, settings.height, settings.spp
+        total_samples, done, cancelled = width * height * total, 0, False
+        for step in range(11):
+            done = total_samples * step // 10
+            if self.interrupt_at is not None and step / 10 >= self.interrupt_at:
+                os.kill(os.getpid(), signal.SIGINT)
+            if progress is not None and progress(done, total_samples) is False:
+                cancelled = True
+                break
+        y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+        beauty = np.stack([x / width, y / height, np.full_like(x, 2.0)], axis=2)
+        beauty[0, : self.nan_pixels] = np.nan
+        return SimpleNamespace(
+            beauty=beauty,
+            albedo=beauty * 0.5,
+            normal=beauty - 0.5,
+            depth=np.where(x < 1, np.inf, x + 1).astype(np.float32),
+            samples=np.full((height, width), total, np.uint32),
+            cancelled=cancelled,
+            stats={
+                "settings": settings.to_dict(),
+                "seconds": {"build": 0.1, "render": 0.5},
+                "phases_s": {"trace": 0.3, "shade": 0.2},
+                "counts": {"samples": done, "rays": 3 * done, "shadow_rays": done, "records": done},
+                "samples_per_s": done / 0.5,
+                "rays_per_s": 4 * done / 0.5,
+                "peak_rss_bytes": 123_000_000,
+            },
+        )
+
+
+def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
+    """Puts the stand-in where the native module and the loader are imported from."""
+    fake = Fake()
+    core = ModuleType("wavecomb._core")
+    usd = ModuleType("wavecomb.usd")
+    for name, value in {
+        "Error": Error,
+        "Settings": Settings,
+        "render": fake.render,
+        "build_info": lambda: {"version": "0", "isa": "none"},
+        "lane_widths": lambda: [1, 8],
+    }.items():
+        setattr(core, name, value)
+    usd.load_stage = fake.load_stage  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "wavecomb._core", core)
+    monkeypatch.setitem(sys.modules, "wavecomb.usd", usd)
+    monkeypatch.setattr(wavecomb, "_core", core, raising=False)
+    monkeypatch.setattr(wavecomb, "usd", usd, raising=False)
+    return fake

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_core import Fake, install
+from wavecomb.errors import WavecombError
+from wavecomb.image import read_image, read_layers
+from wavecomb.stats import COUNTS, PHASES, write_stats
+
+import wavecomb
+
+
+@pytest.fixture
+def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
+    return install(monkeypatch)
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Path:
+    path = tmp_path / "stage.usda"
+    path.write_text("#usda 1.0\n")
+    return path
+
+
+def test_names() -> None:
+    for name in ("load", "render", "compare", "SceneBuilder", "Settings", "Picture"):
+        assert name in wavecomb.__all__
+        assert name in dir(wavecomb)
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = wavecomb.nonsense
+
+
+def test_import_is_light() -> None:
+    code = "import sys, wavecomb; assert 'numpy' not in sys.modules and callable(wavecomb.compare)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
+    calls: list[tuple[int, int]] = []
+
+    def progress(done: int, total: int) -> None:
+        calls.append((done, total))
+
+    picture = wavecomb.render(
+        stage, size=(32, 16), spp=2, progress=progress, camera="/C", frame=3.0, max_depth=4
+    )
+    assert fake.loaded[0] == {"path": stage, "camera": "/C", "frame": 3.0}
+    assert fake.rendered[0]["max_depth"] == 4
+    assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)
+    assert picture.depth.shape == picture.samples.shape == (16, 32)
+    assert calls[-1] == (1024, 1024)
+    assert not picture.cancelled
+    picture.save(tmp_path / "a.exr")
+    picture.save(tmp_path / "a.png", exposure=1, tone_map="neutral")
+    assert read_layers(tmp_path / "a.exr")["beauty"].tobytes() == picture.beauty.tobytes()
+    assert read_image(tmp_path / "a.png").shape == (16, 32, 3)
+    assert wavecomb.compare(picture, tmp_path / "a.exr").equal
+    with pytest.raises(ValueError, match=r"\.exr or \.png"):
+        picture.save(tmp_path / "a.jpg")
+
+
+def test_render_a_loaded_stage_and_a_scene(fake: Fake, stage: Path) -> None:
+    loaded = wavecomb.load(stage)
+    a = wavecomb.render(loaded, size=(4, 4), spp=1)
+    b = wavecomb.render(loaded.scene, size=(4, 4), spp=1)
+    assert wavecomb.compare(a, b).equal
+    assert a.stats["seconds"]["load"] == 0.25
+    assert b.stats["seconds"]["load"] == 0.0
+    assert len(fake.loaded) == 1
+    with pytest.raises(TypeError, match=r"load\(\)"):
+        wavecomb.render(loaded, camera="/C")
+
+
+def test_cancel(fake: Fake, stage: Path) -> None:
+    picture = wavecomb.render(stage, size=(10, 10), spp=10, progress=lambda done, _: done < 500)
+    assert picture.cancelled
+    assert picture.stats["cancelled"] is True
+    assert picture.stats["counts"]["samples"] == 500
+
+
+def test_schema(fake: Fake, stage: Path) -> None:
+    stats = wavecomb.render(stage, size=(4, 4), spp=1).stats
+    assert list(stats) == [
+        *("schema", "version", "stage", "camera", "cancelled", "settings", "seconds"),
+        *("phases_s", "counts", "samples_per_s", "rays_per_s", "peak_rss_bytes", "machine"),
+        *("unsupported", "warnings"),
+    ]
+    assert set(stats["phases_s"]) == set(PHASES)
+    assert set(stats["counts"]) == set(COUNTS)
+    assert stats["machine"]["cores"] >= 1
+    assert stats["unsupported"] == ["volumes: /Smoke"]
+    assert len(stats["warnings"]) == 2
+
+
+@pytest.mark.parametrize("size", [(0, 1), (1, -1), (65537, 1), (65536, 65536)])
+def test_bad_sizes(fake: Fake, stage: Path, size: tuple[int, int]) -> None:
+    with pytest.raises(WavecombError, match="size"):
+        wavecomb.render(stage, size=size)
+    assert fake.loaded == []
+
+
+def test_bad_spp(fake: Fake, stage: Path) -> None:
+    for spp in (0, -1, 1 << 40):
+        with pytest.raises(WavecombError, match="samples per pixel"):
+            wavecomb.render(stage, spp=spp)
+
+
+def test_stats_file_is_plain_json(tmp_path: Path) -> None:
+    stats: dict[str, Any] = {
+        "a": np.float32(0.5),
+        "b": float("nan"),
+        "c": (np.int64(3), np.bool_(True)),
+        "d": Path("x"),
+    }
+    write_stats(tmp_path / "s.json", stats)
+    document = json.loads((tmp_path / "s.json").read_text())
+    assert document == {"a": 0.5, "b": None, "c": [3, True], "d": "x"}

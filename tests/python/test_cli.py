@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from fake_core import Error, Fake, install
+from wavecomb.cli import main
+from wavecomb.image import read_layers, read_metadata, write_exr
+
+
+@pytest.fixture
+def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
+    return install(monkeypatch)
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> str:
+    path = tmp_path / "stage.usda"
+    path.write_text("#usda 1.0\n")
+    return str(path)
+
+
+def run(*arguments: Any) -> Result:
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert "Traceback" not in result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def error_line(result: Result) -> str:
+    assert result.exit_code == 2, result.output
+    lines = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
+    assert len(lines) == 1
+    assert lines[0].startswith("error: ")
+    return lines[0]
+
+
+# ---- render, with a stand-in for the core --------------------------------------------------------
+
+
+def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> None:
+    out, png, stats = tmp_path / "a.exr", tmp_path / "a.png", tmp_path / "a.json"
+    result = run(
+        *("render", stage, "-o", out, "--png", png, "--stats", stats, "--size", 40, 30),
+        *("--spp", 4, "--camera", "/Cam", "--frame", 7, "--lanes", "8", "--seed", 3),
+        *("--filter", "box", "--filter-width", 1, "--roulette", "off", "--fresnel", "schlick"),
+        *("--integrator", "reference", "--threads", 1, "--wave-size", 64, "--sampler", "sobol"),
+        *("--clamp-indirect", 2.5, "--max-depth", 5),
+    )
+    assert result.exit_code == 0, result.output
+    assert fake.loaded[0]["camera"] == "/Cam"
+    assert fake.loaded[0]["frame"] == 7.0
+    assert fake.rendered[0] == {
+        "width": 40, "height": 30, "spp": 4, "lanes": 8, "seed": 3, "filter": "box",
+        "filter_width": 1.0, "roulette": "off", "fresnel": "schlick", "integrator": "reference",
+        "threads": 1, "wave_size": 64, "sampler": "sobol", "clamp_indirect": 2.5, "max_depth": 5,
+    }  # fmt: skip
+    layers = read_layers(out)
+    assert list(layers) == ["beauty", "albedo", "normal", "depth", "samples"]
+    assert layers["beauty"].shape == (30, 40, 3)
+    metadata = read_metadata(out)
+    assert metadata["wavecomb:stage"] == stage
+    assert json.loads(metadata["wavecomb:settings"])["spp"] == 4
+    assert metadata["wavecomb:render_seconds"] == pytest.approx(0.5)
+    assert png.stat().st_size > 0
+    document = json.loads(stats.read_text())
+    assert document["schema"] == "wavecomb-statistics/1"
+    assert document["seconds"] == {"load": 0.25, "build": 0.1, "render": 0.5}
+    assert document["counts"]["samples"] == 4800
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "a.exr", "a.json", "a.png", "stage.usda"
+    ]  # fmt: skip
+
+
+def test_defaults(fake: Fake, stage: str, tmp_path: Path) -> None:
+    assert run("render", stage, "-o", tmp_path / "a.exr").exit_code == 0
+    assert fake.rendered == [{"width": 600, "height": 600, "spp": 64, "seed": 0}]
+    assert fake.loaded[0]["camera"] is None
+    assert "purposes" not in fake.loaded[0]
+
+
+def test_summary_and_warnings(fake: Fake, stage: str, tmp_path: Path) -> None:
+    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8)
+    assert "load 0.250 s, build 0.100 s, render 0.500 s" in result.stdout
+    assert "trace" in result.stdout
+    assert "60.0" in result.stdout
+    assert "peak memory 123 MB" in result.stdout
+    assert result.stdout.count("volumes: /Smoke") == 1
+    assert result.stderr.splitlines() == [
+        "warning: missing texture: ./wood.png",
+        "warning: mesh /Bad: 3 triangles left out",
+    ]
+
+
+def test_quiet(fake: Fake, stage: str, tmp_path: Path) -> None:
+    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8, "--quiet")
+    assert result.stdout == ""
+    assert result.stderr.count("warning: ") == 2
+
+
+def test_nan_pixels_are_said(fake: Fake, stage: str, tmp_path: Path) -> None:
+    fake.nan_pixels = 5
+    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8)
+    assert result.exit_code == 0
+    assert "warning: 5 pixels of the picture are not finite" in result.stderr
+
+
+def test_interrupt_keeps_what_is_done(fake: Fake, stage: str, tmp_path: Path) -> None:
+    fake.interrupt_at = 0.4
+    before = signal.getsignal(signal.SIGINT)
+    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 10, 10)
+    assert result.exit_code == 130
+    assert "stopped at 40 %" in result.stderr
+    assert read_layers(tmp_path / "a.exr")["beauty"].shape == (10, 10, 3)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Path) -> None:
+    fake.interrupt_at = 0.0
+    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 10, 10)
+    assert result.exit_code == 130
+    assert not (tmp_path / "a.exr").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--size", 0, 10], "size 0 x 10"),
+        (["--size", -5, 10], "size -5 x 10"),
+        (["--size", 65537, 10], "from 1 to 65536"),
+        (["--size", 65536, 65536], "GiB of memory"),
+        (["--size", "x", 10], "'x' is not a valid integer"),
+        (["--spp", 0], "0 samples per pixel"),
+        (["--camera", "/Nowhere"], "no camera /Nowhere there are: /Camera"),
+        (["--lanes", 4], "setting lanes: 4 is not built"),
+        (["--lanes", 5], "'5' is not one of"),
+        (["--filter-width", 0], "must be above 0"),
+        (["--filter-width", "nan"], "not a finite number"),
+        (["--clamp-indirect", -1], "at least 0"),
+        (["--exposure", "inf"], "not a finite number"),
+        (["--frame", "x"], "'x' is not a number"),
+        (["--png", "a.exr"], "must end in .png"),
+        (["--png", "/nowhere/a.png"], "/nowhere does not exist"),
+        (["--stats", "/nowhere/a.json"], "/nowhere does not exist"),
+        (["--nonsense"], "No such option"),
+    ],
+)
+def test_bad_options(
+    fake: Fake, stage: str, tmp_path: Path, arguments: list[Any], says: str
+) -> None:
+    result = run("render", stage, "-o", tmp_path / "a.exr", *arguments)
+    assert says in error_line(result)
+    assert fake.rendered == []
+    assert [path.name for path in tmp_path.iterdir()] == ["stage.usda"]
+
+
+@pytest.mark.parametrize(
+    ("output", "says"),
+    [
+        ("/nowhere/a.exr", "/nowhere does not exist"),
+        ("{tmp}", "must end in .exr"),
+        ("{tmp}/folder.exr", "is a folder"),
+        ("{tmp}/stage.usda/a.exr", "is not a folder"),
+        ("{tmp}/pipe.exr", "is not a regular file"),
+        ("a.png", "must end in .exr"),
+    ],
+)
+def test_bad_output(fake: Fake, stage: str, tmp_path: Path, output: str, says: str) -> None:
+    (tmp_path / "folder.exr").mkdir()
+    os.mkfifo(tmp_path / "pipe.exr")
+    result = run("render", stage, "-o", output.replace("{tmp}", str(tmp_path)))
+    assert says in error_line(result)
+    assert fake.loaded == []
+    assert stat.S_ISFIFO((tmp_path / "pipe.exr").stat().st_mode)
+
+
+def test_outputs_must_differ(fake: Fake, stage: str, tmp_path: Path) -> None:
+    out = tmp_path / "a.exr"
+    assert "is the same file as -o" in error_line(run("render", stage, "-o", out, "--stats", out))
+    assert "is the same file as the stage" in error_line(
+        run("render", stage, "-o", out, "--stats", stage)
+    )
+    assert Path(stage).read_text() == "#usda 1.0\n"
+
+
+def test_failed_render_keeps_the_old_file(fake: Fake, stage: str, tmp_path: Path) -> None:
+    out = tmp_path / "a.exr"
+    out.write_text("old")
+    for problem in (Error("mesh /M:\nbad"), MemoryError(), RuntimeError("boom"), OSError("full")):
+        fake.fail = problem
+        error_line(run("render", stage, "-o", out))
+        assert out.read_text() == "old"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_missing_stage(fake: Fake, tmp_path: Path) -> None:
+    assert "no.usd: no such file" in error_line(run("render", "no.usd", "-o", tmp_path / "a.exr"))
+    assert "no.usd: no such file" in error_line(run("info", "no.usd"))
+
+
+# ---- info, scene, compare, help ------------------------------------------------------------------
+
+
+def test_info(fake: Fake, stage: str) -> None:
+    result = run("info", stage)
+    assert result.exit_code == 0
+    for text in ("1,000 (90,000 with", "1 diffuse, 2 metal", "5.0 MB", "3 RectLight", "/Smoke"):
+        assert text in result.stdout
+    assert "missing texture" in result.stderr
+
+
+def test_info_json(fake: Fake, stage: str) -> None:
+    info = json.loads(run("info", stage, "--json").stdout)
+    assert info["triangles"] == {"unique": 1000, "instanced": 90000}
+    assert info["materials"] == {"count": 3, "by_program": {"diffuse": 1, "metal": 2}}
+    assert info["textures"]["bytes"] == 5_000_000
+    assert info["unsupported"] == [{"what": "volumes", "count": 1, "places": ["/Smoke"]}]
+
+
+def test_scene_list() -> None:
+    result = run("scene", "--list")
+    assert result.exit_code == 0
+    assert "cornell" in result.stdout
+    assert "mixed" in result.stdout
+
+
+def test_scene(tmp_path: Path) -> None:
+    out = tmp_path / "box.usda"
+    assert run("scene", "cornell", "-o", out).exit_code == 0
+    assert out.read_text().startswith("#usda")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "give a NAME and -o FILE"),
+        (["cornell"], "give a NAME and -o FILE"),
+        (["nonsense", "-o", "a.usda"], "no scene 'nonsense'"),
+        (["cornell", "-o", "a.txt"], ".usda, .usdc or .usd"),
+        (["cornell", "-o", "/nowhere/a.usda"], "/nowhere does not exist"),
+        (["cornell", "-o", "a.usda", "--triangles", "0"], "--triangles"),
+        (["cornell-dragon", "-o", "a.usda", "--dragon", "no.obj"], "no.obj"),
+    ],
+)
+def test_bad_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], says: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert says in error_line(run("scene", *arguments))
+    assert list(tmp_path.glob("*.usd*")) == []
+
+
+def test_compare(tmp_path: Path) -> None:
+    a, b, other = tmp_path / "a.exr", tmp_path / "b.exr", tmp_path / "other.exr"
+    picture = np.full((4, 6, 3), 0.5, np.float32)
+    write_exr(a, {"beauty": picture})
+    write_exr(other, {"beauty": picture[:2]})
+    changed = picture.copy()
+    changed[1, 2] += 0.25
+    write_exr(b, {"beauty": changed})
+
+    assert run("compare", a, a).exit_code == 0
+    result = run("compare", b, a, "--heatmap", tmp_path / "h.png")
+    assert result.exit_code == 1
+    assert "different: 1 of 24 pixels" in result.stdout
+    assert "max 0.25 at (2, 1)" in result.stdout
+    assert (tmp_path / "h.png").exists()
+    document = json.loads(run("compare", b, a, "--json").stdout)
+    assert document["equal"] is False
+    assert document["mean_signed"] == pytest.approx([0.25 / 24] * 3)
+    assert run("compare", b, a, "--tolerance", 0.3).exit_code == 0
+    assert run("compare", b, a, "--tolerance", 0.2).exit_code == 1
+    assert "only pictures of one size" in error_line(run("compare", a, other))
+    assert "no such file" in error_line(run("compare", a, tmp_path / "no.exr"))
+    assert "must end in .png" in error_line(run("compare", a, b, "--heatmap", "h.exr"))
+    other.write_text("no picture")
+    assert "cannot be read as a picture" in error_line(run("compare", a, other))
+
+
+@pytest.mark.parametrize("command", [[], ["render"], ["info"], ["scene"], ["compare"]])
+def test_help_has_examples(command: list[str]) -> None:
+    result = run(*command, "--help")
+    assert result.exit_code == 0
+    assert "Examples:\n" in result.stdout
+    assert "  wavecomb " in result.stdout
+
+
+def test_version() -> None:
+    assert run("--version").stdout.startswith("wavecomb ")
+
+
+def test_unknown_command() -> None:
+    assert "No such command" in error_line(run("redner"))
+
+
+def test_starts_quickly_and_lazily() -> None:
+    code = (
+        "import sys; from wavecomb.cli import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'pxr', 'OpenImageIO', 'rich', 'wavecomb._core'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    best = 9.0
+    for _ in range(3):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+        best = min(best, time.perf_counter() - start)
+    assert best < 0.6  # 0.06 s where nothing else runs
+
+
+def test_python_m() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "wavecomb", "--help"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("Usage: wavecomb ")
