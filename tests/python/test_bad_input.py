@@ -189,8 +189,8 @@ def test_missing_texture_is_seen(tmp_path: Path, out: Path) -> None:
         mesh(points="[]"),
     ],
     ids=[
-        "nan", "inf", "minus inf", "index one past", "negative index", "huge index", "too few indices",
-        "count too large", "negative count", "huge count", "no points",
+        "nan", "inf", "minus inf", "index one past", "negative index", "huge index",
+        "too few indices", "count too large", "negative count", "huge count", "no points",
     ],
 )  # fmt: skip
 def test_broken_mesh_is_named(tmp_path: Path, out: Path, bad: str) -> None:

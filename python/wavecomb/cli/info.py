@@ -37,4 +37,4 @@ def info_command(
     from rich.console import Console
 
     warn(stage_warnings(loaded))
-    print_info(info, loaded, Console())
+    print_info(info, loaded, Console(emoji=False))

@@ -142,7 +142,7 @@ def render_command(
 def _console() -> Console:
     from rich.console import Console
 
-    return Console(stderr=True)
+    return Console(stderr=True, emoji=False)
 
 
 def _check_outputs(stage: str, output: str, png: str | None, stats_file: str | None) -> None:
@@ -231,7 +231,7 @@ def _summary(picture: Any, loaded: Any, files: list[str]) -> None:
     from wavecomb.progress import count_text, time_text
 
     stats = picture.stats
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, emoji=False, soft_wrap=True)
     seconds, counts = stats["seconds"], stats["counts"]
     rays = counts["rays"] + counts["shadow_rays"]
     console.print(
