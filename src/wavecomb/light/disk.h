@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Disk lights (ellipses, where their transform stretches): uniform over the area.
+#pragma once
+
+#include "wavecomb/light/record.h"
+
+namespace wavecomb::detail {
+
+/// A point p + a u + b v with (a, b) uniform in the unit disk, so of density 1 / area; towards n only.
+template <typename F>
+inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& from, const F& u, const F& v) {
+  const Vec2<F> ab = square_to_disk(u, v);
+  const Vec3<F> q = fma(light.u(), ab.x, fma(light.v(), ab.y, light.p()));
+  const Direction<F> d = make_direction<F>(q - from);
+  const F cos_light = -dot(d.wi, light.n());
+  return {d.wi, d.length, light.radiance(), area_to_solid_angle<F>(d.length2, cos_light, light.area()),
+          Mask<F>(false)};
+}
+
+/// What a ray gets from the disk at distance t.
+template <typename F>
+inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, const F& t) {
+  const F cos_light = -dot(dir, light.n());
+  const Mask<F> front = cos_light > 0.f;
+  return {select<F>(front, light.radiance(), Color<F>(F(0.f))),
+          area_to_solid_angle<F>(F(t * t), cos_light, light.area())};
+}
+
+}  // namespace wavecomb::detail

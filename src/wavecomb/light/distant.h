@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Distant lights: a cone of directions, or a single one.
+#pragma once
+
+#include "wavecomb/core/frame.h"
+#include "wavecomb/light/record.h"
+
+namespace wavecomb::detail {
+
+/// 1 / (2 pi (1 - cos)): uniform over the cone.
+template <typename F>
+inline F distant_pdf(const F& one_minus_cos) {
+  const F pdf = kInv2Pi / select(one_minus_cos > 0.f, one_minus_cos, F(1.f));
+  return select((one_minus_cos > 0.f) & is_finite(pdf), pdf, F(0.f));
+}
+
+/// A direction in the cone around -n; of angle 0: -n, and `radiance` is the irradiance.
+template <typename F>
+inline KindSample<F> sample_distant(const LightReader<F>& light, const F& u, const F& v) {
+  const Vec3<F> axis = -light.n();
+  const F one_minus_cos = light.one_minus_cos();
+  const Mask<F> is_delta = one_minus_cos == 0.f;
+  const Vec3<F> wi = make_frame(axis).to_world(square_to_cone(u, v, one_minus_cos));
+  return {select<F>(is_delta, axis, wi), F(kFarAway), light.radiance(),
+          select(is_delta, F(1.f), distant_pdf<F>(one_minus_cos)), is_delta};
+}
+
+/// What a ray that left the scene gets. With both unit, 1 - cos(angle) = |dir - axis|^2 / 2, which is
+/// exact for small angles, where 1 - dot(dir, axis) is not.
+template <typename F>
+inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
+  const F one_minus_cos = light.one_minus_cos();
+  const Vec3<F> difference = dir + light.n();
+  const Mask<F> inside = (one_minus_cos > 0.f) & (length_squared(difference) * 0.5f <= one_minus_cos);
+  return {select<F>(inside, light.radiance(), Color<F>(F(0.f))),
+          select(inside, distant_pdf<F>(one_minus_cos), F(0.f))};
+}
+
+}  // namespace wavecomb::detail

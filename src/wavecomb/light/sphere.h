@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Sphere lights, which shine outwards, and point lights.
+#pragma once
+
+#include "wavecomb/core/frame.h"
+#include "wavecomb/light/record.h"
+
+namespace wavecomb::detail {
+
+/// The cone of directions in which a sphere is seen.
+template <typename F>
+struct SphereCone {
+  Vec3<F> axis;      ///< unit, to the centre
+  F distance2, distance;  ///< to the centre
+  F one_minus_cos;   ///< of the half angle, exact also for small ones
+  Mask<F> outside;   ///< the point sees the sphere from outside; else nothing of it
+};
+
+/// sin^2 = r^2 / d^2, and 1 - cos = sin^2 / (1 + cos) rather than a difference near 0.
+template <typename F>
+inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>& from) {
+  const Direction<F> d = make_direction<F>(light.p() - from);
+  const F radius = light.radius();
+  const F r2 = radius * radius;
+  const Mask<F> outside = (d.length2 > r2) & (d.length2 > 0.f);
+  const F sin2 = r2 / select(outside, d.length2, F(1.f));
+  return {d.wi, d.length2, d.length, sin2 / (1.f + safe_sqrt(F(1.f - sin2))), outside};
+}
+
+/// 1 / (2 pi (1 - cos)): uniform over the cone. 0 from inside, and where the sphere is too small to see.
+template <typename F>
+inline F sphere_cone_pdf(const SphereCone<F>& cone) {
+  const Mask<F> good = cone.outside & (cone.one_minus_cos > 0.f);
+  const F pdf = kInv2Pi / select(good, cone.one_minus_cos, F(1.f));
+  return select(good & is_finite(pdf), pdf, F(0.f));
+}
+
+/// A direction uniform in the cone that the sphere fills (P. Shirley, C. Wang, K. Zimmerman, "Monte
+/// Carlo Techniques for Direct Lighting Calculations", ACM TOG 15(1) 1996); radius 0: its centre.
+template <typename F>
+inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& from, const F& u, const F& v) {
+  const SphereCone<F> cone = make_sphere_cone<F>(light, from);
+  const F radius = light.radius();
+  const Mask<F> is_point = radius == 0.f;
+
+  const Vec3<F> local = square_to_cone(u, v, cone.one_minus_cos);
+  const Vec3<F> wi = make_frame(cone.axis).to_world(local);
+  // The near crossing: d cos - sqrt(r^2 - d^2 sin^2).
+  const F sin2 = fma(local.x, local.x, F(local.y * local.y));
+  const F half_chord = safe_sqrt(F(radius * radius - cone.distance2 * sin2));
+  const F near = max(fma(cone.distance, local.z, F(-half_chord)), F(0.f));
+
+  const F inverse2 = 1.f / select(cone.distance2 > 0.f, cone.distance2, F(1.f));
+  const Color<F> radiance = light.radiance();
+  const F point_pdf = select((cone.distance2 > 0.f) & is_finite(inverse2), F(1.f), F(0.f));
+  return {select<F>(is_point, cone.axis, wi), select(is_point, cone.distance, near),
+          select<F>(is_point, Color<F>(radiance * inverse2), radiance),
+          select(is_point, point_pdf, sphere_cone_pdf<F>(cone)), is_point};
+}
+
+/// What a ray from `origin` that met the sphere gets.
+template <typename F>
+inline KindHit<F> hit_sphere(const LightReader<F>& light, const Vec3<F>& origin) {
+  const SphereCone<F> cone = make_sphere_cone<F>(light, origin);
+  return {select<F>(cone.outside, light.radiance(), Color<F>(F(0.f))), sphere_cone_pdf<F>(cone)};
+}
+
+}  // namespace wavecomb::detail
