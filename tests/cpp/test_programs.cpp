@@ -269,6 +269,22 @@ TEST(Programs, LosslessMaterialsPassTheWhiteFurnace) {
       0.99999);
 }
 
+TEST(Programs, MultipleScatteringKeepsTheEnergyOfMetals) {
+  // The fit is within 2 % (see LostEnergy).
+  for (float alpha : {0.1f, 0.2f, 0.3f, 0.5f, 0.7f, 1.f})
+    for (const ProgramId id : {ProgramId::kMetal, ProgramId::kPrincipled}) {
+      const Case c = make_case("white metal", id, [&](P& p) {
+        p.base_color = Vec(1, 1, 1), p.metallic = 1, p.roughness = std::sqrt(alpha);
+      });
+      with_bsdf(c, [&](const auto& bsdf) {
+        for (double z : {0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0}) {
+          EXPECT_GE(furnace(bsdf, direction(z, 1)), 0.975) << alpha << " " << z;
+          EXPECT_LE(furnace(bsdf, direction(z, 1)), 1.003) << alpha << " " << z;
+        }
+      });
+    }
+}
+
 /// The values of one sample and one evaluation, as bits.
 template <typename Bsdf, typename F>
 void record_bits(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi, const F& l, const F& u,

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "metal": a GGX conductor, alike from both sides.
+/// Program "metal": a GGX conductor with multiple scattering, alike from both sides.
 #pragma once
 
 #include "wavecomb/material/bsdf.h"
 #include "wavecomb/material/lobes/fresnel.h"
 #include "wavecomb/material/lobes/lambert.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
+#include "wavecomb/material/lobes/multiple_scattering.h"
 
 namespace wavecomb {
 
@@ -35,35 +36,40 @@ class MetalBsdf {
     const F alpha = alpha_from_roughness(roughness_);
     smooth_ = alpha < kDeltaAlpha;
     ggx_.alpha = max(alpha, F(kDeltaAlpha));
+    lost_ = LostEnergy<F>(ggx_.alpha);
+    multiple_ = lost_.tint(mean_reflectance(f0));
   }
 
   Color<F> albedo() const { return tinted_.f0; }
   Mask<F> has_non_delta() const { return not_(smooth_); }
 
-  BsdfEval<F> eval(const Vec3<F>& wo_, const Vec3<F>& wi_) const {
-    const F side = side_of(wo_);
-    const Vec3<F> wo = mirror_z(wo_, side), wi = mirror_z(wi_, side);
-    const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
-    const F f_cos = select(smooth_, F(0.f), m.f_cos);
-    return {fresnel(m.cos_h) * f_cos, select(smooth_, F(0.f), m.pdf)};
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F side = side_of(wo);
+    const Vec3<F> o = mirror_z(wo, side);
+    const F lost = lost_(o.z);
+    return eval_above(o, mirror_z(wi, side), lost, multiple_probability(lost));
   }
 
-  BsdfSample<F> sample(const Vec3<F>& wo_, const F& /*u_lobe*/, const F& u, const F& v) const {
+  BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
     const F side = side_of(wo_);
     const Vec3<F> wo = mirror_z(wo_, side);
-    const Vec3<F> mirror(-wo.x, -wo.y, wo.z);
-    const Vec3<F> wi = select<F>(smooth_, mirror, sample_microfacet(ggx_, wo, u, v));
-    const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
-    const Mask<F> rough = not_(smooth_) & (m.pdf > 0.f);
+    const F lost = lost_(wo.z);
+    const F p_multiple = multiple_probability(lost);
+    const Mask<F> multiple = u_lobe < p_multiple;
+    Vec3<F> wi = sample_microfacet(ggx_, wo, u, v);
+    if (any(multiple)) wi = select<F>(multiple, square_to_cosine_hemisphere(u, v), wi);
+    wi = select<F>(smooth_, Vec3<F>(-wo.x, -wo.y, wo.z), wi);
+    const BsdfEval<F> e = eval_above(wo, wi, lost, p_multiple);
+    const Mask<F> rough = not_(smooth_) & (e.pdf > 0.f);
     const Mask<F> delta = smooth_ & (wo.z > 0.f);
-    const F ratio = select(rough, F(m.f_cos / select(rough, m.pdf, F(1.f))), F(1.f));
+    const Color<F> ratio = e.f_cos * F(1.f / select(rough, e.pdf, F(1.f)));
     BsdfSample<F> s = empty_sample<F>();
     s.wi = mirror_z(wi, side);
-    s.weight =
-        select<F>(rough | delta, fresnel(select(smooth_, wo.z, m.cos_h)) * ratio, Color<F>(F(0.f)));
-    s.pdf = select(delta, F(1.f), select(rough, m.pdf, F(0.f)));
+    s.weight = select<F>(rough, ratio, Color<F>(F(0.f)));
+    if (any(delta)) s.weight = select<F>(delta, fresnel(wo.z), s.weight);
+    s.pdf = select(delta, F(1.f), select(rough, e.pdf, F(0.f)));
     s.is_delta = delta;
-    s.roughness = select(smooth_, F(0.f), roughness_);
+    s.roughness = select(smooth_, F(0.f), select(multiple, F(1.f), roughness_));
     return s;
   }
 
@@ -74,9 +80,37 @@ class MetalBsdf {
     return f;
   }
 
-  Color<F> eta_, k_;
+  /// Mean over the hemisphere; for a measured index that of the tinted form through its values at 0
+  /// and 82 degrees, which is within a percent or so.
+  Color<F> mean_reflectance(const Color<F>& f0) const {
+    if (none(exact_)) return tinted_.average();
+    const F c82(1.f / 7.f);
+    const Color<F> exact = fresnel_conductor(c82, eta_, k_);
+    const Color<F> schlick = fresnel_schlick(f0, c82);
+    const auto ratio = [](const F& a, const F& b) { return min(F(a / max(b, F(1e-6f))), F(1.f)); };
+    const Color<F> tint(ratio(exact.x, schlick.x), ratio(exact.y, schlick.y),
+                        ratio(exact.z, schlick.z));
+    return select<F>(exact_, F82Tint<F>(f0, tint).average(), tinted_.average());
+  }
+
+  /// Share of the lobe of multiple scattering; 0 exactly where it is black.
+  F multiple_probability(const F& lost) const {
+    return select(smooth_, F(0.f), F(lost * luminance(multiple_)));
+  }
+
+  BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const F& lost, const F& p) const {
+    const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
+    const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
+    const F again = F(F(lost * lost_(max(wi.z, F(0.f)))) / lost_.average) * cosine;
+    const Color<F> f = fma(multiple_, again, fresnel(m.cos_h) * m.f_cos);
+    const F pdf = fma(p, cosine, F(F(1.f - p) * m.pdf));
+    return {select<F>(smooth_, Color<F>(F(0.f)), f), select(smooth_, F(0.f), pdf)};
+  }
+
+  Color<F> eta_, k_, multiple_;
   F roughness_;
   F82Tint<F> tinted_;
+  LostEnergy<F> lost_;
   Ggx<F> ggx_;
   Mask<F> measured_, exact_, smooth_;
 };

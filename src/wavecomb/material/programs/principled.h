@@ -6,6 +6,7 @@
 #include "wavecomb/material/lobes/coat.h"
 #include "wavecomb/material/lobes/lambert.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
+#include "wavecomb/material/lobes/multiple_scattering.h"
 
 namespace wavecomb {
 
@@ -13,7 +14,8 @@ namespace wavecomb {
 /// Specification", OpenUSD), alike from both sides:
 ///   specular       GGX, F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or
 ///   specular_color
-///                  in the specular workflow; F90 = 1;
+///                  in the specular workflow; F90 = 1; with multiple scattering, sampled as
+///                  diffuse;
 ///   diffuse        base_color (1 - metallic) opacity, seen through the specular interface;
 ///   transmission   (1 - opacity) times what the interface lets pass, straight on;
 ///   clearcoat      GGX of index 1.5 times `clearcoat`; what lies below is dimmed by its
@@ -49,6 +51,8 @@ class PrincipledBsdf {
     const F alpha = alpha_from_roughness(roughness_);
     smooth_ = alpha < kDeltaAlpha;
     ggx_.alpha = max(alpha, F(kDeltaAlpha));
+    lost_ = LostEnergy<F>(ggx_.alpha);
+    multiple_ = select<F>(smooth_, Color<F>(F(0.f)), lost_.tint(average_));
     const F coat_alpha = alpha_from_roughness(coat_roughness_);
     coat_smooth_ = coat_alpha < kDeltaAlpha;
     coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
@@ -113,7 +117,7 @@ class PrincipledBsdf {
 
   /// What depends on wo alone: reflectances towards it and the probabilities of the lobes.
   struct View {
-    F coat;
+    F coat, lost;
     Color<F> specular, straight;
     F p_diffuse, p_specular, p_coat, p_straight;
   };
@@ -125,13 +129,15 @@ class PrincipledBsdf {
     v.coat = F(0.f);
     if (any(Mask<F>(clearcoat_ > 0.f))) v.coat = coat_reflectance(wo.z);
     v.specular = interface_(f0_, wo.z);
+    v.lost = lost_(max(wo.z, F(0.f)));
     const F below = 1.f - v.coat;
     const Color<F> passed = Color<F>(F(1.f)) - v.specular;
     v.straight = passed * F(below * transparency_);
     // Estimated contributions; a lobe that can contribute gets at least 2 % before normalisation.
     const F floor(0.02f);
-    const F diffuse =
-        select(is_black(diffuse_), F(0.f), max(F(below * luminance(diffuse_ * passed)), floor));
+    const F multiple = F(below * v.lost) * luminance(multiple_);
+    const F diffuse = select(is_black(diffuse_), multiple,
+                             max(fma(below, luminance(diffuse_ * passed), multiple), floor));
     const F specular = max(F(below * luminance(v.specular)), floor);
     const F coat = select(clearcoat_ > 0.f, max(v.coat, floor), F(0.f));
     const F straight = select(transparency_ > 0.f, max(luminance(v.straight), floor), F(0.f));
@@ -146,7 +152,8 @@ class PrincipledBsdf {
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const View& view) const {
     const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
     const Color<F> through = seen_through_coat(view.specular, interface_(f0_, wi.z), average_);
-    Color<F> f = diffuse_ * through * cosine;
+    const F again = F(view.lost * lost_(max(wi.z, F(0.f)))) / lost_.average;
+    Color<F> f = fma(multiple_, again, diffuse_ * through) * cosine;
     F pdf = view.p_diffuse * cosine;
     if (!all(smooth_)) {
       const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
@@ -169,7 +176,8 @@ class PrincipledBsdf {
 
   F roughness_, coat_roughness_, clearcoat_, transparency_;
   CoatFresnel<F> coat_, interface_;
-  Color<F> f0_, diffuse_, average_;
+  Color<F> f0_, diffuse_, average_, multiple_;
+  LostEnergy<F> lost_;
   Ggx<F> ggx_, coat_ggx_;
   Mask<F> smooth_, coat_smooth_;
 };
