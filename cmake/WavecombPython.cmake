@@ -11,6 +11,7 @@ if(NOT binding_sources)
   message(FATAL_ERROR "bindings/ holds no *.cpp: there is no Python module to build.")
 endif()
 nanobind_add_module(wavecomb_python NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sources})
+target_compile_definitions(wavecomb_python PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
 target_link_libraries(wavecomb_python PRIVATE wavecomb_core wavecomb_private TBB::tbb)
 
 # In site-packages/wavecomb: `lib` holds what we bring; ../../.. is <venv>/lib, where the tbb wheel puts

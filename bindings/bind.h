@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+void bind_scene(nanobind::module_& m);
+void bind_render(nanobind::module_& m);

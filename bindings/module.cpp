@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The Python module wavecomb._core: thin, no logic. Documented in python/wavecomb/_core.pyi.
+#include <nanobind/nanobind.h>
+
+#include "bind.h"
+#include "wavecomb/core/error.h"
+
+namespace nb = nanobind;
+
+NB_MODULE(_core, m) {
+  m.doc() = "The native core of Wavecomb.";
+  nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
+  bind_scene(m);
+  bind_render(m);
+}

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstring>
+
+#include "bind.h"
+#include "wavecomb/core/error.h"
+#include "wavecomb/scene/scene.h"
+
+namespace nb = nanobind;
+using namespace wavecomb;
+
+namespace {
+
+using Color3 = std::tuple<float, float, float>;
+template <typename T>
+using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+
+Vec3<float> vec3(const Color3& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
+
+/// Keeps arrays alive from C++; they are let go of with the GIL held.
+std::shared_ptr<const void> hold(nb::list arrays) {
+  return {new nb::list(std::move(arrays)), [](const void* p) {
+            const nb::gil_scoped_acquire gil;
+            delete static_cast<const nb::list*>(p);
+          }};
+}
+
+/// USD's row-vector matrix at `m` as a column-vector map.
+template <typename T>
+Affine affine(const T* m) {
+  const auto at = [m](int row, int column) { return static_cast<float>(m[4 * row + column]); };
+  Affine a;
+  for (int i = 0; i < 3; ++i) a.row[i] = {at(0, i), at(1, i), at(2, i)};
+  a.t = {at(3, 0), at(3, 1), at(3, 2)};
+  return a;
+}
+
+Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
+  if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4) throw Error("a transform must be 4 x 4");
+  if (m.dtype() == nb::dtype<double>()) return affine(static_cast<const double*>(m.data()));
+  if (m.dtype() == nb::dtype<float>()) return affine(static_cast<const float*>(m.data()));
+  throw Error("a transform must be of float32 or float64");
+}
+
+template <typename Enum>
+Enum choose(const std::string& what, const std::string& value,
+            std::initializer_list<std::pair<const char*, Enum>> choices) {
+  std::string list;
+  for (const auto& [name, e] : choices) {
+    if (value == name) return e;
+    list += (list.empty() ? "" : ", ") + std::string(name);
+  }
+  throw Error(what + " is '" + value + "'; it must be one of " + list);
+}
+
+Wrap wrap(const std::string& name) {
+  return choose<Wrap>("wrap", name, {{"repeat", Wrap::kRepeat},
+                                     {"clamp", Wrap::kClamp},
+                                     {"mirror", Wrap::kMirror},
+                                     {"black", Wrap::kBlack}});
+}
+
+template <size_t N>
+void fill(std::array<float, N>& to, const nb::handle& from, const char* what) {
+  const auto values = nb::cast<std::vector<float>>(from);
+  if (values.size() != N) throw Error(std::string(what) + " must have " + std::to_string(N) + " numbers");
+  std::copy(values.begin(), values.end(), to.begin());
+}
+
+TextureUse texture_use(const nb::dict& d) {
+  TextureUse use;
+  use.texture = nb::cast<uint32_t>(d["texture"]);
+  if (d.contains("channel"))
+    use.channel = choose<uint32_t>("channel", nb::cast<std::string>(d["channel"]),
+                                   {{"r", 0u}, {"g", 1u}, {"b", 2u}, {"a", 3u}, {"rgb", 4u}});
+  if (d.contains("scale")) fill(use.scale, d["scale"], "scale");
+  if (d.contains("bias")) fill(use.bias, d["bias"], "bias");
+  if (d.contains("uv")) fill(use.uv, d["uv"], "uv");
+  return use;
+}
+
+Slot slot(const std::string& name) {
+  std::string list;
+  for (uint32_t s = 0; s < kSlotCount; ++s) {
+    if (name == kSlotNames[s]) return static_cast<Slot>(s);
+    list += (list.empty() ? "" : ", ") + std::string(kSlotNames[s]);
+  }
+  throw Error("texture slot '" + name + "' is not known; it must be one of " + list);
+}
+
+ProgramId program(const std::string& name) {
+  std::string list;
+  for (uint32_t p = 0; p < kProgramCount; ++p) {
+    if (name == kProgramNames[p]) return static_cast<ProgramId>(p);
+    list += (list.empty() ? "" : ", ") + std::string(kProgramNames[p]);
+  }
+  throw Error("program '" + name + "' is not known; it must be one of " + list);
+}
+
+uint32_t add_texture(SceneBuilder& builder, const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& pixels,
+                     bool srgb, const std::string& wrap_s, const std::string& wrap_t,
+                     const std::string& name) {
+  TextureDesc desc;
+  desc.name = name;
+  if (pixels.ndim() != 2 && pixels.ndim() != 3)
+    throw Error("texture '" + name + "' must be an array of (height, width, channels)");
+  if (pixels.dtype() == nb::dtype<uint8_t>())
+    desc.format = TexelFormat::kU8;
+  else if (pixels.dtype() == nb::dtype<float>())
+    desc.format = TexelFormat::kF32;
+  else if (pixels.dtype().code == static_cast<uint8_t>(nb::dlpack::dtype_code::Float) &&
+           pixels.dtype().bits == 16)
+    desc.format = TexelFormat::kF16;
+  else
+    throw Error("texture '" + name + "' must be of uint8, float16 or float32");
+  const auto size = [&](size_t i) { return static_cast<uint32_t>(std::min<size_t>(pixels.shape(i), 1u << 30)); };
+  desc.data = pixels.data();
+  desc.height = size(0);
+  desc.width = size(1);
+  desc.channels = pixels.ndim() == 3 ? size(2) : 1;
+  desc.srgb = srgb;
+  desc.wrap_s = wrap(wrap_s);
+  desc.wrap_t = wrap(wrap_t);
+  return builder.add_texture(desc);
+}
+
+uint32_t add_material(SceneBuilder& builder, const std::string& program_name, const std::string& name,
+                      const Color3& base_color, const Color3& specular_color, const Color3& emission,
+                      float roughness, float metallic, float clearcoat, float clearcoat_roughness,
+                      float opacity, float ior, float opacity_threshold, const Color3& conductor_eta,
+                      const Color3& conductor_k, bool specular_workflow, bool presence,
+                      const nb::dict& textures) {
+  Material m;
+  m.name = name;
+  m.program = program(program_name);
+  m.base_color = vec3(base_color);
+  m.specular_color = vec3(specular_color);
+  m.emission = vec3(emission);
+  m.roughness = roughness;
+  m.metallic = metallic;
+  m.clearcoat = clearcoat;
+  m.clearcoat_roughness = clearcoat_roughness;
+  m.opacity = opacity;
+  m.ior = ior;
+  m.opacity_threshold = opacity_threshold;
+  m.conductor_eta = vec3(conductor_eta);
+  m.conductor_k = vec3(conductor_k);
+  m.specular_workflow = specular_workflow;
+  m.presence = presence;
+  for (const auto& [key, value] : textures)
+    m.textures[static_cast<size_t>(slot(nb::cast<std::string>(key)))] =
+        texture_use(nb::cast<nb::dict>(value));
+  return builder.add_material(std::move(m));
+}
+
+/// Per vertex when (n, k), per corner when (m, 3, k).
+Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, const std::string& name) {
+  if (!values) return Attribute::kNone;
+  if (values->ndim() == 2 && values->shape(1) == k) return Attribute::kVertex;
+  if (values->ndim() == 3 && values->shape(1) == 3 && values->shape(2) == k) return Attribute::kCorner;
+  throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
+}
+
+uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
+                  const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+                  const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
+                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                  const std::string& name) {
+  Mesh mesh;
+  mesh.name = name;
+  if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 || indices.shape(1) != 3)
+    throw Error("mesh '" + name + "' needs positions of shape (n, 3) and indices of shape (m, 3)");
+  if (indices.dtype() != nb::dtype<uint32_t>() && indices.dtype() != nb::dtype<int32_t>())
+    throw Error("mesh '" + name + "' needs indices of int32 or uint32");
+  mesh.positions = {positions.data(), positions.size()};
+  mesh.indices = {static_cast<const uint32_t*>(indices.data()), indices.size()};
+  nb::list owners;
+  owners.append(nb::cast(positions));
+  owners.append(nb::cast(indices));
+  mesh.normals_at = attribute_of(normals, 3, name);
+  if (normals) {
+    mesh.normals = {normals->data(), normals->size()};
+    owners.append(nb::cast(*normals));
+  }
+  mesh.uvs_at = attribute_of(uvs, 2, name);
+  if (uvs) {
+    mesh.uvs = {uvs->data(), uvs->size()};
+    owners.append(nb::cast(*uvs));
+  }
+  if (face_materials) {
+    mesh.face_materials = {face_materials->data(), face_materials->size()};
+    owners.append(nb::cast(*face_materials));
+  }
+  mesh.material = material;
+  mesh.owner = hold(std::move(owners));
+  return builder.add_mesh(std::move(mesh));
+}
+
+void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
+                   const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transforms,
+                   const std::optional<Array<uint32_t>>& materials) {
+  if (transforms.ndim() != 3 || transforms.shape(1) != 4 || transforms.shape(2) != 4)
+    throw Error("transforms of instances must have the shape (k, 4, 4)");
+  const bool is_double = transforms.dtype() == nb::dtype<double>();
+  if (!is_double && transforms.dtype() != nb::dtype<float>())
+    throw Error("transforms of instances must be of float32 or float64");
+  const size_t k = transforms.shape(0);
+  if (materials && (materials->ndim() != 1 || materials->shape(0) != k))
+    throw Error("materials of instances must be one for each transform");
+  for (size_t i = 0; i < k; ++i)
+    builder.add_instance(parent, child,
+                         is_double ? affine(static_cast<const double*>(transforms.data()) + 16 * i)
+                                   : affine(static_cast<const float*>(transforms.data()) + 16 * i),
+                         materials ? materials->data()[i] : kInheritMaterial);
+}
+
+uint32_t add_light(SceneBuilder& builder, const std::string& kind,
+                   const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
+                   const std::string& name, const Color3& color, float width, float height, float radius,
+                   float angle, bool normalize, std::optional<uint32_t> texture) {
+  Light light;
+  light.name = name;
+  light.kind = choose<LightKind>("light kind", kind,
+                                 {{"rect", LightKind::kRect},
+                                  {"disk", LightKind::kDisk},
+                                  {"sphere", LightKind::kSphere},
+                                  {"distant", LightKind::kDistant},
+                                  {"dome", LightKind::kDome}});
+  light.to_world = affine(transform);
+  light.color = vec3(color);
+  light.width = width;
+  light.height = height;
+  light.radius = radius;
+  light.angle = angle;
+  light.normalize = normalize;
+  light.texture = texture.value_or(kNoTexture);
+  return builder.add_light(std::move(light));
+}
+
+void set_camera(SceneBuilder& builder, const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
+                const std::tuple<float, float, float, float>& window, float lens_radius,
+                float focus_distance, float near_clip, float far_clip) {
+  Camera camera;
+  camera.to_world = affine(transform);
+  std::tie(camera.window[0], camera.window[1], camera.window[2], camera.window[3]) = window;
+  camera.lens_radius = lens_radius;
+  camera.focus_distance = focus_distance;
+  camera.near_clip = near_clip;
+  camera.far_clip = far_clip;
+  builder.set_camera(camera);
+}
+
+}  // namespace
+
+void bind_scene(nb::module_& m) {
+  using namespace nb::literals;
+  m.attr("INHERIT_MATERIAL") = kInheritMaterial;
+
+  nb::class_<Scene>(m, "Scene")
+      .def_prop_ro("triangles", &Scene::unique_triangles)
+      .def_prop_ro("instanced_triangles", &Scene::instanced_triangles)
+      .def_prop_ro("mesh_count", [](const Scene& s) { return s.meshes().size(); })
+      .def_prop_ro("instance_count", [](const Scene& s) { return s.instances().size(); })
+      .def_prop_ro("light_count", [](const Scene& s) { return s.lights().size(); })
+      .def_prop_ro("materials",
+                   [](const Scene& s) {
+                     std::vector<std::pair<std::string, std::string>> out;
+                     for (const Material& material : s.materials())
+                       out.emplace_back(material.name,
+                                        kProgramNames[static_cast<size_t>(material.program)]);
+                     return out;
+                   })
+      .def_prop_ro("textures",
+                   [](const Scene& s) {
+                     std::vector<std::pair<std::string, size_t>> out;
+                     for (const auto& texture : s.textures())
+                       out.emplace_back(texture->name(), texture->bytes());
+                     return out;
+                   })
+      .def_prop_ro("warnings", &Scene::warnings)
+      .def_prop_ro("bounds", [](const Scene& s) {
+        const Bounds& b = s.bounds();
+        return std::make_pair(Color3{b.lo.x, b.lo.y, b.lo.z}, Color3{b.hi.x, b.hi.y, b.hi.z});
+      });
+
+  const Color3 grey{0.18f, 0.18f, 0.18f}, black{0.f, 0.f, 0.f}, white{1.f, 1.f, 1.f};
+  nb::class_<SceneBuilder>(m, "SceneBuilder")
+      .def(nb::init<>())
+      .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
+           "wrap_t"_a = "repeat", "name"_a = "")
+      .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
+           "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black, "roughness"_a = 0.5f,
+           "metallic"_a = 0.f, "clearcoat"_a = 0.f, "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f,
+           "ior"_a = 1.5f, "opacity_threshold"_a = 0.f, "conductor_eta"_a = black,
+           "conductor_k"_a = black, "specular_workflow"_a = false, "presence"_a = false,
+           "textures"_a = nb::dict())
+      .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(), "normals"_a = nb::none(),
+           "uvs"_a = nb::none(), "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
+           "name"_a = "")
+      .def("add_group", &SceneBuilder::add_group, "name"_a = "")
+      .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
+      .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
+           "materials"_a = nb::none())
+      .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
+           "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f, "angle"_a = 0.53f,
+           "normalize"_a = false, "texture"_a = nb::none())
+      .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a, "lens_radius"_a = 0.f,
+           "focus_distance"_a = 1.f, "near_clip"_a = 0.f, "far_clip"_a = 1e30f)
+      .def("build", &SceneBuilder::build);
+}

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The native core: scenes in, pictures out. Arrays are NumPy arrays and are not copied where said so."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+INHERIT_MATERIAL: int
+"""Material id that means "what the instance says"."""
+
+class Error(ValueError):
+    """Bad input; one line that names the object and says what to do."""
+
+class Scene:
+    """An immutable scene."""
+
+    @property
+    def triangles(self) -> int:
+        """Triangles of all meshes, each counted once."""
+    @property
+    def instanced_triangles(self) -> int:
+        """Triangles as seen, every instance counted."""
+    @property
+    def mesh_count(self) -> int: ...
+    @property
+    def instance_count(self) -> int: ...
+    @property
+    def light_count(self) -> int: ...
+    @property
+    def materials(self) -> list[tuple[str, str]]:
+        """(name, program) of every material."""
+    @property
+    def textures(self) -> list[tuple[str, int]]:
+        """(name, bytes) of every texture."""
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
+
+class SceneBuilder:
+    """Collects a scene; ids are handed out from 0 in order. Transforms are in USD's row-vector convention
+    (translation in the last row), float64 or float32, shape (4, 4)."""
+
+    def __init__(self) -> None: ...
+    def add_texture(
+        self,
+        pixels: NDArray[Any],
+        *,
+        srgb: bool,
+        wrap_s: str = "repeat",
+        wrap_t: str = "repeat",
+        name: str = "",
+    ) -> int:
+        """Pixels (height, width, channels 1 to 4), uint8, float16 or float32, C order, row 0 at the top.
+
+        wrap: repeat, clamp, mirror, black. srgb matters for uint8 only. Tiled and mip-mapped inside.
+        """
+    def add_material(
+        self,
+        program: str,
+        *,
+        name: str = "",
+        base_color: tuple[float, float, float] = (0.18, 0.18, 0.18),
+        specular_color: tuple[float, float, float] = (0, 0, 0),
+        emission: tuple[float, float, float] = (0, 0, 0),
+        roughness: float = 0.5,
+        metallic: float = 0,
+        clearcoat: float = 0,
+        clearcoat_roughness: float = 0.01,
+        opacity: float = 1,
+        ior: float = 1.5,
+        opacity_threshold: float = 0,
+        conductor_eta: tuple[float, float, float] = (0, 0, 0),
+        conductor_k: tuple[float, float, float] = (0, 0, 0),
+        specular_workflow: bool = False,
+        presence: bool = False,
+        textures: dict[str, dict[str, Any]] = {},
+    ) -> int:
+        """Programs: diffuse, metal, dielectric, plastic, emissive, principled.
+
+        textures: slot -> {"texture": id, "channel": "rgb"|"r"|"g"|"b"|"a", "scale": 4 floats,
+        "bias": 4 floats, "uv": 6 floats}; value = texel * scale + bias at
+        u' = uv[0] u + uv[1] v + uv[2], v' = uv[3] u + uv[4] v + uv[5]. Slots: base_color,
+        specular_color, emission, roughness, metallic, clearcoat, clearcoat_roughness, opacity, normal
+        (tangent space, value already in [-1, 1] after scale and bias).
+        For a metal: base_color is the reflectance at normal incidence, specular_color the tint at 82 degrees
+        (black: none given, untinted).
+        """
+    def add_mesh(
+        self,
+        positions: NDArray[np.float32],
+        indices: NDArray[np.uint32] | NDArray[np.int32],
+        *,
+        normals: NDArray[np.float32] | None = None,
+        uvs: NDArray[np.float32] | None = None,
+        face_materials: NDArray[np.uint32] | None = None,
+        material: int = ...,
+        name: str = "",
+    ) -> int:
+        """Positions (n, 3), triangles (m, 3) counter-clockwise from outside; normals (n, 3) per vertex or
+        (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,). No copy of C-ordered arrays
+        of these types: they are kept alive. Do not change them afterwards."""
+    def add_group(self, name: str = "") -> int:
+        """A new empty group; group 0, the world, is there."""
+    def add_to_group(self, group: int, mesh: int) -> None: ...
+    def add_instances(
+        self,
+        parent: int,
+        child: int,
+        transforms: NDArray[Any],
+        materials: NDArray[np.uint32] | None = None,
+    ) -> None:
+        """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it that
+        have none of their own. Nested to any depth without copies of geometry."""
+    def add_light(
+        self,
+        kind: str,
+        transform: NDArray[Any],
+        *,
+        name: str = "",
+        color: tuple[float, float, float] = (1, 1, 1),
+        width: float = 1,
+        height: float = 1,
+        radius: float = 0.5,
+        angle: float = 0.53,
+        normalize: bool = False,
+        texture: int | None = None,
+    ) -> int:
+        """Kinds: rect, disk, sphere, distant, dome, as UsdLux. color = colour * intensity * 2^exposure *
+        colour temperature."""
+    def set_camera(
+        self,
+        transform: NDArray[Any],
+        *,
+        window: tuple[float, float, float, float],
+        lens_radius: float = 0,
+        focus_distance: float = 1,
+        near_clip: float = 0,
+        far_clip: float = 1e30,
+    ) -> None:
+        """Looks along -z. window: x0, x1, y0, y1 on the plane z = -1 (aperture / focal length). The
+        renderer widens it to the shape of the picture (UsdRender's expandAperture)."""
+    def build(self) -> Scene:
+        """Checks all that spans objects and makes the scene. Raises Error."""
+
+class Settings:
+    """Settings of a render; attributes as keyword arguments."""
+
+    width: int  # 600
+    height: int  # 600
+    spp: int  # 64
+    max_depth: int  # 8
+    seed: int  # 0
+    sampler: str  # "sobol" | "independent"
+    filter: str  # "blackman-harris" | "gaussian" | "box"
+    filter_width: float  # pixels
+    roulette: str  # "throughput" | "off"
+    roulette_depth: int
+    clamp_indirect: float  # 0: off
+    fresnel: str  # "exact" | "schlick"
+    cosine_sampling: bool
+    integrator: str  # "wavefront" | "reference"
+    threads: int  # 0: all
+    wave_size: int  # 0: default
+    lanes: int  # 0: widest
+    policy: str  # "none"
+    materialize: str  # "auto" | "on" | "off"
+    def __init__(self, **settings: Any) -> None: ...
+    def check(self) -> None:
+        """Raises Error naming the setting and what it may be."""
+    def to_dict(self) -> dict[str, Any]: ...
+
+class Result:
+    """Pictures and figures of a render. Row 0 is the top."""
+
+    @property
+    def beauty(self) -> NDArray[np.float32]:
+        """(height, width, 3), linear Rec.709."""
+    @property
+    def albedo(self) -> NDArray[np.float32]: ...
+    @property
+    def normal(self) -> NDArray[np.float32]:
+        """(height, width, 3), world space."""
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """(height, width), distance from the camera along its axis; infinite where nothing was hit."""
+    @property
+    def samples(self) -> NDArray[np.uint32]: ...
+    @property
+    def cancelled(self) -> bool: ...
+    @property
+    def stats(self) -> dict[str, Any]:
+        """settings, seconds {build, render}, phases_s, counts, samples_per_s, rays_per_s,
+        peak_rss_bytes (all plain ints, floats, strings and dicts)."""
+
+def render(
+    scene: Scene,
+    settings: Settings,
+    progress: Callable[[int, int], bool | None] | None = None,
+) -> Result:
+    """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling thread
+    (GIL held); returning False cancels, and the result holds what was done. KeyboardInterrupt raised
+    in the callback also stops the render. Raises Error."""
+
+def lane_widths() -> list[int]: ...
+def build_info() -> dict[str, str]:
+    """version, compiler, isa, embree, tbb, drjit."""

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Ray traversal by Embree. The .cpp beside this is the only file that includes it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Rays to trace, column by column. Directions are unit, tnear is 0.
+struct RaySpan {
+  const float *ox, *oy, *oz, *dx, *dy, *dz;
+  const float* tfar;      ///< null: no limit
+  const uint32_t* slot;   ///< for presence, see PresenceKeys; may be null
+  size_t size;
+};
+
+/// Where hits go: barycentric u, v as in HitBuffer; `inst` is an index into SceneView::instances and `geom`
+/// a geometry within its group, or `inst` is kLightShape and geom is the light's number among the records.
+struct HitSpan {
+  float *t, *u, *v;
+  uint32_t *prim, *geom, *inst;
+};
+inline constexpr uint32_t kNoHit = 0xffffffffu;
+inline constexpr uint32_t kLightShape = 0xfffffffeu;
+
+/// What decides whether a partly present surface is there for a path: random numbers keyed by the path, so
+/// that no traversal order matters. Indexed by slot.
+struct PresenceKeys {
+  const uint32_t* pixel_hash = nullptr;
+  const uint32_t* sample = nullptr;
+  uint32_t salt = 0;  ///< different for every depth and for shadow rays, so that crossings are independent
+};
+
+/// A two-level bounding volume hierarchy: each group of meshes committed once, instanced any number of
+/// times; the world's own meshes in the top level.
+///
+/// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is thread-safe.
+class EmbreeAccelerator {
+ public:
+  /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory ...).
+  EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads);
+  ~EmbreeAccelerator();
+
+  /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent` for camera rays.
+  /// Hits do not depend on width, order or coherence.
+  void intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width, bool coherent,
+                 const PresenceKeys& keys) const;
+  /// occluded[i] = 1 where something lies before tfar, else 0.
+  void occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,
+                const PresenceKeys& keys) const;
+
+  /// Memory that Embree holds for the hierarchy, bytes.
+  size_t bytes() const;
+  /// Widest packets that Embree traces natively here.
+  uint32_t native_width() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace wavecomb

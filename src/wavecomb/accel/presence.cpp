@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/accel/presence.h"
+
+#include "wavecomb/core/hash.h"
+#include "wavecomb/texture/lookup.h"
+
+namespace wavecomb {
+namespace {
+
+/// Texture coordinates of a hit; barycentrics where the mesh has none.
+Vec2<float> hit_uv(const MeshRecord& mesh, uint32_t prim, float u, float v) {
+  if ((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) == 0) return {u, v};
+  const auto* indices = reinterpret_cast<const uint32_t*>(mesh.indices);
+  const auto* uvs = reinterpret_cast<const float*>(mesh.uvs);
+  const float weight[3] = {1.f - u - v, u, v};
+  Vec2<float> uv{0, 0};
+  for (uint32_t k = 0; k < 3; ++k) {
+    const uint32_t at = (mesh.flags & kUvsPerCorner) ? 3 * prim + k : indices[3 * prim + k];
+    uv.x += weight[k] * uvs[2 * at];
+    uv.y += weight[k] * uvs[2 * at + 1];
+  }
+  return uv;
+}
+
+float opacity_at(const SceneView& scene, const MaterialRecord& material, uint32_t material_id,
+                 const Vec2<float>& uv) {
+  float opacity = material.opacity;
+  if (material.texture_slots & slot_bit(Slot::kOpacity)) {
+    const TextureUseRecord& use =
+        scene.materials.uses[material_id * kSlotCount + static_cast<uint32_t>(Slot::kOpacity)];
+    const float s = use.uv[0] * uv.x + use.uv[1] * uv.y + use.uv[2];
+    const float t = use.uv[3] * uv.x + use.uv[4] * uv.y + use.uv[5];
+    const Texel<float> texel =
+        lookup<float>(scene.materials.textures[use.texture], s, t, 0.f, true);
+    const float rgba[4] = {texel.r, texel.g, texel.b, texel.a};
+    const uint32_t c = use.channel < 4 ? use.channel : 0;
+    opacity = rgba[c] * use.scale[c] + use.bias[c];
+  }
+  if (material.opacity_threshold > 0) return opacity < material.opacity_threshold ? 0.f : 1.f;
+  return opacity;
+}
+
+}  // namespace
+
+bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u, float v,
+                uint32_t slot, const PresenceKeys& keys) {
+  const MeshRecord& record = scene.meshes[mesh];
+  uint32_t material = record.material;
+  if (record.face_materials != 0)
+    material = reinterpret_cast<const uint32_t*>(record.face_materials)[prim];
+  if (material == kInheritMaterial) material = scene.instances[instance].material;
+  const MaterialRecord& m = scene.materials.materials[material];
+  if ((m.flags & kPresence) == 0) return true;
+
+  const float opacity = opacity_at(scene, m, material, hit_uv(record, prim, u, v));
+  if (opacity >= 1.f) return true;
+  if (!(opacity > 0.f)) return false;
+  const uint32_t path = hash_u32(keys.pixel_hash[slot], keys.sample[slot]);
+  const uint32_t where = hash_u32(instance * 0x9e3779b9u + mesh, prim);
+  return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Orthonormal shading frames.
+#pragma once
+
+#include "wavecomb/core/vec.h"
+
+namespace wavecomb {
+
+/// Right-handed orthonormal basis (s, t, n). Local directions have z along n.
+template <typename F>
+struct Frame {
+  Vec3<F> s, t, n;
+
+  Vec3<F> to_local(const Vec3<F>& v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+  Vec3<F> to_world(const Vec3<F>& v) const {
+    return fma(s, v.x, fma(t, v.y, Vec3<F>(n * v.z)));
+  }
+};
+
+/// A frame around the unit vector `n`, without a branch (Duff et al., "Building an Orthonormal Basis,
+/// Revisited", JCGT 6(1) 2017).
+template <typename F>
+inline Frame<F> make_frame(const Vec3<F>& n) {
+  const F sign = copysign(F(1.f), n.z);
+  const F a = -1.f / (sign + n.z);
+  const F b = n.x * n.y * a;
+  return {{fma(F(sign * n.x * n.x), a, F(1.f)), sign * b, -sign * n.x},
+          {b, fma(F(n.y * n.y), a, sign), -n.y},
+          n};
+}
+
+/// A frame around the unit vector `n` whose s is `tangent` made orthogonal to n; falls back to
+/// make_frame where the tangent is parallel to n, zero or not finite.
+template <typename F>
+inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent) {
+  const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);
+  const F len2 = length_squared(s);
+  const Mask<F> good = (len2 > 1e-20f * length_squared(tangent)) & (len2 > 0.f) & is_finite(len2);
+  const Frame<F> other = make_frame(n);
+  const Vec3<F> unit = s * F(1.f / sqrt(select(good, len2, F(1.f))));
+  const Vec3<F> sx = select<F>(good, unit, other.s);
+  return {sx, select<F>(good, cross(n, sx), other.t), n};
+}
+
+/// Trigonometry of a local direction w with respect to n = (0, 0, 1).
+template <typename F>
+inline F cos_theta(const Vec3<F>& w) {
+  return w.z;
+}
+template <typename F>
+inline F abs_cos_theta(const Vec3<F>& w) {
+  return abs(w.z);
+}
+template <typename F>
+inline Mask<F> same_hemisphere(const Vec3<F>& a, const Vec3<F>& b) {
+  return F(a.z * b.z) > 0.f;
+}
+
+}  // namespace wavecomb

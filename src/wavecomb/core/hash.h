@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Integer hashes over lanes: every random number is a hash of (pixel, sample, dimension, seed).
+#pragma once
+
+#include "wavecomb/core/lanes.h"
+
+namespace wavecomb {
+
+/// A bijective 32-bit mix ("lowbias32" by C. Wellons, found by hash-prospector, 2018).
+template <typename U>
+inline U hash_u32(U x) {
+  x ^= x >> 16;
+  x *= 0x7feb352du;
+  x ^= x >> 15;
+  x *= 0x846ca68bu;
+  x ^= x >> 16;
+  return x;
+}
+
+/// Hash of two words (the second may be uniform).
+template <typename U>
+inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
+  return hash_u32<U>(a ^ (hash_u32<U>(b) + 0x9e3779b9u + (a << 6) + (a >> 2)));
+}
+
+/// The top 24 bits as a float in [0, 1).
+template <typename F>
+inline F unit_float(const UInt<F>& x) {
+  return F(Int<F>(x >> 8)) * 0x1p-24f;
+}
+
+}  // namespace wavecomb

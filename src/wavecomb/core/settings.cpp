@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/core/settings.h"
+
+#include <cmath>
+
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+void check_range(const char* option, double value, double lo, double hi) {
+  if (value >= lo && value <= hi) return;
+  const auto text = [](double v) {
+    return v == std::floor(v) && std::abs(v) < 1e15 ? std::to_string(static_cast<long long>(v))
+                                                    : std::to_string(v);
+  };
+  throw Error(std::string(option) + " is " + text(value) + "; it must be from " + text(lo) + " to " +
+              text(hi));
+}
+
+}  // namespace
+
+void Settings::check() const {
+  check_range("width", width, 1, kMaxSize);
+  check_range("height", height, 1, kMaxSize);
+  check_range("width x height", static_cast<double>(width) * height, 1, kMaxPixels);
+  check_range("spp", spp, 1, 1 << 20);
+  check_range("max_depth", max_depth, 0, 4096);
+  check_range("filter_width", filter_width, 0.01, 32);
+  check_range("roulette_depth", roulette_depth, 0, 4096);
+  check_range("clamp_indirect", clamp_indirect, 0, 1e30);
+  check_range("threads", threads, 0, 1024);
+  if (wave_size != 0) check_range("wave_size", wave_size, 64, 1 << 20);
+  if (lanes != 0 && lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16)
+    throw Error("lanes is " + std::to_string(lanes) + "; it must be 1, 4, 8, 16 or auto (0)");
+}
+
+}  // namespace wavecomb

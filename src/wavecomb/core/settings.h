@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What a render can be told.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace wavecomb {
+
+enum class SamplerKind : uint8_t { kSobol, kIndependent };
+enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
+enum class IntegratorKind : uint8_t { kWavefront, kReference };
+enum class RouletteKind : uint8_t { kOff, kThroughput };
+enum class Materialize : uint8_t { kAuto, kOn, kOff };
+
+/// Largest picture.
+inline constexpr uint32_t kMaxSize = 65535;
+inline constexpr uint32_t kMaxPixels = 1u << 28;
+
+/// Settings of a render. The picture depends on those above the line only.
+struct Settings {
+  uint32_t width = 600, height = 600;  ///< pixels
+  uint32_t spp = 64;                   ///< samples per pixel, 1 to 2^20
+  uint32_t max_depth = 8;              ///< scattering vertices of a path; 0 sees emitters only
+  uint32_t seed = 0;
+  SamplerKind sampler = SamplerKind::kSobol;
+  FilterKind filter = FilterKind::kBlackmanHarris;
+  float filter_width = 3.f;      ///< full width in pixels (box: 1 is the pixel itself)
+  RouletteKind roulette = RouletteKind::kThroughput;
+  uint32_t roulette_depth = 3;   ///< first vertex after which a path may end
+  float clamp_indirect = 0;      ///< largest luminance of one indirect contribution; 0: off
+  bool schlick_fresnel = false;
+  bool cosine_sampling = false;  ///< sample every non-delta bounce by cosine (the dissertation's way)
+  IntegratorKind integrator = IntegratorKind::kWavefront;
+  // ---- below: how it is computed; never changes the picture ----
+  uint32_t threads = 0;          ///< 0: all that the process may use
+  uint32_t wave_size = 0;        ///< paths per wave, 64 to 2^22; 0: default
+  uint32_t lanes = 0;            ///< 1, 4, 8, 16; 0: widest built
+  std::string policy = "program";
+  Materialize materialize = Materialize::kAuto;
+
+  /// Throws Error naming the option and what it may be.
+  void check() const;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Two- and three-component vectors, without a need for Dr.Jit: what public headers may include.
+#pragma once
+
+#include <type_traits>
+
+namespace wavecomb {
+
+template <typename F>
+struct Vec2 {
+  F x, y;
+};
+
+/// A vector, point, normal or linear Rec.709 colour (r, g, b = x, y, z); the name says which.
+template <typename F>
+struct Vec3 {
+  F x{0.f}, y{0.f}, z{0.f};
+
+  Vec3() = default;
+  explicit Vec3(const F& s) : x(s), y(s), z(s) {}
+  Vec3(const F& x_, const F& y_, const F& z_) : x(x_), y(y_), z(z_) {}
+  /// Broadcast of a scalar vector.
+  template <typename G = F, typename = std::enable_if_t<!std::is_same_v<G, float>>>
+  explicit Vec3(const Vec3<float>& v) : x(v.x), y(v.y), z(v.z) {}
+
+  Vec3 operator-() const { return {-x, -y, -z}; }
+  friend Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend Vec3 operator*(const Vec3& a, const Vec3& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+  friend Vec3 operator*(const Vec3& a, const F& s) { return {a.x * s, a.y * s, a.z * s}; }
+  friend Vec3 operator*(const F& s, const Vec3& a) { return a * s; }
+  Vec3& operator+=(const Vec3& b) { return *this = *this + b; }
+  Vec3& operator*=(const Vec3& b) { return *this = *this * b; }
+  Vec3& operator*=(const F& s) { return *this = *this * s; }
+};
+
+template <typename F>
+using Color = Vec3<F>;
+
+}  // namespace wavecomb

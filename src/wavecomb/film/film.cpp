@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/film/film.h"
+
+#include <limits>
+
+namespace wavecomb {
+namespace {
+
+double inverse(uint32_t n) { return n == 0 ? 0.0 : 1.0 / n; }
+
+}  // namespace
+
+Film::Film(uint32_t width, uint32_t height, bool with_aovs)
+    : width_(width), height_(height), pixels_(size_t{width} * height) {
+  if (with_aovs) aovs_.resize(pixels_.size());
+}
+
+std::vector<float> Film::beauty() const {
+  std::vector<float> out(3 * pixels_.size());
+  for (size_t i = 0; i < pixels_.size(); ++i) {
+    const Pixel& p = pixels_[i];
+    const double s = inverse(p.samples);
+    out[3 * i] = static_cast<float>(p.r * s);
+    out[3 * i + 1] = static_cast<float>(p.g * s);
+    out[3 * i + 2] = static_cast<float>(p.b * s);
+  }
+  return out;
+}
+
+std::vector<float> Film::albedo() const {
+  std::vector<float> out(3 * aovs_.size());
+  for (size_t i = 0; i < aovs_.size(); ++i)
+    for (size_t c = 0; c < 3; ++c)
+      out[3 * i + c] = static_cast<float>(aovs_[i].albedo[c] * inverse(pixels_[i].samples));
+  return out;
+}
+
+std::vector<float> Film::normal() const {
+  std::vector<float> out(3 * aovs_.size());
+  for (size_t i = 0; i < aovs_.size(); ++i)
+    for (size_t c = 0; c < 3; ++c)
+      out[3 * i + c] = static_cast<float>(aovs_[i].normal[c] * inverse(pixels_[i].samples));
+  return out;
+}
+
+std::vector<float> Film::depth() const {
+  std::vector<float> out(aovs_.size());
+  for (size_t i = 0; i < aovs_.size(); ++i)
+    out[i] = aovs_[i].depth_samples == 0
+                 ? std::numeric_limits<float>::infinity()
+                 : static_cast<float>(aovs_[i].depth * inverse(aovs_[i].depth_samples));
+  return out;
+}
+
+std::vector<uint32_t> Film::samples() const {
+  std::vector<uint32_t> out(pixels_.size());
+  for (size_t i = 0; i < pixels_.size(); ++i) out[i] = pixels_[i].samples;
+  return out;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/film/filter.h"
+
+#include <cmath>
+
+namespace wavecomb {
+namespace {
+
+/// Filter value at x in [-1, 1], the filter's half width being 1.
+double filter_value(FilterKind kind, double x) {
+  constexpr double kPi = 3.14159265358979323846;
+  switch (kind) {
+    case FilterKind::kBox: return 1.0;
+    case FilterKind::kGaussian: return std::exp(-0.5 * 9.0 * x * x) - std::exp(-0.5 * 9.0);
+    case FilterKind::kBlackmanHarris: {
+      const double a = kPi * (x + 1.0);
+      return 0.35875 - 0.48829 * std::cos(a) + 0.14128 * std::cos(2 * a) - 0.01168 * std::cos(3 * a);
+    }
+  }
+  return 1.0;
+}
+
+}  // namespace
+
+FilterTable::FilterTable(FilterKind kind, float width) : offsets_(kBins + 2) {
+  constexpr int kSteps = 1 << 16;
+  std::vector<double> cdf(kSteps + 1, 0.0);
+  for (int i = 0; i < kSteps; ++i)
+    cdf[i + 1] = cdf[i] + filter_value(kind, 2.0 * (i + 0.5) / kSteps - 1.0);
+  int step = 0;
+  for (uint32_t bin = 0; bin <= kBins; ++bin) {
+    const double target = cdf[kSteps] * bin / kBins;
+    while (step < kSteps - 1 && cdf[step + 1] < target) ++step;
+    const double mass = cdf[step + 1] - cdf[step];
+    const double within = mass > 0 ? (target - cdf[step]) / mass : 0.0;
+    offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
+  }
+  offsets_[kBins + 1] = offsets_[kBins];
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The pixel filter, as offsets to sample.
+#pragma once
+
+#include <vector>
+
+#include "wavecomb/core/settings.h"
+
+namespace wavecomb {
+
+/// Inverse cumulative distribution of a separable, non-negative pixel filter along one axis: importance
+/// sampled, so that every sample has weight 1 and belongs to one pixel (Ernst, Stamminger and Greiner,
+/// "Filter Importance Sampling", RT 2006).
+class FilterTable {
+ public:
+  static constexpr uint32_t kBins = 1024;
+
+  /// `width`: full width in pixels. Gaussian: sigma = width / 6. Blackman-Harris: 4-term window.
+  FilterTable(FilterKind kind, float width);
+
+  /// kBins + 2 offsets in pixels; entry i belongs to u = i / kBins.
+  const float* offsets() const { return offsets_.data(); }
+
+ private:
+  std::vector<float> offsets_;
+};
+
+}  // namespace wavecomb

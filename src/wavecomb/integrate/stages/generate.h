@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Stage 1: a camera ray for every slot.
+#pragma once
+
+#include <limits>
+
+#include "wavecomb/integrate/wave.h"
+
+namespace wavecomb {
+
+/// Fills the pool and the ray queue, slot by slot: slot = pixel in the task * samples + sample.
+/// Returns the column of far-plane distances, or null when the camera has no far plane.
+template <typename F>
+const float* generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
+  using U = UInt<F>;
+  const CameraSetup& camera = *context.camera;
+  const Settings& settings = *context.settings;
+  PathPool& pool = wave.pool;
+  RayQueue& rays = wave.rays;
+  const uint32_t n = task.path_count();
+  const float inv_samples = 1.f / static_cast<float>(task.samples);
+  float* tfar = wave.shadows.tfar;  // free until the first shading
+  for (uint32_t i = 0; i < n; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(n - i);
+    const U slot = lane_index<F>() + i;
+    // slot / samples, exact: slots are below 2^20 and half a step is added.
+    const U index = U(to_int<F>((F(Int<F>(slot)) + 0.5f) * inv_samples));
+    const U pixel = gather<U>(task.pixels, index, Mask<U>(active));
+    const U sample = slot - index * task.samples + task.first_sample;
+    const SampleKey<F> key = make_sample_key<F>(pixel, sample, settings.seed);
+    const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
+    const CameraRay<F> ray = camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r,
+                                           active);
+    store(pool.r + i, F(0.f));
+    store(pool.g + i, F(0.f));
+    store(pool.b + i, F(0.f));
+    store(pool.pixel_hash + i, key.pixel_hash);
+    store(pool.sample + i, sample);
+    if (pool.has_aovs) {
+      for (float* column : {pool.albedo_r, pool.albedo_g, pool.albedo_b, pool.normal_x, pool.normal_y,
+                            pool.normal_z})
+        store(column + i, F(0.f));
+      store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
+    }
+    store(rays.ox + i, ray.o.x);
+    store(rays.oy + i, ray.o.y);
+    store(rays.oz + i, ray.o.z);
+    store(rays.dx + i, ray.d.x);
+    store(rays.dy + i, ray.d.y);
+    store(rays.dz + i, ray.d.z);
+    for (float* one : {rays.throughput_r, rays.throughput_g, rays.throughput_b, rays.eta_scale})
+      store(one + i, F(1.f));
+    store(rays.pdf + i, F(0.f));
+    store(rays.cone_width + i, F(0.f));
+    store(rays.cone_spread + i, ray.spread);
+    store(rays.slot + i, slot);
+    store(tfar + i, ray.tfar);
+  }
+  rays.size = n;
+  return camera.has_far ? tfar : nullptr;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Stage 2: what the rays hit. Stage 4: what the shadow rays meet.
+#pragma once
+
+#include "wavecomb/integrate/wave.h"
+
+namespace wavecomb {
+
+/// Keys of presence for rays of `depth`; shadow rays draw other numbers than the rays themselves.
+inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow) {
+  return {pool.pixel_hash, pool.sample, 2 * depth + (shadow ? 1u : 0u)};
+}
+
+/// Closest hits of the ray queue into the hit buffer.
+inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar) {
+  const RayQueue& q = wave.rays;
+  const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size};
+  const HitBuffer& h = wave.hits;
+  context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
+                           depth == 0, presence_keys(wave.pool, depth, false));
+  wave.counts.rays += q.size;
+}
+
+/// Adds what the unblocked shadow rays bring to their slots. A slot has at most one, so the order of the
+/// queue cannot matter.
+template <typename F>
+void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
+  using U = UInt<F>;
+  ShadowQueue& q = wave.shadows;
+  if (q.size == 0) return;
+  const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.slot, q.size};
+  uint32_t* occluded = q.alive;  // compaction is done with it
+  context.accel->occluded(rays, occluded, context.traversal_width,
+                          presence_keys(wave.pool, depth, true));
+  PathPool& pool = wave.pool;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(occluded + i) == U(0u));
+    const U slot = load<U>(q.slot + i);
+    const auto add = [&](float* to, const float* from) {
+      scatter<F>(to, gather<F>(to, slot, active) + load<F>(from + i), slot, active);
+    };
+    add(pool.r, q.r);
+    add(pool.g, q.g);
+    add(pool.b, q.b);
+  }
+  wave.counts.shadow_rays += q.size;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+/// One vertex of a path: emission, next event estimation, the BSDF's bounce and roulette. Both
+/// integrators, wave and reference, run this and nothing else.
+///
+/// The estimator, for a path that reaches x_k with throughput T_k:
+///   L += T_k Le(x_k) w_bsdf                                     (emission met by the bounce before)
+///   L += T_k f |cos| Le / p_light  w_light  V                   (one light sample, balance heuristic)
+///   T_{k+1} = T_k f |cos| / p_bsdf / q                          (bounce, survival probability q)
+/// with w_bsdf = p_bsdf / (p_bsdf + p_light), w_light = p_light / (p_bsdf + p_light) (Veach 1997, 9.2).
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/warp.h"
+#include "wavecomb/integrate/surface.h"
+#include "wavecomb/light/light.h"
+#include "wavecomb/material/params.h"
+#include "wavecomb/material/program_table.h"
+
+namespace wavecomb {
+
+/// The settings that shading reads.
+struct ShadeSettings {
+  SamplerKind sampler;
+  uint32_t max_depth;
+  bool roulette;
+  uint32_t roulette_depth;
+  float clamp_indirect;  ///< 0: off
+  bool schlick_fresnel;
+  bool cosine_sampling;
+
+  explicit ShadeSettings(const Settings& s)
+      : sampler(s.sampler),
+        max_depth(s.max_depth),
+        roulette(s.roulette == RouletteKind::kThroughput),
+        roulette_depth(s.roulette_depth),
+        clamp_indirect(s.clamp_indirect),
+        schlick_fresnel(s.schlick_fresnel),
+        cosine_sampling(s.cosine_sampling) {}
+};
+
+/// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the hit.
+template <typename F>
+struct PathState {
+  Vec3<F> dir;
+  Color<F> throughput;
+  F pdf;        ///< of the bounce before; 0: delta or camera
+  F eta_scale;
+  F cone_width, cone_spread;
+};
+
+/// What shading a vertex gives. Lanes outside the masks hold anything.
+template <typename F>
+struct VertexResult {
+  Color<F> emitted;       ///< to add to the path's radiance, clamped
+  Mask<F> has_shadow;     ///< a shadow ray is wanted
+  Vec3<F> shadow_o, shadow_d;
+  F shadow_tfar;
+  Color<F> direct;        ///< to add where the shadow ray is free, clamped
+  Mask<F> alive;          ///< the path goes on
+  Vec3<F> o;              ///< of the next ray; its direction and the rest is in `next`
+  PathState<F> next;
+  Color<F> albedo;        ///< first-hit AOVs
+  Vec3<F> normal;
+};
+
+/// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and NaN-free: a
+/// contribution that is not finite is dropped.
+template <typename F>
+inline Color<F> clean(const Color<F>& c, float limit) {
+  const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
+  Color<F> r = select<F>(ok, c, Color<F>(F(0.f)));
+  if (limit > 0) {
+    const F y = luminance(r);
+    r = r * select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
+  }
+  return r;
+}
+
+/// The limit for a contribution that light brings after `bounces` scatterings: direct light is free.
+inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
+  return bounces > 1 ? s.clamp_indirect : 0.f;
+}
+
+/// Balance heuristic for the technique with density `a` against `b`; 1 where a was a delta (a = 0).
+template <typename F>
+inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
+  return select(bsdf_pdf > 0.f, F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))),
+                F(1.f));
+}
+
+/// Radiance of a light's own shape met by a path.
+template <typename F>
+inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
+                               const UInt<F>& light, const Vec3<F>& o, const F& t,
+                               const PathState<F>& path, const Mask<F>& active) {
+  const LightHit<F> hit = light_hit<F>(scene.lights, light, o, path.dir, t, active);
+  const F w = bounce_weight<F>(path.pdf, hit.pdf);
+  return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
+}
+
+/// Radiance of the environment met by a path that left the scene.
+template <typename F>
+inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings& settings,
+                                     uint32_t depth, const PathState<F>& path, const Mask<F>& active) {
+  const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
+  const Color<F> le = escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active);
+  return clean<F>(path.throughput * le, clamp_limit(settings, depth));
+}
+
+/// Shades vertex `depth` (0: the camera's first hit) of the active lanes' paths with program `Bsdf`.
+/// `material` and `geom` (geometry within the instance's group) belong to `hit`; t is the length of the ray.
+template <typename Bsdf, typename F>
+inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings& settings,
+                                    const SampleKey<F>& key, uint32_t depth, const MeshHit<F>& hit,
+                                    const UInt<F>& geom, const F& t, const UInt<F>& material,
+                                    const PathState<F>& path, bool wants_aovs, const Mask<F>& active) {
+  using U = UInt<F>;
+  VertexResult<F> out;
+  out.emitted = Color<F>(F(0.f));
+  out.direct = Color<F>(F(0.f));
+  out.has_shadow = Mask<F>(false);
+  out.alive = Mask<F>(false);
+
+  // Texture coordinates are worked out only where a texture is read.
+  const U slots = gather<U>(scene.materials.materials,
+                            material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
+                                static_cast<uint32_t>(offsetof(MaterialRecord, texture_slots) / 4),
+                            Mask<U>(active));
+  const bool textured = any(Mask<F>((slots & Bsdf::kSlots) != U(0u)) & active);
+  constexpr bool kOpaque = Bsdf::kProgram != ProgramId::kDielectric;
+  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, textured, kOpaque, active);
+  const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
+  const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
+
+  MaterialView materials = scene.materials;
+  materials.schlick_fresnel = settings.schlick_fresnel;
+  const ShadingParams<F> params =
+      fetch_params<Bsdf::kSlots, F>(materials, material, s.uv, uv_width, active);
+  const Bsdf bsdf(params, settings.schlick_fresnel);
+
+  if constexpr ((Bsdf::kSlots & slot_bit(Slot::kEmission)) != 0) {
+    const Mask<F> emits = active & not_(is_black(params.emission));
+    if (any(emits)) {
+      F light_pdf(0.f);
+      if (scene.has_emissive_meshes) {
+        constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+        const U first = gather<U>(scene.instances,
+                                  hit.inst * kWords +
+                                      static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+                                  Mask<U>(emits));
+        const U base = gather<U>(scene.emissive_lights, first + geom, Mask<U>(emits));
+        const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
+        if (any(sampled))
+          light_pdf = select(sampled,
+                             triangle_light_pdf<F>(scene.lights, base + hit.prim, path.dir, t, sampled),
+                             F(0.f));
+      }
+      const F w = bounce_weight<F>(path.pdf, light_pdf);
+      const Color<F> e = clean<F>(path.throughput * params.emission * w, clamp_limit(settings, depth));
+      out.emitted = select<F>(emits, e, Color<F>(F(0.f)));
+    }
+  }
+
+  // The shading frame, with the normal map where there is one.
+  Frame<F> frame;
+  if (textured) {
+    frame = make_frame<F>(s.ns, s.dpdu);
+    const U normal_bit(slot_bit(Slot::kNormal));
+    const Mask<F> mapped = active & Mask<F>((slots & normal_bit) != U(0u));
+    if (any(mapped)) {
+      Vec3<F> n = normalize(frame.to_world(params.normal));
+      const F towards = select(dot(path.dir, s.ng) < 0.f, F(1.f), F(-1.f));
+      const F seen = -dot(path.dir, n) * towards;
+      n = select<F>(seen < 1e-3f, normalize(fma(path.dir, F(-towards * (1e-3f - seen)), n)), n);
+      n = select<F>(mapped, n, s.ns);
+      frame = make_frame<F>(n, s.dpdu);
+    }
+  } else {
+    frame = make_frame<F>(s.ns);
+  }
+  const Vec3<F> wo = frame.to_local(-path.dir);
+
+  if (wants_aovs) {
+    out.albedo = bsdf.albedo();
+    out.normal = select<F>(dot(path.dir, s.ng) > 0.f, -frame.n, frame.n);
+  }
+  if (depth >= settings.max_depth) return out;
+
+  const Sample4<F> rl = sample_4d<F>(settings.sampler, key, light_set(depth));
+
+  // A direction is on the side of the surface that the BSDF thinks it is on, or light leaks.
+  const auto consistent = [&](const Vec3<F>& world, const Vec3<F>& local) {
+    return F(dot(world, s.ng) * local.z) > 0.f;
+  };
+
+  const Mask<F> lit = active & bsdf.has_non_delta();
+  if (Bsdf::kHasNonDelta && scene.lights.count > 0 && any(lit)) {
+    // Light is gathered where reflected rays will start, so that both techniques agree.
+    const Vec3<F> from = spawn_origin<F>(s, -path.dir);
+    const LightSample<F> l = sample_light<F>(scene.lights, from, rl.x, rl.y, rl.z, lit);
+    const Vec3<F> wi = frame.to_local(l.wi);
+    const BsdfEval<F> e = bsdf.eval(wo, wi);
+    const F bounce_pdf =
+        settings.cosine_sampling && kOpaque
+            ? select(F(wo.z * wi.z) > 0.f, cosine_hemisphere_pdf(abs(wi.z)), F(0.f))
+            : e.pdf;
+    const F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
+    const Color<F> c = clean<F>(path.throughput * e.f_cos * l.weight * w,
+                                clamp_limit(settings, depth + 1));
+    out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
+    out.direct = c;
+    out.shadow_o = spawn_origin<F>(s, l.wi);
+    out.shadow_d = l.wi;
+    out.shadow_tfar = l.distance * 0.9999f;
+  }
+
+  const Sample4<F> rb = sample_4d<F>(settings.sampler, key, bsdf_set(depth));
+  BsdfSample<F> b = bsdf.sample(wo, rb.x, rb.y, rb.z);
+  if (settings.cosine_sampling && kOpaque) {
+    // The dissertation's way: the hemisphere by cosine, whatever the lobe.
+    Vec3<F> wi = square_to_cosine_hemisphere(rb.y, rb.z);
+    const F pdf = cosine_hemisphere_pdf(wi.z);
+    wi.z = select(wo.z < 0.f, F(-wi.z), wi.z);
+    const BsdfEval<F> e = bsdf.eval(wo, wi);
+    const Mask<F> use = not_(b.is_delta) & (pdf > 0.f);
+    const F inv = 1.f / select(pdf > 0.f, pdf, F(1.f));
+    b.wi = select<F>(use, wi, b.wi);
+    b.weight = select<F>(use, e.f_cos * inv, b.weight);
+    b.pdf = select(use, pdf, b.pdf);
+  }
+  const Vec3<F> d = normalize(frame.to_world(b.wi));
+  out.next.dir = d;
+  out.next.throughput = path.throughput * b.weight;
+  out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
+  out.next.eta_scale = path.eta_scale * b.eta * b.eta;
+  out.next.cone_width = path.cone_width;
+  // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
+  out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
+  out.o = spawn_origin<F>(s, d);
+  const F largest = max_component(out.next.throughput);
+  out.alive = active & (b.pdf > 0.f) & consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);
+
+  if (settings.roulette && depth + 1 >= settings.roulette_depth) {
+    const F q = min(F(largest * out.next.eta_scale), F(0.95f));
+    out.alive = out.alive & (rl.w < q);
+    out.next.throughput *= F(1.f / max(q, F(1e-10f)));
+  }
+  return out;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Materials as data: a program with parameters and textures.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/affine.h"
+#include "wavecomb/texture/texture.h"
+
+namespace wavecomb {
+
+/// A program is shading code; each material runs one.
+enum class ProgramId : uint8_t { kDiffuse, kMetal, kDielectric, kPlastic, kEmissive, kPrincipled };
+inline constexpr uint32_t kProgramCount = 6;
+inline constexpr const char* kProgramNames[kProgramCount] = {"diffuse", "metal",    "dielectric",
+                                                             "plastic", "emissive", "principled"};
+
+/// Parameters that a texture can drive. Each has a constant, used where no texture is connected.
+enum class Slot : uint8_t {
+  kBaseColor,           ///< rgb: albedo; metal: reflectance at normal incidence (F0); dielectric: tint
+  kSpecularColor,       ///< rgb: metal: tint at 82 degrees (F82); principled, specular workflow: F0
+  kEmission,            ///< rgb: radiance
+  kRoughness,           ///< perceptual; alpha = roughness^2
+  kMetallic,
+  kClearcoat,
+  kClearcoatRoughness,
+  kOpacity,
+  kNormal,              ///< rgb: tangent-space normal, already scaled and biased to [-1, 1]
+};
+inline constexpr uint32_t kSlotCount = 9;
+inline constexpr const char* kSlotNames[kSlotCount] = {
+    "base_color", "specular_color", "emission",            "roughness", "metallic",
+    "clearcoat",  "clearcoat_roughness", "opacity", "normal"};
+inline constexpr uint32_t slot_bit(Slot s) { return 1u << static_cast<uint32_t>(s); }
+
+/// How a slot reads a texture: value = texel * scale + bias at uv' = transform(uv).
+struct TextureUse {
+  uint32_t texture = kNoTexture;
+  /// 0..3: that channel for all of r, g, b; 4: rgb.
+  uint32_t channel = 4;
+  std::array<float, 4> scale{1, 1, 1, 1}, bias{0, 0, 0, 0};
+  /// u' = m[0] u + m[1] v + m[2]; v' = m[3] u + m[4] v + m[5].
+  std::array<float, 6> uv{1, 0, 0, 0, 1, 0};
+};
+
+/// One material. Defaults are those of UsdPreviewSurface.
+struct Material {
+  std::string name;
+  ProgramId program = ProgramId::kPrincipled;
+  Vec3<float> base_color{0.18f, 0.18f, 0.18f};
+  Vec3<float> specular_color{0, 0, 0};
+  Vec3<float> emission{0, 0, 0};
+  float roughness = 0.5f;
+  float metallic = 0;
+  float clearcoat = 0;
+  float clearcoat_roughness = 0.01f;
+  float opacity = 1;
+  float ior = 1.5f;
+  float opacity_threshold = 0;  ///< > 0: opacity below it is 0, else 1
+  /// Conductor by measured index (metal only): used where any k > 0, in place of F0 and F82.
+  Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
+  bool specular_workflow = false;    ///< principled: F0 from specular_color rather than metallic
+  bool presence = false;             ///< principled: opacity is presence (cut-out) rather than transparency
+  std::array<TextureUse, kSlotCount> textures;
+
+  bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
+  /// Whether rays must ask how much of the surface is there.
+  bool needs_presence() const {
+    return (presence || opacity_threshold > 0) && (opacity < 1 || has_texture(Slot::kOpacity));
+  }
+};
+
+/// A material as lanes read it: 32 floats side by side, so that one record is two cache lines.
+struct alignas(64) MaterialRecord {
+  float base_color[3], specular_color[3], emission[3];
+  float roughness, metallic, clearcoat, clearcoat_roughness, opacity;
+  float normal[3];
+  float ior, opacity_threshold;
+  float conductor_eta[3], conductor_k[3];
+  uint32_t texture_slots;  ///< bit s: slot s reads a texture
+  uint32_t flags;          ///< MaterialFlags
+  uint32_t program;
+  float pad[4];
+};
+static_assert(sizeof(MaterialRecord) == 128);
+enum MaterialFlags : uint32_t {
+  kSpecularWorkflow = 1,
+  kPresence = 2,
+  kConductorIndex = 4,
+};
+
+/// A TextureUse as lanes read it: 16 words.
+struct alignas(64) TextureUseRecord {
+  uint32_t texture, channel;
+  float scale[4], bias[4], uv[6];
+};
+static_assert(sizeof(TextureUseRecord) == 64);
+
+/// What kernels need of all materials. Uses are at `material * kSlotCount + slot`.
+struct MaterialView {
+  const MaterialRecord* materials = nullptr;
+  const TextureUseRecord* uses = nullptr;
+  const TextureView* textures = nullptr;
+  bool schlick_fresnel = false;  ///< a render setting: Schlick's approximation in place of exact Fresnel
+};
+
+}  // namespace wavecomb

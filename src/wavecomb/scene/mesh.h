@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Triangle meshes as data.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace wavecomb {
+
+/// Material id that means "what the instance says" (see Instance::material).
+inline constexpr uint32_t kInheritMaterial = 0xffffffffu;
+
+enum class Attribute : uint8_t {
+  kNone,
+  kVertex,  ///< one value per vertex, addressed by the triangle's indices
+  kCorner,  ///< one value per corner, 3 per triangle in order
+};
+
+/// An indexed triangle mesh. Arrays belong to the caller and are not copied; `owner` keeps them alive for
+/// as long as a Scene uses them.
+struct Mesh {
+  std::string name;
+  std::span<const float> positions;    ///< 3 per vertex
+  std::span<const uint32_t> indices;   ///< 3 per triangle, counter-clockwise from outside
+  std::span<const float> normals;      ///< 3 per vertex or corner; empty: flat
+  Attribute normals_at = Attribute::kNone;
+  std::span<const float> uvs;          ///< 2 per vertex or corner; empty: uv = barycentrics
+  Attribute uvs_at = Attribute::kNone;
+  std::span<const uint32_t> face_materials;  ///< one per triangle, or empty
+  uint32_t material = kInheritMaterial;      ///< where face_materials is empty
+  std::shared_ptr<const void> owner;
+
+  size_t triangle_count() const { return indices.size() / 3; }
+  size_t vertex_count() const { return positions.size() / 3; }
+};
+
+/// A mesh as lanes read it: addresses and flags, 16 words.
+struct alignas(64) MeshRecord {
+  uint64_t positions, indices, normals, uvs, face_materials;
+  uint32_t material;
+  uint32_t flags;
+  uint32_t pad[4];
+};
+static_assert(sizeof(MeshRecord) == 64);
+enum MeshFlags : uint32_t {
+  kNormalsPerVertex = 1,
+  kNormalsPerCorner = 2,
+  kUvsPerVertex = 4,
+  kUvsPerCorner = 8,
+};
+
+}  // namespace wavecomb

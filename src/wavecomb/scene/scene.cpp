@@ -1,0 +1,441 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+std::string quoted(const std::string& kind, const std::string& name) {
+  return kind + (name.empty() ? "" : " '" + name + "'");
+}
+
+bool finite(const Vec3<float>& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool finite(const Affine& m) {
+  return finite(m.row[0]) && finite(m.row[1]) && finite(m.row[2]) && finite(m.t);
+}
+
+/// Attribute arrays must have 'arity' floats per vertex or per corner.
+void check_attribute(const Mesh& mesh, std::span<const float> values, Attribute at, size_t arity,
+                     const char* what) {
+  if (at == Attribute::kNone) return;
+  const size_t want =
+      arity * (at == Attribute::kVertex ? mesh.vertex_count() : mesh.indices.size());
+  if (values.size() != want)
+    throw Error(quoted("mesh", mesh.name) + " has " + std::to_string(values.size() / arity) + " " +
+                what + " where " + std::to_string(want / arity) + " are needed");
+}
+
+uint64_t address(const void* p) { return reinterpret_cast<uint64_t>(p); }
+
+MeshRecord make_mesh_record(const Mesh& mesh) {
+  MeshRecord r{};
+  r.positions = address(mesh.positions.data());
+  r.indices = address(mesh.indices.data());
+  r.normals = address(mesh.normals.data());
+  r.uvs = address(mesh.uvs.data());
+  r.face_materials = address(mesh.face_materials.empty() ? nullptr : mesh.face_materials.data());
+  r.material = mesh.material;
+  if (mesh.normals_at == Attribute::kVertex) r.flags |= kNormalsPerVertex;
+  if (mesh.normals_at == Attribute::kCorner) r.flags |= kNormalsPerCorner;
+  if (mesh.uvs_at == Attribute::kVertex) r.flags |= kUvsPerVertex;
+  if (mesh.uvs_at == Attribute::kCorner) r.flags |= kUvsPerCorner;
+  return r;
+}
+
+MaterialRecord make_material_record(const Material& m) {
+  MaterialRecord r{};
+  const auto put = [](float* to, const Vec3<float>& v) {
+    to[0] = v.x;
+    to[1] = v.y;
+    to[2] = v.z;
+  };
+  put(r.base_color, m.base_color);
+  put(r.specular_color, m.specular_color);
+  put(r.emission, m.emission);
+  r.roughness = m.roughness;
+  r.metallic = m.metallic;
+  r.clearcoat = m.clearcoat;
+  r.clearcoat_roughness = m.clearcoat_roughness;
+  r.opacity = m.opacity;
+  put(r.normal, {0, 0, 1});
+  r.ior = m.ior;
+  r.opacity_threshold = m.opacity_threshold;
+  put(r.conductor_eta, m.conductor_eta);
+  put(r.conductor_k, m.conductor_k);
+  for (uint32_t s = 0; s < kSlotCount; ++s)
+    if (m.has_texture(static_cast<Slot>(s))) r.texture_slots |= 1u << s;
+  if (m.specular_workflow) r.flags |= kSpecularWorkflow;
+  if (m.needs_presence()) r.flags |= kPresence;
+  if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
+  r.program = static_cast<uint32_t>(m.program);
+  return r;
+}
+
+TextureUseRecord make_use_record(const TextureUse& use) {
+  TextureUseRecord r{};
+  r.texture = use.texture;
+  r.channel = use.channel;
+  std::copy(use.scale.begin(), use.scale.end(), r.scale);
+  std::copy(use.bias.begin(), use.bias.end(), r.bias);
+  std::copy(use.uv.begin(), use.uv.end(), r.uv);
+  return r;
+}
+
+InstanceRecord make_instance_record(const Affine& m, uint32_t material) {
+  InstanceRecord r{};
+  for (int i = 0; i < 3; ++i) {
+    r.to_world[4 * i] = m.row[i].x;
+    r.to_world[4 * i + 1] = m.row[i].y;
+    r.to_world[4 * i + 2] = m.row[i].z;
+  }
+  r.to_world[3] = m.t.x;
+  r.to_world[7] = m.t.y;
+  r.to_world[11] = m.t.z;
+  // Cofactors: rows are cross products of the rows of A.
+  const auto cross3 = [](const Vec3<float>& a, const Vec3<float>& b) {
+    return Vec3<float>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  };
+  const float sign = m.determinant() < 0 ? -1.f : 1.f;
+  const Vec3<float> c[3] = {cross3(m.row[1], m.row[2]), cross3(m.row[2], m.row[0]),
+                            cross3(m.row[0], m.row[1])};
+  for (int i = 0; i < 3; ++i) {
+    r.normal[3 * i] = sign * c[i].x;
+    r.normal[3 * i + 1] = sign * c[i].y;
+    r.normal[3 * i + 2] = sign * c[i].z;
+  }
+  r.material = material;
+  r.identity = m.is_identity();
+  return r;
+}
+
+}  // namespace
+
+uint64_t Scene::unique_triangles() const {
+  uint64_t n = 0;
+  for (const Mesh& mesh : meshes_) n += mesh.triangle_count();
+  return n;
+}
+
+uint64_t Scene::instanced_triangles() const {
+  std::vector<uint64_t> of_group(groups_.size(), 0);
+  for (size_t g = 0; g < groups_.size(); ++g)
+    for (uint32_t mesh : groups_[g].meshes) of_group[g] += meshes_[mesh].triangle_count();
+  uint64_t n = of_group[0];
+  for (const Instance& i : instances_) n += of_group[i.group];
+  return n;
+}
+
+SceneBuilder::SceneBuilder() : groups_(1), children_(1) { groups_[0].name = "world"; }
+
+uint32_t SceneBuilder::add_texture(const TextureDesc& desc) {
+  textures_.push_back(std::make_unique<Texture>(desc));
+  return static_cast<uint32_t>(textures_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_material(Material material) {
+  const auto name = quoted("material", material.name);
+  for (uint32_t s = 0; s < kSlotCount; ++s) {
+    const TextureUse& use = material.textures[s];
+    if (use.texture == kNoTexture) continue;
+    if (use.texture >= textures_.size())
+      throw Error(name + " reads texture " + std::to_string(use.texture) +
+                  ", which was never added; add textures before materials");
+    if (use.channel > 4) throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
+  }
+  for (const Vec3<float>& v : {material.base_color, material.specular_color, material.emission,
+                               material.conductor_eta, material.conductor_k})
+    if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
+  for (float x : {material.roughness, material.metallic, material.clearcoat,
+                  material.clearcoat_roughness, material.opacity, material.ior,
+                  material.opacity_threshold})
+    if (!std::isfinite(x)) throw Error(name + " has a parameter that is not finite; give finite numbers");
+  if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
+  materials_.push_back(std::move(material));
+  return static_cast<uint32_t>(materials_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_mesh(Mesh mesh) {
+  const auto name = quoted("mesh", mesh.name);
+  if (mesh.positions.size() % 3 != 0) throw Error(name + ": positions must be triples");
+  if (mesh.indices.size() % 3 != 0) throw Error(name + ": indices must be triples");
+  if (mesh.vertex_count() > 0x7fffffffu / 3 || mesh.triangle_count() > 0x7fffffffu / 9)
+    throw Error(name + " has too many points or triangles for 32-bit offsets; split it");
+  for (float x : mesh.positions)
+    if (!std::isfinite(x))
+      throw Error(name + " has points that are not finite (NaN or infinite); mend or remove them");
+  const size_t vertices = mesh.vertex_count();
+  uint32_t highest = 0;
+  for (uint32_t i : mesh.indices) highest = std::max(highest, i);
+  if (!mesh.indices.empty() && highest >= vertices)
+    throw Error(name + " has a face with vertex " + std::to_string(highest) + " but only " +
+                std::to_string(vertices) + " points");
+  check_attribute(mesh, mesh.normals, mesh.normals_at, 3, "normals");
+  check_attribute(mesh, mesh.uvs, mesh.uvs_at, 2, "texture coordinates");
+  if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.triangle_count())
+    throw Error(name + " has " + std::to_string(mesh.face_materials.size()) + " face materials for " +
+                std::to_string(mesh.triangle_count()) + " triangles");
+  meshes_.push_back(std::move(mesh));
+  return static_cast<uint32_t>(meshes_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_group(std::string name) {
+  groups_.push_back({std::move(name), {}});
+  children_.emplace_back();
+  return static_cast<uint32_t>(groups_.size() - 1);
+}
+
+void SceneBuilder::add_to_group(uint32_t group, uint32_t mesh) {
+  if (group >= groups_.size()) throw Error("group " + std::to_string(group) + " was never added");
+  if (mesh >= meshes_.size()) throw Error("mesh " + std::to_string(mesh) + " was never added");
+  groups_[group].meshes.push_back(mesh);
+}
+
+void SceneBuilder::add_instance(uint32_t parent, uint32_t child, const Affine& transform,
+                                uint32_t material) {
+  if (parent >= groups_.size() || child >= groups_.size())
+    throw Error("an instance names a group that was never added");
+  if (child == 0) throw Error("the world cannot be instanced; make a group");
+  if (!finite(transform))
+    throw Error("an instance of " + quoted("group", groups_[child].name) +
+                " has a transform that is not finite; mend it");
+  children_[parent].push_back({child, transform, material});
+}
+
+uint32_t SceneBuilder::add_light(Light light) {
+  const auto name = quoted("light", light.name);
+  if (!finite(light.to_world)) throw Error(name + " has a transform that is not finite; mend it");
+  if (!finite(light.color) || light.color.x < 0 || light.color.y < 0 || light.color.z < 0)
+    throw Error(name + " has a colour that is negative or not finite; give one of 0 or more");
+  for (float x : {light.width, light.height, light.radius, light.angle})
+    if (!std::isfinite(x) || x < 0)
+      throw Error(name + " has a size that is negative or not finite; give one of 0 or more");
+  if (light.texture != kNoTexture && light.texture >= textures_.size())
+    throw Error(name + " reads a texture that was never added; add textures before lights");
+  lights_.push_back(std::move(light));
+  return static_cast<uint32_t>(lights_.size() - 1);
+}
+
+void SceneBuilder::set_camera(const Camera& camera) {
+  const float* w = camera.window;
+  if (!finite(camera.to_world) || std::abs(camera.to_world.determinant()) < 1e-30f)
+    throw Error("the camera's transform is singular or not finite; mend it");
+  for (int i = 0; i < 4; ++i)
+    if (!std::isfinite(w[i])) throw Error("the camera's window is not finite; check its aperture");
+  if (!(w[0] < w[1]) || !(w[2] < w[3]))
+    throw Error("the camera's window is empty; check its aperture and focal length");
+  if (!(camera.lens_radius >= 0) || !std::isfinite(camera.lens_radius) ||
+      (camera.lens_radius > 0 && !(camera.focus_distance > 0)))
+    throw Error("the camera's lens needs a radius of 0 or more and a focus distance above 0");
+  camera_ = camera;
+}
+
+void SceneBuilder::flatten(uint32_t group, const Affine& to_world, uint32_t material,
+                           std::vector<uint32_t>& path, std::vector<Instance>& out) const {
+  if (std::find(path.begin(), path.end(), group) != path.end())
+    throw Error(quoted("group", groups_[group].name) + " holds itself; break the cycle of instances");
+  if (group != 0 && !groups_[group].meshes.empty()) {
+    if (out.size() >= 0x0fffffffu) throw Error("more than 268 million instances; use fewer");
+    out.push_back({group, to_world, material});
+  }
+  path.push_back(group);
+  for (const Node& node : children_[group])
+    flatten(node.child, to_world * node.transform,
+            node.material == kInheritMaterial ? material : node.material, path, out);
+  path.pop_back();
+}
+
+std::shared_ptr<const Scene> SceneBuilder::build() {
+  std::shared_ptr<Scene> scene(new Scene);
+  std::vector<uint32_t> path;
+  std::vector<Instance> flat;
+  flatten(0, Affine{}, kInheritMaterial, path, flat);
+  size_t singular = 0;
+  for (Instance& i : flat) {
+    const float det = i.to_world.determinant();
+    if (finite(i.to_world) && std::isfinite(det) && std::abs(det) > 1e-35f)
+      scene->instances_.push_back(std::move(i));
+    else
+      ++singular;
+  }
+  if (singular > 0)
+    warnings_.push_back(std::to_string(singular) +
+                        " instances have a singular transform and were left out");
+
+  // A grey for meshes that nothing was bound to.
+  const auto material_count = static_cast<uint32_t>(materials_.size());
+  const uint32_t grey = material_count;
+  Material fallback;
+  fallback.name = "default";
+  fallback.program = ProgramId::kDiffuse;
+  fallback.base_color = {0.5f, 0.5f, 0.5f};
+  materials_.push_back(fallback);
+  for (const Mesh& mesh : meshes_) {
+    const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
+    if (bad(mesh.material) || std::any_of(mesh.face_materials.begin(), mesh.face_materials.end(), bad))
+      throw Error(quoted("mesh", mesh.name) + " uses a material that was never added");
+  }
+  for (Instance& i : scene->instances_) {
+    if (i.material == kInheritMaterial) i.material = grey;
+    if (i.material > grey) throw Error("an instance uses a material that was never added");
+  }
+
+  scene->meshes_ = std::move(meshes_);
+  scene->groups_ = std::move(groups_);
+  scene->materials_ = std::move(materials_);
+  scene->textures_ = std::move(textures_);
+  scene->lights_ = std::move(lights_);
+  scene->camera_ = camera_;
+  make_records(*scene);
+  make_lights(*scene);
+  scene->warnings_ = std::move(warnings_);
+  *this = SceneBuilder();
+  return scene;
+}
+
+void SceneBuilder::make_records(Scene& scene) const {
+  for (const Mesh& mesh : scene.meshes_) scene.mesh_records_.push_back(make_mesh_record(mesh));
+  for (const auto& texture : scene.textures_) scene.texture_views_.push_back(texture->view());
+  for (const Material& m : scene.materials_) {
+    scene.material_records_.push_back(make_material_record(m));
+    for (const TextureUse& use : m.textures) scene.use_records_.push_back(make_use_record(use));
+    scene.material_program_.push_back(static_cast<uint32_t>(m.program));
+  }
+
+  std::vector<uint32_t> first(scene.groups_.size());
+  std::vector<Bounds> bounds(scene.groups_.size());
+  for (size_t g = 0; g < scene.groups_.size(); ++g) {
+    first[g] = static_cast<uint32_t>(scene.geometry_mesh_.size());
+    for (uint32_t mesh : scene.groups_[g].meshes) {
+      scene.geometry_mesh_.push_back(mesh);
+      const auto& p = scene.meshes_[mesh].positions;
+      for (size_t i = 0; i + 2 < p.size(); i += 3) bounds[g].add({p[i], p[i + 1], p[i + 2]});
+    }
+  }
+  const auto grey = static_cast<uint32_t>(scene.materials_.size() - 1);
+  scene.instance_records_.push_back(make_instance_record(Affine{}, grey));
+  scene.bounds_ = bounds[0];
+  for (const Instance& i : scene.instances_) {
+    InstanceRecord r = make_instance_record(i.to_world, i.material);
+    r.geometry = first[i.group];
+    scene.instance_records_.push_back(r);
+    const Bounds& b = bounds[i.group];
+    if (b.empty()) continue;
+    for (int corner = 0; corner < 8; ++corner)
+      scene.bounds_.add(i.to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
+                                          corner & 4 ? b.hi.z : b.lo.z}));
+  }
+}
+
+void SceneBuilder::make_lights(Scene& scene) const {
+  // Triangles of meshes whose material emits become lights of their own.
+  std::vector<EmissiveTriangle> triangles;
+  std::vector<uint32_t>& table = scene.emissive_lights_;
+  const auto emits = [&](uint32_t material) {
+    const Material& m = scene.materials_[material];
+    const bool can = m.program == ProgramId::kEmissive || m.program == ProgramId::kPrincipled;
+    return can && (m.emission.x > 0 || m.emission.y > 0 || m.emission.z > 0 ||
+                   m.has_texture(Slot::kEmission));
+  };
+  bool any_emissive = false;
+  for (uint32_t m = 0; m < scene.materials_.size(); ++m) any_emissive = any_emissive || emits(m);
+
+  if (any_emissive) {
+    for (size_t index = 0; index < scene.instance_records_.size(); ++index) {
+      InstanceRecord& record = scene.instance_records_[index];
+      const Affine to_world = index == 0 ? Affine{} : scene.instances_[index - 1].to_world;
+      const Group& group = scene.groups_[index == 0 ? 0 : scene.instances_[index - 1].group];
+      record.emissive = static_cast<uint32_t>(table.size());
+      for (uint32_t mesh_id : group.meshes) {
+        const Mesh& mesh = scene.meshes_[mesh_id];
+        const auto material_of = [&](size_t face) {
+          const uint32_t m = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[face];
+          return m == kInheritMaterial ? record.material : m;
+        };
+        bool emissive = false;
+        for (size_t f = 0; f < mesh.triangle_count() && !emissive; ++f) {
+          emissive = emits(material_of(f));
+          if (mesh.face_materials.empty()) break;
+        }
+        if (!emissive) {
+          table.push_back(kNoLight);
+          continue;
+        }
+        table.push_back(static_cast<uint32_t>(triangles.size()));
+        for (size_t f = 0; f < mesh.triangle_count(); ++f) {
+          const uint32_t material = material_of(f);
+          EmissiveTriangle t{};
+          const Material& m = scene.materials_[material];
+          Vec3<float> radiance = m.emission;
+          if (m.has_texture(Slot::kEmission)) {
+            const TextureUse& use = m.textures[static_cast<size_t>(Slot::kEmission)];
+            const float* mean = scene.textures_[use.texture]->mean();
+            const auto value = [&](uint32_t c) {
+              const uint32_t from = use.channel == 4 ? c : use.channel;
+              return std::max(0.f, mean[from] * use.scale[from] + use.bias[from]);
+            };
+            radiance = {value(0), value(1), value(2)};
+            t.material = material;
+          }
+          if (!emits(material)) radiance = {0, 0, 0};
+          t.radiance[0] = radiance.x;
+          t.radiance[1] = radiance.y;
+          t.radiance[2] = radiance.z;
+          float* const corners[3] = {t.p0, t.p1, t.p2};
+          float* const uvs[3] = {t.uv0, t.uv1, t.uv2};
+          constexpr float kBarycentric[3][2] = {{0, 0}, {1, 0}, {0, 1}};
+          for (size_t k = 0; k < 3; ++k) {
+            const size_t vertex = mesh.indices[3 * f + k];
+            const float* p = &mesh.positions[3 * vertex];
+            const Vec3<float> w = to_world.point({p[0], p[1], p[2]});
+            corners[k][0] = w.x;
+            corners[k][1] = w.y;
+            corners[k][2] = w.z;
+            const size_t at = mesh.uvs_at == Attribute::kCorner ? 3 * f + k : vertex;
+            const float* uv = mesh.uvs_at == Attribute::kNone ? kBarycentric[k] : &mesh.uvs[2 * at];
+            uvs[k][0] = uv[0];
+            uvs[k][1] = uv[1];
+          }
+          triangles.push_back(t);
+        }
+      }
+    }
+  }
+
+  const Bounds& b = scene.bounds_;
+  Vec3<float> center{0, 0, 0};
+  float radius = 1;
+  if (!b.empty()) {
+    center = (b.lo + b.hi) * 0.5f;
+    const Vec3<float> d = b.hi - center;
+    radius = std::max(1e-20f, std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z));
+  }
+  scene.light_set_ = build_lights(scene.lights_, triangles, center, radius, scene.textures_);
+  // Table entries now point at the first triangle; make them light ids.
+  for (uint32_t& entry : table)
+    if (entry != kNoLight) entry += scene.light_set_.first_triangle;
+
+  SceneView& v = scene.view_;
+  v.meshes = scene.mesh_records_.data();
+  v.instances = scene.instance_records_.data();
+  v.geometry_mesh = scene.geometry_mesh_.data();
+  v.emissive_lights = table.data();
+  v.material_program = scene.material_program_.data();
+  v.materials.materials = scene.material_records_.data();
+  v.materials.uses = scene.use_records_.data();
+  v.materials.textures = scene.texture_views_.data();
+  v.lights = scene.light_set_.view(v.materials);
+  v.scale = radius;
+  v.has_emissive_meshes = any_emissive;
+  v.has_presence = std::any_of(scene.materials_.begin(), scene.materials_.end(),
+                               [](const Material& m) { return m.needs_presence(); });
+}
+
+}  // namespace wavecomb

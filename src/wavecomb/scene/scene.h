@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+/// An immutable scene, and the builder that is the only way to make one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "wavecomb/scene/camera.h"
+#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/scene/light_data.h"
+#include "wavecomb/scene/material_data.h"
+#include "wavecomb/scene/mesh.h"
+#include "wavecomb/texture/texture.h"
+
+namespace wavecomb {
+
+/// An instance as lanes read it: 32 words. Instance 0 is the world itself (identity).
+struct alignas(64) InstanceRecord {
+  float to_world[12];   ///< rows of A, each followed by its translation
+  float normal[9];      ///< rows of the cofactor matrix of A (times the sign of det A): maps normals
+  uint32_t geometry;    ///< first of its group's entries in SceneView::geometry_mesh
+  uint32_t material;    ///< for meshes whose material is kInheritMaterial
+  uint32_t emissive;    ///< first of its entries in SceneView::emissive_lights
+  uint32_t identity;    ///< 1 when to_world is the identity
+  float pad[7];
+};
+static_assert(sizeof(InstanceRecord) == 128);
+
+/// What kernels need of a scene: plain pointers, valid as long as the Scene.
+struct SceneView {
+  const MeshRecord* meshes = nullptr;
+  const InstanceRecord* instances = nullptr;
+  const uint32_t* geometry_mesh = nullptr;    ///< mesh of (instance.geometry + geometry id)
+  const uint32_t* emissive_lights = nullptr;  ///< first triangle light of (instance.emissive + geometry id)
+  const uint32_t* material_program = nullptr;
+  MaterialView materials;
+  LightView lights;
+  float scale = 1;  ///< radius of the bounding sphere
+  bool has_presence = false;
+  bool has_emissive_meshes = false;
+};
+
+struct Bounds {
+  Vec3<float> lo{1e30f, 1e30f, 1e30f}, hi{-1e30f, -1e30f, -1e30f};
+  bool empty() const { return lo.x > hi.x; }
+  void add(const Vec3<float>& p) {
+    lo = {p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z};
+    hi = {p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z};
+  }
+};
+
+/// A group of meshes that is committed once and instanced any number of times.
+struct Group {
+  std::string name;
+  std::vector<uint32_t> meshes;
+};
+
+/// One placement of a group.
+struct Instance {
+  uint32_t group = 0;
+  Affine to_world;
+  uint32_t material = kInheritMaterial;
+};
+
+class SceneBuilder;
+
+/// Geometry, materials, textures, lights and camera, checked and complete. Immutable; any number of
+/// renderers and threads may read it.
+class Scene {
+ public:
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  SceneView view() const { return view_; }
+  const std::vector<Mesh>& meshes() const { return meshes_; }
+  /// Group 0 is the world: its meshes are in world space and not instanced.
+  const std::vector<Group>& groups() const { return groups_; }
+  /// Flattened: every entry places a group of meshes (never group 0) in the world.
+  const std::vector<Instance>& instances() const { return instances_; }
+  const std::vector<Material>& materials() const { return materials_; }
+  const std::vector<std::unique_ptr<Texture>>& textures() const { return textures_; }
+  const std::vector<Light>& lights() const { return lights_; }
+  const LightSet& light_set() const { return light_set_; }
+  const Camera& camera() const { return camera_; }
+  const Bounds& bounds() const { return bounds_; }
+  /// Triangles of all meshes, each counted once, and with every instance counted.
+  uint64_t unique_triangles() const;
+  uint64_t instanced_triangles() const;
+  /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  friend class SceneBuilder;
+  Scene() = default;
+
+  std::vector<Mesh> meshes_;
+  std::vector<Group> groups_;
+  std::vector<Instance> instances_;
+  std::vector<Material> materials_;
+  std::vector<std::unique_ptr<Texture>> textures_;
+  std::vector<Light> lights_;
+  LightSet light_set_;
+  Camera camera_;
+  Bounds bounds_;
+  std::vector<std::string> warnings_;
+
+  std::vector<MeshRecord> mesh_records_;
+  std::vector<InstanceRecord> instance_records_;
+  std::vector<uint32_t> geometry_mesh_, emissive_lights_, material_program_;
+  std::vector<MaterialRecord> material_records_;
+  std::vector<TextureUseRecord> use_records_;
+  std::vector<TextureView> texture_views_;
+  SceneView view_;
+};
+
+/// Collects a scene. Ids are handed out from 0 in order of addition.
+///
+/// Contract: one thread at a time. Arrays of meshes stay the caller's and must live as long as the Scene
+/// (Mesh::owner sees to it). Every function throws Error with one line that names the object.
+class SceneBuilder {
+ public:
+  SceneBuilder();
+  SceneBuilder(SceneBuilder&&) = default;
+  SceneBuilder& operator=(SceneBuilder&&) = default;
+
+  uint32_t add_texture(const TextureDesc& desc);
+  /// Texture ids in the material must exist.
+  uint32_t add_material(Material material);
+  /// Checks sizes and indices. Faces with points that are not finite are refused by name; faces without
+  /// area stay (they are never hit).
+  uint32_t add_mesh(Mesh mesh);
+  /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.
+  uint32_t add_group(std::string name);
+  void add_to_group(uint32_t group, uint32_t mesh);
+  /// Places `child` inside `parent`; nested to any depth without copies of geometry. `material` (or
+  /// kInheritMaterial) goes to the meshes in it that have none of their own.
+  void add_instance(uint32_t parent, uint32_t child, const Affine& transform,
+                    uint32_t material = kInheritMaterial);
+  uint32_t add_light(Light light);
+  void set_camera(const Camera& camera);
+
+  /// Checks everything that spans objects (cycles of groups, singular transforms, materials) and makes the
+  /// scene. The builder is empty afterwards. Meshes without any material get a grey diffuse one.
+  std::shared_ptr<const Scene> build();
+
+ private:
+  struct Node {
+    uint32_t child;
+    Affine transform;
+    uint32_t material;
+  };
+  void flatten(uint32_t group, const Affine& to_world, uint32_t material,
+               std::vector<uint32_t>& path, std::vector<Instance>& out) const;
+  void make_records(Scene& scene) const;
+  void make_lights(Scene& scene) const;
+
+  std::vector<Mesh> meshes_;
+  std::vector<Group> groups_;
+  std::vector<std::vector<Node>> children_;
+  std::vector<Material> materials_;
+  std::vector<std::unique_ptr<Texture>> textures_;
+  std::vector<Light> lights_;
+  Camera camera_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/schedule/policies/policies.h"
+
+namespace wavecomb {
+namespace {
+
+/// Arrival order: the baseline that every other policy is measured against.
+class NonePolicy final : public SchedulingPolicy {
+ public:
+  std::string_view name() const override { return "none"; }
+  bool order(const ShadingQueueView&, const CostSnapshot&, std::span<uint64_t>) const override {
+    return false;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SchedulingPolicy> make_none_policy() { return std::make_unique<NonePolicy>(); }
+
+}  // namespace wavecomb
