@@ -26,11 +26,14 @@ inline Vec3<F> from_dome(const LightReader<F>& light, const Vec3<F>& d) {
   return fma(light.u(), d.x, fma(light.v(), d.y, Vec3<F>(light.n() * d.z)));
 }
 
-/// Radiance at image coordinates s and t, finest level.
+/// Radiance at image coordinates s and t, finest level. Taps do not cross the poles, however the texture
+/// wraps; in s the texture's own wrap mode holds (which should be kRepeat).
 template <typename F>
 inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& texture, const F& s,
                               const F& t, const Mask<F>& active) {
-  const Texel<F> texel = lookup<F>(texture, s, t, F(0.f), active);
+  const float half_texel = 0.5f / static_cast<float>(texture.levels[0].height);
+  const F inside = clamp(t, F(half_texel), F(1.f - half_texel));
+  const Texel<F> texel = lookup<F>(texture, s, inside, F(0.f), active);
   return light.radiance() * not_negative(Color<F>(texel.r, texel.g, texel.b));
 }
 

@@ -15,36 +15,57 @@ constexpr uint32_t kMaxWidth = 1024, kMaxHeight = 512;
 /// cumulative values can tell it apart and no lit cell is missed.
 constexpr double kFloor = 1e-3;
 
+/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; parts of one cell sum to 1.
+template <typename Add>
+void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
+  const uint64_t begin = i * cells, end = begin + cells;  // in units of 1 / (n cells)
+  for (uint64_t c = begin / n; c * n < end; ++c) {
+    const uint64_t covered = std::min(end, (c + 1) * n) - std::max(begin, c * n);
+    add(static_cast<size_t>(c), static_cast<double>(covered) / static_cast<double>(n));
+  }
+}
+
 /// The neighbour of texel i that a bilinear tap reads, -1 or +1 away; size where it is black.
 uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
   const bool off = step < 0 ? i == 0 : i + 1 == size;
-  if (!off) return i + static_cast<uint32_t>(step);
+  if (!off) return step < 0 ? i - 1 : i + 1;
   if (wrap == Wrap::kRepeat) return step < 0 ? size - 1 : 0;
   return wrap == Wrap::kBlack ? size : i;
 }
 
-/// Means over each texel of the function that is linear between texel centres: weights 1, 6, 1 of 8.
-void smooth(Wrap wrap, std::vector<double>& line, std::vector<double>& scratch) {
-  const auto n = static_cast<uint32_t>(line.size());
-  scratch = line;
-  const auto at = [&](uint32_t i) { return i == n ? 0.0 : scratch[i]; };
-  for (uint32_t i = 0; i < n; ++i) {
-    line[i] = (at(neighbour(wrap, i, -1, n)) + 6 * scratch[i] + at(neighbour(wrap, i, 1, n))) / 8;
-  }
-}
+/// Luminance of rows of an image, each averaged over columns of cells. A function that is linear between
+/// texel centres has the mean (a + 6 b + c) / 8 over the texel b between a and c.
+class RowMeans {
+ public:
+  RowMeans(const TextureView& texture, const Vec3<float>& color, uint32_t cells)
+      : texture_(texture), color_(color), cells_(cells), line_(texture.levels[0].width) {}
 
-/// Adds `line` to `cells` cells: each gets what it overlaps, in units of texels.
-void spread(const std::vector<double>& line, uint32_t cells, double weight, double* to) {
-  const auto n = static_cast<uint64_t>(line.size());
-  for (uint64_t i = 0; i < n; ++i) {
-    // Texel i covers [i cells, (i + 1) cells) in units of 1 / (n cells).
-    const uint64_t begin = i * cells, end = begin + cells;
-    for (uint64_t c = begin / n; c * n < end; ++c) {
-      const uint64_t covered = std::min(end, (c + 1) * n) - std::max(begin, c * n);
-      to[c] += weight * line[i] * static_cast<double>(covered);
+  std::vector<double> operator()(uint32_t y) {
+    const auto n = static_cast<uint32_t>(line_.size());
+    for (uint32_t x = 0; x < n; ++x) {
+      const auto t = texel_at(texture_, 0, x, y);
+      const auto lit = [](float texel, float scale) { return std::max(0.0, double{texel}) * double{scale}; };
+      line_[x] = 0.212656 * lit(t[0], color_.x) + 0.715158 * lit(t[1], color_.y) +
+                 0.072186 * lit(t[2], color_.z);
     }
+    const auto at = [&](uint32_t i) { return i == n ? 0.0 : line_[i]; };
+    std::vector<double> smooth(n), cells(cells_, 0.0);
+    for (uint32_t x = 0; x < n; ++x) {
+      smooth[x] = (at(neighbour(texture_.wrap_s, x, -1, n)) + 6 * line_[x] +
+                   at(neighbour(texture_.wrap_s, x, 1, n))) / 8;
+    }
+    for (uint32_t x = 0; x < n; ++x) {
+      for_each_overlap(x, n, cells_, [&](size_t c, double part) { cells[c] += part * smooth[x]; });
+    }
+    return cells;
   }
-}
+
+ private:
+  const TextureView& texture_;
+  Vec3<float> color_;
+  uint32_t cells_;
+  std::vector<double> line_;
+};
 
 /// Cumulative floats of the given weights, 0 first and 1 last; lit entries have some floor.
 /// Returns the sum of the weights.
@@ -87,34 +108,42 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
   d.width = std::min(width, kMaxWidth);
   d.height = std::min(height, kMaxHeight);
 
-  // Smoothed luminance of each row of texels, spread over the cells of the rows that it and its two
-  // neighbours touch.
+  // Means over cells; the rows above and below bleed in as in RowMeans (the poles are clamped).
   std::vector<double> cells(size_t{d.width} * d.height, 0.0);
-  std::vector<double> line(width), scratch, row_cells(d.width), one(1);
+  RowMeans means(texture, color, d.width);
+  std::vector<double> row = means(0), above = row, below;
   for (uint32_t y = 0; y < height; ++y) {
-    for (uint32_t x = 0; x < width; ++x) {
-      const auto t = texel_at(texture, 0, x, y);
-      const auto lit = [](float texel, float scale) { return std::max(0.0, double{texel}) * double{scale}; };
-      line[x] = 0.212656 * lit(t[0], color.x) + 0.715158 * lit(t[1], color.y) + 0.072186 * lit(t[2], color.z);
-    }
-    smooth(texture.wrap_s, line, scratch);
-    std::fill(row_cells.begin(), row_cells.end(), 0.0);
-    spread(line, d.width, 1, row_cells.data());
-    // Row y counts in its own mean with 6/8, and in a neighbour's with 1/8 for each tap that reads it.
-    const auto add = [&](uint32_t row, double weight) {
-      const uint64_t begin = uint64_t{row} * d.height, end = begin + d.height;
-      for (uint64_t c = begin / height; c * height < end; ++c) {
-        const uint64_t covered = std::min(end, (c + 1) * height) - std::max(begin, c * height);
-        for (uint32_t x = 0; x < d.width; ++x) {
-          cells[size_t(c) * d.width + x] += weight * static_cast<double>(covered) * row_cells[x];
-        }
-      }
-    };
-    add(y, 6.0 / 8);
-    for (const uint32_t other : {y == 0 ? height - 1 : y - 1, y + 1 == height ? 0 : y + 1, y}) {
-      for (const int step : {-1, 1}) {
-        if (neighbour(texture.wrap_t, other, step, height) == y && !(other == y && false)) add(other, 1.0 / 8);
-      }
+    below = y + 1 < height ? means(y + 1) : row;
+    for_each_overlap(y, height, d.height, [&](size_t c, double part) {
+      double* to = cells.data() + c * d.width;
+      for (uint32_t x = 0; x < d.width; ++x) to[x] += part * (above[x] + 6 * row[x] + below[x]) / 8;
+    });
+    above = std::move(row);
+    row = std::move(below);
+  }
+
+  d.conditional.resize(size_t{d.height} * (d.width + 1));
+  d.marginal.resize(d.height + 1);
+  d.density.resize(size_t{d.width} * d.height);
+  std::vector<double> rows(d.height), line(d.width);
+  double mean = 0;
+  for (uint32_t y = 0; y < d.height; ++y) {
+    const auto from = cells.begin() + static_cast<std::ptrdiff_t>(size_t{y} * d.width);
+    std::copy(from, from + d.width, line.begin());
+    // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
+    const double ring = std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height);
+    rows[y] = ring * accumulate(line, d.conditional.data() + size_t{y} * (d.width + 1)) / d.width;
+    mean += rows[y] / 2;
+  }
+  if (mean_luminance) *mean_luminance = mean;
+  if (!(accumulate(rows, d.marginal.data()) > 0)) return {};
+
+  // The density that the float tables really have.
+  for (uint32_t y = 0; y < d.height; ++y) {
+    const double row_part = (double{d.marginal[y + 1]} - double{d.marginal[y]}) * d.height;
+    const float* cdf = d.conditional.data() + size_t{y} * (d.width + 1);
+    for (uint32_t x = 0; x < d.width; ++x) {
+      d.density[size_t{y} * d.width + x] = static_cast<float>(row_part * (double{cdf[x + 1]} - double{cdf[x]}) * d.width);
     }
   }
   return d;
