@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The camera: one of the stage's, or one that frames what there is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom, UsdRender
+
+from wavecomb.errors import WavecombError
+from wavecomb.usd.network import number
+from wavecomb.usd.report import LoadReport
+
+Matrix = NDArray[np.float64]
+
+_TENTH = 0.1
+"""Focal length and aperture are in tenths of a scene unit."""
+
+_FRAME_TAN = 0.4
+"""Half the opening of the default camera, on the plane z = -1."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Arguments of ``SceneBuilder.set_camera``."""
+
+    transform: Matrix
+    options: dict[str, Any]
+
+
+def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
+    """The camera asked for, else the render settings', else the stage's first.
+
+    Raises:
+        WavecombError: The camera asked for is none.
+    """
+    if wanted is not None:
+        return _named(stage, wanted)
+    settings = UsdRender.Settings.GetStageRenderSettings(stage)
+    candidates = [settings.GetPrim()] if settings else []
+    render = stage.GetPrimAtPath("/Render")
+    if render:
+        candidates += [p for p in render.GetChildren() if p.IsA(UsdRender.Settings)]
+    for prim in candidates:
+        for target in UsdRender.Settings(prim).GetCameraRel().GetForwardedTargets():
+            camera = stage.GetPrimAtPath(target)
+            if camera and camera.IsA(UsdGeom.Camera):
+                return camera
+    for predicate in (Usd.PrimDefaultPredicate, _PROXIES):
+        for prim in Usd.PrimRange.Stage(stage, predicate):
+            if prim.GetTypeName() == "Camera":
+                return prim
+    return None
+
+
+_PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+
+
+def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:
+    """A camera by path, or by name where that is unique."""
+    if Sdf.Path.IsValidPathString(wanted) and wanted.startswith("/"):
+        prim = stage.GetPrimAtPath(wanted)
+        if prim and prim.IsA(UsdGeom.Camera):
+            return prim
+    cameras = [p for p in Usd.PrimRange.Stage(stage, _PROXIES) if p.IsA(UsdGeom.Camera)]
+    by_name = [p for p in cameras if p.GetName() == wanted]
+    if len(by_name) == 1:
+        return by_name[0]
+    known = ", ".join(str(p.GetPath()) for p in cameras[:8]) or "none"
+    raise WavecombError(f"no camera {wanted}; the stage has: {known}")
+
+
+def read_camera(
+    prim: Usd.Prim, to_world: Matrix, time: Usd.TimeCode, report: LoadReport
+) -> View | None:
+    """The view of a camera prim; None, and a warning, where it cannot be used.
+
+    Args:
+        prim: A UsdGeomCamera.
+        to_world: (4, 4), row vectors.
+        time: Of evaluation.
+        report: For what is odd.
+    """
+    camera = UsdGeom.Camera(prim)
+    path = prim.GetPath()
+    frame = _rigid(to_world)
+    focal = number(camera.GetFocalLengthAttr().Get(time), 50.0)
+    wide = number(camera.GetHorizontalApertureAttr().Get(time), 20.955)
+    high = number(camera.GetVerticalApertureAttr().Get(time), 15.2908)
+    if frame is None or focal <= 0 or wide <= 0 or high <= 0:
+        report.warn("camera left out: its transform, focal length or aperture is no good", path)
+        return None
+    x = number(camera.GetHorizontalApertureOffsetAttr().Get(time), 0.0)
+    y = number(camera.GetVerticalApertureOffsetAttr().Get(time), 0.0)
+    window = tuple(v / focal for v in (x - wide / 2, x + wide / 2, y - high / 2, y + high / 2))
+    options: dict[str, Any] = {"window": window}
+    if camera.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic:
+        report.missing("orthographic cameras (drawn in perspective)", path)
+    clip = camera.GetClippingRangeAttr().Get(time)
+    if clip is not None and 0 <= clip[0] < clip[1]:
+        options |= {"near_clip": float(clip[0]), "far_clip": min(float(clip[1]), 1e30)}
+    stop = number(camera.GetFStopAttr().Get(time), 0.0)
+    focus = number(camera.GetFocusDistanceAttr().Get(time), 0.0)
+    if stop > 0 and focus > 0:
+        options |= {"lens_radius": _TENTH * focal / (2.0 * stop), "focus_distance": focus}
+    elif stop > 0:
+        report.warn("camera has fStop but no focusDistance: drawn without depth of field", path)
+    return View(frame, options)
+
+
+def _rigid(to_world: Matrix) -> Matrix | None:
+    """A camera's transform without scale; None where it has no inverse."""
+    out = np.array(to_world, np.float64)
+    lengths = np.linalg.norm(out[:3, :3], axis=1)
+    if not np.isfinite(out).all() or lengths.min() <= 0:
+        return None
+    out[:3, :3] /= lengths[:, None]
+    return None if abs(np.linalg.det(out[:3, :3])) < 1e-6 else out
+
+
+def frame_bounds(bounds: Matrix | None, up_axis: str) -> View:
+    """A three-quarter view that fits bounds (2, 3) in its frame; the origin where there are none."""
+    if bounds is None:
+        bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+    centre = 0.5 * (bounds[0] + bounds[1])
+    size = float(np.linalg.norm(bounds[1] - bounds[0])) or 1.0
+    up = np.array({"X": (1.0, 0, 0), "Z": (0, 0, 1.0)}.get(up_axis, (0, 1.0, 0)))
+    # Half right of the front, a little from above; the front is +Z, or -Y where Z is up.
+    front = {"X": (0, 0, 1.0), "Z": (0, -1.0, 0)}.get(up_axis, (0, 0, 1.0))
+    side = np.cross(up, front)
+    back = np.asarray(front) + 0.6 * side + 0.42 * up
+    back /= np.linalg.norm(back)
+    right = np.cross(up, back)
+    right /= np.linalg.norm(right)
+    true_up = np.cross(back, right)
+    corners = bounds[[[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], range(3)] - centre
+    reach = np.maximum(np.abs(corners @ right), np.abs(corners @ true_up)) / _FRAME_TAN
+    distance = 1.08 * float((reach + corners @ back).max()) or size
+    frame = np.eye(4)
+    frame[0, :3], frame[1, :3], frame[2, :3] = right, true_up, back
+    frame[3, :3] = centre + distance * back
+    t = _FRAME_TAN
+    return View(frame, {"window": (-t, t, -t, t), "near_clip": 1e-4 * distance})

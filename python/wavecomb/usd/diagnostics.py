@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps USD's own diagnostics off the terminal and turns them into lines of the report."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import sys
+from collections.abc import Iterator
+
+from pxr import Tf
+
+from wavecomb.usd.report import LoadReport
+
+MAX_LINES = 12
+"""Diagnostics that are passed on; the rest is counted."""
+
+
+def plain(text: str) -> str:
+    """One short line of a USD diagnostic."""
+    text = re.sub(r"\((?:instantiating|recomposing|loading)[^()]*stage[^()]*\)", "", text)
+    text = re.sub(r" <0x[0-9a-f]+>", "", " ".join(text.split()))
+    return text if len(text) <= 300 else text[:297] + "..."
+
+
+_FORMS = (
+    (
+        re.compile(r"Found material bindings on prim at path \((\S+)\) but MaterialBindingAPI"),
+        "material binding without MaterialBindingAPI applied (used all the same)",
+    ),
+    (re.compile(r"Could not open asset @([^@]*)@"), "cannot open layer"),
+    (re.compile(r"^In <([^>]*)>: (.*)$"), ""),
+)
+"""Diagnostics that are said in our words: the place is the first group."""
+
+
+def _tell(report: LoadReport, text: str) -> None:
+    """Adds one diagnostic to a report."""
+    for form, words in _FORMS:
+        match = form.search(text)
+        if match:
+            report.warn(words or f"USD: {match.group(2)}", match.group(1))
+            return
+    report.warn(f"USD: {text}")
+
+
+def commentary(error: BaseException) -> str:
+    """What a ``Tf.ErrorException`` says, first message only."""
+    for item in error.args:
+        text = getattr(item, "commentary", None)
+        if text:
+            return plain(text)
+    return plain(str(error))
+
+
+@contextlib.contextmanager
+def _muted_stderr() -> Iterator[None]:
+    """File descriptor 2 to nowhere, for USD versions without ``Tf.DiagnosticTrap``."""
+    sys.stderr.flush()
+    saved = os.dup(2)
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)
+
+
+@contextlib.contextmanager
+def captured(report: LoadReport) -> Iterator[None]:
+    """Collects what USD's C++ side reports inside the block as warnings of the report."""
+    trap_type = getattr(Tf, "DiagnosticTrap", None)
+    if trap_type is None:
+        with _muted_stderr():
+            yield
+        return
+    with trap_type() as trap:
+        try:
+            yield
+        finally:
+            texts = [item.commentary for item in (*trap.GetErrors(), *trap.GetWarnings())]
+            lines = list(dict.fromkeys(plain(text) for text in texts))
+            # What can be said in our words is grouped there, however often it comes.
+            known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
+            for line in known:
+                _tell(report, line)
+            lines = [line for line in lines if line not in set(known)]
+            for line in lines[:MAX_LINES]:
+                _tell(report, line)
+            if len(lines) > MAX_LINES:
+                report.warn(f"USD: {len(lines) - MAX_LINES} more messages like these")
+            trap.Clear()

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Point instancers: transforms of all instances at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from wavecomb.usd.primvar import as_array
+from wavecomb.usd.report import LoadReport
+
+Matrices = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Instances:
+    """What a point instancer places.
+
+    Attributes:
+        transforms: (k, 4, 4), row vectors, in the instancer's space.
+        prototypes: (k,) index into its prototypes.
+        kept: (k,) positions in the authored arrays.
+        authored: Length of the authored arrays.
+    """
+
+    transforms: Matrices
+    prototypes: NDArray[np.int64]
+    kept: NDArray[np.intp]
+    authored: int
+
+
+def rotations(quaternions: NDArray[Any]) -> Matrices:
+    """Rotation matrices (k, 3, 3) for row vectors of quaternions (k, 4), i, j, k, real."""
+    q = np.asarray(quaternions, np.float64)
+    length = np.sqrt(np.einsum("ij,ij->i", q, q))
+    usable = (length > 0) & np.isfinite(length)
+    q = np.where(usable[:, None], q / np.where(usable, length, 1)[:, None], (0.0, 0.0, 0.0, 1.0))
+    x, y, z, w = q.T
+    out = np.empty((len(q), 3, 3))
+    out[:, 0, 0] = 1 - 2 * (y * y + z * z)
+    out[:, 0, 1] = 2 * (x * y + z * w)
+    out[:, 0, 2] = 2 * (x * z - y * w)
+    out[:, 1, 0] = 2 * (x * y - z * w)
+    out[:, 1, 1] = 1 - 2 * (x * x + z * z)
+    out[:, 1, 2] = 2 * (y * z + x * w)
+    out[:, 2, 0] = 2 * (x * z + y * w)
+    out[:, 2, 1] = 2 * (y * z - x * w)
+    out[:, 2, 2] = 1 - 2 * (x * x + y * y)
+    return out
+
+
+def sound(transforms: Matrices) -> NDArray[np.bool_]:
+    """Which of (k, 4, 4) are finite and can be inverted."""
+    linear = transforms[:, :3, :3]
+    finite = np.isfinite(transforms).all(axis=(1, 2)) & (np.abs(transforms) < 1e18).all(axis=(1, 2))
+    a, b, c = np.where(finite[:, None, None], linear, 0.0).transpose(1, 0, 2)
+    volume = np.abs(np.einsum("ij,ij->i", np.cross(a, b), c))
+    edges = [np.sqrt(np.einsum("ij,ij->i", row, row)) for row in (a, b, c)]
+    return finite & (volume > 1e-9 * edges[0] * edges[1] * edges[2])
+
+
+def read_instances(
+    prim: Usd.Prim, time: Usd.TimeCode, prototype_count: int, report: LoadReport
+) -> Instances | None:
+    """The visible instances of a point instancer; None where it cannot be used."""
+    instancer = UsdGeom.PointInstancer(prim)
+    path = prim.GetPath()
+    prototypes = as_array(instancer.GetProtoIndicesAttr().Get(time))
+    positions = as_array(instancer.GetPositionsAttr().Get(time))
+    if prototypes is None or len(prototypes) == 0:
+        return None
+    index = prototypes[:, 0].astype(np.int64)
+    count = len(index)
+    if positions is None or len(positions) != count:
+        report.warn("point instancer left out: positions do not match protoIndices", path)
+        return None
+    keep = _mask(instancer, time, count, report)
+    outside = (index < 0) | (index >= prototype_count)
+    if outside.any():
+        what = "instances left out: prototype index out of range"
+        report.warn(what, path, int(outside.sum()))
+        keep &= ~outside
+    linear = _linear(instancer, time, count, report)
+    kept = np.flatnonzero(keep)
+    transforms = np.zeros((len(kept), 4, 4))
+    transforms[:, :3, :3] = linear if linear.ndim == 2 else linear[kept]
+    transforms[:, 3, :3] = positions[kept]
+    transforms[:, 3, 3] = 1.0
+    return Instances(transforms, index[kept], kept, count)
+
+
+def _mask(
+    instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int, report: LoadReport
+) -> NDArray[np.bool_]:
+    """(count,) which instances are neither invisible nor inactive."""
+    keep = np.ones(count, bool)
+    hidden: list[int] = []
+    invisible = instancer.GetInvisibleIdsAttr().Get(time)
+    if invisible is not None and len(invisible):
+        hidden += np.asarray(invisible).tolist()
+    inactive = instancer.GetPrim().GetMetadata("inactiveIds")
+    if inactive is not None:
+        hidden += [int(i) for i in inactive.GetAddedOrExplicitItems()]
+    if not hidden:
+        return keep
+    ids = as_array(instancer.GetIdsAttr().Get(time))
+    if ids is not None and len(ids) != count:
+        what = "point instancer ids do not match protoIndices: ignored"
+        report.warn(what, instancer.GetPath())
+        ids = None
+    numbers = np.arange(count) if ids is None else ids[:, 0]
+    return ~np.isin(numbers, np.array(hidden, np.int64))
+
+
+def _linear(
+    instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int, report: LoadReport
+) -> Matrices:
+    """Scale then rotation of each instance, (count, 3, 3); (3, 3) where all are the identity."""
+    path = instancer.GetPath()
+    out: Matrices = np.eye(3)
+    turns = None
+    for name in ("orientationsf", "orientations"):
+        attribute = instancer.GetPrim().GetAttribute(name)
+        turns = as_array(attribute.Get(time)) if attribute else None
+        if turns is not None and len(turns):
+            break
+    if turns is not None and len(turns):
+        if turns.shape == (count, 4):
+            out = rotations(turns)
+        else:
+            report.warn("point instancer orientations do not match: ignored", path)
+    scales = as_array(instancer.GetScalesAttr().Get(time))
+    if scales is not None and len(scales):
+        if scales.shape == (count, 3):
+            out = out * scales.astype(np.float64)[:, :, None]
+        else:
+            report.warn("point instancer scales do not match: ignored", path)
+    return out

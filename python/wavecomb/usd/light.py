@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdLux lights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Usd, UsdLux
+
+from wavecomb.usd.network import colour, number
+from wavecomb.usd.report import LoadReport
+from wavecomb.usd.texture import TextureTable, asset_file
+
+KINDS = {
+    "RectLight": "rect",
+    "DiskLight": "disk",
+    "SphereLight": "sphere",
+    "DistantLight": "distant",
+    "DomeLight": "dome",
+    "DomeLight_1": "dome",
+}
+"""Lights that are drawn, by prim type."""
+
+Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
+"""Turns +Y to +Z, row vectors: what UsdLux does to a dome on a Z-up stage."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light as ``SceneBuilder.add_light`` takes it, before its transform is known in full.
+
+    Attributes:
+        kind: rect, disk, sphere, distant or dome.
+        options: Keyword arguments.
+        local: (4, 4) applied before the prim's transform.
+    """
+
+    kind: str
+    options: dict[str, Any]
+    local: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+
+
+class LightReader:
+    """Reads the lights of one stage."""
+
+    def __init__(
+        self, time: Usd.TimeCode, up_axis: str, textures: TextureTable, report: LoadReport
+    ) -> None:
+        self.time = time
+        self.up_axis = up_axis
+        self.textures = textures
+        self.report = report
+
+    def read(self, prim: Usd.Prim) -> Light:
+        """The light of a prim whose type is in ``KINDS``."""
+        kind = KINDS[str(prim.GetTypeName())]
+        self._say_unsupported(prim)
+        radiance = self._colour(prim)
+        if not all(math.isfinite(value) and value >= 0 for value in radiance):
+            self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
+            radiance = (0.0, 0.0, 0.0)
+        options: dict[str, Any] = {"name": str(prim.GetPath()), "color": radiance}
+        normalize = bool(self._get(prim, "normalize", False))
+        local = np.eye(4)
+        if kind == "rect":
+            options["width"] = abs(number(self._get(prim, "width", 1.0), 1.0))
+            options["height"] = abs(number(self._get(prim, "height", 1.0), 1.0))
+            options["texture"] = self._texture(prim)
+        elif kind == "disk":
+            options["radius"] = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        elif kind == "sphere":
+            self._sphere(prim, options, normalize)
+            normalize = normalize and options["radius"] > 0
+        elif kind == "distant":
+            options["angle"] = min(max(number(self._get(prim, "angle", 0.53), 0.53), 0.0), 360.0)
+        else:
+            options["texture"] = self._texture(prim)
+            local = self._pole(prim)
+            normalize = False
+        options["normalize"] = normalize
+        return Light(kind, options, local)
+
+    def _get(self, prim: Usd.Prim, name: str, default: Any) -> Any:
+        attribute = prim.GetAttribute(f"inputs:{name}")
+        if not attribute:
+            return default
+        if attribute.HasAuthoredConnections():
+            self.report.missing(f"light input {name} from a shader", prim.GetPath())
+        value = attribute.Get(self.time)
+        return default if value is None else value
+
+    def _colour(self, prim: Usd.Prim) -> tuple[float, float, float]:
+        """colour * intensity * 2^exposure * colour temperature."""
+        base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (1.0, 1.0, 1.0))
+        exposure = min(number(self._get(prim, "exposure", 0.0), 0.0), 100.0)
+        power = number(self._get(prim, "intensity", 1.0), 1.0) * 2.0**exposure
+        tint = (1.0, 1.0, 1.0)
+        if self._get(prim, "enableColorTemperature", False):
+            kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
+            tint = tuple(UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10000.0)))
+        return tuple(b * t * power for b, t in zip(base, tint, strict=True))  # type: ignore[return-value]
+
+    def _sphere(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> None:
+        """Radius; a point light gets the radiant intensity that the sphere would have."""
+        radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        point = prim.GetAttribute("treatAsPoint")
+        if radius > 0 and not (point and point.Get(self.time)):
+            options["radius"] = radius
+            return
+        # Radiance L over the disk pi r^2 that is seen; normalized, L / (4 pi r^2).
+        area = 0.25 if normalize or radius == 0 else math.pi * radius * radius
+        options["radius"] = 0.0
+        options["color"] = tuple(area * value for value in options["color"])
+        if radius == 0 and not normalize:
+            self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
+
+    def _texture(self, prim: Usd.Prim) -> int | None:
+        attribute = prim.GetAttribute("inputs:texture:file")
+        value = attribute.Get(self.time) if attribute else None
+        path = asset_file(value, attribute, self.report) if value is not None else ""
+        if not path:
+            return None
+        form = prim.GetAttribute("inputs:texture:format")
+        layout = form.Get(self.time) if form else None
+        if layout not in (None, "automatic", "latlong"):
+            self.report.missing(f"dome texture format {layout} (read as latlong)", prim.GetPath())
+        image = self.textures.image(path, prim.GetPath())
+        if image is None:
+            return None
+        rect = prim.GetTypeName() == "RectLight"
+        wraps = ("clamp", "clamp") if rect else ("repeat", "clamp")
+        return self.textures.add(path, image, "auto", *wraps)
+
+    def _pole(self, prim: Usd.Prim) -> NDArray[np.float64]:
+        """Where the dome's pole starts: +Y for DomeLight, by poleAxis for DomeLight_1."""
+        attribute = prim.GetAttribute("poleAxis")
+        axis = attribute.Get(self.time) if attribute else "Y"
+        if axis == "scene":
+            axis = self.up_axis
+        return Y_TO_Z if axis == "Z" else np.eye(4)
+
+    def _say_unsupported(self, prim: Usd.Prim) -> None:
+        path = prim.GetPath()
+
+        def authored(name: str) -> Any:
+            attribute = prim.GetAttribute(name)
+            value = attribute and attribute.HasAuthoredValue() and attribute.Get(self.time)
+            return value or None
+
+        cone = authored("inputs:shaping:cone:angle")
+        if cone is not None and cone < 180.0:
+            self.report.missing("light shaping cone", path)
+        if authored("inputs:shaping:focus"):
+            self.report.missing("light shaping focus", path)
+        if authored("inputs:shaping:ies:file"):
+            self.report.missing("IES profiles", path)
+        for name in ("diffuse", "specular"):
+            attribute = prim.GetAttribute(f"inputs:{name}")
+            if attribute and attribute.HasAuthoredValue() and attribute.Get(self.time) != 1.0:
+                self.report.missing(f"light multiplier {name}", path)
+        for name in ("lightLink", "shadowLink"):
+            for side in ("includes", "excludes"):
+                relation = prim.GetRelationship(f"collection:{name}:{side}")
+                if relation and relation.HasAuthoredTargets():
+                    self.report.missing(f"light linking ({name})", path)
+        for name in ("light:filters", "portals"):
+            relation = prim.GetRelationship(name)
+            if relation and relation.HasAuthoredTargets():
+                self.report.missing(name.replace(":", " "), path)
+
+
+def soft_dome() -> NDArray[np.float32]:
+    """The environment of a stage without lights, (64, 128, 3): bright above, warm grey below."""
+    rows = (np.arange(64, dtype=np.float32) + 0.5) / 64
+    height = np.cos(np.pi * rows)[:, None]
+    blend = 1.0 / (1.0 + np.exp(-6.0 * height))
+    sky, ground = np.array([1.0, 1.03, 1.08]), np.array([0.42, 0.40, 0.38])
+    image = ground + blend * (sky - ground)
+    return np.ascontiguousarray(np.repeat(image[:, None], 128, axis=1), np.float32)
+
+
+def up_rotation(up_axis: str) -> NDArray[np.float64]:
+    """Turns +Y to the stage's up axis, row vectors."""
+    return Y_TO_Z if up_axis == "Z" else np.eye(4)

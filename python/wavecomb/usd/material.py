@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials: which one a prim has, and its id in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from pxr import Sdf, Tf, Usd, UsdShade
+
+from wavecomb.usd.materialx import MaterialXReader, model_of
+from wavecomb.usd.network import shader_id
+from wavecomb.usd.preview import PreviewReader
+from wavecomb.usd.report import LoadReport
+from wavecomb.usd.surface import Surface, fallback_surface
+from wavecomb.usd.texture import TextureTable
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+INHERIT_MATERIAL = 0xFFFFFFFF
+"""Same as ``_core.INHERIT_MATERIAL``: what the instance says."""
+
+DEFAULT_COLOUR = (0.5, 0.5, 0.5)
+"""Of what has neither a material nor a display colour."""
+
+
+LAMP = 1.0
+"""Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
+
+
+def bound_materials(prims: Sequence[Usd.Prim]) -> list[UsdShade.Material | None]:
+    """The material of each prim (full, else all purposes, else preview), in bulk."""
+    if not prims:
+        return []
+    compute = UsdShade.MaterialBindingAPI.ComputeBoundMaterials
+    found = list(compute(prims, UsdShade.Tokens.full)[0])
+    bare = [i for i, material in enumerate(found) if not material]
+    if bare:
+        preview = compute([prims[i] for i in bare], UsdShade.Tokens.preview)[0]
+        for i, material in zip(bare, preview, strict=True):
+            found[i] = material
+    return [material if material else None for material in found]
+
+
+class BindingScan:
+    """Finds bindings on a prim or above that act on what is inside an instance."""
+
+    def __init__(self) -> None:
+        self._cache: dict[Sdf.Path, tuple[bool, bool]] = {}
+
+    def above(self, prim: Usd.Prim) -> tuple[bool, bool]:
+        """(a direct binding stronger than descendants, a collection binding) here or above."""
+        if not prim or prim.IsPseudoRoot():
+            return False, False
+        path = prim.GetPath()
+        known = self._cache.get(path)
+        if known is None:
+            strong, collection = self.above(prim.GetParent())
+            for name in prim.GetAuthoredPropertyNames():
+                if name.startswith("material:binding"):
+                    if name.startswith("material:binding:collection"):
+                        collection = True
+                    strength = prim.GetRelationship(name).GetMetadata("bindMaterialAs")
+                    strong = strong or strength == UsdShade.Tokens.strongerThanDescendants
+            known = self._cache[path] = (strong, collection)
+        return known
+
+
+class MaterialTable:
+    """Adds materials to the scene, equal ones once."""
+
+    def __init__(
+        self,
+        builder: _core.SceneBuilder,
+        textures: TextureTable,
+        time: Usd.TimeCode,
+        report: LoadReport,
+    ) -> None:
+        self._builder = builder
+        self._textures = textures
+        self._time = time
+        self._report = report
+        self._surfaces: dict[Sdf.Path, Surface] = {}
+        self._ids: dict[str, int] = {}
+        self._surface_ids: dict[int, tuple[Surface, int]] = {}
+        self._plain: dict[tuple[float, ...], int] = {}
+        self.glows = False
+        """Whether a material is in use that emits as a lamp does, brighter than ``LAMP``."""
+
+    def surface(self, material: UsdShade.Material) -> Surface:
+        """The surface of a bound material."""
+        path = material.GetPath()
+        surface = self._surfaces.get(path)
+        if surface is None:
+            try:
+                surface = self._convert(material)
+            except (Tf.ErrorException, RecursionError):
+                self._report.warn("material network cannot be read: drawn grey", path)
+                surface = fallback_surface(DEFAULT_COLOUR, name=str(path))
+            self._surfaces[path] = surface
+            self._report.tally("materials")
+        return surface
+
+    def add(self, surface: Surface) -> int:
+        """Material id of a surface."""
+        known = self._surface_ids.get(id(surface))
+        if known is not None:
+            return known[1]
+        key = surface.key()
+        number = self._ids.get(key)
+        if number is None:
+            self.glows = self.glows or surface.brightest() > LAMP
+            number = self._builder.add_material(
+                surface.program,
+                name=surface.name,
+                **surface.parameters,
+                textures=surface.textures,
+            )
+            self._ids[key] = number
+        # Holding the surface keeps its address from being used again.
+        self._surface_ids[id(surface)] = (surface, number)
+        return number
+
+    def plain(self, colour: Iterable[float] = DEFAULT_COLOUR, opacity: float = 1.0) -> int:
+        """Material id of a display colour."""
+        r, g, b = (max(float(value), 0.0) for value in colour)
+        key = (r, g, b, float(opacity))
+        number = self._plain.get(key)
+        if number is None:
+            number = self._plain[key] = self.add(fallback_surface((r, g, b), key[3]))
+        return number
+
+    def _convert(self, material: UsdShade.Material) -> Surface:
+        prim = material.GetPrim()
+        shader = material.ComputeSurfaceSource()[0]
+        identifier = shader_id(shader)
+        if identifier == "UsdPreviewSurface":
+            return PreviewReader(prim, self._time, self._textures, self._report).read(shader)
+        foreign = material.ComputeSurfaceSource("mtlx")[0]
+        for candidate in (foreign, shader):
+            name = shader_id(candidate)
+            if name.startswith("ND_UsdPreviewSurface"):
+                reader = PreviewReader(prim, self._time, self._textures, self._report)
+                return reader.read(candidate)
+            if model := model_of(name):
+                reader_x = MaterialXReader(prim, self._time, self._textures, self._report)
+                return reader_x.read(candidate, model)
+        what = identifier or shader_id(foreign)
+        if what:
+            self._report.missing(f"surface shader {what} (drawn grey)", prim.GetPath())
+        elif not material.GetSurfaceOutputs():
+            self._report.warn("material without a surface: drawn grey", prim.GetPath())
+        else:
+            self._report.warn("material whose surface leads nowhere: drawn grey", prim.GetPath())
+        return fallback_surface(DEFAULT_COLOUR, name=str(prim.GetPath()))

@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdGeomMesh and implicit shapes as arrays for the core."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd
+
+from wavecomb.usd.normals import crease_edges, smooth_normals
+from wavecomb.usd.primvar import (
+    Primvar,
+    PrimvarError,
+    as_array,
+    from_attribute,
+    read_primvar,
+    spread,
+)
+from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shapes import read_shape
+from wavecomb.usd.triangulate import MeshError, Topology, triangulate
+
+Array = NDArray[np.float32]
+
+IDENTITY = Gf.Matrix4d(1.0)
+
+LIMIT = 1e18
+"""Coordinates beyond this are taken for a mistake (Embree's own limit is 1.8e18)."""
+
+UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
+"""Texture coordinates that are looked for where no material says which."""
+
+_CHUNK = 1 << 18
+
+
+@dataclass
+class MeshArrays:
+    """A mesh in its group's space.
+
+    Attributes:
+        positions: (n, 3).
+        topology: Triangles; None for implicit shapes.
+        triangles: (m, 3), counter-clockwise from outside.
+        normals: (n, 3), (m, 3, 3) or None.
+        uvs: (n, 2), (m, 3, 2) or None.
+        bounds: (2, 3) lowest and highest coordinates.
+        order: Corner order of topology's triangles is reversed where this is True.
+    """
+
+    positions: Array
+    triangles: NDArray[np.uint32]
+    normals: Array | None
+    uvs: Array | None
+    bounds: Array
+    topology: Topology | None = None
+
+
+def check_matrix(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform mirrors.
+
+    Raises:
+        MeshError: It has no inverse or is not finite.
+    """
+    det = matrix.GetDeterminant3()
+    if not abs(det) > 1e-6:
+        volume = 1.0
+        for row in range(3):
+            volume *= matrix.GetRow3(row).GetLength()
+        if not abs(det) > 1e-9 * volume:
+            raise MeshError("its transform has no inverse")
+    return bool(det < 0)
+
+
+def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
+    """Points (n, 3) under a transform, in double precision: a float32 copy."""
+    m = np.array(matrix)
+    linear, offset = m[:3, :3], m[3, :3]
+    if len(points) <= _CHUNK:
+        return (points @ linear + offset).astype(np.float32)
+    out = np.empty((len(points), 3), np.float32)
+    for first in range(0, len(points), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        out[part] = points[part] @ linear + offset
+    return out
+
+
+def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
+    """Normals (..., 3) under the inverse transpose of a transform, unit length."""
+    linear = np.linalg.inv(np.array(matrix)[:3, :3]).T
+    flat = normals.reshape(-1, 3)
+    out = np.empty(flat.shape, np.float32)
+    for first in range(0, len(flat), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        turned = flat[part] @ linear
+        length = np.sqrt(np.einsum("ij,ij->i", turned, turned))
+        out[part] = turned / np.where(length > 0, length, 1)[:, None]
+    return out.reshape(normals.shape)
+
+
+def extent(positions: Array) -> Array:
+    """Bounds (2, 3) of points.
+
+    Raises:
+        MeshError: A point is not finite or absurdly far away.
+    """
+    bounds = np.array([positions.min(axis=0), positions.max(axis=0)])
+    # Written so that NaN fails too.
+    if not float(np.abs(bounds).max()) < LIMIT:
+        raise MeshError("a point is not finite or absurdly far away")
+    return bounds
+
+
+class MeshReader:
+    """Reads meshes and shapes of one stage."""
+
+    def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
+        self.time = time
+        self.report = report
+
+    def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> MeshArrays:
+        """An implicit shape, in its group's space."""
+        mirrored = check_matrix(matrix)
+        shape = read_shape(prim, self.time)
+        if shape is None or len(shape.triangles) == 0:
+            raise MeshError("no faces")
+        positions = bake(shape.positions, matrix)
+        triangles = shape.triangles[:, ::-1] if mirrored else shape.triangles
+        return MeshArrays(
+            positions,
+            np.ascontiguousarray(triangles),
+            bake_normals(shape.normals, matrix),
+            shape.uvs,
+            extent(positions),
+        )
+
+    def mesh(
+        self,
+        prim: Usd.Prim,
+        matrix: Gf.Matrix4d,
+        uv_names: Sequence[str],
+        inherited: Sequence[Any] = (),
+    ) -> MeshArrays | None:
+        """A mesh in its group's space; None where it is empty.
+
+        Args:
+            prim: A UsdGeomMesh.
+            matrix: From the mesh to its group.
+            uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
+            inherited: Primvars of its ancestors.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        get, time = prim.GetAttribute, self.time
+        mirrored = check_matrix(matrix)
+        points = as_array(get("points").Get(time))
+        counts = _integers(get("faceVertexCounts").Get(time))
+        if points is None or len(points) == 0 or len(counts) == 0:
+            return None
+        if points.shape[1] != 3:
+            raise MeshError("points are not triples")
+        points = np.ascontiguousarray(points, np.float32)
+        indices = _integers(get("faceVertexIndices").Get(time))
+        holes = get("holeIndices")
+        hole_list = _integers(holes.Get(time)) if holes.HasAuthoredValue() else None
+        flip = get("orientation").Get(time) == "leftHanded"
+        positions = points if matrix == IDENTITY else bake(points, matrix)
+        bounds = extent(positions)
+        topology = triangulate(points, counts, indices, hole_list, flip)
+        normals = self._normals(prim, points, topology)
+        uvs = self._uvs(prim, topology, uv_names, inherited) if uv_names else None
+        if normals is not None and positions is not points:
+            normals = bake_normals(normals, matrix)
+        triangles = topology.triangles
+        if mirrored:
+            triangles = np.ascontiguousarray(triangles[:, ::-1])
+            normals, uvs = _reverse(normals), _reverse(uvs)
+        return MeshArrays(positions, triangles, normals, uvs, bounds, topology)
+
+    def _normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
+        """(n, 3), (m, 3, 3), or None for flat: as authored, else smooth for subdivision surfaces."""
+        authored = self._authored_normals(prim, points, topology)
+        scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
+        if scheme not in (None, "none"):
+            what = "subdivision mesh shaded as smooth polygons"
+            if scheme == "bilinear":
+                what = "bilinear subdivision mesh shaded as polygons"
+            self.report.note(what, prim.GetPath())
+        if authored is not None or scheme in (None, "none", "bilinear"):
+            return authored
+        return smooth_normals(points, topology, self._creases(prim, topology))
+
+    def _creases(self, prim: Usd.Prim, topology: Topology) -> NDArray[np.int64] | None:
+        get, time = prim.GetAttribute, self.time
+        if not get("creaseIndices").HasAuthoredValue():
+            return None
+        indices = _integers(get("creaseIndices").Get(time))
+        lengths = _integers(get("creaseLengths").Get(time))
+        sharpness = as_array(get("creaseSharpnesses").Get(time))
+        if sharpness is None or (len(indices) and indices.max() >= topology.point_count):
+            return None
+        return crease_edges(indices, lengths, sharpness[:, 0])
+
+    def _authored_normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
+        """primvars:normals, else normals; None where there are none that fit."""
+        try:
+            primvar = read_primvar(prim, "normals", self.time)
+            if primvar is None:
+                attribute = prim.GetAttribute("normals")
+                if not attribute.HasAuthoredValue():
+                    return None
+                values = as_array(attribute.Get(self.time))
+                if values is None or len(values) == 0:
+                    return None
+                kind = attribute.GetMetadata("interpolation") or "vertex"
+                primvar = Primvar(values, kind, "normals")
+            normals, at = spread(primvar, topology, 3)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", prim.GetPath())
+            return None
+        lengths = np.einsum("...i,...i->...", normals, normals)
+        # Written so that NaN fails too.
+        if not float(lengths.max(initial=0.0)) < 1e30:
+            self.report.warn("normals that are not finite: ignored", prim.GetPath())
+            return None
+        if at == "constant":
+            normals = np.repeat(normals, len(points), axis=0)
+        elif float(lengths.min(initial=1.0)) <= 0.0:
+            self.report.warn("normals of length zero: replaced by smooth ones", prim.GetPath())
+            smooth = smooth_normals(points, topology)
+            if at == "corner":
+                smooth = smooth[topology.triangles]
+            normals = np.where(lengths[..., None] > 0, normals, smooth)
+        return np.ascontiguousarray(normals, np.float32)
+
+    def _uvs(
+        self,
+        prim: Usd.Prim,
+        topology: Topology,
+        names: Sequence[str],
+        inherited: Sequence[Any],
+    ) -> Array | None:
+        """(n, 2), (m, 3, 2) or None."""
+        try:
+            primvar = next(
+                (p for p in (self._find(prim, name, inherited) for name in names) if p), None
+            )
+            if primvar is None:
+                primvar = self._any_coordinates(prim)
+                if primvar is None:
+                    return None
+                if names[0] not in UV_NAMES[:1]:
+                    what = f"no primvar {names[0]!r}: used {primvar.name!r} in its place"
+                    self.report.warn(what, prim.GetPath())
+            uvs, at = spread(primvar, topology, 2)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", prim.GetPath())
+            return None
+        if not np.isfinite(uvs).all():
+            self.report.warn("texture coordinates that are not finite: set to 0", prim.GetPath())
+            uvs = np.nan_to_num(uvs, nan=0.0, posinf=0.0, neginf=0.0)
+        if at == "constant":
+            return np.repeat(uvs, topology.point_count, axis=0)
+        return uvs
+
+    def _find(self, prim: Usd.Prim, name: str, inherited: Sequence[Any]) -> Primvar | None:
+        return find_primvar(prim, name, inherited, self.time)
+
+    def _any_coordinates(self, prim: Usd.Prim) -> Primvar | None:
+        """The first primvar whose type says texture coordinates."""
+        for attribute in prim.GetAuthoredAttributes():
+            name = attribute.GetName()
+            coordinates = attribute.GetTypeName() == Sdf.ValueTypeNames.TexCoord2fArray
+            if coordinates and name.startswith("primvars:"):
+                found = from_attribute(attribute, name[len("primvars:") :], self.time)
+                if found is not None:
+                    return found
+        return None
+
+
+def find_primvar(
+    prim: Usd.Prim, name: str, inherited: Sequence[Any], time: Usd.TimeCode
+) -> Primvar | None:
+    """A primvar of a prim, else the constant one that it inherits."""
+    own = read_primvar(prim, name, time)
+    if own is not None or not inherited:
+        return own
+    for primvar in inherited:
+        if primvar.GetPrimvarName() == name:
+            return from_attribute(primvar.GetAttr(), name, time)
+    return None
+
+
+def _integers(value: Any) -> NDArray[np.int32]:
+    array = as_array(value)
+    if array is None or array.dtype.kind not in "iu":
+        return np.empty(0, np.int32)
+    return np.ascontiguousarray(array[:, 0], np.int32)
+
+
+def _reverse(values: Array | None) -> Array | None:
+    """Per-corner values (m, 3, c) with the corners of each triangle reversed; others as they are."""
+    if values is None or values.ndim != 3:
+        return values
+    return np.ascontiguousarray(values[:, ::-1])

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shader networks: what feeds an input, through node graphs and interface inputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pxr import Usd, UsdShade
+
+MAX_DEPTH = 32
+"""Shaders in a row before a network is taken for a cycle."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the value of an input comes from: a shader's output, or an attribute with a value.
+
+    Attributes:
+        shader: The shader, where the input is connected to one.
+        output: Its output's name.
+        value: The value, where there is one.
+        attribute: Which holds that value.
+    """
+
+    shader: UsdShade.Shader | None = None
+    output: str = ""
+    value: Any = None
+    attribute: Usd.Attribute | None = None
+
+    @property
+    def is_value(self) -> bool:
+        """Whether this is a plain value."""
+        return self.value is not None
+
+
+def source_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Source | None:
+    """What feeds an input; None where it is not authored, dangles or runs in a circle."""
+    shader_input = shader.GetInput(name)
+    if not shader_input:
+        return None
+    for attribute in UsdShade.Utils.GetValueProducingAttributes(shader_input):
+        if UsdShade.Output.IsOutput(attribute):
+            node = UsdShade.Shader(attribute.GetPrim())
+            if node:
+                return Source(shader=node, output=UsdShade.Output(attribute).GetBaseName())
+            continue
+        value = attribute.Get(time)
+        if value is not None:
+            return Source(value=value, attribute=attribute)
+    value = shader_input.Get(time)
+    return None if value is None else Source(value=value, attribute=shader_input.GetAttr())
+
+
+def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: Any = None) -> Any:
+    """The constant value of an input, or the default."""
+    source = source_of(shader, name, time)
+    return source.value if source is not None and source.is_value else default
+
+
+def shader_id(shader: UsdShade.Shader) -> str:
+    """info:id of a shader, or the empty string."""
+    return str(shader.GetIdAttr().Get() or "") if shader else ""
+
+
+def number(value: Any, default: float) -> float:
+    """A finite float of a value; of a vector its first component."""
+    try:
+        result = float(value[0]) if hasattr(value, "__getitem__") else float(value)
+    except (TypeError, ValueError, IndexError):
+        return default
+    return result if result - result == 0 else default
+
+
+def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Three finite floats of a value; a number is taken for grey."""
+    try:
+        if hasattr(value, "__len__"):
+            r, g, b = (float(value[i]) for i in range(3))
+        else:
+            r = g = b = float(value)
+    except (TypeError, ValueError, IndexError):
+        return default
+    return (r, g, b) if (r - r) + (g - g) + (b - b) == 0 else default

@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdPreviewSurface networks to surfaces (specification 2.6)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from pxr import Usd, UsdShade
+
+from wavecomb.usd.network import MAX_DEPTH, Source, colour, number, shader_id, source_of, value_of
+from wavecomb.usd.surface import COLOUR_SLOTS, Surface
+from wavecomb.usd.texture import asset_file
+
+if TYPE_CHECKING:
+    from wavecomb.usd.report import LoadReport
+    from wavecomb.usd.texture import TextureTable
+
+_INPUTS: dict[str, tuple[str, Any]] = {
+    "diffuseColor": ("base_color", (0.18, 0.18, 0.18)),
+    "specularColor": ("specular_color", (0.0, 0.0, 0.0)),
+    "emissiveColor": ("emission", (0.0, 0.0, 0.0)),
+    "roughness": ("roughness", 0.5),
+    "metallic": ("metallic", 0.0),
+    "clearcoat": ("clearcoat", 0.0),
+    "clearcoatRoughness": ("clearcoat_roughness", 0.01),
+    "opacity": ("opacity", 1.0),
+    "normal": ("normal", (0.0, 0.0, 1.0)),
+    "ior": ("ior", 1.5),
+    "opacityThreshold": ("opacity_threshold", 0.0),
+}
+_UNIT = (
+    "roughness",
+    "metallic",
+    "clearcoat",
+    "clearcoat_roughness",
+    "opacity",
+    "opacity_threshold",
+)
+_USES: dict[str, tuple[str, ...]] = {
+    "diffuse": ("base_color", "normal"),
+    "metal": ("base_color", "specular_color", "roughness", "normal"),
+    "dielectric": ("base_color", "roughness", "ior", "normal"),
+    "plastic": ("base_color", "roughness", "ior", "normal"),
+    "emissive": ("emission",),
+}
+PROGRAMS = (*_USES, "principled")
+"""What ``wavecomb:program`` may say."""
+
+_IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> str:
+    """The program that a material asks for by ``wavecomb:program``; principled where it does not."""
+    attribute = material.GetAttribute("wavecomb:program")
+    name = attribute.Get(time) if attribute else None
+    if name is None:
+        return "principled"
+    if name not in PROGRAMS:
+        known = ", ".join(PROGRAMS)
+        report.warn(f"wavecomb:program {name!r} is none of {known}: principled", material.GetPath())
+        return "principled"
+    return str(name)
+
+
+class PreviewReader:
+    """Reads one UsdPreviewSurface network."""
+
+    def __init__(
+        self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
+    ) -> None:
+        self.material = material
+        self.time = time
+        self.textures = textures
+        self.report = report
+        self.uv_names: list[str] = []
+        self.slots: dict[str, dict[str, Any]] = {}
+        self.primvars: dict[str, str] = {}
+
+    def read(self, shader: UsdShade.Shader) -> Surface:
+        """The surface of a UsdPreviewSurface shader."""
+        program = program_of(self.material, self.time, self.report)
+        wanted = _USES.get(program)
+        parameters: dict[str, Any] = {}
+        for name, (slot, default) in _INPUTS.items():
+            if wanted is not None and slot not in wanted:
+                continue
+            source = source_of(shader, name, self.time)
+            if source is not None:
+                value = self._input(slot, source, default)
+                if value is not None and slot != "normal":
+                    parameters[slot] = value
+        if program == "dielectric" and "base_color" not in parameters:
+            parameters["base_color"] = (1.0, 1.0, 1.0)
+        if program == "principled":
+            workflow = value_of(shader, "useSpecularWorkflow", self.time, 0)
+            parameters["specular_workflow"] = bool(number(workflow, 0))
+            mode = value_of(shader, "opacityMode", self.time, "transparent")
+            parameters["presence"] = mode == "presence"
+            self._look_for_displacement(shader)
+        for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
+            attribute = self.material.GetAttribute(key)
+            if program == "metal" and attribute and attribute.HasAuthoredValue():
+                parameters[slot] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
+        return Surface(
+            str(self.material.GetPath()),
+            program,
+            parameters,
+            self.slots,
+            tuple(dict.fromkeys(self.uv_names)),
+            self.primvars,
+        )
+
+    def _look_for_displacement(self, shader: UsdShade.Shader) -> None:
+        source = source_of(shader, "displacement", self.time)
+        if source is not None and (not source.is_value or number(source.value, 0.0) != 0.0):
+            self.report.missing("displacement", self.material.GetPath())
+
+    def _input(self, slot: str, source: Source, default: Any) -> Any:
+        """A constant for a slot, None for its default; a texture goes to ``slots``."""
+        if source.is_value:
+            return self._constant(slot, source.value, default)
+        shader = source.shader
+        identifier = shader_id(shader) if shader else ""
+        if shader is not None and identifier == "UsdUVTexture":
+            if slot in ("ior", "opacity_threshold"):
+                self.report.missing(f"a texture for {slot}", self.material.GetPath())
+                return default
+            return self._texture(slot, shader, source.output, default)
+        if shader is not None and identifier.startswith("UsdPrimvarReader_"):
+            name = value_of(shader, "varname", self.time, "")
+            fallback = value_of(shader, "fallback", self.time)
+            if name and slot != "normal":
+                self.primvars[slot] = str(name)
+            return self._constant(slot, fallback, default)
+        what = identifier or "a shader without info:id"
+        self.report.missing(f"shading node {what}", self.material.GetPath())
+        return default
+
+    def _constant(self, slot: str, value: Any, default: Any) -> Any:
+        if isinstance(default, tuple):
+            return colour(value, default)
+        result = number(value, default)
+        return min(max(result, 0.0), 1.0) if slot in _UNIT else result
+
+    def _texture(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
+        """Adds a texture use; gives a constant where there is no image."""
+        time = self.time
+        scale = _four(value_of(shader, "scale", time), (1.0, 1.0, 1.0, 1.0))
+        bias = _four(value_of(shader, "bias", time), (0.0, 0.0, 0.0, 0.0))
+        file = source_of(shader, "file", time)
+        path = asset_file(file.value, file.attribute, self.report) if file is not None else ""
+        image = self.textures.image(path, shader.GetPath())
+        channel = output if output in ("rgb", "r", "g", "b", "a") else "rgb"
+        if image is None:
+            return self._fallback(slot, shader, channel, scale, bias, default)
+        if channel == "a" and image.channels in (1, 3):
+            value = scale[3] + bias[3]
+            return (value,) * 3 if isinstance(default, tuple) else value
+        if image.channels <= 2:
+            channel = "g" if channel == "a" else "r"
+        elif channel == "rgb" and slot not in (*COLOUR_SLOTS, "normal"):
+            channel = "r"
+        space = self._colour_space(shader, file)
+        if slot == "normal" and scale[:3] == (1.0, 1.0, 1.0) and bias[:3] == (0.0, 0.0, 0.0):
+            if image.pixels.dtype.name in ("uint8", "float16"):
+                scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
+                what = "normal map without scale and bias: read as 2 x - 1, linear"
+                self.report.note(what, shader.GetPath())
+                space = "raw"
+        wraps = [str(value_of(shader, name, time, "useMetadata")) for name in ("wrapS", "wrapT")]
+        self.slots[slot] = {
+            "texture": self.textures.add(path, image, space, wraps[0], wraps[1]),
+            "channel": channel,
+            "scale": scale,
+            "bias": bias,
+            "uv": self._coordinates(shader),
+        }
+        return None
+
+    def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
+        """auto, raw or sRGB: by sourceColorSpace, else by the file attribute's colour space."""
+        space = value_of(shader, "sourceColorSpace", self.time)
+        if space in ("auto", "raw", "sRGB"):
+            return str(space)
+        attribute = file.attribute if file is not None else None
+        tag = attribute.GetColorSpace() if attribute and attribute.HasColorSpace() else ""
+        if tag.lower().startswith(("srgb", "gamma_2.2")):
+            return "sRGB"
+        return "raw" if tag.lower().startswith(("raw", "lin", "data")) else "auto"
+
+    def _fallback(
+        self,
+        slot: str,
+        shader: UsdShade.Shader,
+        channel: str,
+        scale: tuple[float, ...],
+        bias: tuple[float, ...],
+        default: Any,
+    ) -> Any:
+        """The value that stands for an image that cannot be read."""
+        authored = value_of(shader, "fallback", self.time)
+        if authored is not None:
+            texel = _four(authored, (0.0, 0.0, 0.0, 1.0))
+            value = [t * s + b for t, s, b in zip(texel, scale, bias, strict=True)]
+            if isinstance(default, tuple):
+                return tuple(value[:3]) if channel == "rgb" else (value["rgba".index(channel)],) * 3
+            return self._constant(slot, value["rgba".index(channel[0])], default)
+        if slot == "base_color":
+            self.slots[slot] = {
+                "texture": self.textures.missing(),
+                "channel": "rgb",
+                "scale": (1.0, 1.0, 1.0, 1.0),
+                "bias": (0.0, 0.0, 0.0, 0.0),
+                "uv": self._coordinates(shader),
+            }
+            return None
+        return default
+
+    def _coordinates(self, shader: UsdShade.Shader) -> tuple[float, ...]:
+        """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``."""
+        matrix = _IDENTITY_UV
+        name = "st"
+        node, key = shader, "st"
+        for _ in range(MAX_DEPTH):
+            source = source_of(node, key, self.time)
+            if source is None:
+                break
+            if source.is_value:
+                at = (
+                    colour((*source.value, 0.0), (0.0, 0.0, 0.0))
+                    if _is_pair(source.value)
+                    else None
+                )
+                if at is not None and node is not shader:
+                    matrix = _compose(matrix, (0.0, 0.0, at[0], 0.0, 0.0, at[1]))
+                break
+            if source.shader is None:
+                break
+            node = source.shader
+            identifier = shader_id(node)
+            if identifier == "UsdTransform2d":
+                matrix = _compose(matrix, self._transform_2d(node))
+                key = "in"
+            elif identifier.startswith("UsdPrimvarReader_float2"):
+                name = str(value_of(node, "varname", self.time, "") or "st")
+                break
+            else:
+                self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
+                break
+        self.uv_names.append(name)
+        return matrix
+
+    def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
+        """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""
+        angle = math.radians(number(value_of(node, "rotation", self.time), 0.0))
+        sx, sy = _two(value_of(node, "scale", self.time), (1.0, 1.0))
+        tx, ty = _two(value_of(node, "translation", self.time), (0.0, 0.0))
+        c, s = math.cos(angle), math.sin(angle)
+        return (c * sx, -s * sy, tx, s * sx, c * sy, ty)
+
+
+def _is_pair(value: Any) -> bool:
+    return hasattr(value, "__len__") and len(value) >= 2
+
+
+def _two(value: Any, default: tuple[float, float]) -> tuple[float, float]:
+    if not _is_pair(value):
+        return default
+    return number(value[0], default[0]), number(value[1], default[1])
+
+
+def _four(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
+    if not hasattr(value, "__len__") or len(value) < 4:
+        return default
+    return tuple(number(value[i], default[i]) for i in range(4))
+
+
+def _compose(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[float, ...]:
+    """The 2 x 3 matrix that applies ``inner`` first."""
+    a, b, c, d, e, f = outer
+    p, q, r, s, t, u = inner
+    return (
+        a * p + b * s, a * q + b * t, a * r + b * u + c,
+        d * p + e * s, d * q + e * t, d * r + e * u + f,
+    )  # fmt: skip

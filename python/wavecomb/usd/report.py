@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What loading a stage found: said once each, with how often and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+MAX_PLACES = 3
+"""Prims named for each finding; the rest is counted."""
+
+
+@dataclass
+class Finding:
+    """Something worth saying.
+
+    Attributes:
+        what: One line, lower case, no full stop.
+        count: How often it came up.
+        places: The first prims or files it concerns.
+    """
+
+    what: str
+    count: int = 0
+    places: list[str] = field(default_factory=list)
+
+    def add(self, place: str, count: int = 1) -> None:
+        """Counts it once more."""
+        self.count += count
+        if place and len(self.places) < MAX_PLACES and place not in self.places:
+            self.places.append(place)
+
+    def line(self) -> str:
+        """The finding as one line."""
+        if not self.places:
+            return self.what
+        more = self.count - len(self.places)
+        return f"{self.what}: {', '.join(self.places)}" + (f" and {more} more" if more > 0 else "")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"what": self.what, "count": self.count, "places": list(self.places)}
+
+
+class LoadReport:
+    """Notes, warnings and what is not supported, in the order they came up.
+
+    Attributes:
+        notes: What was chosen or approximated ("no camera: framed the bounds").
+        warnings: What is wrong in the stage and what was done about it.
+        unsupported: What the stage asks for and Wavecomb does not do.
+        counts: Prims by kind, as read.
+    """
+
+    def __init__(self) -> None:
+        self._notes: dict[str, Finding] = {}
+        self._warnings: dict[str, Finding] = {}
+        self._unsupported: dict[str, Finding] = {}
+        self.counts: dict[str, int] = {}
+
+    def note(self, what: str, place: object = "", count: int = 1) -> None:
+        """Adds a note."""
+        self._notes.setdefault(what, Finding(what)).add(str(place), count)
+
+    def warn(self, what: str, place: object = "", count: int = 1) -> None:
+        """Adds a warning about a prim or a file."""
+        self._warnings.setdefault(what, Finding(what)).add(str(place), count)
+
+    def missing(self, what: str, place: object = "", count: int = 1) -> None:
+        """Adds something that is not supported."""
+        self._unsupported.setdefault(what, Finding(what)).add(str(place), count)
+
+    def tally(self, kind: str, count: int = 1) -> None:
+        """Counts prims of a kind."""
+        if count:
+            self.counts[kind] = self.counts.get(kind, 0) + count
+
+    @property
+    def notes(self) -> list[Finding]:
+        """What was chosen or approximated."""
+        return list(self._notes.values())
+
+    @property
+    def warnings(self) -> list[Finding]:
+        """What is wrong in the stage."""
+        return list(self._warnings.values())
+
+    @property
+    def unsupported(self) -> list[Finding]:
+        """What was asked for and is not done."""
+        return list(self._unsupported.values())
+
+    def lines(self) -> list[str]:
+        """All findings as lines for a log, warnings first."""
+        return [
+            *(f"warning: {finding.line()}" for finding in self.warnings),
+            *(f"not supported: {finding.line()}" for finding in self.unsupported),
+            *(f"note: {finding.line()}" for finding in self.notes),
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "notes": [finding.as_dict() for finding in self.notes],
+            "warnings": [finding.as_dict() for finding in self.warnings],
+            "unsupported": [finding.as_dict() for finding in self.unsupported],
+            "counts": dict(self.counts),
+        }

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A material as the core takes it, before it has an id."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+COLOUR_SLOTS = ("base_color", "specular_color", "emission")
+SLOTS = (
+    *COLOUR_SLOTS,
+    "roughness",
+    "metallic",
+    "clearcoat",
+    "clearcoat_roughness",
+    "opacity",
+    "normal",
+)
+"""Parameters that a texture can drive."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A program with its parameters.
+
+    Attributes:
+        name: For messages.
+        program: diffuse, metal, dielectric, plastic, emissive or principled.
+        parameters: Keyword arguments of ``SceneBuilder.add_material``.
+        textures: Slots as ``SceneBuilder.add_material`` takes them.
+        uv_names: Primvars that hold texture coordinates, first use first.
+        primvars: Slots read from a primvar of the mesh: slot -> (primvar, scale).
+    """
+
+    name: str
+    program: str = "principled"
+    parameters: dict[str, Any] = field(default_factory=dict)
+    textures: dict[str, dict[str, Any]] = field(default_factory=dict)
+    uv_names: tuple[str, ...] = ()
+    primvars: dict[str, str] = field(default_factory=dict)
+
+    def key(self) -> str:
+        """Equal for surfaces that look alike."""
+        return repr((self.program, sorted(self.parameters.items()), sorted(self.textures.items())))
+
+    def brightest(self) -> float:
+        """Highest emission that it can reach, textures taken for white."""
+        use = self.textures.get("emission")
+        if use is not None:
+            return float(max(s + b for s, b in zip(use["scale"][:3], use["bias"][:3], strict=True)))
+        return float(max(self.parameters.get("emission", (0.0,))))
+
+    def with_value(self, slot: str, value: Any) -> Surface:
+        """The surface with another constant in a slot, and without that slot's primvar."""
+        rest = {name: primvar for name, primvar in self.primvars.items() if name != slot}
+        return replace(self, parameters={**self.parameters, slot: value}, primvars=rest)
+
+
+def fallback_surface(
+    colour: tuple[float, float, float], opacity: float = 1.0, name: str = "displayColor"
+) -> Surface:
+    """What is drawn where no material is bound: matt, in the display colour."""
+    parameters: dict[str, Any] = {"base_color": colour}
+    if opacity >= 1.0:
+        return Surface(name, "diffuse", parameters)
+    parameters |= {"opacity": max(opacity, 0.0), "roughness": 0.5, "presence": True}
+    return Surface(name, "principled", parameters)

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Polygons to triangles, in bulk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_CHUNK = 1 << 17
+"""Polygons split at once: bounds the memory in use."""
+
+_EAR_LIMIT = 5000
+"""Corners of the largest polygon that ears are clipped from; beyond that it is a fan."""
+
+
+class MeshError(ValueError):
+    """A mesh that cannot be drawn; says why in a few words."""
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Triangles and where their corners and faces come from.
+
+    Attributes:
+        triangles: (m, 3) points of each triangle, uint32.
+        corners: (m, 3) positions in faceVertexIndices, or None where triangle i has 3i, 3i+1, 3i+2.
+        faces: (m,) face of each triangle, or None where that is the triangle's own number.
+        indices: (corner_count,) faceVertexIndices.
+        point_count: Number of points.
+        face_count: Number of faces, holes included.
+    """
+
+    triangles: NDArray[np.uint32]
+    corners: NDArray[np.intp] | None
+    faces: NDArray[np.intp] | None
+    indices: NDArray[np.int32]
+    point_count: int
+    face_count: int
+
+    @property
+    def count(self) -> int:
+        """Number of triangles, m."""
+        return len(self.triangles)
+
+    def corner_ids(self) -> NDArray[np.intp]:
+        """(m, 3) positions in faceVertexIndices."""
+        if self.corners is None:
+            return np.arange(3 * self.count).reshape(-1, 3)
+        return self.corners
+
+    def face_ids(self) -> NDArray[np.intp]:
+        """(m,) face of each triangle."""
+        return np.arange(self.count) if self.faces is None else self.faces
+
+
+def triangulate(
+    points: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    holes: NDArray[np.int32] | None = None,
+    flip: bool = False,
+) -> Topology:
+    """Splits polygons: quads along the better diagonal, convex ones as fans, others by their ears.
+
+    Args:
+        points: (n, 3).
+        counts: (faces,) corners of each face; faces of fewer than 3 corners are dropped.
+        indices: (corners,) points of each corner.
+        holes: Faces that are not drawn.
+        flip: Turn every triangle round.
+
+    Raises:
+        MeshError: Counts and indices do not fit together.
+    """
+    if len(counts) == 0:
+        raise MeshError("no faces")
+    low, high = int(counts.min()), int(counts.max())
+    if low < 0:
+        raise MeshError("a face has a negative number of corners")
+    total = int(counts.sum(dtype=np.int64))
+    if total != len(indices):
+        raise MeshError("the face counts do not add up to the number of face indices")
+    if total and (int(indices.min()) < 0 or int(indices.max()) >= len(points)):
+        raise MeshError("a face index is out of range")
+    has_holes = holes is not None and len(holes) > 0
+    if low == 3 and high == 3 and not has_holes:
+        triangles = np.ascontiguousarray(indices.reshape(-1, 3))
+        if not flip:
+            return Topology(
+                triangles.view(np.uint32), None, None, indices, len(points), len(counts)
+            )
+        corners = np.arange(total).reshape(-1, 3)[:, ::-1]
+        turned = np.ascontiguousarray(triangles[:, ::-1]).view(np.uint32)
+        return Topology(turned, corners, None, indices, len(points), len(counts))
+    keep = counts >= 3
+    if has_holes and holes is not None:
+        inside = holes[(holes >= 0) & (holes < len(counts))]
+        keep[inside] = False
+    faces = np.flatnonzero(keep)
+    if len(faces) == 0:
+        raise MeshError("no faces")
+    corners, owners = _split(points, counts, indices, faces)
+    if flip:
+        corners = corners[:, ::-1]
+    triangles = np.ascontiguousarray(indices[corners]).view(np.uint32)
+    return Topology(triangles, corners, owners, indices, len(points), len(counts))
+
+
+def _split(
+    points: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    faces: NDArray[np.intp],
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Corners (m, 3) and faces (m,) of the triangles of some faces, in face order."""
+    starts = np.cumsum(counts, dtype=np.intp) - counts
+    sizes = counts[faces]
+    corners: list[NDArray[np.intp]] = []
+    owners: list[NDArray[np.intp]] = []
+    for size in np.unique(sizes):
+        group = faces[sizes == size]
+        step = max(1, _CHUNK * 4 // int(size))
+        for first in range(0, len(group), step):
+            part = group[first : first + step]
+            ring = starts[part][:, None] + np.arange(size)
+            local = _split_rings(points, indices, ring)
+            corners.append(local.reshape(-1, 3))
+            owners.append(np.repeat(part, size - 2))
+    all_corners, all_owners = np.concatenate(corners), np.concatenate(owners)
+    if len(corners) > 1:
+        order = np.argsort(all_owners, kind="stable")
+        all_corners, all_owners = all_corners[order], all_owners[order]
+    return all_corners, all_owners
+
+
+def _split_rings(
+    points: NDArray[np.float32], indices: NDArray[np.int32], ring: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Triangles (faces, k - 2, 3) of polygons of k corners each, ring (faces, k)."""
+    size = ring.shape[1]
+    if size == 3:
+        return ring[:, None, :]
+    p = points[indices[ring]].astype(np.float64)
+    if size == 4:
+        # Signed areas of the four possible triangles along the normal of the quad.
+        normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+        first = np.minimum(_area(p, normal, 0, 1, 2), _area(p, normal, 0, 2, 3))
+        second = np.minimum(_area(p, normal, 0, 1, 3), _area(p, normal, 1, 2, 3))
+        slack = 1e-6 * np.einsum("ij,ij->i", normal, normal)
+        other = second > first + slack
+        out = np.empty((len(ring), 2, 3), np.intp)
+        out[:] = ring[:, [[0, 1, 2], [0, 2, 3]]]
+        out[other] = ring[other][:, [[0, 1, 3], [1, 2, 3]]]
+        return out
+    p -= p[:, :1]
+    # Newell's normal; the fan is right where each of its triangles turns the same way.
+    normal = np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
+    areas = np.einsum("fkc,fc->fk", np.cross(p[:, 1:-1], p[:, 2:]), normal)
+    bad = areas.min(axis=1) < -1e-9 * np.einsum("ij,ij->i", normal, normal)
+    fan = np.stack(
+        [np.zeros(size - 2, np.intp), np.arange(1, size - 1), np.arange(2, size)], axis=1
+    )
+    out = ring[:, fan]
+    if size <= _EAR_LIMIT:
+        for face in np.flatnonzero(bad):
+            out[face] = ring[face][clip_ears(p[face], normal[face])]
+    return out
+
+
+def _area(p: NDArray[Any], normal: NDArray[Any], a: int, b: int, c: int) -> NDArray[Any]:
+    cross = np.cross(p[:, b] - p[:, a], p[:, c] - p[:, a])
+    return np.einsum("ij,ij->i", cross, normal)
+
+
+def clip_ears(points: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Triangles (k - 2, 3) of one simple polygon, points (k, 3), by clipping ears."""
+    drop = int(np.argmax(np.abs(normal)))
+    axes = [(drop + 1) % 3, (drop + 2) % 3]
+    flat = points[:, axes] * (1.0 if normal[drop] >= 0 else -1.0, 1.0)
+    ring = list(range(len(points)))
+    out: list[tuple[int, int, int]] = []
+    at, misses = 0, 0
+    while len(ring) > 3:
+        size = len(ring)
+        triple = ring[at - 1], ring[at % size], ring[(at + 1) % size]
+        # After a whole round without an ear the polygon crosses itself: cut anyhow.
+        if misses >= size or _is_ear(flat, ring, triple):
+            out.append(triple)
+            ring.pop(at % size)
+            at, misses = at % len(ring), 0
+        else:
+            at, misses = (at + 1) % size, misses + 1
+    out.append((ring[0], ring[1], ring[2]))
+    return np.array(out, np.intp)
+
+
+def _is_ear(flat: NDArray[Any], ring: list[int], triple: tuple[int, int, int]) -> bool:
+    a, b, c = flat[list(triple)]
+    if _turn(a, b, c) <= 0:
+        return False
+    others = flat[[i for i in ring if i not in triple]]
+    inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
+    # A point on a corner (a bridge to a hole) blocks nothing.
+    inside &= ~((others == a).all(1) | (others == b).all(1) | (others == c).all(1))
+    return not bool(inside.any())
+
+
+def _turn(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> Any:
+    """Twice the signed area of the triangle a, b, c in the plane; c may be (n, 2)."""
+    return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
