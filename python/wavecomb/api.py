@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -94,7 +94,8 @@ def load(
     *,
     camera: str | None = None,
     frame: float | None = None,
-    purposes: tuple[str, ...] | None = None,
+    purposes: Sequence[str] | None = None,
+    variants: Mapping[str, str] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -103,7 +104,8 @@ def load(
         camera: Path of a camera prim; by default the stage's render settings, or its first camera,
             or one that sees everything.
         frame: Time code; by default the stage's start.
-        purposes: Of the geometry, as in USD; by default what the loader says.
+        purposes: Of the geometry, as in USD; by default "default" and "render".
+        variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -118,7 +120,7 @@ def load(
     from wavecomb.usd import load_stage
 
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
-    return load_stage(Path(path), camera=camera, frame=frame, **options)
+    return load_stage(Path(path), camera=camera, frame=frame, variants=variants, **options)
 
 
 def render(
@@ -220,10 +222,12 @@ def _resolve(
         return loaded.scene, loaded, os.fspath(source)
     if camera is not None or frame is not None:
         raise TypeError("camera and frame are chosen when the stage is loaded: give them to load()")
-    scene: Any = getattr(source, "scene", None)
-    if scene is not None:
-        return scene, source, None  # type: ignore[return-value]
-    return source, None, None  # type: ignore[return-value]
+    loaded_scene: Any = getattr(source, "scene", None)
+    if loaded_scene is not None:
+        stage: Any = source
+        return loaded_scene, stage, str(stage.stage_path)
+    scene: Any = source
+    return scene, None, None
 
 
 def _render(scene: Scene, settings: Settings, progress: Progress | None) -> Result:

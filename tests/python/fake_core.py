@@ -74,7 +74,9 @@ class Fake:
             notes=[Finding(what="no light", place="/")],
             counts={"Mesh": 2, "RectLight": 3, "Camera": 1},
         )
-        return SimpleNamespace(scene=scene, report=report, camera_path="/Camera", seconds=0.25)
+        return SimpleNamespace(
+            scene=scene, report=report, camera_path="/Camera", seconds=0.25, stage_path=path
+        )
 
     def render(self, scene: Any, settings: Settings, progress: Any = None) -> Any:
         if self.fail is not None:

@@ -51,7 +51,7 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     picture = wavecomb.render(
         stage, size=(32, 16), spp=2, progress=progress, camera="/C", frame=3.0, max_depth=4
     )
-    assert fake.loaded[0] == {"path": stage, "camera": "/C", "frame": 3.0}
+    assert fake.loaded[0] == {"path": stage, "camera": "/C", "frame": 3.0, "variants": None}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)
     assert picture.depth.shape == picture.samples.shape == (16, 32)

@@ -53,6 +53,7 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
     out, png, stats = tmp_path / "a.exr", tmp_path / "a.png", tmp_path / "a.json"
     result = run(
         *("render", stage, "-o", out, "--png", png, "--stats", stats, "--size", 40, 30),
+        *("--variant", "/World/Car{paint}=red", "--variant", "lod=high", "--purpose", "proxy"),
         *("--spp", 4, "--camera", "/Cam", "--frame", 7, "--lanes", "8", "--seed", 3),
         *("--filter", "box", "--filter-width", 1, "--roulette", "off", "--fresnel", "schlick"),
         *("--integrator", "reference", "--threads", 1, "--wave-size", 64, "--sampler", "sobol"),
@@ -61,6 +62,8 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
     assert result.exit_code == 0, result.output
     assert fake.loaded[0]["camera"] == "/Cam"
     assert fake.loaded[0]["frame"] == 7.0
+    assert fake.loaded[0]["purposes"] == ("default", "proxy")
+    assert fake.loaded[0]["variants"] == {"/World/Car{paint}": "red", "lod": "high"}
     assert fake.rendered[0] == {
         "width": 40, "height": 30, "spp": 4, "lanes": 8, "seed": 3, "filter": "box",
         "filter_width": 1.0, "roulette": "off", "fresnel": "schlick", "integrator": "reference",
@@ -97,6 +100,7 @@ def test_summary_and_warnings(fake: Fake, stage: str, tmp_path: Path) -> None:
     assert "60.0" in result.stdout
     assert "peak memory 123 MB" in result.stdout
     assert result.stdout.count("volumes: /Smoke") == 1
+    assert "note: no light: /" in result.stdout
     assert result.stderr.splitlines() == [
         "warning: missing texture: ./wood.png",
         "warning: mesh /Bad: 3 triangles left out",
@@ -150,6 +154,8 @@ def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Pat
         (["--clamp-indirect", -1], "at least 0"),
         (["--exposure", "inf"], "not a finite number"),
         (["--frame", "x"], "'x' is not a number"),
+        (["--variant", "red"], "must be PRIM{SET}=NAME"),
+        (["--camera", ""], "--camera is empty"),
         (["--png", "a.exr"], "must end in .png"),
         (["--png", "/nowhere/a.png"], "/nowhere does not exist"),
         (["--stats", "/nowhere/a.json"], "/nowhere does not exist"),

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import click
 
-from wavecomb.cli.options import examples, load, stage_options, stage_warnings, warn
+from wavecomb.cli.options import StageOptions, examples, stage_options, stage_warnings, warn
 
 
 @click.command(
@@ -19,17 +20,11 @@ from wavecomb.cli.options import examples, load, stage_options, stage_warnings, 
 )
 @stage_options
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
-def info_command(
-    stage: str,
-    camera: str | None,
-    frame: float | None,
-    purposes: tuple[str, ...],
-    as_json: bool,
-) -> None:
+def info_command(stage: str, as_json: bool, **options: Any) -> None:
     """Say what would be rendered of STAGE, and what would not."""
     from wavecomb.info import print_info, stage_info
 
-    loaded = load(stage, camera, frame, purposes)
+    loaded = StageOptions.take(options).load(stage)
     info = stage_info(loaded, stage)
     if as_json:
         click.echo(json.dumps(info, indent=2))

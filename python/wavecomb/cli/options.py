@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+if TYPE_CHECKING:
+    from wavecomb.usd import LoadedStage
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -43,8 +47,15 @@ def examples(*lines: str) -> str:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame and --purpose."""
+    """STAGE, --camera, --frame, --variant and --purpose."""
     for option in (
+        click.option(
+            "--variant",
+            "variants",
+            multiple=True,
+            metavar="PRIM{SET}=NAME",
+            help="Variant to select, may be given again; SET=NAME is of the default prim.",
+        ),
         click.option(
             "--purpose",
             "purposes",
@@ -69,12 +80,41 @@ def stage_options(command: F) -> F:
     return command
 
 
-def load(stage: str, camera: str | None, frame: float | None, purposes: tuple[str, ...]) -> Any:
-    """Loads a stage as the options say."""
-    from wavecomb.api import load as load_stage
+@dataclass(frozen=True)
+class StageOptions:
+    """What ``stage_options`` gave."""
 
-    chosen = tuple(dict.fromkeys(("default", *purposes))) if purposes else None
-    return load_stage(stage, camera=camera, frame=frame, purposes=chosen)
+    camera: str | None
+    frame: float | None
+    purposes: tuple[str, ...]
+    variants: tuple[str, ...]
+
+    @classmethod
+    def take(cls, options: dict[str, Any]) -> StageOptions:
+        """Moves them out of a command's arguments."""
+        return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
+
+    def load(self, stage: str) -> LoadedStage:
+        """Loads a stage as the options say."""
+        from wavecomb.api import load
+        from wavecomb.errors import WavecombError
+
+        if self.camera == "":
+            raise WavecombError("--camera is empty: give the path of a camera prim")
+        variants: dict[str, str] = {}
+        for text in self.variants:
+            key, equals, value = text.rpartition("=")
+            if not (key and equals and value):
+                raise WavecombError(f"--variant {text}: must be PRIM{{SET}}=NAME or SET=NAME")
+            variants[key] = value
+        purposes = tuple(dict.fromkeys(("default", *self.purposes))) if self.purposes else None
+        return load(
+            stage,
+            camera=self.camera,
+            frame=self.frame,
+            purposes=purposes,
+            variants=variants or None,
+        )
 
 
 def warn(lines: list[str]) -> None:
@@ -83,6 +123,6 @@ def warn(lines: list[str]) -> None:
         click.echo(f"warning: {' '.join(line.split())}", err=True)
 
 
-def stage_warnings(loaded: Any) -> list[str]:
+def stage_warnings(loaded: LoadedStage) -> list[str]:
     """Warnings of a loaded stage as lines."""
     return [*(finding.line() for finding in loaded.report.warnings), *loaded.scene.warnings]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wavecomb.cli.group import INTERRUPTED
-from wavecomb.cli.options import Real, examples, load, stage_options, stage_warnings, warn
+from wavecomb.cli.options import Real, StageOptions, examples, stage_options, stage_warnings, warn
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -92,9 +92,6 @@ _INTEGERS = click.IntRange(min=0)
 @click.option("--quiet", is_flag=True, help="Only warnings and errors.")
 def render_command(
     stage: str,
-    camera: str | None,
-    frame: float | None,
-    purposes: tuple[str, ...],
     output: str,
     png: str | None,
     stats_file: str | None,
@@ -116,6 +113,7 @@ def render_command(
     from wavecomb.api import make_settings
 
     _check_outputs(stage, output, png, stats_file)
+    source = StageOptions.take(options)
     chosen = {name: value for name, value in options.items() if value is not None}
     if lanes is not None:
         chosen["lanes"] = 0 if lanes == "auto" else int(lanes)
@@ -124,7 +122,7 @@ def render_command(
     settings = make_settings(size, spp, **chosen)
 
     console = _console()
-    loaded = _load(stage, camera, frame, purposes, console, quiet)
+    loaded = _load(source, stage, console, quiet)
     warn(stage_warnings(loaded))
     picture, done = _render(loaded, stage, settings, console, quiet)
     if picture.cancelled and done <= 0.0:
@@ -163,20 +161,13 @@ def _check_outputs(stage: str, output: str, png: str | None, stats_file: str | N
         check_writable(name)
 
 
-def _load(
-    stage: str,
-    camera: str | None,
-    frame: float | None,
-    purposes: tuple[str, ...],
-    console: Console,
-    quiet: bool,
-) -> Any:
+def _load(source: StageOptions, stage: str, console: Console, quiet: bool) -> Any:
     if quiet or not console.is_terminal:
-        return load(stage, camera, frame, purposes)
+        return source.load(stage)
     from rich.markup import escape
 
     with console.status(f"loading {escape(os.path.basename(stage))}"):
-        return load(stage, camera, frame, purposes)
+        return source.load(stage)
 
 
 def _render(
@@ -256,4 +247,6 @@ def _summary(picture: Any, loaded: Any, files: list[str]) -> None:
         console.print("not supported, and left out:")
         for finding in loaded.report.unsupported:
             console.print(f"  {escape(finding.line())}")
+    for finding in loaded.report.notes:
+        console.print(f"note: {escape(finding.line())}")
     console.print("wrote " + escape(", ".join(files)))
