@@ -2,6 +2,10 @@
 /// Reads the parameters of materials at hits: constants from records, or textures.
 #pragma once
 
+#include <bit>
+#include <cstddef>
+#include <cstring>
+
 #include "wavecomb/core/math.h"
 #include "wavecomb/material/bsdf.h"
 #include "wavecomb/texture/lookup.h"
@@ -15,23 +19,42 @@ inline constexpr float kMaxEmission = 1e18f;
 
 namespace detail {
 
+/// Value of the first active lane, read through memory: `lane` on a packet that is still in a
+/// register is miscompiled by GCC 12 (Dr.Jit's entry() breaks its aliasing rules).
+template <typename F>
+inline uint32_t first_index(const UInt<F>& value, const Mask<F>& active) {
+  uint32_t lanes[kWidth<F>];
+  wavecomb::store(lanes, value);
+  return lanes[static_cast<size_t>(std::countr_zero(lane_bits<F>(active)))];
+}
+
 /// Words of a record, by lane: one scalar load when all active lanes share the record, else
 /// gathers.
 template <typename F>
 struct RecordReader {
   const void* base;
   UInt<F> first_word;
-  const float* shared;  ///< the record of all active lanes, or null
+  const std::byte* shared;  ///< the record of all active lanes, or null
   Mask<F> active;
 
-  F real(size_t offset_bytes) const {
-    const uint32_t word = static_cast<uint32_t>(offset_bytes / 4);
-    if (shared) return F(shared[word]);
-    return gather<F>(base, first_word + word, active);
-  }
-  UInt<F> bits(size_t offset_bytes) const { return float_bits<F>(real(offset_bytes)); }
+  F real(size_t offset_bytes) const { return word<F, float>(offset_bytes); }
+  UInt<F> bits(size_t offset_bytes) const { return word<UInt<F>, uint32_t>(offset_bytes); }
   Vec3<F> vec3(size_t offset_bytes) const {
     return {real(offset_bytes), real(offset_bytes + 4), real(offset_bytes + 8)};
+  }
+
+ private:
+  template <typename T, typename Scalar>
+  T word(size_t offset_bytes) const {
+    if (shared) {
+      Scalar value;
+      std::memcpy(&value, shared + offset_bytes, sizeof(value));
+      return T(value);
+    }
+    if constexpr (kIsScalar<F>)
+      return T(0);  // not active: a lane alone shares its record with itself
+    else
+      return gather<T>(base, first_word + static_cast<uint32_t>(offset_bytes / 4), Mask<T>(active));
   }
 };
 
@@ -41,8 +64,8 @@ template <typename Record, typename F>
 inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index, bool uniform,
                                    const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(Record) / 4;
-  const float* shared = nullptr;
-  if (uniform) shared = reinterpret_cast<const float*>(base + first_active(index, active));
+  const std::byte* shared = nullptr;
+  if (uniform) shared = reinterpret_cast<const std::byte*>(base + first_index<F>(index, active));
   return {base, index * kWords, shared, active};
 }
 
@@ -60,7 +83,7 @@ inline Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use
   const F width = uv_width * stretch;
   const UInt<F> id = use.bits(offsetof(R, texture));
   const Texel<F> texel =
-      use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t, width, active)
+      use.shared ? lookup<F>(view.textures[first_index<F>(id, active)], s, t, width, active)
                  : lookup<F>(view.textures, id, s, t, width, active);
   const auto channel = [&](const F& value, size_t i) {
     return fma(value, use.real(offsetof(R, scale) + 4 * i), use.real(offsetof(R, bias) + 4 * i));
