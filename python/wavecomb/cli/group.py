@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
@@ -35,6 +36,8 @@ class Commands(click.Group):
         """Runs the command line and exits."""
         if not standalone_mode:
             return super().main(args, prog_name, complete_var, False, **extra)
+        if not sys.warnoptions and not os.environ.get("WAVECOMB_DEBUG"):
+            warnings.simplefilter("ignore")  # Python's own are for developers
         try:
             code = super().main(args, prog_name, complete_var, False, **extra)
         except click.ClickException as error:
