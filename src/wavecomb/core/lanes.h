@@ -69,6 +69,28 @@ concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
 using drjit::select;
 
+#if defined(__AVX512F__)
+// Dr.Jit 1.x compares unsigned lanes as signed ones at width 16 alone; these are a better match.
+namespace detail {
+using U16 = UInt<FloatP<16>>;
+using U16Mask = drjit::mask_t<U16>;
+}  // namespace detail
+#define WAVECOMB_COMPARE_U16(op, predicate)                                                  \
+  inline detail::U16Mask operator op(const detail::U16& a, const detail::U16& b) {           \
+    return detail::U16Mask::from_k(_mm512_cmp_epu32_mask(a.m, b.m, predicate));              \
+  }                                                                                          \
+  template <typename T>                                                                      \
+    requires std::is_integral_v<T>                                                           \
+  inline detail::U16Mask operator op(const detail::U16& a, const T& b) {                     \
+    return a op detail::U16(static_cast<uint32_t>(b));                                       \
+  }
+WAVECOMB_COMPARE_U16(<, _MM_CMPINT_LT)
+WAVECOMB_COMPARE_U16(<=, _MM_CMPINT_LE)
+WAVECOMB_COMPARE_U16(>, _MM_CMPINT_NLE)
+WAVECOMB_COMPARE_U16(>=, _MM_CMPINT_NLT)
+#undef WAVECOMB_COMPARE_U16
+#endif
+
 /// Logical not that is right for `bool` too (`~true` is not `false`).
 template <typename M>
 inline M not_(const M& m) {
@@ -284,35 +306,78 @@ inline void store(void* p, const T& value) {
     drjit::store(p, value);
 }
 
-/// base[index] in each active lane, 0 elsewhere. `T` is a float or uint lane type.
+namespace detail {
+/// A packet's lanes in memory. Dr.Jit's entry() is not used: it reads integer registers through a
+/// pointer that may not alias them, which GCC 12 miscompiles.
+template <typename T>
+struct InMemory {
+  using Value = std::conditional_t<std::is_same_v<T, FloatP<kWidth<T>>>, float,
+                                   std::conditional_t<std::is_same_v<T, Int<T>>, int32_t,
+                                   std::conditional_t<std::is_same_v<T, UInt<T>>, uint32_t, uint64_t>>>;
+  alignas(64) Value value[kWidth<T>];
+
+  InMemory() : value{} {}
+  explicit InMemory(const T& lanes) { store(value, lanes); }
+};
+
+/// Words at base + 4 * index, where the index may have 64 bits.
+template <typename T, typename Index, typename M>
+inline T gather_words(const void* base, const Index& index, const M& active) {
+#if defined(__AVX2__)
+  if constexpr (requires { active.a1; })  // made of two halves
+    return T(gather_words<typename T::Array1>(base, drjit::low(index), active.a1),
+             gather_words<typename T::Array2>(base, drjit::high(index), active.a2));
+  else
+    return T::gather_(base, index, active, ReduceMode::Auto);
+#else
+  const InMemory<Index> at(index);
+  InMemory<T> result;
+  for (uint32_t bits = mask_bits(active); bits != 0; bits &= bits - 1) {
+    const auto i = static_cast<size_t>(std::countr_zero(bits));
+    const uint64_t address = reinterpret_cast<uint64_t>(base) + 4 * static_cast<uint64_t>(at.value[i]);
+    std::memcpy(result.value + i, reinterpret_cast<const void*>(address), 4);
+  }
+  return load<T>(result.value);
+#endif
+}
+}  // namespace detail
+
+/// base[index] in each active lane, 0 elsewhere. `T` is a float or uint lane type; indices of active
+/// lanes are below 2^31.
 template <typename T>
 inline T gather(const void* base, const UInt<T>& index, const Mask<T>& active) {
   if constexpr (kIsScalar<T>)
     return active ? static_cast<const T*>(base)[index] : T(0);
   else
-    return T::gather_(base, index, active, ReduceMode::Auto);
+    return detail::gather_words<T>(base, index, active);
 }
 
 /// The 32-bit value at each lane's own address plus 4 * index bytes, in active lanes; 0 elsewhere.
 /// Contract: addresses are multiples of 4.
 template <typename T>
 inline T gather_at(const UInt64<T>& address, const UInt<T>& index, const Mask<T>& active) {
-  if constexpr (kIsScalar<T>) {
+  if constexpr (kIsScalar<T>)
     return active ? reinterpret_cast<const T*>(address)[index] : T(0);
-  } else {
-    using U64 = UInt64<T>;
-    const U64 word = (address >> 2) + U64(index);
-    return T::gather_(nullptr, word, active, ReduceMode::Auto);
-  }
+  else
+    return detail::gather_words<T>(nullptr, UInt64<T>((address >> 2) + UInt64<T>(index)), active);
 }
 
-/// base[index] = value in each active lane; indices of active lanes are distinct.
+/// base[index] = value in each active lane; indices of active lanes are distinct and below 2^31.
 template <typename T>
 inline void scatter(void* base, const T& value, const UInt<T>& index, const Mask<T>& active) {
   if constexpr (kIsScalar<T>) {
     if (active) static_cast<T*>(base)[index] = value;
   } else {
+#if defined(__AVX512VL__)
     value.scatter_(base, index, active, ReduceMode::Auto);
+#else
+    const detail::InMemory<T> from(value);
+    const detail::InMemory<UInt<T>> at(index);
+    for (uint32_t bits = detail::mask_bits(active); bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<size_t>(std::countr_zero(bits));
+      std::memcpy(static_cast<char*>(base) + 4 * size_t{at.value[i]}, from.value + i, 4);
+    }
+#endif
   }
 }
 
@@ -336,12 +401,10 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
                         _mm256_maskz_compress_epi32(static_cast<__mmask8>(bits), v));
 #endif
   } else {
-    using Scalar = std::conditional_t<std::is_same_v<T, FloatP<kWidth<T>>>, float, uint32_t>;
-    Scalar lanes[kWidth<T>];
-    store(lanes, value);
-    auto* out = static_cast<Scalar*>(p);
-    for (uint32_t rest = bits; rest != 0; rest &= rest - 1)
-      *out++ = lanes[std::countr_zero(rest)];
+    const detail::InMemory<T> lanes(value);
+    auto* out = static_cast<char*>(p);
+    for (uint32_t rest = bits; rest != 0; rest &= rest - 1, out += 4)
+      std::memcpy(out, lanes.value + std::countr_zero(rest), 4);
   }
   return static_cast<uint32_t>(std::popcount(bits));
 }
@@ -353,7 +416,7 @@ inline auto lane(const T& value, size_t i) {
     (void)i;
     return value;
   } else {
-    return value.entry(i);
+    return detail::InMemory<T>(value).value[i];
   }
 }
 
