@@ -122,3 +122,54 @@ def test_stats_file_is_plain_json(tmp_path: Path) -> None:
     write_stats(tmp_path / "s.json", stats)
     document = json.loads((tmp_path / "s.json").read_text())
     assert document == {"a": 0.5, "b": None, "c": [3, True], "d": "x"}
+
+
+def test_scene_builder_for_real(tmp_path: Path) -> None:
+    pytest.importorskip("wavecomb._core")
+    builder = wavecomb.SceneBuilder()
+    paint = builder.add_material("diffuse", name="Paint", base_color=(0.5, 0.5, 0.5))
+    points = np.array([[-9, -9, -2], [9, -9, -2], [9, 9, -2], [-9, 9, -2]], np.float32)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    builder.add_to_group(0, builder.add_mesh(points, triangles, material=paint, name="Wall"))
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1))
+    builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5))
+    scene = builder.build()
+    picture = wavecomb.render(scene, size=(16, 8), spp=64, filter="box", filter_width=1)
+    # A flat wall under an even sky: albedo times radiance, whatever the sampler does.
+    assert picture.beauty.mean() == pytest.approx(0.5, rel=0.02)
+    assert picture.albedo == pytest.approx(0.5)
+    assert picture.depth == pytest.approx(2.0)
+    assert (picture.samples == 64).all()
+    assert picture.stats["stage"] is None
+    assert picture.stats["counts"]["samples"] == 16 * 8 * 64
+    picture.save(tmp_path / "a.exr")
+    assert wavecomb.compare(picture, tmp_path / "a.exr").equal
+    assert picture.stats["machine"]["build"]["isa"]
+    for settings in ({"threads": 1}, {"lanes": 1}, {"wave_size": 64}, {"integrator": "reference"}):
+        other = wavecomb.render(
+            scene, size=(16, 8), spp=64, filter="box", filter_width=1, **settings
+        )
+        assert wavecomb.compare(other, picture).equal, settings
+
+
+def test_progress_for_real() -> None:
+    pytest.importorskip("wavecomb._core")
+    builder = wavecomb.SceneBuilder()
+    builder.add_light("dome", np.eye(4))
+    builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5))
+    scene = builder.build()
+    calls: list[tuple[int, int]] = []
+
+    def stop(done: int, total: int) -> bool:
+        calls.append((done, total))
+        return False
+
+    picture = wavecomb.render(scene, size=(256, 256), spp=100000, progress=stop)
+    assert picture.cancelled
+    assert calls[0][1] == 256 * 256 * 100000
+
+    def fail(done: int, total: int) -> bool:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        wavecomb.render(scene, size=(256, 256), spp=100000, progress=fail)

@@ -30,6 +30,7 @@ CAMERA = """
 LIGHT = """
     def DistantLight "Sun" {
         float inputs:intensity = 3
+        bool inputs:normalize = 1
         float xformOp:rotateX = -60
         uniform token[] xformOpOrder = ["xformOp:rotateX"]
     }

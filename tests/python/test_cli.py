@@ -331,3 +331,49 @@ def test_python_m() -> None:
         [sys.executable, "-m", "wavecomb", "--help"], capture_output=True, text=True, check=True
     )
     assert done.stdout.startswith("Usage: wavecomb ")
+
+
+# ---- the real thing ------------------------------------------------------------------------------
+
+
+def wavecomb(*arguments: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "wavecomb", *(str(argument) for argument in arguments)],
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+
+
+def test_from_scene_to_comparison(tmp_path: Path) -> None:
+    pytest.importorskip("wavecomb._core")
+    stage, small = tmp_path / "box.usda", ("--size", 48, 40, "--spp", 4)
+    a, b = tmp_path / "a.exr", tmp_path / "b.exr"
+    assert wavecomb("scene", "cornell", "-o", stage).returncode == 0
+    info = json.loads(wavecomb("info", stage, "--json").stdout)
+    assert info["triangles"]["instanced"] == 30
+    assert info["camera"] == "/World/Camera"
+    assert info["unsupported"] == []
+    done = wavecomb(
+        *("render", stage, "-o", a, "--png", tmp_path / "a.png", *small),
+        *("--stats", tmp_path / "a.json"),
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    stats = json.loads((tmp_path / "a.json").read_text())
+    assert stats["counts"]["samples"] == 48 * 40 * 4
+    assert stats["counts"]["rays"] > stats["counts"]["samples"]
+    assert stats["peak_rss_bytes"] > 1_000_000
+    for options in (
+        ("--threads", 1, "--wave-size", 64),
+        ("--lanes", 1),
+        ("--integrator", "reference"),
+    ):
+        done = wavecomb("render", stage, "-o", b, *small, *options, "--quiet")
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+        assert wavecomb("compare", a, b).returncode == 0, options
+    done = wavecomb("render", stage, "-o", b, *small, "--seed", 1, "--quiet")
+    assert done.returncode == 0
+    done = wavecomb("compare", a, b, "--heatmap", tmp_path / "h.png")
+    assert done.returncode == 1
+    assert "different: " in done.stdout
+    assert wavecomb("compare", a, stage).returncode == 2
