@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads USD stages into scenes: ``load_stage("shot.usd").scene``.
 
-One module for each concept: ``stage`` is the way in; ``traverse`` walks prims; ``mesh``, ``shapes``,
-``light``, ``camera`` and ``instancing`` read one kind of prim each; ``material``, ``preview`` and
-``materialx`` turn networks into programs with parameters.
+One module for each concept: ``stage`` is the way in; ``traverse`` finds prims and ``groups`` places
+them; ``mesh``, ``shapes``, ``light``, ``camera`` and ``instancing`` read one kind of prim each;
+``material``, ``preview`` and ``materialx`` turn networks into programs with parameters.
 """
 
 from wavecomb.errors import WavecombError

@@ -64,13 +64,15 @@ class Assigner:
             self.report.missing(what, draw.prim.GetPath())
         return unique
 
-    def assign(self, draw: Draw, mesh: MeshArrays, otherwise: int) -> tuple[int, FaceIds | None]:
+    def assign(
+        self, draw: Draw, mesh: MeshArrays, otherwise: int | None
+    ) -> tuple[int, FaceIds | None]:
         """The material of a mesh, and one for each triangle where they differ.
 
         Args:
             draw: The gprim with its bindings.
             mesh: Its arrays.
-            otherwise: Id to use where nothing is bound and there is no display colour.
+            otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
         """
         if draw.material is None:
             base, faces = self._display(draw, mesh, otherwise)
@@ -133,11 +135,13 @@ class Assigner:
                 surface = surface.with_value(slot, _plain(values.mean(axis=0)))
         return self.table.add(surface), faces
 
-    def _display(self, draw: Draw, mesh: MeshArrays, otherwise: int) -> tuple[int, FaceIds | None]:
+    def _display(
+        self, draw: Draw, mesh: MeshArrays, otherwise: int | None
+    ) -> tuple[int, FaceIds | None]:
         """Ids for displayColor and displayOpacity."""
         colours = self._values(draw, "displayColor", mesh.topology, 3)
         if colours is None or len(colours) == 0:
-            return otherwise, None
+            return self.table.plain() if otherwise is None else otherwise, None
         opacity = self._opacity(draw, mesh.topology)
         if len(colours) == 1:
             return self.table.plain(colour(colours[0], DEFAULT_COLOUR), opacity), None

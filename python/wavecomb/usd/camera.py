@@ -122,7 +122,7 @@ def _rigid(to_world: Matrix) -> Matrix | None:
 
 
 def frame_bounds(bounds: Matrix | None, up_axis: str) -> View:
-    """A three-quarter view that fits bounds (2, 3) in its frame; the origin where there are none."""
+    """A three-quarter view that fits bounds (2, 3) in its frame; None: of the origin."""
     if bounds is None:
         bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
     centre = 0.5 * (bounds[0] + bounds[1])
@@ -136,7 +136,8 @@ def frame_bounds(bounds: Matrix | None, up_axis: str) -> View:
     right = np.cross(up, back)
     right /= np.linalg.norm(right)
     true_up = np.cross(back, right)
-    corners = bounds[[[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], range(3)] - centre
+    picks = [[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    corners = bounds[picks, range(3)] - centre
     reach = np.maximum(np.abs(corners @ right), np.abs(corners @ true_up)) / _FRAME_TAN
     distance = 1.08 * float((reach + corners @ back).max()) or size
     frame = np.eye(4)

@@ -82,7 +82,7 @@ def captured(report: LoadReport) -> Iterator[None]:
             yield
         finally:
             texts = [item.commentary for item in (*trap.GetErrors(), *trap.GetWarnings())]
-            lines = list(dict.fromkeys(plain(text) for text in texts))
+            lines = sorted({plain(text) for text in texts})
             # What can be said in our words is grouped there, however often it comes.
             known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
             for line in known:

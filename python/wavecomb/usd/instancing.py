@@ -56,7 +56,7 @@ def rotations(quaternions: NDArray[Any]) -> Matrices:
 def sound(transforms: Matrices) -> NDArray[np.bool_]:
     """Which of (k, 4, 4) are finite and can be inverted."""
     linear = transforms[:, :3, :3]
-    finite = np.isfinite(transforms).all(axis=(1, 2)) & (np.abs(transforms) < 1e18).all(axis=(1, 2))
+    finite: NDArray[np.bool_] = np.asarray((np.abs(transforms) < 1e18).all(axis=(1, 2)))
     a, b, c = np.where(finite[:, None, None], linear, 0.0).transpose(1, 0, 2)
     volume = np.abs(np.einsum("ij,ij->i", np.cross(a, b), c))
     edges = [np.sqrt(np.einsum("ij,ij->i", row, row)) for row in (a, b, c)]

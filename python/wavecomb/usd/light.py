@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd, UsdLux
+from pxr import Usd, UsdLux
 
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
@@ -55,15 +55,15 @@ class LightReader:
         self.textures = textures
         self.report = report
 
-    def read(self, prim: Usd.Prim) -> Light:
-        """The light of a prim whose type is in ``KINDS``."""
+    def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
+        """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
         kind = KINDS[str(prim.GetTypeName())]
         self._say_unsupported(prim)
         radiance = self._colour(prim)
-        if not all(math.isfinite(value) and value >= 0 for value in radiance):
+        if not all(0 <= value < 1e30 for value in radiance):
             self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
             radiance = (0.0, 0.0, 0.0)
-        options: dict[str, Any] = {"name": str(prim.GetPath()), "color": radiance}
+        options: dict[str, Any] = {"name": self.report.place(prim.GetPath()), "color": radiance}
         normalize = bool(self._get(prim, "normalize", False))
         local = np.eye(4)
         if kind == "rect":
@@ -73,7 +73,7 @@ class LightReader:
         elif kind == "disk":
             options["radius"] = abs(number(self._get(prim, "radius", 0.5), 0.5))
         elif kind == "sphere":
-            self._sphere(prim, options, normalize)
+            self._sphere(prim, options, normalize, scale)
             normalize = normalize and options["radius"] > 0
         elif kind == "distant":
             options["angle"] = min(max(number(self._get(prim, "angle", 0.53), 0.53), 0.0), 360.0)
@@ -94,17 +94,22 @@ class LightReader:
         return default if value is None else value
 
     def _colour(self, prim: Usd.Prim) -> tuple[float, float, float]:
-        """colour * intensity * 2^exposure * colour temperature."""
-        base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (1.0, 1.0, 1.0))
-        exposure = min(number(self._get(prim, "exposure", 0.0), 0.0), 100.0)
-        power = number(self._get(prim, "intensity", 1.0), 1.0) * 2.0**exposure
+        """Colour * intensity * 2^exposure * colour temperature."""
+        # What is not finite stays so, and is warned of.
+        bad = math.nan
+        base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
+        exposure = min(number(self._get(prim, "exposure", 0.0), bad), 200.0)
+        power = number(self._get(prim, "intensity", 1.0), bad) * 2.0**exposure
         tint = (1.0, 1.0, 1.0)
         if self._get(prim, "enableColorTemperature", False):
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
-            tint = tuple(UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10000.0)))
-        return tuple(b * t * power for b, t in zip(base, tint, strict=True))  # type: ignore[return-value]
+            tint = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10000.0))
+        r, g, b = (float(c * t * power) for c, t in zip(base, tint, strict=True))
+        return (r, g, b)
 
-    def _sphere(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> None:
+    def _sphere(
+        self, prim: Usd.Prim, options: dict[str, Any], normalize: bool, scale: float
+    ) -> None:
         """Radius; a point light gets the radiant intensity that the sphere would have."""
         radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
         point = prim.GetAttribute("treatAsPoint")
@@ -112,7 +117,7 @@ class LightReader:
             options["radius"] = radius
             return
         # Radiance L over the disk pi r^2 that is seen; normalized, L / (4 pi r^2).
-        area = 0.25 if normalize or radius == 0 else math.pi * radius * radius
+        area = 0.25 if normalize or radius == 0 else math.pi * (scale * radius) ** 2
         options["radius"] = 0.0
         options["color"] = tuple(area * value for value in options["color"])
         if radius == 0 and not normalize:

@@ -43,12 +43,11 @@ class MeshArrays:
 
     Attributes:
         positions: (n, 3).
-        topology: Triangles; None for implicit shapes.
         triangles: (m, 3), counter-clockwise from outside.
         normals: (n, 3), (m, 3, 3) or None.
         uvs: (n, 2), (m, 3, 2) or None.
         bounds: (2, 3) lowest and highest coordinates.
-        order: Corner order of topology's triangles is reversed where this is True.
+        topology: Where the triangles come from; None for implicit shapes.
     """
 
     positions: Array
@@ -182,7 +181,7 @@ class MeshReader:
         return MeshArrays(positions, triangles, normals, uvs, bounds, topology)
 
     def _normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
-        """(n, 3), (m, 3, 3), or None for flat: as authored, else smooth for subdivision surfaces."""
+        """(n, 3), (m, 3, 3), or None for flat: authored, else smooth for subdivision surfaces."""
         authored = self._authored_normals(prim, points, topology)
         scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
         if scheme not in (None, "none"):
@@ -303,7 +302,7 @@ def _integers(value: Any) -> NDArray[np.int32]:
 
 
 def _reverse(values: Array | None) -> Array | None:
-    """Per-corner values (m, 3, c) with the corners of each triangle reversed; others as they are."""
+    """Values (m, 3, c) with the corners of each triangle reversed; others as they are."""
     if values is None or values.ndim != 3:
         return values
     return np.ascontiguousarray(values[:, ::-1])

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,9 +14,9 @@ SHARP = 1.0
 """Crease sharpness from which an edge is drawn as an edge."""
 
 
-def _scatter(index: NDArray, values: NDArray, count: int) -> NDArray[np.float32]:
+def _scatter(index: NDArray[Any], values: NDArray[Any], count: int) -> NDArray[np.float32]:
     """Sums of rows of values (k, 3) by index (k,), made unit length: (count, 3)."""
-    total = np.stack(
+    total: NDArray[np.float64] = np.stack(
         [np.bincount(index, weights=values[:, axis], minlength=count) for axis in range(3)], axis=1
     )
     length = np.sqrt(np.einsum("ij,ij->i", total, total))
@@ -78,7 +80,7 @@ def _smoothing_groups(
 def crease_edges(
     indices: NDArray[np.int32], lengths: NDArray[np.int32], sharpness: NDArray[np.float32]
 ) -> NDArray[np.int64]:
-    """(k, 2) points of the edges of UsdGeomMesh creases that are at least ``SHARP``; bad data: none."""
+    """(k, 2) points of the creases of a UsdGeomMesh from ``SHARP`` on; none where data is bad."""
     none = np.empty((0, 2), np.int64)
     if len(lengths) == 0 or lengths.min() < 2 or lengths.sum(dtype=np.int64) != len(indices):
         return none

@@ -51,7 +51,7 @@ _IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> str:
-    """The program that a material asks for by ``wavecomb:program``; principled where it does not."""
+    """The program that ``wavecomb:program`` of a material asks for, else principled."""
     attribute = material.GetAttribute("wavecomb:program")
     name = attribute.Get(time) if attribute else None
     if name is None:
@@ -90,6 +90,9 @@ class PreviewReader:
                 value = self._input(slot, source, default)
                 if value is not None and slot != "normal":
                     parameters[slot] = value
+        if parameters.get("ior", 1.0) <= 0.0:
+            self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
+            parameters["ior"] = 1.5
         if program == "dielectric" and "base_color" not in parameters:
             parameters["base_color"] = (1.0, 1.0, 1.0)
         if program == "principled":
@@ -162,12 +165,12 @@ class PreviewReader:
         elif channel == "rgb" and slot not in (*COLOUR_SLOTS, "normal"):
             channel = "r"
         space = self._colour_space(shader, file)
-        if slot == "normal" and scale[:3] == (1.0, 1.0, 1.0) and bias[:3] == (0.0, 0.0, 0.0):
-            if image.pixels.dtype.name in ("uint8", "float16"):
-                scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
-                what = "normal map without scale and bias: read as 2 x - 1, linear"
-                self.report.note(what, shader.GetPath())
-                space = "raw"
+        bare = scale[:3] == (1.0, 1.0, 1.0) and bias[:3] == (0.0, 0.0, 0.0)
+        if slot == "normal" and bare and image.pixels.dtype.name in ("uint8", "float16"):
+            scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
+            what = "normal map without scale and bias: read as 2 x - 1, linear"
+            self.report.note(what, shader.GetPath())
+            space = "raw"
         wraps = [str(value_of(shader, name, time, "useMetadata")) for name in ("wrapS", "wrapT")]
         self.slots[slot] = {
             "texture": self.textures.add(path, image, space, wraps[0], wraps[1]),
@@ -219,7 +222,7 @@ class PreviewReader:
 
     def _coordinates(self, shader: UsdShade.Shader) -> tuple[float, ...]:
         """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``."""
-        matrix = _IDENTITY_UV
+        matrix: tuple[float, ...] = _IDENTITY_UV
         name = "st"
         node, key = shader, "st"
         for _ in range(MAX_DEPTH):

@@ -57,18 +57,31 @@ class LoadReport:
         self._warnings: dict[str, Finding] = {}
         self._unsupported: dict[str, Finding] = {}
         self.counts: dict[str, int] = {}
+        self._aliases: dict[str, str] = {}
+
+    def alias(self, prototype: object, instance: object) -> None:
+        """Makes places in a prototype of USD's own be named by the first instance of it."""
+        self._aliases.setdefault(str(prototype), self.place(instance))
+
+    def place(self, place: object) -> str:
+        """A prim's path as the user knows it."""
+        path = str(place)
+        if not path.startswith("/__Prototype_"):
+            return path
+        head, slash, tail = path[1:].partition("/")
+        return self._aliases.get(f"/{head}", f"/{head}") + slash + tail
 
     def note(self, what: str, place: object = "", count: int = 1) -> None:
         """Adds a note."""
-        self._notes.setdefault(what, Finding(what)).add(str(place), count)
+        self._notes.setdefault(what, Finding(what)).add(self.place(place), count)
 
     def warn(self, what: str, place: object = "", count: int = 1) -> None:
         """Adds a warning about a prim or a file."""
-        self._warnings.setdefault(what, Finding(what)).add(str(place), count)
+        self._warnings.setdefault(what, Finding(what)).add(self.place(place), count)
 
     def missing(self, what: str, place: object = "", count: int = 1) -> None:
         """Adds something that is not supported."""
-        self._unsupported.setdefault(what, Finding(what)).add(str(place), count)
+        self._unsupported.setdefault(what, Finding(what)).add(self.place(place), count)
 
     def tally(self, kind: str, count: int = 1) -> None:
         """Counts prims of a kind."""

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,14 +108,21 @@ def _plane(number: Number, token: Token) -> Shape:
     uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
     axis = token("axis", "Z")
     return Shape(
-        _to_axis(corners, axis),
-        _to_axis(normals, axis),
+        _turn_plane(corners, axis),
+        _turn_plane(normals, axis),
         uvs,
         np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
     )
 
 
-def _to_axis(values: NDArray, axis: str) -> Array:
+def _turn_plane(values: NDArray[Any], axis: str) -> Array:
+    """Width is along x and length along y for Z; x and z for Y; z and y for X."""
+    x, y, z = values.T
+    turned = {"X": (z, y, -x), "Y": (x, z, -y), "Z": (x, y, z)}[axis]
+    return np.ascontiguousarray(np.stack(turned, axis=1), np.float32)
+
+
+def _to_axis(values: NDArray[Any], axis: str) -> Array:
     """Turns what was made about Z to another axis, by a cyclic exchange (right-handed)."""
     order = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}[axis]
     return np.ascontiguousarray(values[:, order], np.float32)
@@ -124,7 +132,7 @@ def _to_axis(values: NDArray, axis: str) -> Array:
 def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> Shape:
     """A profile turned about an axis: radius and z, and their normals, from bottom to top."""
     half = 0.5 * height
-    pieces: list[tuple[NDArray, NDArray]] = []
+    pieces: list[tuple[NDArray[Any], NDArray[Any]]] = []
     if kind == "sphere":
         pieces.append(_arc(bottom, -90, 90, 0.0, RINGS))
     elif kind == "capsule":
@@ -166,14 +174,16 @@ def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> 
     )
 
 
-def _arc(radius: float, start: float, stop: float, z: float, steps: int) -> tuple[NDArray, NDArray]:
+def _arc(
+    radius: float, start: float, stop: float, z: float, steps: int
+) -> tuple[NDArray[Any], NDArray[Any]]:
     angle = np.radians(np.linspace(start, stop, steps + 1))
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     normal[np.abs(normal) < 1e-12] = 0.0
     return radius * normal + (0.0, z), normal
 
 
-def _sweep(profile: NDArray, turn: NDArray) -> NDArray:
+def _sweep(profile: NDArray[Any], turn: NDArray[Any]) -> NDArray[Any]:
     """Profile (rows, 2) of radius and z about Z: (rows * columns, 3)."""
     out = np.empty((len(profile), len(turn), 3))
     out[..., :2] = profile[:, None, :1] * turn

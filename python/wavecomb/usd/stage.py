@@ -15,12 +15,13 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from wavecomb.errors import WavecombError
 from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured, commentary
+from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import TextureTable
-from wavecomb.usd.traverse import Group, Walker, placed_lights
+from wavecomb.usd.traverse import Traversal
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -158,15 +159,15 @@ def _read(
     textures = TextureTable(builder, report)
     materials = MaterialTable(builder, textures, time, report)
     lights = LightReader(time, up_axis, textures, report)
-    walker = Walker(stage, time, purposes, builder, materials, lights, report)
-    world = walker.world()
+    traversal = Traversal(time, purposes, lights, report)
+    world = GroupBuilder(stage, traversal, builder, materials, report).world()
     lit = materials.glows or _has_lights(stage)
     _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):
         report.note("nothing to draw: the picture shows the environment only")
     view = None
     if view_prim is not None:
-        to_world = np.array(walker.xforms.GetLocalToWorldTransform(view_prim))
+        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
         view = read_camera(view_prim, to_world, time, report)
     chosen = None if view is None or view_prim is None else str(view_prim.GetPath())
     if view is None:

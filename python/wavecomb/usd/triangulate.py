@@ -87,11 +87,10 @@ def triangulate(
         raise MeshError("a face index is out of range")
     has_holes = holes is not None and len(holes) > 0
     if low == 3 and high == 3 and not has_holes:
-        triangles = np.ascontiguousarray(indices.reshape(-1, 3))
+        triangles: NDArray[Any] = np.ascontiguousarray(indices.reshape(-1, 3))
         if not flip:
-            return Topology(
-                triangles.view(np.uint32), None, None, indices, len(points), len(counts)
-            )
+            unsigned = triangles.view(np.uint32)
+            return Topology(unsigned, None, None, indices, len(points), len(counts))
         corners = np.arange(total).reshape(-1, 3)[:, ::-1]
         turned = np.ascontiguousarray(triangles[:, ::-1]).view(np.uint32)
         return Topology(turned, corners, None, indices, len(points), len(counts))

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene builder that records what it is given and checks what the native one relies on."""
+
+from pathlib import Path
+
+import numpy as np
+from wavecomb.usd import LoadedStage, load_stage
+
+INHERIT = 0xFFFFFFFF
+ASSETS = Path(__file__).resolve().parents[3] / "shared" / "assets"
+
+
+class Recorder:
+    """Stands in for ``_core.SceneBuilder``."""
+
+    def __init__(self):
+        self.textures, self.materials, self.meshes, self.lights = [], [], [], []
+        self.groups = [{"name": "world", "meshes": [], "children": []}]
+        self.camera = None
+
+    def add_texture(self, pixels, *, srgb, wrap_s="repeat", wrap_t="repeat", name=""):
+        assert pixels.ndim == 3 and 1 <= pixels.shape[2] <= 4 and pixels.flags.c_contiguous
+        assert pixels.dtype in (np.uint8, np.float16, np.float32)
+        self.textures.append({"pixels": pixels, "srgb": srgb, "wrap": (wrap_s, wrap_t)})
+        return len(self.textures) - 1
+
+    def add_material(self, program, *, name="", textures=None, **parameters):
+        self.materials.append(
+            {"program": program, "name": name, "textures": textures or {}, **parameters}
+        )
+        return len(self.materials) - 1
+
+    def add_mesh(
+        self,
+        positions,
+        indices,
+        *,
+        normals=None,
+        uvs=None,
+        face_materials=None,
+        material=INHERIT,
+        name="",
+    ):
+        n, m = len(positions), len(indices)
+        assert positions.dtype == np.float32 and positions.shape == (n, 3)
+        assert indices.dtype == np.uint32 and indices.shape == (m, 3)
+        assert positions.flags.c_contiguous and indices.flags.c_contiguous
+        assert m > 0 and indices.max() < n and np.isfinite(positions).all()
+        for array, width in ((normals, 3), (uvs, 2)):
+            if array is not None:
+                assert array.dtype == np.float32 and array.flags.c_contiguous
+                assert array.shape in ((n, width), (m, 3, width))
+                assert np.isfinite(array).all()
+        if face_materials is not None:
+            assert face_materials.shape == (m,) and face_materials.dtype == np.uint32
+            assert face_materials.max() < len(self.materials) or face_materials.max() == INHERIT
+        assert material == INHERIT or material < len(self.materials)
+        self.meshes.append(
+            {
+                "positions": positions,
+                "indices": indices,
+                "normals": normals,
+                "uvs": uvs,
+                "face_materials": face_materials,
+                "material": material,
+                "name": name,
+            }
+        )
+        return len(self.meshes) - 1
+
+    def add_group(self, name=""):
+        self.groups.append({"name": name, "meshes": [], "children": []})
+        return len(self.groups) - 1
+
+    def add_to_group(self, group, mesh):
+        self.groups[group]["meshes"].append(mesh)
+
+    def add_instances(self, parent, child, transforms, materials=None):
+        assert transforms.dtype == np.float64 and transforms.shape == (len(transforms), 4, 4)
+        assert materials.dtype == np.uint32 and materials.shape == (len(transforms),)
+        assert np.isfinite(transforms).all() and child != 0
+        self.groups[parent]["children"].append((child, transforms, materials))
+
+    def add_light(self, kind, transform, **options):
+        assert np.shape(transform) == (4, 4)
+        self.lights.append({"kind": kind, "transform": np.asarray(transform), **options})
+        return len(self.lights) - 1
+
+    def set_camera(self, transform, **options):
+        self.camera = {"transform": np.asarray(transform), **options}
+
+    def build(self):
+        return self
+
+    # What tests ask for.
+
+    def mesh(self, name):
+        """The mesh whose path ends so."""
+        (found,) = [mesh for mesh in self.meshes if mesh["name"].endswith(name)]
+        return found
+
+    def material_of(self, name):
+        """The material of a mesh, where it has one for all faces."""
+        return self.materials[self.mesh(name)["material"]]
+
+    def world_meshes(self):
+        """(mesh, transform, material id) of all that is seen, instances one by one."""
+
+        def expand(group, matrix, inherited):
+            for number in self.groups[group]["meshes"]:
+                mesh = self.meshes[number]
+                own = mesh["material"]
+                yield mesh, matrix, inherited if own == INHERIT else own
+            for child, transforms, materials in self.groups[group]["children"]:
+                for transform, material in zip(transforms, materials, strict=True):
+                    passed = inherited if material == INHERIT else int(material)
+                    yield from expand(child, transform @ matrix, passed)
+
+        return list(expand(0, np.eye(4), INHERIT))
+
+
+def write(folder: Path, text: str, name: str = "stage.usda") -> Path:
+    """Writes a stage of some prims; braces may stand on one line with statements."""
+    path = folder / name
+    header = "" if text.startswith("#usda") else "#usda 1.0\n"
+    path.write_text(header + text.replace("{", "{\n").replace("}", "\n}\n"))
+    return path
+
+
+def load(folder: Path, text: str, **options) -> tuple[Recorder, LoadedStage]:
+    """Loads a stage of some prims."""
+    loaded = load_stage(write(folder, text), builder_factory=Recorder, **options)
+    return loaded.scene, loaded
+
+
+def said(loaded: LoadedStage) -> str:
+    """All that the report says."""
+    return "\n".join(loaded.report.lines())
+
+
+QUAD = """
+    point3f[] points = [(0,0,0), (1,0,0), (1,1,0), (0,1,0)]
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0,1,2,3]
+    uniform token subdivisionScheme = "none"
+"""
