@@ -2,7 +2,6 @@
 /// Reads the parameters of materials at hits: constants from records, or textures.
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <cstring>
 
@@ -18,15 +17,6 @@ inline constexpr float kMaxIor = 10.f;
 inline constexpr float kMaxEmission = 1e18f;
 
 namespace detail {
-
-/// Value of the first active lane, read through memory: `lane` on a packet that is still in a
-/// register is miscompiled by GCC 12 (Dr.Jit's entry() breaks its aliasing rules).
-template <typename F>
-inline uint32_t first_index(const UInt<F>& value, const Mask<F>& active) {
-  uint32_t lanes[kWidth<F>];
-  wavecomb::store(lanes, value);
-  return lanes[static_cast<size_t>(std::countr_zero(lane_bits<F>(active)))];
-}
 
 /// Words of a record, by lane: one scalar load when all active lanes share the record, else
 /// gathers.
@@ -65,7 +55,7 @@ inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index, boo
                                    const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(Record) / 4;
   const std::byte* shared = nullptr;
-  if (uniform) shared = reinterpret_cast<const std::byte*>(base + first_index<F>(index, active));
+  if (uniform) shared = reinterpret_cast<const std::byte*>(base + first_active(index, active));
   return {base, index * kWords, shared, active};
 }
 
@@ -83,7 +73,7 @@ inline Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use
   const F width = uv_width * stretch;
   const UInt<F> id = use.bits(offsetof(R, texture));
   const Texel<F> texel =
-      use.shared ? lookup<F>(view.textures[first_index<F>(id, active)], s, t, width, active)
+      use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t, width, active)
                  : lookup<F>(view.textures, id, s, t, width, active);
   const auto channel = [&](const F& value, size_t i) {
     return fma(value, use.real(offsetof(R, scale) + 4 * i), use.real(offsetof(R, bias) + 4 * i));
