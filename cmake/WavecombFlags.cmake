@@ -57,7 +57,7 @@ add_library(wavecomb_private INTERFACE)
 target_compile_features(wavecomb_private INTERFACE cxx_std_20)
 target_include_directories(wavecomb_private SYSTEM INTERFACE "${WAVECOMB_DRJIT_INCLUDE_DIR}")
 target_compile_options(wavecomb_private INTERFACE
-  ${_arch_flags} -ffp-contract=off -fno-math-errno -fno-trapping-math
+  ${_arch_flags} -ffp-contract=off -fno-strict-aliasing -fno-math-errno -fno-trapping-math
   -Wall -Wextra -Wpedantic -Wshadow=local -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
   # GCC 12 sees uninitialized and out-of-bounds vectors inside its own intrinsics once they are inlined.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>

@@ -165,11 +165,12 @@ inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, c
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
 
-  // |A| (b0 |p0| + b1 |p1| + b2 |p2|) + |t|, by row: the magnitudes that were rounded.
-  const Vec3<F> size = detail::abs3(p0) * abs(b0) + detail::abs3(p1) * b1 + detail::abs3(p2) * b2;
+  // What was rounded: the interpolated point in all its terms, and, less so, the triangle's corners that
+  // traversal subtracts the ray's origin from. All axes count, since the traversal's products mix them.
+  const Vec3<F> q0 = detail::abs3(p0), q1 = detail::abs3(p1), q2 = detail::abs3(p2);
+  const Vec3<F> size = (q0 * abs(b0) + q1 * b1 + q2 * b2) + max(q0, max(q1, q2)) * F(0.25f);
   const auto magnitude = [&](int i, const F& t) { return dot(detail::abs3(maps.row[i]), size) + abs(t); };
-  const Vec3<F> error{magnitude(0, maps.t.x), magnitude(1, maps.t.y), magnitude(2, maps.t.z)};
-  s.offset = dot(detail::abs3(s.ng), error) * 0x1p-19f;  // 32 units of rounding
+  s.offset = max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
 
   s.ns = s.ng;
   s.terminator = Vec3<F>(F(0.f));
