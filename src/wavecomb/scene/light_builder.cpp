@@ -37,6 +37,15 @@ void put(float (&to)[3], const Double3& v) {
 }
 double luminance(double r, double g, double b) { return 0.212656 * r + 0.715158 * g + 0.072186 * b; }
 
+/// Areas below are too small to be told from 0 in float: such lights are dark.
+constexpr double kLeastArea = 1e-36;
+/// Largest radiance; beyond it products overflow.
+constexpr double kMostRadiance = 1e30;
+
+void put_radiance(LightRecord& record, const Double3& v) {
+  put(record.radiance, {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
+}
+
 bool finite(const Vec3<float>& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 void check(const Light& light, size_t texture_count) {
@@ -78,8 +87,8 @@ void finish_flat(Made& made, const Light& light, const Double3& u, const Double3
   put(made.record.v, v);
   put(made.record.n, n);
   made.record.area = static_cast<float>(area);
-  const double scale = light.normalize ? (area > 0 ? 1 / area : 0) : 1;
-  put(made.record.radiance, color * scale);
+  const double scale = area < kLeastArea ? 0 : (light.normalize ? 1 / area : 1);
+  put_radiance(made.record, color * scale);
   made.power = kPiD * area * scale * mean;
 }
 
@@ -91,16 +100,15 @@ void make_sphere(Made& made, const Light& light, const Double3& color, double me
   made.record.radius = static_cast<float>(radius);
   if (light.radius == 0) {
     const double scale = light.normalize ? 0.25 : 1;  // pi r^2 / (4 pi r^2)
-    put(made.record.radiance, color * scale);
+    put_radiance(made.record, color * scale);
     made.power = 4 * kPiD * scale * mean;
     return;
   }
   const double area = 4 * kPiD * radius * radius;
   made.record.area = static_cast<float>(area);
-  // Squashed flat, or too small for its square to be a float: nothing to see.
-  const bool there = static_cast<float>(radius) * static_cast<float>(radius) > 0;
+  const bool there = area >= kLeastArea;
   const double scale = !there ? 0 : (light.normalize ? 1 / area : 1);
-  put(made.record.radiance, color * scale);
+  put_radiance(made.record, color * scale);
   made.power = kPiD * area * scale * mean;
   if (!there) made.record.radius = 1e-18f;  // 0 would make it a point light
 }
@@ -117,7 +125,7 @@ void make_distant(Made& made, const Light& light, const Double3& color, double m
     const double sin2 = std::sin(half) * std::sin(half);
     scale = 1 / (kPiD * (half <= kPiD / 2 ? sin2 : 2 - sin2));
   }
-  put(made.record.radiance, color * scale);
+  put_radiance(made.record, color * scale);
   const double solid_angle = one_minus_cos > 0 ? 2 * kPiD * one_minus_cos : 1;
   made.power = kPiD * scene_radius * scene_radius * solid_angle * scale * mean;
 }
@@ -138,7 +146,7 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
   put(made.record.u, x);
   put(made.record.v, y);
   put(made.record.n, z);
-  put(made.record.radiance, color);
+  put_radiance(made.record, color);
   double mean_radiance = mean;
   if (light.texture != kNoTexture) {
     made.record.distribution = static_cast<uint32_t>(set.distributions.size());
@@ -209,13 +217,13 @@ Made make_triangle(const EmissiveTriangle& t) {
   put(r.u, u);
   put(r.v, v);
   put(r.n, unit(m));
-  put(r.radiance, to_double(t.radiance));
+  put_radiance(r, to_double(t.radiance));
   r.area = static_cast<float>(area);
   std::copy(t.uv0, t.uv0 + 2, r.uv0);
   std::copy(t.uv1, t.uv1 + 2, r.uv1);
   std::copy(t.uv2, t.uv2 + 2, r.uv2);
   const double mean = luminance(double{t.radiance[0]}, double{t.radiance[1]}, double{t.radiance[2]}) * double{t.mean_scale};
-  made.power = 2 * kPiD * area * mean;
+  made.power = area < kLeastArea ? 0 : 2 * kPiD * area * mean;
   return made;
 }
 

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/light_builder.h"
+
+#include "lane_testing.h"
+#include "light_testing.h"
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace light_testing;
+using lane_testing::kInf;
+using lane_testing::kNan;
+
+const LightRecord& only(const Lights& lights) {
+  EXPECT_EQ(lights.set.records.size(), 1u);
+  return lights.set.records[0];
+}
+void expect_vec(const float (&v)[3], float x, float y, float z) {
+  EXPECT_NEAR(v[0], x, 1e-5);
+  EXPECT_NEAR(v[1], y, 1e-5);
+  EXPECT_NEAR(v[2], z, 1e-5);
+}
+
+TEST(LightBuilder, RectInItsOwnSpace) {
+  Light light = make_light(LightKind::kRect);
+  light.width = 4;
+  light.height = 2;
+  const Lights lights({light});
+  const LightRecord& r = only(lights);
+  // Seen from the front (from -z, +y up), +x is to the left: the corner is at the lower left.
+  expect_vec(r.p, 2, -1, 0);
+  expect_vec(r.u, -4, 0, 0);
+  expect_vec(r.v, 0, 2, 0);
+  expect_vec(r.n, 0, 0, -1);
+  EXPECT_FLOAT_EQ(r.area, 8);
+  expect_vec(r.radiance, 2, 3, 4);
+  EXPECT_FLOAT_EQ(r.pick_pdf, 1);
+}
+
+TEST(LightBuilder, FlatLightsShineToTheImageOfMinusZ) {
+  for (const LightKind kind : {LightKind::kRect, LightKind::kDisk}) {
+    expect_vec(only(Lights({make_light(kind, scale(-1, 1, 1))})).n, 0, 0, -1);
+    expect_vec(only(Lights({make_light(kind, scale(1, 1, -1))})).n, 0, 0, 1);
+    expect_vec(only(Lights({make_light(kind, rotate(90, 0))})).n, 0, 1, 0);
+    // A shear keeps the plane.
+    const Affine shear{{{1, 0, 5}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
+    expect_vec(only(Lights({make_light(kind, shear)})).n, 0, 0, -1);
+  }
+}
+
+TEST(LightBuilder, AreasInWorldSpace) {
+  const Affine m = translate(1, 2, 3) * rotate(30, 50) * scale(2, 3, 5);
+  EXPECT_NEAR(only(Lights({make_light(LightKind::kRect, m)})).area, 6, 1e-5);
+  EXPECT_NEAR(only(Lights({make_light(LightKind::kDisk, m)})).area, kPiD * 0.25 * 6, 1e-5);
+  const Lights sphere({make_light(LightKind::kSphere, m)});
+  EXPECT_NEAR(only(sphere).radius, 0.5 * std::cbrt(30.0), 1e-5);
+  expect_vec(only(sphere).p, 1, 2, 3);
+}
+
+TEST(LightBuilder, NormalizedLightsKeepTheirPower) {
+  for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere}) {
+    double first = 0;
+    for (const float size : {1e-3f, 0.1f, 1.f, 7.f, 1e4f}) {
+      Light light = make_light(kind, rotate(20, 40) * scale(size, 2 * size, -size));
+      light.normalize = true;
+      const Lights lights({light});
+      const double power = lights.set.total_power;
+      if (first == 0) first = power;
+      EXPECT_NEAR(power / first, 1, 1e-5);
+      EXPECT_NEAR(static_cast<double>(only(lights).radiance[0]) * only(lights).area, 2, 1e-4);
+    }
+  }
+  // Small normalized spheres tend to the point light: intensity pi r^2 L.
+  Light light = make_light(LightKind::kSphere);
+  light.normalize = true;
+  light.radius = 1e-3f;
+  const float small = only(Lights({light})).radiance[0] * static_cast<float>(kPiD * 1e-6);
+  light.radius = 0;
+  EXPECT_NEAR(only(Lights({light})).radiance[0], small, 1e-5);
+  EXPECT_EQ(only(Lights({light})).radius, 0);
+}
+
+TEST(LightBuilder, DistantConventions) {
+  Light light = make_light(LightKind::kDistant, rotate(-90, 0));
+  for (const float angle : {0.1f, 0.53f, 10.f, 90.f, 180.f}) {
+    light.angle = angle;
+    light.normalize = true;
+    const double half = angle / 2 * kPiD / 180;
+    const Lights lights({light});
+    const LightRecord& r = only(lights);
+    EXPECT_NEAR(r.radiance[0] * kPiD * std::sin(half) * std::sin(half), 2, 1e-4);  // irradiance 2
+    EXPECT_NEAR(r.one_minus_cos / (2 * std::pow(std::sin(half / 2), 2)), 1, 1e-6);
+    expect_vec(r.n, 0, -1, 0);
+    light.normalize = false;
+    EXPECT_EQ(only(Lights({light})).radiance[0], 2);
+  }
+  light.angle = 0;
+  light.normalize = true;
+  EXPECT_EQ(only(Lights({light})).one_minus_cos, 0);
+  EXPECT_EQ(only(Lights({light})).radiance[0], 2);
+  light.angle = 270;
+  const double s2 = std::pow(std::sin(135 * kPiD / 180), 2);
+  EXPECT_NEAR(only(Lights({light})).radiance[0] * kPiD * (2 - s2), 2, 1e-4);
+}
+
+TEST(LightBuilder, DomeAxesAreOrthonormal) {
+  for (const Affine& m : {Affine{}, rotate(30, 70), translate(5, 6, 7) * scale(2, 3, -4), scale(1, 1, 0), scale(0, 0, 0)}) {
+    const Lights lights({make_light(LightKind::kDome, m)});
+    const LightRecord& r = only(lights);
+    const Vec3<float> u(r.u[0], r.u[1], r.u[2]), v(r.v[0], r.v[1], r.v[2]), n(r.n[0], r.n[1], r.n[2]);
+    EXPECT_NEAR(dot(u, u), 1, 1e-6);
+    EXPECT_NEAR(dot(v, v), 1, 1e-6);
+    EXPECT_NEAR(dot(n, n), 1, 1e-6);
+    EXPECT_NEAR(dot(u, v), 0, 1e-6);
+    EXPECT_NEAR(dot(u, n), 0, 1e-6);
+    EXPECT_NEAR(dot(v, n), 0, 1e-6);
+  }
+}
+
+TEST(LightBuilder, InfiniteLightsFirstThenTrianglesLast) {
+  const std::vector<Light> input = {make_light(LightKind::kRect), make_light(LightKind::kDome), make_light(LightKind::kSphere),
+                                    make_light(LightKind::kDistant), make_light(LightKind::kDisk)};
+  const std::vector<EmissiveTriangle> triangles(3, make_triangle({0, 0, 0}, {1, 0, 0}, {0, 2, 0}));
+  const Lights lights(input, triangles);
+  EXPECT_EQ(lights.set.infinite_count, 2u);
+  EXPECT_EQ(lights.set.first_triangle, 5u);
+  ASSERT_EQ(lights.set.records.size(), 8u);
+  EXPECT_EQ(lights.set.of_input, (std::vector<uint32_t>{2, 0, 3, 1, 4}));
+  for (size_t i = 0; i < input.size(); ++i) {
+    EXPECT_EQ(lights.set.records[lights.set.of_input[i]].kind, static_cast<uint32_t>(input[i].kind));
+  }
+  EXPECT_FLOAT_EQ(lights.set.records[5].area, 1);
+  expect_vec(lights.set.records[5].n, 0, 0, 1);
+  double sum = 0;
+  for (const LightRecord& r : lights.set.records) sum += r.pick_pdf;
+  EXPECT_EQ(sum, 1);  // multiples of 2^-24
+}
+
+TEST(LightBuilder, ProbabilitiesFollowPower) {
+  Light bright = make_light(LightKind::kRect), dim = bright, black = bright;
+  dim.color = {2e-9f, 3e-9f, 4e-9f};
+  black.color = {0, 0, 0};
+  bright.width = 3;
+  const Lights lights({black, dim, bright, make_light(LightKind::kRect)});
+  EXPECT_EQ(lights.set.records[0].pick_pdf, 0);
+  EXPECT_GT(lights.set.records[1].pick_pdf, 1e-3f);  // the floor
+  EXPECT_NEAR(lights.set.records[2].pick_pdf, 0.75, 0.01);
+  EXPECT_NEAR(lights.set.records[3].pick_pdf, 0.25, 0.01);
+}
+
+TEST(LightBuilder, PickPdfIsExact) {
+  // Every number that u_pick can be, counted.
+  for (const uint32_t n : {1u, 2u, 3u, 7u, 64u, 1000u, 70001u}) {
+    std::vector<EmissiveTriangle> triangles(n, make_triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
+    std::mt19937 rng(n);
+    for (auto& t : triangles) t.mean_scale = rng() % 5 == 0 ? 0.f : std::exp(static_cast<float>(rng() % 1000) / 100.f);
+    triangles[0].mean_scale = 1;
+    const Lights lights({}, triangles);
+    const LightView view = lights.view();
+    std::vector<uint32_t> hits(n, 0);
+    using F = FloatP<16>;
+    for (uint32_t k = 0; k < 1u << 24; k += 16) {
+      const F u = F(Int<F>(UInt<F>(k) + lane_index<F>())) * 0x1p-24f;
+      uint32_t out[16];
+      store(out, detail::pick_light<F>(view, u, Mask<F>(true)));
+      for (const uint32_t i : out) {
+        ASSERT_LT(i, n);
+        ++hits[i];
+      }
+    }
+    for (uint32_t i = 0; i < n; ++i) {
+      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, view.lights[i].pick_pdf) << i << " of " << n;
+      ASSERT_EQ(hits[i] > 0, triangles[i].mean_scale > 0);
+    }
+  }
+}
+
+TEST(LightBuilder, AliasTableOfMillions) {
+  std::vector<double> weights(1500000, 1);
+  weights[7] = 1e12;
+  weights[8] = 0;
+  weights[9] = 1e-300;
+  std::vector<AliasEntry> table;
+  std::vector<float> probability;
+  build_alias_table(weights, table, probability);
+  EXPECT_EQ(probability[8], 0);
+  EXPECT_GT(probability[9], 0);
+  EXPECT_GT(probability[7], 0.5);
+  EXPECT_GT(*std::min_element(probability.begin() + 10, probability.end()), 0);
+}
+
+/// Mean of max(bilinear, 0) style radiance over a cell, to be compared with the density.
+TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
+  std::mt19937 rng(3);
+  const uint32_t sizes[][2] = {{1, 1}, {2, 1}, {8, 4}, {17, 9}, {64, 32}, {1500, 700}, {2048, 1024}};
+  for (const auto& size : sizes)
+    for (int n = 0; n < 3; ++n) {
+      const uint32_t w = size[0], h = size[1];
+      std::vector<float> rgb(size_t{w} * h * 3, 0.f);
+      for (int k = 0; k < 2; ++k) rgb[rng() % rgb.size()] = k ? 1e-6f : 1e5f;
+      rgb[rng() % rgb.size()] = -50.f;
+      Lights lights;
+      const uint32_t texture = lights.add_texture(w, h, rgb);
+      double mean = 0;
+      const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1}, &mean);
+      ASSERT_GT(d.width, 0u);
+      ASSERT_LE(d.width, 1024u);
+      ASSERT_LE(d.height, 512u);
+      double mass = 0;
+      for (const float x : d.density) mass += static_cast<double>(x) / (static_cast<double>(d.width) * d.height);
+      ASSERT_NEAR(mass, 1, 1e-6);
+      ASSERT_EQ(d.marginal.front(), 0.f);
+      ASSERT_EQ(d.marginal.back(), 1.f);
+      Light light = make_light(LightKind::kDome);
+      light.texture = texture;
+      lights.build({light});
+      // Points near lit texels.
+      for (uint32_t y = 0; y < h; ++y)
+        for (uint32_t x = 0; x < w; ++x) {
+          const float* texel = &rgb[3 * (size_t{y} * w + x)];
+          if (!(texel[0] > 0 || texel[1] > 0 || texel[2] > 0)) continue;
+          for (int k = 0; k < 100; ++k) {
+            const double s = (x + 0.5 + (static_cast<double>(rng() % 1000) / 500 - 1) * 0.999) / w;
+            const double down = (y + 0.5 + (static_cast<double>(rng() % 1000) / 500 - 1) * 0.999) / h;
+            if (down <= 0.001 || down >= 0.999) continue;
+            const auto sf = static_cast<float>(s - std::floor(s)), df = static_cast<float>(down);
+            const auto c = detail::dome_radiance<float>(detail::LightReader<float>(lights.set.records[0], true),
+                                                        lights.views[texture], sf, 1.f - df, true);
+            if (c.x + c.y + c.z <= 1e-9f) continue;
+            const auto cx = std::min(static_cast<uint32_t>(sf * static_cast<float>(d.width)), d.width - 1);
+            const auto cy = std::min(static_cast<uint32_t>(df * static_cast<float>(d.height)), d.height - 1);
+            ASSERT_GT(d.density[size_t{cy} * d.width + cx], 0.f) << w << " x " << h;
+          }
+        }
+    }
+}
+
+TEST(DomeDistribution, MeanAndBlack) {
+  Lights lights;
+  const uint32_t grey = lights.add_texture(5, 7, std::vector<float>(5 * 7 * 3, 0.25f));
+  const uint32_t black = lights.add_texture(4, 2, std::vector<float>(4 * 2 * 3, -1.f));
+  double mean = 0;
+  build_dome_distribution(lights.views[grey], {2, 2, 2}, &mean);
+  EXPECT_NEAR(mean, 0.5, 1e-6);
+  EXPECT_EQ(build_dome_distribution(lights.views[black], {1, 1, 1}, &mean).width, 0u);
+  EXPECT_EQ(mean, 0);
+  Light light = make_light(LightKind::kDome);
+  light.texture = black;
+  lights.build({light});
+  EXPECT_EQ(lights.set.records[0].pick_pdf, 0);
+  EXPECT_EQ(lights.set.records[0].texture, kNoTexture);
+  EXPECT_EQ(lights.set.records[0].radiance[0], 0);
+}
+
+TEST(LightBuilder, BadLightsAreRefusedByName) {
+  const auto message = [](const auto& change) -> std::string {
+    Light light = make_light(LightKind::kRect);
+    change(light);
+    try {
+      Lights lights({light});
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message([](Light&) {}), "");
+  for (const std::string& m : {message([](Light& l) { l.to_world.t.x = kNan; }), message([](Light& l) { l.to_world.row[1].z = kInf; }),
+                               message([](Light& l) { l.color.y = kInf; }), message([](Light& l) { l.width = kNan; }),
+                               message([](Light& l) { l.texture = 3; }), message([](Light& l) { l.kind = LightKind::kTriangle; })}) {
+    EXPECT_NE(m.find("/World/light"), std::string::npos) << m;
+    EXPECT_EQ(m.find('\n'), std::string::npos);
+  }
+}
+
+TEST(LightBuilder, DegenerateLightsHaveNoProbability) {
+  std::vector<Light> lights;
+  for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere}) {
+    for (const Affine& m : {scale(0, 0, 0), scale(1, 0, 1), scale(1e-30f, 1e-30f, 1e-30f)}) {
+      for (const bool normalize : {false, true}) {
+        lights.push_back(make_light(kind, m));
+        lights.back().normalize = normalize;
+      }
+    }
+  }
+  const Lights set(lights, {make_triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0}), make_triangle({0, 0, 0}, {1, 1, 1}, {2, 2, 2})});
+  for (const LightRecord& r : set.set.records) {
+    for (const float x : {r.radiance[0], r.area, r.radius, r.pick_pdf, r.n[0], r.n[1], r.n[2]}) EXPECT_TRUE(std::isfinite(x));
+  }
+  EXPECT_EQ(set.set.records.back().pick_pdf, 0);
+}
+
+}  // namespace
+}  // namespace wavecomb
