@@ -6,6 +6,7 @@
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -247,10 +248,12 @@ struct EmbreeAccelerator::Impl {
     check("building the hierarchy");
   }
 
-  /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
-  void store_hits(const float* tfar, const float* u, const float* v, const unsigned* prim,
-                  const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
-                  size_t n) const {
+  /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise. Returns a bit
+  /// for each hit on an edge of its triangle.
+  uint32_t store_hits(const float* tfar, const float* u, const float* v, const unsigned* prim,
+                      const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
+                      size_t n) const {
+    uint32_t on_edge = 0;
     for (size_t i = 0; i < n; ++i) {
       const bool instanced = inst[i] != RTC_INVALID_GEOMETRY_ID;
       const uint32_t top_id = instanced ? inst[i] : geom[i];
@@ -262,7 +265,34 @@ struct EmbreeAccelerator::Impl {
       out.prim[base + i] = prim[i];
       out.geom[base + i] = light ? top_id - first_light : (instanced ? geom[i] : geom[i] - first_world);
       out.inst[base + i] = missed ? kNoHit : (light ? kLightShape : (instanced ? inst[i] : 0));
+      const bool inside = u[i] > 0.f && v[i] > 0.f && u[i] + v[i] < 1.f - 0x1p-21f;
+      on_edge |= static_cast<uint32_t>(!missed && !inside) << i;
     }
+    return on_edge;
+  }
+
+  /// Settles hits on edges. There two triangles may be equally far, to the last bit or nearly, and which one
+  /// a packet reports depends on the rays beside. A ray alone always gets the same answer.
+  void settle_edges(uint32_t on_edge, const RaySpan& rays, const HitSpan& hits, size_t base,
+                    RTCIntersectArguments& args) const {
+    for (; on_edge != 0; on_edge &= on_edge - 1) {
+      const size_t i = base + static_cast<size_t>(std::countr_zero(on_edge));
+      if (hits.inst[i] == kLightShape &&
+          view.lights.lights[hits.geom[i]].kind != static_cast<uint32_t>(LightKind::kRect))
+        continue;  // one primitive, whose u and v are always 0
+      intersect_alone(rays, hits, i, args);
+    }
+  }
+
+  void intersect_alone(const RaySpan& rays, const HitSpan& hits, size_t i,
+                       RTCIntersectArguments& args) const {
+    RTCRayHit rh{};
+    rh.ray = load_ray(rays, i);
+    rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(top, &rh, &args);
+    store_hits(&rh.ray.tfar, &rh.hit.u, &rh.hit.v, &rh.hit.primID, &rh.hit.geomID, &rh.hit.instID[0],
+               hits, i, 1);
   }
 
   template <uint32_t W, typename Ray>
@@ -308,8 +338,9 @@ struct EmbreeAccelerator::Impl {
         rtcIntersect8(valid, top, &rh, &args);
       else
         rtcIntersect4(valid, top, &rh, &args);
-      store_hits(rh.ray.tfar, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID, rh.hit.instID[0], hits,
-                 base, n);
+      const uint32_t on_edge = store_hits(rh.ray.tfar, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID,
+                                          rh.hit.instID[0], hits, base, n);
+      if (on_edge != 0) settle_edges(on_edge, rays, hits, base, args);
     }
   }
 
@@ -379,15 +410,7 @@ void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint
     case 4: return impl_->intersect_packets<4>(rays, hits, args);
     default: break;
   }
-  for (size_t i = 0; i < rays.size; ++i) {
-    RTCRayHit rh{};
-    rh.ray = Impl::load_ray(rays, i);
-    rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(impl_->top, &rh, &args);
-    impl_->store_hits(&rh.ray.tfar, &rh.hit.u, &rh.hit.v, &rh.hit.primID, &rh.hit.geomID,
-                      &rh.hit.instID[0], hits, i, 1);
-  }
+  for (size_t i = 0; i < rays.size; ++i) impl_->intersect_alone(rays, hits, i, args);
 }
 
 void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,

@@ -126,7 +126,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
                             material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
                                 static_cast<uint32_t>(offsetof(MaterialRecord, texture_slots) / 4),
                             Mask<U>(active));
-  const bool textured = any(Mask<F>((slots & Bsdf::kSlots) != U(0u)) & active);
+  const Mask<F> reads_texture = active & Mask<F>((slots & Bsdf::kSlots) != U(0u));
+  const bool textured = any(reads_texture);
   constexpr bool kOpaque = Bsdf::kProgram != ProgramId::kDielectric;
   const Surface<F> s = setup_surface<F>(scene, hit, path.dir, textured, kOpaque, active);
   const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
@@ -161,23 +162,23 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     }
   }
 
-  // The shading frame, with the normal map where there is one.
-  Frame<F> frame;
+  // The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing but its
+  // own hit, whatever its neighbours are.
+  Vec3<F> n = s.ns;
+  Vec3<F> tangent(F(0.f));
   if (textured) {
-    frame = make_frame<F>(s.ns, s.dpdu);
-    const U normal_bit(slot_bit(Slot::kNormal));
-    const Mask<F> mapped = active & Mask<F>((slots & normal_bit) != U(0u));
+    tangent = select<F>(reads_texture, s.dpdu, tangent);
+    const Mask<F> mapped = active & Mask<F>((slots & slot_bit(Slot::kNormal)) != U(0u));
     if (any(mapped)) {
-      Vec3<F> n = normalize(frame.to_world(params.normal));
+      Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
       const F towards = select(dot(path.dir, s.ng) < 0.f, F(1.f), F(-1.f));
-      const F seen = -dot(path.dir, n) * towards;
-      n = select<F>(seen < 1e-3f, normalize(fma(path.dir, F(-towards * (1e-3f - seen)), n)), n);
-      n = select<F>(mapped, n, s.ns);
-      frame = make_frame<F>(n, s.dpdu);
+      const F seen = -dot(path.dir, bumped) * towards;
+      bumped = select<F>(seen < 1e-3f, normalize(fma(path.dir, F(-towards * (1e-3f - seen)), bumped)),
+                         bumped);
+      n = select<F>(mapped, bumped, n);
     }
-  } else {
-    frame = make_frame<F>(s.ns);
   }
+  const Frame<F> frame = make_frame<F>(n, tangent);
   const Vec3<F> wo = frame.to_local(-path.dir);
 
   if (wants_aovs) {
