@@ -12,6 +12,7 @@ from pxr import Usd, UsdGeom
 
 from wavecomb.usd.primvar import as_array
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.triangulate import cross
 
 Matrices = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def sound(transforms: Matrices) -> NDArray[np.bool_]:
     linear = transforms[:, :3, :3]
     finite: NDArray[np.bool_] = np.asarray((np.abs(transforms) < 1e18).all(axis=(1, 2)))
     a, b, c = np.where(finite[:, None, None], linear, 0.0).transpose(1, 0, 2)
-    volume = np.abs(np.einsum("ij,ij->i", np.cross(a, b), c))
+    volume = np.abs(np.einsum("ij,ij->i", cross(a, b), c))
     edges = [np.sqrt(np.einsum("ij,ij->i", row, row)) for row in (a, b, c)]
     return finite & (volume > 1e-9 * edges[0] * edges[1] * edges[2])
 

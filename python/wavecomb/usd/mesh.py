@@ -89,7 +89,7 @@ def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
 
 def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
     """Normals (..., 3) under the inverse transpose of a transform, unit length."""
-    linear = np.linalg.inv(np.array(matrix)[:3, :3]).T
+    linear = np.array(matrix.GetInverse())[:3, :3].T
     flat = normals.reshape(-1, 3)
     out = np.empty(flat.shape, np.float32)
     for first in range(0, len(flat), _CHUNK):
@@ -100,15 +100,25 @@ def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
     return out.reshape(normals.shape)
 
 
+def _moves_only(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform is a translation."""
+    return bool(matrix.ExtractRotationMatrix() == _NO_TURN)
+
+
+_NO_TURN = Gf.Matrix3d(1.0)
+
+
 def extent(positions: Array) -> Array:
     """Bounds (2, 3) of points.
 
     Raises:
         MeshError: A point is not finite or absurdly far away.
     """
-    bounds = np.array([positions.min(axis=0), positions.max(axis=0)])
+    bounds = np.empty((2, 3), np.float32)
+    np.minimum.reduce(positions, axis=0, out=bounds[0])
+    np.maximum.reduce(positions, axis=0, out=bounds[1])
     # Written so that NaN fails too.
-    if not float(np.abs(bounds).max()) < LIMIT:
+    if not all(-LIMIT < value < LIMIT for row in bounds.tolist() for value in row):
         raise MeshError("a point is not finite or absurdly far away")
     return bounds
 
@@ -172,7 +182,7 @@ class MeshReader:
         topology = triangulate(points, counts, indices, hole_list, flip)
         normals = self._normals(prim, points, topology)
         uvs = self._uvs(prim, topology, uv_names, inherited) if uv_names else None
-        if normals is not None and positions is not points:
+        if normals is not None and not _moves_only(matrix):
             normals = bake_normals(normals, matrix)
         triangles = topology.triangles
         if mirrored:
@@ -221,19 +231,20 @@ class MeshReader:
         except PrimvarError as error:
             self.report.warn(f"{error}: ignored", prim.GetPath())
             return None
-        lengths = np.einsum("...i,...i->...", normals, normals)
+        flat = normals.reshape(-1, 3)
+        lengths = np.einsum("ij,ij->i", flat, flat)
         # Written so that NaN fails too.
-        if not float(lengths.max(initial=0.0)) < 1e30:
+        if not float(np.maximum.reduce(lengths, axis=None, initial=0.0)) < 1e30:
             self.report.warn("normals that are not finite: ignored", prim.GetPath())
             return None
         if at == "constant":
             normals = np.repeat(normals, len(points), axis=0)
-        elif float(lengths.min(initial=1.0)) <= 0.0:
+        elif float(np.minimum.reduce(lengths, axis=None, initial=1.0)) <= 0.0:
             self.report.warn("normals of length zero: replaced by smooth ones", prim.GetPath())
             smooth = smooth_normals(points, topology)
             if at == "corner":
                 smooth = smooth[topology.triangles]
-            normals = np.where(lengths[..., None] > 0, normals, smooth)
+            normals = np.where(lengths.reshape(*normals.shape[:-1], 1) > 0, normals, smooth)
         return np.ascontiguousarray(normals, np.float32)
 
     def _uvs(

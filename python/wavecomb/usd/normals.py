@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.triangulate import Topology
+from wavecomb.usd.triangulate import Topology, cross
 
 SHARP = 1.0
 """Crease sharpness from which an edge is drawn as an edge."""
@@ -39,7 +39,7 @@ def smooth_normals(
     """
     triangles = topology.triangles.astype(np.int64)
     p = points[triangles].astype(np.float64)
-    face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     spread = np.repeat(face, 3, axis=0)
     if creases is None or len(creases) == 0:
         return _scatter(triangles.ravel(), spread, len(points))

@@ -109,7 +109,7 @@ def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np
     if kind in ("vertex", "varying"):
         return values, "vertex"
     if kind == "uniform":
-        per_face = values if topology.faces is None else values[topology.faces]
+        per_face = values[topology.face_ids()]
         return np.repeat(per_face[:, None], 3, axis=1), "corner"
     welded = _weld(values, topology)
     if welded is not None:

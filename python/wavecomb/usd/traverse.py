@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from wavecomb.usd.assign import Draw
 from wavecomb.usd.instancing import sound
@@ -59,6 +59,7 @@ class Traversal:
         self.report = report
         self.xforms = UsdGeom.XformCache(time)
         self._kinds: dict[str, str] = {}
+        self._counts: dict[Sdf.Path, int] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
         """What a prim is to the walk; found once for each type."""
@@ -122,7 +123,7 @@ class Traversal:
             shown = purpose in self.purposes
             if prim.IsInstance():
                 prototype = prim.GetPrototype()
-                if len(prototype.GetInstances()) > 1:
+                if self._shared(prototype):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
                     inherited = self.inherit(prim, inherited)
                     found.instances.append(Placed(prim, matrix, purpose, inherited))
@@ -150,6 +151,14 @@ class Traversal:
             for child in reversed(children):
                 stack.append((child, matrix, purpose, inherited, pick))
         return found
+
+    def _shared(self, prototype: Usd.Prim) -> bool:
+        """Whether a prototype has several instances; one alone is drawn as if it were none."""
+        path = prototype.GetPath()
+        known = self._counts.get(path)
+        if known is None:
+            known = self._counts[path] = len(prototype.GetInstances())
+        return known > 1
 
     def inherit(self, prim: Usd.Prim, inherited: Sequence[Any]) -> Sequence[Any]:
         """Primvars that the children of a prim inherit."""

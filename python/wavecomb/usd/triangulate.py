@@ -27,10 +27,11 @@ class Topology:
     Attributes:
         triangles: (m, 3) points of each triangle, uint32.
         corners: (m, 3) positions in faceVertexIndices, or None where triangle i has 3i, 3i+1, 3i+2.
-        faces: (m,) face of each triangle, or None where that is the triangle's own number.
+        faces: (m,) face of each triangle, or None where every face has ``per_face`` triangles.
         indices: (corner_count,) faceVertexIndices.
         point_count: Number of points.
         face_count: Number of faces, holes included.
+        per_face: Triangles of each face where ``faces`` is None.
     """
 
     triangles: NDArray[np.uint32]
@@ -39,6 +40,7 @@ class Topology:
     indices: NDArray[np.int32]
     point_count: int
     face_count: int
+    per_face: int = 1
 
     @property
     def count(self) -> int:
@@ -53,7 +55,7 @@ class Topology:
 
     def face_ids(self) -> NDArray[np.intp]:
         """(m,) face of each triangle."""
-        return np.arange(self.count) if self.faces is None else self.faces
+        return np.arange(self.count) // self.per_face if self.faces is None else self.faces
 
 
 def triangulate(
@@ -77,13 +79,14 @@ def triangulate(
     """
     if len(counts) == 0:
         raise MeshError("no faces")
-    low, high = int(counts.min()), int(counts.max())
+    low, high = int(np.minimum.reduce(counts)), int(np.maximum.reduce(counts))
     if low < 0:
         raise MeshError("a face has a negative number of corners")
-    total = int(counts.sum(dtype=np.int64))
+    total = low * len(counts) if low == high else int(counts.sum(dtype=np.int64))
     if total != len(indices):
         raise MeshError("the face counts do not add up to the number of face indices")
-    if total and (int(indices.min()) < 0 or int(indices.max()) >= len(points)):
+    # Negative ones are large as unsigned.
+    if total and int(np.maximum.reduce(indices.view(np.uint32))) >= len(points):
         raise MeshError("a face index is out of range")
     has_holes = holes is not None and len(holes) > 0
     if low == 3 and high == 3 and not has_holes:
@@ -94,6 +97,12 @@ def triangulate(
         corners = np.arange(total).reshape(-1, 3)[:, ::-1]
         turned = np.ascontiguousarray(triangles[:, ::-1]).view(np.uint32)
         return Topology(turned, corners, None, indices, len(points), len(counts))
+    if low == 4 and high == 4 and not has_holes:
+        corners = _quads(points, indices)
+        if flip:
+            corners = corners[:, ::-1]
+        turned = indices.take(corners).view(np.uint32)
+        return Topology(turned, corners, None, indices, len(points), len(counts), 2)
     keep = counts >= 3
     if has_holes and holes is not None:
         inside = holes[(holes >= 0) & (holes < len(counts))]
@@ -135,6 +144,16 @@ def _split(
     return all_corners, all_owners
 
 
+def _quads(points: NDArray[np.float32], indices: NDArray[np.int32]) -> NDArray[np.intp]:
+    """Corners (m, 3) of the triangles of a mesh of quads alone."""
+    ring = np.arange(len(indices)).reshape(-1, 4)
+    parts = [
+        _split_rings(points, indices, ring[first : first + _CHUNK]).reshape(-1, 3)
+        for first in range(0, len(ring), _CHUNK)
+    ]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
 def _split_rings(
     points: NDArray[np.float32], indices: NDArray[np.int32], ring: NDArray[np.intp]
 ) -> NDArray[np.intp]:
@@ -142,22 +161,13 @@ def _split_rings(
     size = ring.shape[1]
     if size == 3:
         return ring[:, None, :]
-    p = points[indices[ring]].astype(np.float64)
+    p = points.take(indices[ring], axis=0).astype(np.float64)
     if size == 4:
-        # Signed areas of the four possible triangles along the normal of the quad.
-        normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-        first = np.minimum(_area(p, normal, 0, 1, 2), _area(p, normal, 0, 2, 3))
-        second = np.minimum(_area(p, normal, 0, 1, 3), _area(p, normal, 1, 2, 3))
-        slack = 1e-6 * np.einsum("ij,ij->i", normal, normal)
-        other = second > first + slack
-        out = np.empty((len(ring), 2, 3), np.intp)
-        out[:] = ring[:, [[0, 1, 2], [0, 2, 3]]]
-        out[other] = ring[other][:, [[0, 1, 3], [1, 2, 3]]]
-        return out
+        return _split_quads(p, ring)
     p -= p[:, :1]
     # Newell's normal; the fan is right where each of its triangles turns the same way.
-    normal = np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
-    areas = np.einsum("fkc,fc->fk", np.cross(p[:, 1:-1], p[:, 2:]), normal)
+    normal = cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
+    areas = np.einsum("fkc,fc->fk", cross(p[:, 1:-1], p[:, 2:]), normal)
     bad = areas.min(axis=1) < -1e-9 * np.einsum("ij,ij->i", normal, normal)
     fan = np.stack(
         [np.zeros(size - 2, np.intp), np.arange(1, size - 1), np.arange(2, size)], axis=1
@@ -169,9 +179,38 @@ def _split_rings(
     return out
 
 
-def _area(p: NDArray[Any], normal: NDArray[Any], a: int, b: int, c: int) -> NDArray[Any]:
-    cross = np.cross(p[:, b] - p[:, a], p[:, c] - p[:, a])
-    return np.einsum("ij,ij->i", cross, normal)
+def _split_quads(p: NDArray[np.float64], ring: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Triangles (faces, 2, 3) of quads with corners p (faces, 4, 3), ring (faces, 4)."""
+    d = p[:, 1:] - p[:, :1]
+    # d1 x d2, d2 x d3 and d1 x d3; the first two add up to the normal of the quad.
+    turns = cross(d.take(_FIRST, axis=1), d.take(_SECOND, axis=1))
+    normal = turns[:, 0] + turns[:, 1]
+    signed = np.einsum("fkc,fc->fk", turns, normal)
+    whole = signed[:, 0] + signed[:, 1]
+    # Signed areas of the smaller triangle for either diagonal: both pairs add up to the whole.
+    first = np.minimum(signed[:, 0], signed[:, 1])
+    second = np.minimum(signed[:, 2], whole - signed[:, 2])
+    other = second > first + 1e-6 * whole
+    out: NDArray[np.intp] = ring.take(_QUAD, axis=1)
+    if other.any():
+        out[other] = ring[other][:, _QUAD_OTHER]
+    return out
+
+
+_FIRST, _SECOND = np.array([0, 1, 0]), np.array([1, 2, 2])
+_QUAD = np.array([[0, 1, 2], [0, 2, 3]])
+_QUAD_OTHER = np.array([[0, 1, 3], [1, 2, 3]])
+
+
+def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Cross product along the last axis; np.cross is slow on small arrays."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    out = np.empty(a.shape, a.dtype)
+    out[..., 0] = ay * bz - az * by
+    out[..., 1] = az * bx - ax * bz
+    out[..., 2] = ax * by - ay * bx
+    return out
 
 
 def clip_ears(points: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.intp]:
