@@ -52,6 +52,8 @@ const Names<IntegratorKind> kIntegrators{
 const Names<Materialize> kMaterialize{
     "materialize",
     {{"auto", Materialize::kAuto}, {"on", Materialize::kOn}, {"off", Materialize::kOff}}};
+const Names<Traversal> kTraversals{
+    "traversal", {{"packets", Traversal::kPackets}, {"single", Traversal::kSingle}}};
 const Names<bool> kFresnel{"fresnel", {{"exact", false}, {"schlick", true}}};
 
 template <typename Class, typename Enum>
@@ -65,7 +67,7 @@ constexpr const char* kAttributes[] = {
     "width",          "height",         "spp",         "max_depth",  "seed",
     "sampler",        "filter",         "filter_width", "roulette",  "roulette_depth",
     "clamp_indirect", "fresnel",        "cosine_sampling", "integrator", "threads",
-    "wave_size",      "lanes",          "policy",      "materialize"};
+    "wave_size",      "lanes",          "traversal",      "policy",      "materialize"};
 
 nb::dict to_dict(nb::handle settings) {
   nb::dict d;
@@ -178,6 +180,7 @@ void bind_render(nb::module_& m) {
   def_enum(c, "roulette", &Settings::roulette, kRoulettes);
   def_enum(c, "integrator", &Settings::integrator, kIntegrators);
   def_enum(c, "materialize", &Settings::materialize, kMaterialize);
+  def_enum(c, "traversal", &Settings::traversal, kTraversals);
   def_enum(c, "fresnel", &Settings::schlick_fresnel, kFresnel);
 
   nb::class_<Result>(m, "Result")

@@ -165,7 +165,8 @@ class Settings:
     threads: int  # 0: all
     wave_size: int  # 0: default
     lanes: int  # 0: widest
-    policy: str  # "none"
+    traversal: str  # "packets" | "single"
+    policy: str  # "program"
     materialize: str  # "auto" | "on" | "off"
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:

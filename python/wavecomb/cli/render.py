@@ -62,6 +62,11 @@ _INTEGERS = click.IntRange(min=0)
 @click.option("--threads", type=_INTEGERS, metavar="N", help="0 is all.  [default: 0]")
 @click.option("--wave-size", type=_INTEGERS, metavar="N", help="Paths of a wave; 0 is automatic.")
 @click.option(
+    "--traversal",
+    type=click.Choice(["packets", "single"]),
+    help="single: exact also where surfaces lie in one another.  [default: packets]",
+)
+@click.option(
     "--lanes", type=click.Choice(["auto", "1", "4", "8", "16"]), help="SIMD width.  [default: auto]"
 )
 @click.option("--sampler", type=click.Choice(["sobol", "independent"]), help="[default: sobol]")

@@ -98,7 +98,9 @@ def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
         start, end = mirror[index], mirror[(index + 1) % 4]
         along = (end - start) / np.linalg.norm(end - start)
         out = np.cross(along, normal)
-        a, b = start - along * bar, end + along * bar
+        # The long bars cover the corners: faces that lie in one another would be seen by chance.
+        cover = bar if index % 2 == 0 else 0.0
+        a, b = start - along * cover, end + along * cover
         section = [
             -depth * normal,
             out * bar - depth * normal,

@@ -18,6 +18,10 @@
 namespace wavecomb {
 namespace {
 
+/// Hits whose barycentrics are within this of an edge may lie in the neighbour as well: the traversal's
+/// robust edge tests overlap by some roundings of the larger triangle.
+constexpr float kEdge = 0x1p-13f;
+
 /// Handed through Embree to the presence filter.
 struct QueryContext {
   RTCRayQueryContext base;
@@ -265,7 +269,7 @@ struct EmbreeAccelerator::Impl {
       out.prim[base + i] = prim[i];
       out.geom[base + i] = light ? top_id - first_light : (instanced ? geom[i] : geom[i] - first_world);
       out.inst[base + i] = missed ? kNoHit : (light ? kLightShape : (instanced ? inst[i] : 0));
-      const bool inside = u[i] > 0.f && v[i] > 0.f && u[i] + v[i] < 1.f - 0x1p-21f;
+      const bool inside = u[i] > kEdge && v[i] > kEdge && u[i] + v[i] < 1.f - kEdge;
       on_edge |= static_cast<uint32_t>(!missed && !inside) << i;
     }
     return on_edge;

@@ -11,6 +11,8 @@ enum class SamplerKind : uint8_t { kSobol, kIndependent };
 enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 enum class RouletteKind : uint8_t { kOff, kThroughput };
+/// How rays are given to the accelerator: in packets, or each alone.
+enum class Traversal : uint8_t { kPackets, kSingle };
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
 /// Largest picture.
@@ -36,6 +38,9 @@ struct Settings {
   uint32_t threads = 0;          ///< 0: all that the process may use
   uint32_t wave_size = 0;        ///< paths per wave, 64 to 2^22; 0: default
   uint32_t lanes = 0;            ///< 1, 4, 8, 16; 0: widest built
+  /// Packets are faster. They can show in one place: where two surfaces lie exactly in one another
+  /// (z-fighting), which of them is seen depends on the packet's make-up; single rays always agree.
+  Traversal traversal = Traversal::kPackets;
   std::string policy = "program";
   Materialize materialize = Materialize::kAuto;
 

@@ -122,7 +122,9 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
                             policy.get(),
                             &costs,
                             &film,
-                            lanes == 1 ? 1u : std::min(lanes, impl_->accel->native_width())};
+                            settings.traversal == Traversal::kSingle
+                                ? 1u
+                                : std::min(lanes, impl_->accel->native_width())};
   const WaveFunction wave_function_ = wave_function(lanes);
 
   std::vector<Worker> workers(threads);
