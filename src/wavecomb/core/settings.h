@@ -36,7 +36,7 @@ struct Settings {
   IntegratorKind integrator = IntegratorKind::kWavefront;
   // ---- below: how it is computed; never changes the picture ----
   uint32_t threads = 0;          ///< 0: all that the process may use
-  uint32_t wave_size = 0;        ///< paths per wave, 64 to 2^22; 0: default
+  uint32_t wave_size = 0;        ///< paths per wave, 64 to 2^20; 0: default
   uint32_t lanes = 0;            ///< 1, 4, 8, 16; 0: widest built
   /// Packets are faster. They can show in one place: where two surfaces lie exactly in one another
   /// (z-fighting), which of them is seen depends on the packet's make-up; single rays always agree.

@@ -121,12 +121,17 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
 
+  // Programs that emit read one slot more than their BSDF does.
+  constexpr bool kEmits =
+      Bsdf::kProgram == ProgramId::kEmissive || Bsdf::kProgram == ProgramId::kPrincipled;
+  constexpr uint32_t kSlots = Bsdf::kSlots | (kEmits ? slot_bit(Slot::kEmission) : 0u);
+
   // Texture coordinates are worked out only where a texture is read.
   const U slots = gather<U>(scene.materials.materials,
                             material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
                                 static_cast<uint32_t>(offsetof(MaterialRecord, texture_slots) / 4),
                             Mask<U>(active));
-  const Mask<F> reads_texture = active & Mask<F>((slots & Bsdf::kSlots) != U(0u));
+  const Mask<F> reads_texture = active & Mask<F>((slots & kSlots) != U(0u));
   const bool textured = any(reads_texture);
   constexpr bool kOpaque = Bsdf::kProgram != ProgramId::kDielectric;
   const Surface<F> s = setup_surface<F>(scene, hit, path.dir, textured, kOpaque, active);
@@ -136,10 +141,10 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   MaterialView materials = scene.materials;
   materials.schlick_fresnel = settings.schlick_fresnel;
   const ShadingParams<F> params =
-      fetch_params<Bsdf::kSlots, F>(materials, material, s.uv, uv_width, active);
+      fetch_params<kSlots, F>(materials, material, s.uv, uv_width, active);
   const Bsdf bsdf(params, settings.schlick_fresnel);
 
-  if constexpr ((Bsdf::kSlots & slot_bit(Slot::kEmission)) != 0) {
+  if constexpr (kEmits) {
     const Mask<F> emits = active & not_(is_black(params.emission));
     if (any(emits)) {
       F light_pdf(0.f);
