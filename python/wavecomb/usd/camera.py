@@ -99,6 +99,9 @@ def read_camera(
     options: dict[str, Any] = {"window": window}
     if camera.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic:
         report.missing("orthographic cameras (drawn in perspective)", path)
+    exposure = prim.GetAttribute("exposure")
+    if exposure and number(exposure.Get(time), 0.0) != 0.0:
+        report.missing("camera exposure", path)
     clip = camera.GetClippingRangeAttr().Get(time)
     if clip is not None and 0 <= clip[0] < clip[1]:
         options |= {"near_clip": float(clip[0]), "far_clip": min(float(clip[1]), 1e30)}

@@ -261,9 +261,13 @@ class MeshReader:
             )
             if primvar is None:
                 primvar = self._any_coordinates(prim)
-                if primvar is None:
+                if primvar is None and names is UV_NAMES:
                     return None
-                if names[0] not in UV_NAMES[:1]:
+                if primvar is None:
+                    what = f"no primvar {names[0]!r} for its textures: all at (0, 0)"
+                    self.report.warn(what, prim.GetPath())
+                    return np.zeros((topology.point_count, 2), np.float32)
+                if names is not UV_NAMES:
                     what = f"no primvar {names[0]!r}: used {primvar.name!r} in its place"
                     self.report.warn(what, prim.GetPath())
             uvs, at = spread(primvar, topology, 2)

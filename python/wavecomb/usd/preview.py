@@ -172,12 +172,16 @@ class PreviewReader:
             self.report.note(what, shader.GetPath())
             space = "raw"
         wraps = [str(value_of(shader, name, time, "useMetadata")) for name in ("wrapS", "wrapT")]
+        matrix = self._coordinates(shader)
+        if not any((*matrix[:2], *matrix[3:5])):
+            # One texel for all: its border must not be mixed in.
+            wraps = ["clamp", "clamp"]
         self.slots[slot] = {
             "texture": self.textures.add(path, image, space, wraps[0], wraps[1]),
             "channel": channel,
             "scale": scale,
             "bias": bias,
-            "uv": self._coordinates(shader),
+            "uv": matrix,
         }
         return None
 
@@ -221,38 +225,31 @@ class PreviewReader:
         return default
 
     def _coordinates(self, shader: UsdShade.Shader) -> tuple[float, ...]:
-        """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``."""
+        """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``.
+
+        Without a connection the coordinates are constant, (0, 0) where nothing is authored.
+        """
         matrix: tuple[float, ...] = _IDENTITY_UV
-        name = "st"
         node, key = shader, "st"
         for _ in range(MAX_DEPTH):
             source = source_of(node, key, self.time)
-            if source is None:
-                break
-            if source.is_value:
-                at = (
-                    colour((*source.value, 0.0), (0.0, 0.0, 0.0))
-                    if _is_pair(source.value)
-                    else None
-                )
-                if at is not None and node is not shader:
-                    matrix = _compose(matrix, (0.0, 0.0, at[0], 0.0, 0.0, at[1]))
-                break
-            if source.shader is None:
-                break
+            if source is None or source.shader is None:
+                u, v = _two(source.value if source is not None else None, (0.0, 0.0))
+                return _compose(matrix, (0.0, 0.0, u, 0.0, 0.0, v))
             node = source.shader
             identifier = shader_id(node)
             if identifier == "UsdTransform2d":
                 matrix = _compose(matrix, self._transform_2d(node))
                 key = "in"
             elif identifier.startswith("UsdPrimvarReader_float2"):
-                name = str(value_of(node, "varname", self.time, "") or "st")
-                break
+                self.uv_names.append(str(value_of(node, "varname", self.time, "") or "st"))
+                return matrix
             else:
                 self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
-                break
-        self.uv_names.append(name)
-        return matrix
+                self.uv_names.append("st")
+                return matrix
+        self.report.warn("texture coordinates that run in a circle", self.material.GetPath())
+        return (0.0,) * 6
 
     def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
         """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""

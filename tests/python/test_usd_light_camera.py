@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lights and cameras, and the defaults where there are none."""
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from usd_recorder import QUAD, load, said
+
+
+def light(tmp_path, text, header=""):
+    scene, loaded = load(tmp_path, (f"#usda 1.0\n({header})\n" if header else "") + text)
+    (found,) = scene.lights
+    return found, loaded
+
+
+def test_colour_intensity_exposure_temperature(tmp_path):
+    from pxr import UsdLux
+
+    found, _ = light(
+        tmp_path,
+        """def RectLight "L" { float inputs:intensity = 3
+        float inputs:exposure = 2
+        color3f inputs:color = (1, 0.5, 0.25)
+        bool inputs:enableColorTemperature = true
+        float inputs:colorTemperature = 3000
+        float inputs:width = 4
+        float inputs:height = 5
+        bool inputs:normalize = true }""",
+    )
+    warm = np.array(UsdLux.BlackbodyTemperatureAsRgb(3000))
+    assert found["color"] == pytest.approx(12 * warm * (1, 0.5, 0.25))
+    assert (found["kind"], found["width"], found["height"]) == ("rect", 4, 5)
+    assert found["normalize"] and found["texture"] is None
+
+
+def test_schema_defaults(tmp_path):
+    scene, _ = load(
+        tmp_path,
+        'def DistantLight "A" {} def DiskLight "B" {} def SphereLight "C" {} def DomeLight "D" {}',
+    )
+    a, b, c, d = scene.lights
+    assert a["angle"] == pytest.approx(0.53) and a["color"] == (50000, 50000, 50000)
+    assert b["radius"] == 0.5 and c["radius"] == 0.5
+    assert d["kind"] == "dome" and d["color"] == (1, 1, 1)
+
+
+def test_point_lights_keep_the_spheres_intensity(tmp_path):
+    text = """def SphereLight "L" { float inputs:radius = 2
+        bool treatAsPoint = true
+        NORMALIZE
+        float3 xformOp:scale = (3, 3, 3)
+        uniform token[] xformOpOrder = ["xformOp:scale"] }"""
+    found, _ = light(tmp_path, text.replace("NORMALIZE", ""))
+    assert found["radius"] == 0 and found["color"][0] == pytest.approx(np.pi * 36)
+    assert not found["normalize"]
+    found, _ = light(tmp_path, text.replace("NORMALIZE", "bool inputs:normalize = true"))
+    assert found["color"][0] == pytest.approx(0.25) and not found["normalize"]
+
+
+def pole(found):
+    return (np.array([0, 1, 0, 0]) @ found["transform"])[:3].round(6).tolist()
+
+
+@pytest.mark.parametrize(
+    ("up", "prim", "axis", "expected"),
+    [
+        ("Y", "DomeLight", None, [0, 1, 0]),
+        ("Z", "DomeLight", None, [0, 1, 0]),
+        ("Y", "DomeLight_1", None, [0, 1, 0]),
+        ("Z", "DomeLight_1", None, [0, 0, 1]),
+        ("Y", "DomeLight_1", "Z", [0, 0, 1]),
+        ("Z", "DomeLight_1", "Y", [0, 1, 0]),
+    ],
+)
+def test_dome_poles(tmp_path, up, prim, axis, expected):
+    body = f'uniform token poleAxis = "{axis}"' if axis else ""
+    found, _ = light(tmp_path, f'def {prim} "L" {{ {body} }}', f'upAxis = "{up}"')
+    assert pole(found) == expected
+
+
+def test_oriented_dome_is_where_usd_puts_it(tmp_path):
+    found, _ = light(
+        tmp_path,
+        """def DomeLight "L" { double xformOp:rotateX:orientToStageUpAxis = 90
+        uniform token[] xformOpOrder = ["xformOp:rotateX:orientToStageUpAxis"] }""",
+        'upAxis = "Z"',
+    )
+    from wavecomb.usd.light import Y_TO_Z
+
+    assert found["transform"] == pytest.approx(Y_TO_Z)
+
+
+def test_dome_texture(tmp_path):
+    out = oiio.ImageOutput.create(str(tmp_path / "sky.exr"))
+    out.open(str(tmp_path / "sky.exr"), oiio.ImageSpec(4, 2, 3, "half"))
+    out.write_image(np.full((2, 4, 3), 7, np.float32))
+    out.close()
+    scene, _ = load(tmp_path, 'def DomeLight "L" { asset inputs:texture:file = @sky.exr@ }')
+    image = scene.textures[scene.lights[0]["texture"]]
+    assert image["pixels"].dtype == np.float16 and not image["srgb"]
+    scene, loaded = load(tmp_path, 'def DomeLight "L" { asset inputs:texture:file = @no.exr@ }')
+    assert scene.lights[0]["texture"] is None and "no.exr" in said(loaded)
+
+
+def test_hidden_lights_stay_off(tmp_path):
+    scene, loaded = load(tmp_path, 'def DomeLight "L" { token visibility = "invisible" }')
+    assert not scene.lights and "no visible light" in said(loaded)
+
+
+def test_what_lights_ask_for_and_do_not_get(tmp_path):
+    scene, loaded = load(
+        tmp_path,
+        """def CylinderLight "Tube" {}
+        def RectLight "Spot" { float inputs:shaping:cone:angle = 20
+            float inputs:specular = 0
+            rel light:filters = </Tube>
+            rel collection:lightLink:includes = </Tube> }""",
+    )
+    listed = [finding.what for finding in loaded.report.unsupported]
+    assert listed == [
+        "CylinderLight",
+        "light shaping cone",
+        "light multiplier specular",
+        "light linking (lightLink)",
+        "light filters",
+    ]
+    assert len(scene.lights) == 1
+
+
+@pytest.mark.parametrize(("up", "axis"), [("Y", 1), ("Z", 2)])
+def test_default_dome_and_camera_know_what_is_up(tmp_path, up, axis):
+    box = QUAD.replace("(1,1,0)", "(1,1,5)")
+    scene, loaded = load(tmp_path, f'#usda 1.0\n(upAxis = "{up}")\ndef Mesh "M" {{ {box} }}')
+    assert pole(scene.lights[0])[axis] == 1
+    frame = scene.camera["transform"]
+    assert frame[1, axis] > 0.8  # the camera's up
+    assert np.linalg.det(frame[:3, :3]) == pytest.approx(1)
+    # All corners are in the picture.
+    points = np.append(scene.mesh("M")["positions"], np.ones((4, 1)), axis=1)
+    seen = points @ np.linalg.inv(frame)
+    assert (seen[:, 2] < 0).all()
+    window = scene.camera["window"]
+    x, y = seen[:, 0] / -seen[:, 2], seen[:, 1] / -seen[:, 2]
+    assert window[0] < x.min() and x.max() < window[1]
+    assert window[2] < y.min() and y.max() < window[3]
+    assert loaded.camera_path is None
+
+
+CAMERA = """def Camera "Cam" {
+    float focalLength = 50
+    float horizontalAperture = 20
+    float verticalAperture = 10
+    float horizontalApertureOffset = 5
+    float fStop = 2
+    float focusDistance = 7
+    float2 clippingRange = (0.5, 100)
+    float3 xformOp:scale = (2, 2, 2)
+    double3 xformOp:translate = (1, 2, 3)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"] }
+"""
+
+
+def test_camera(tmp_path):
+    scene, loaded = load(tmp_path, CAMERA)
+    camera = scene.camera
+    assert loaded.camera_path == "/Cam"
+    assert camera["window"] == pytest.approx((-0.1, 0.3, -0.1, 0.1))
+    # 50 tenths of a unit at f/2: an aperture of 2.5 units across.
+    assert camera["lens_radius"] == pytest.approx(1.25) and camera["focus_distance"] == 7
+    assert (camera["near_clip"], camera["far_clip"]) == (0.5, 100)
+    assert camera["transform"][:3, :3] == pytest.approx(np.eye(3))
+    assert camera["transform"][3, :3] == pytest.approx([1, 2, 3])
+
+
+def test_which_camera(tmp_path):
+    text = 'def Camera "First" {}\ndef Camera "Second" {}\n'
+    assert load(tmp_path, text)[1].camera_path == "/First"
+    assert load(tmp_path, text, camera="/Second")[1].camera_path == "/Second"
+    assert load(tmp_path, text, camera="Second")[1].camera_path == "/Second"
+    settings = '#usda 1.0\n(renderSettingsPrimPath = "/Render/S")\n' + text
+    settings += 'def "Render" { def RenderSettings "S" { rel camera = </Second> } }'
+    assert load(tmp_path, settings)[1].camera_path == "/Second"
+
+
+def test_orthographic_is_listed(tmp_path):
+    _, loaded = load(tmp_path, 'def Camera "C" { token projection = "orthographic" }')
+    assert "orthographic" in said(loaded)
+
+
+def test_time(tmp_path):
+    text = f"""#usda 1.0
+    (startTimeCode = 1
+    endTimeCode = 3)
+    def Mesh "M" {{ {QUAD}
+        double3 xformOp:translate.timeSamples = {{ 1: (1, 0, 0), 3: (3, 0, 0), }}
+        uniform token[] xformOpOrder = ["xformOp:translate"] }}"""
+    for frame, x in ((None, 1), (2, 2), (3, 3)):
+        scene, _ = load(tmp_path, text, frame=frame)
+        assert scene.mesh("M")["positions"][0, 0] == x
+
+
+def test_variants(tmp_path):
+    text = f"""#usda 1.0
+    (defaultPrim = "A")
+    def Xform "A" (variants = {{ string size = "small" }}
+        prepend variantSets = "size") {{
+        variantSet "size" = {{ "small" {{ def Mesh "S" {{ {QUAD} }} }}
+            "large" {{ def Mesh "L" {{ {QUAD} }} }} }} }}"""
+    assert load(tmp_path, text)[0].meshes[0]["name"] == "/A/S"
+    for key in ("size", "/A{size}"):
+        scene, _ = load(tmp_path, text, variants={key: "large"})
+        assert scene.meshes[0]["name"] == "/A/L"
