@@ -30,12 +30,13 @@ inline Frame<F> make_frame(const Vec3<F>& n) {
 }
 
 /// A frame around the unit vector `n` whose s is `tangent` made orthogonal to n; falls back to
-/// make_frame where the tangent is parallel to n, zero or not finite.
+/// make_frame where the tangent is parallel to n (within 1e-3), zero or not finite. The bound is far above
+/// rounding, which would else decide on s.
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);
   const F len2 = length_squared(s);
-  const Mask<F> good = (len2 > 1e-20f * length_squared(tangent)) & (len2 > 0.f) & is_finite(len2);
+  const Mask<F> good = (len2 > 1e-6f * length_squared(tangent)) & (len2 > 0.f) & is_finite(len2);
   const Frame<F> other = make_frame(n);
   const Vec3<F> unit = s * F(1.f / sqrt(select(good, len2, F(1.f))));
   const Vec3<F> sx = select<F>(good, unit, other.s);

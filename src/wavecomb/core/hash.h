@@ -17,10 +17,11 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hash of two words (the second may be uniform).
+/// Hash of two words (the second may be uniform). A bijection of either one while the other stays, so
+/// that no two pixels share a seed's numbers.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
-  return hash_u32<U>(a ^ (hash_u32<U>(b) + 0x9e3779b9u + (a << 6) + (a >> 2)));
+  return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);
 }
 
 /// The top 24 bits as a float in [0, 1).
