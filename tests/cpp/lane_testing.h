@@ -39,14 +39,24 @@ inline bool same_bits(float a, float b) {
 
 /// Numbers that go wrong first: zeros, denormals, bounds, infinities, NaN, and some in between.
 inline std::vector<float> awkward_floats() {
-  std::vector<float> all = {0.f, 0x1p-149f, 0x1p-130f, 0x1p-126f, 1e-20f, 1e-7f, 0.1f, 0x1.fffffep-2f, 0.5f, 0x1.fffffep-1f,
-                            1.f, 1.5f, 2.f, 2.5f, 3.f, 100.f, 8388607.5f, 16777216.f, 1e20f, 0x1.fffffep127f, kInf, kNan};
+  std::vector<float> all = {0.f,        0x1p-149f,
+                            0x1p-130f,  0x1p-126f,
+                            1e-20f,     1e-7f,
+                            0.1f,       0x1.fffffep-2f,
+                            0.5f,       0x1.fffffep-1f,
+                            1.f,        1.5f,
+                            2.f,        2.5f,
+                            3.f,        100.f,
+                            8388607.5f, 16777216.f,
+                            1e20f,      0x1.fffffep127f,
+                            kInf,       kNan};
   for (size_t i = all.size(); i-- > 0;) all.push_back(-all[i]);
   return all;
 }
 
 /// `values` with n random floats between lo and hi behind them, made a multiple of 16 long.
-inline std::vector<float> padded(std::vector<float> values, size_t n, float lo, float hi, uint32_t seed = 1) {
+inline std::vector<float> padded(std::vector<float> values, size_t n, float lo, float hi,
+                                 uint32_t seed = 1) {
   std::mt19937 rng(seed);
   std::uniform_real_distribution<float> uniform(lo, hi);
   for (size_t i = 0; i < n; ++i) values.push_back(uniform(rng));
@@ -62,7 +72,8 @@ std::vector<float> map(const std::vector<float>& x, const Function& f) {
   return y;
 }
 template <typename F, typename Function>
-std::vector<float> map(const std::vector<float>& x, const std::vector<float>& y, const Function& f) {
+std::vector<float> map(const std::vector<float>& x, const std::vector<float>& y,
+                       const Function& f) {
   std::vector<float> z(x.size());
   for (size_t i = 0; i < x.size(); i += kWidth<F>) {
     store(z.data() + i, F(f(load<F>(x.data() + i), load<F>(y.data() + i))));
@@ -70,10 +81,12 @@ std::vector<float> map(const std::vector<float>& x, const std::vector<float>& y,
   return z;
 }
 
-inline void expect_same(const std::vector<float>& a, const std::vector<float>& b, const char* what) {
+inline void expect_same(const std::vector<float>& a, const std::vector<float>& b,
+                        const char* what) {
   ASSERT_EQ(a.size(), b.size());
   for (size_t i = 0; i < a.size(); ++i) {
-    ASSERT_TRUE(same_bits(a[i], b[i])) << what << " differs at " << i << ": " << a[i] << " and " << b[i];
+    ASSERT_TRUE(same_bits(a[i], b[i]))
+        << what << " differs at " << i << ": " << a[i] << " and " << b[i];
   }
 }
 
@@ -84,7 +97,8 @@ void expect_lanes_agree(const std::vector<float>& x, const Function& f, const ch
   for_each_packet([&]<typename F>() { expect_same(scalar, map<F>(x, f), what); });
 }
 template <typename Function>
-void expect_lanes_agree(const std::vector<float>& x, const std::vector<float>& y, const Function& f, const char* what) {
+void expect_lanes_agree(const std::vector<float>& x, const std::vector<float>& y, const Function& f,
+                        const char* what) {
   const auto scalar = map<float>(x, y, f);
   for_each_packet([&]<typename F>() { expect_same(scalar, map<F>(x, y, f), what); });
 }
@@ -106,7 +120,8 @@ inline std::array<std::vector<float>, 2> all_pairs(const std::vector<float>& val
 inline double ulps(float y, double exact) {
   const float nearest = static_cast<float>(exact);
   if (y == nearest) return 0;
-  if (!std::isfinite(nearest) || !std::isfinite(y)) return std::isnan(nearest) && std::isnan(y) ? 0 : 1e30;
+  if (!std::isfinite(nearest) || !std::isfinite(y))
+    return std::isnan(nearest) && std::isnan(y) ? 0 : 1e30;
   const double magnitude = std::max(std::fabs(exact), 0x1p-126);
   const double ulp = std::ldexp(1.0, std::ilogb(magnitude) - 23);
   return std::fabs(static_cast<double>(y) - exact) / ulp;

@@ -19,13 +19,14 @@ struct Lights {
   LightSet set;
 
   Lights() = default;
-  explicit Lights(const std::vector<Light>& lights, const std::vector<EmissiveTriangle>& triangles = {},
-                  float scene_radius = 10.f) {
+  explicit Lights(const std::vector<Light>& lights,
+                  const std::vector<EmissiveTriangle>& triangles = {}, float scene_radius = 10.f) {
     build(lights, triangles, scene_radius);
   }
-  uint32_t add_texture(uint32_t width, uint32_t height, const std::vector<float>& rgb, Wrap t = Wrap::kClamp) {
-    textures.push_back(std::make_unique<Texture>(
-        TextureDesc{"test", rgb.data(), width, height, 3, TexelFormat::kF32, false, Wrap::kRepeat, t}));
+  uint32_t add_texture(uint32_t width, uint32_t height, const std::vector<float>& rgb,
+                       Wrap t = Wrap::kClamp) {
+    textures.push_back(std::make_unique<Texture>(TextureDesc{
+        "test", rgb.data(), width, height, 3, TexelFormat::kF32, false, Wrap::kRepeat, t}));
     views.push_back(textures.back()->view());
     return static_cast<uint32_t>(textures.size() - 1);
   }
@@ -57,16 +58,23 @@ inline Affine translate(float x, float y, float z) {
   a.t = {x, y, z};
   return a;
 }
-inline Affine scale(float x, float y, float z) { return {{{x, 0, 0}, {0, y, 0}, {0, 0, z}}, {0, 0, 0}}; }
+inline Affine scale(float x, float y, float z) {
+  return {{{x, 0, 0}, {0, y, 0}, {0, 0, z}}, {0, 0, 0}};
+}
 /// Rotation by `degrees` about the x axis, then about the y axis.
 inline Affine rotate(double x_degrees, double y_degrees) {
   const double a = x_degrees * kPiD / 180, b = y_degrees * kPiD / 180;
   const auto f = [](double v) { return static_cast<float>(v); };
-  const Affine x{{{1, 0, 0}, {0, f(std::cos(a)), f(-std::sin(a))}, {0, f(std::sin(a)), f(std::cos(a))}}, {0, 0, 0}};
-  const Affine y{{{f(std::cos(b)), 0, f(std::sin(b))}, {0, 1, 0}, {f(-std::sin(b)), 0, f(std::cos(b))}}, {0, 0, 0}};
+  const Affine x{
+      {{1, 0, 0}, {0, f(std::cos(a)), f(-std::sin(a))}, {0, f(std::sin(a)), f(std::cos(a))}},
+      {0, 0, 0}};
+  const Affine y{
+      {{f(std::cos(b)), 0, f(std::sin(b))}, {0, 1, 0}, {f(-std::sin(b)), 0, f(std::cos(b))}},
+      {0, 0, 0}};
   return y * x;
 }
-inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b, const Vec3<float>& c) {
+inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b,
+                                      const Vec3<float>& c) {
   EmissiveTriangle t{};
   const Vec3<float> p[3] = {a, b, c};
   float* const to[3] = {t.p0, t.p1, t.p2};
@@ -82,26 +90,33 @@ inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b
 }
 
 /// Distance along dir to the geometry of a rect, disk, sphere or triangle.
-inline std::optional<float> trace(const LightRecord& r, const Vec3<float>& origin, const Vec3<float>& dir) {
+inline std::optional<float> trace(const LightRecord& r, const Vec3<float>& origin,
+                                  const Vec3<float>& dir) {
   const double o[3] = {origin.x - r.p[0], origin.y - r.p[1], origin.z - r.p[2]};
   const double d[3] = {dir.x, dir.y, dir.z};
-  const auto dot = [](const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+  const auto dot = [](const double* a, const double* b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  };
   const auto kind = static_cast<LightKind>(r.kind);
   if (kind == LightKind::kSphere) {
-    const double b = dot(o, d), dd = dot(d, d), c = dot(o, o) - static_cast<double>(r.radius) * r.radius;
+    const double b = dot(o, d), dd = dot(d, d),
+                 c = dot(o, o) - static_cast<double>(r.radius) * r.radius;
     const double discriminant = b * b - dd * c;
     if (discriminant < 0 || (c > 0 && b > 0)) return std::nullopt;
     const double root = std::sqrt(discriminant);
     return static_cast<float>(c > 0 ? (-b - root) / dd : (-b + root) / dd);
   }
   const double u[3] = {r.u[0], r.u[1], r.u[2]}, v[3] = {r.v[0], r.v[1], r.v[2]};
-  const double m[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  const double m[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                       u[0] * v[1] - u[1] * v[0]};
   const double t = -dot(o, m) / dot(d, m);
   if (!(t > 0) || !std::isfinite(t)) return std::nullopt;
   // h = a u + b v + (no part along m)
   const double h[3] = {o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]};
-  const double hv[3] = {h[1] * v[2] - h[2] * v[1], h[2] * v[0] - h[0] * v[2], h[0] * v[1] - h[1] * v[0]};
-  const double uh[3] = {u[1] * h[2] - u[2] * h[1], u[2] * h[0] - u[0] * h[2], u[0] * h[1] - u[1] * h[0]};
+  const double hv[3] = {h[1] * v[2] - h[2] * v[1], h[2] * v[0] - h[0] * v[2],
+                        h[0] * v[1] - h[1] * v[0]};
+  const double uh[3] = {u[1] * h[2] - u[2] * h[1], u[2] * h[0] - u[0] * h[2],
+                        u[0] * h[1] - u[1] * h[0]};
   const double a = dot(hv, m) / dot(m, m), b = dot(uh, m) / dot(m, m);
   const bool inside = kind == LightKind::kDisk   ? a * a + b * b <= 1
                       : kind == LightKind::kRect ? a >= 0 && a <= 1 && b >= 0 && b <= 1

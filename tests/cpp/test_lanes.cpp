@@ -74,18 +74,30 @@ TEST(Lanes, ClampSendsNanToTheLowerBound) {
 TEST(Lanes, ArithmeticRoundsAlike) {
   const auto awkward = all_pairs(awkward_floats());
   auto a = padded(awkward[0], 5000, -1e4f, 1e4f, 2), b = padded(awkward[1], 5000, -3.f, 3.f, 3);
-  expect_lanes_agree(a, b, [](auto x, auto y) { return x + y; }, "+");
-  expect_lanes_agree(a, b, [](auto x, auto y) { return x - y; }, "-");
-  expect_lanes_agree(a, b, [](auto x, auto y) { return x * y; }, "*");
-  expect_lanes_agree(a, b, [](auto x, auto y) { return x / y; }, "/");
-  expect_lanes_agree(a, b, [](auto x, auto y) { return fma(x, y, x); }, "fma");
-  expect_lanes_agree(a, b, [](auto x, auto y) { return fnma(x, y, y); }, "fnma");
-  expect_lanes_agree(a, b, [](auto x, auto y) { return copysign(x, y); }, "copysign");
-  expect_lanes_agree(a, [](auto x) { return sqrt(x); }, "sqrt");
-  expect_lanes_agree(a, [](auto x) { return safe_sqrt(x); }, "safe_sqrt");
-  expect_lanes_agree(a, [](auto x) { return abs(x); }, "abs");
-  expect_lanes_agree(a, [](auto x) { return floor(x); }, "floor");
-  expect_lanes_agree(a, [](auto x) { return sqr(x); }, "sqr");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return x + y; }, "+");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return x - y; }, "-");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return x * y; }, "*");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return x / y; }, "/");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return fma(x, y, x); }, "fma");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return fnma(x, y, y); }, "fnma");
+  expect_lanes_agree(
+      a, b, [](auto x, auto y) { return copysign(x, y); }, "copysign");
+  expect_lanes_agree(
+      a, [](auto x) { return sqrt(x); }, "sqrt");
+  expect_lanes_agree(
+      a, [](auto x) { return safe_sqrt(x); }, "safe_sqrt");
+  expect_lanes_agree(
+      a, [](auto x) { return abs(x); }, "abs");
+  expect_lanes_agree(
+      a, [](auto x) { return floor(x); }, "floor");
+  expect_lanes_agree(
+      a, [](auto x) { return sqr(x); }, "sqr");
   for (size_t i = 0; i < a.size(); ++i) {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
     ASSERT_TRUE(same_bits(fma(a[i], b[i], a[i]), std::fma(a[i], b[i], a[i])));
@@ -106,14 +118,18 @@ TEST(Lanes, FiniteAndBits) {
       using G = decltype(v);
       return select(is_finite(v), G(1.f), G(0.f));
     });
-    for (size_t i = 0; i < x.size(); ++i) ASSERT_EQ(finite[i], std::isfinite(x[i]) ? 1.f : 0.f) << x[i];
-    const auto round_trip = map<F>(x, [](auto v) { return bits_float<decltype(v)>(float_bits<decltype(v)>(v)); });
+    for (size_t i = 0; i < x.size(); ++i)
+      ASSERT_EQ(finite[i], std::isfinite(x[i]) ? 1.f : 0.f) << x[i];
+    const auto round_trip =
+        map<F>(x, [](auto v) { return bits_float<decltype(v)>(float_bits<decltype(v)>(v)); });
     ASSERT_EQ(0, std::memcmp(x.data(), round_trip.data(), x.size() * 4));
   });
 }
 
 TEST(Lanes, ConversionsToIntegersAndBack) {
-  const auto x = padded({0.f, -0.f, 0.99f, -0.99f, 1.f, -1.f, 2147483520.f, -2147483648.f, 16777215.f}, 1000, -1e9f, 1e9f);
+  const auto x =
+      padded({0.f, -0.f, 0.99f, -0.99f, 1.f, -1.f, 2147483520.f, -2147483648.f, 16777215.f}, 1000,
+             -1e9f, 1e9f);
   for_each_lane_type([&]<typename F>() {
     for (size_t i = 0; i < x.size(); i += kWidth<F>) {
       const Int<F> n = to_int<F>(load<F>(x.data() + i));

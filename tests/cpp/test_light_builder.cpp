@@ -105,10 +105,12 @@ TEST(LightBuilder, DistantConventions) {
 }
 
 TEST(LightBuilder, DomeAxesAreOrthonormal) {
-  for (const Affine& m : {Affine{}, rotate(30, 70), translate(5, 6, 7) * scale(2, 3, -4), scale(1, 1, 0), scale(0, 0, 0)}) {
+  for (const Affine& m : {Affine{}, rotate(30, 70), translate(5, 6, 7) * scale(2, 3, -4),
+                          scale(1, 1, 0), scale(0, 0, 0)}) {
     const Lights lights({make_light(LightKind::kDome, m)});
     const LightRecord& r = only(lights);
-    const Vec3<float> u(r.u[0], r.u[1], r.u[2]), v(r.v[0], r.v[1], r.v[2]), n(r.n[0], r.n[1], r.n[2]);
+    const Vec3<float> u(r.u[0], r.u[1], r.u[2]), v(r.v[0], r.v[1], r.v[2]),
+        n(r.n[0], r.n[1], r.n[2]);
     EXPECT_NEAR(dot(u, u), 1, 1e-6);
     EXPECT_NEAR(dot(v, v), 1, 1e-6);
     EXPECT_NEAR(dot(n, n), 1, 1e-6);
@@ -119,8 +121,9 @@ TEST(LightBuilder, DomeAxesAreOrthonormal) {
 }
 
 TEST(LightBuilder, InfiniteLightsFirstThenTrianglesLast) {
-  const std::vector<Light> input = {make_light(LightKind::kRect), make_light(LightKind::kDome), make_light(LightKind::kSphere),
-                                    make_light(LightKind::kDistant), make_light(LightKind::kDisk)};
+  const std::vector<Light> input = {make_light(LightKind::kRect), make_light(LightKind::kDome),
+                                    make_light(LightKind::kSphere), make_light(LightKind::kDistant),
+                                    make_light(LightKind::kDisk)};
   const std::vector<EmissiveTriangle> triangles(3, make_triangle({0, 0, 0}, {1, 0, 0}, {0, 2, 0}));
   const Lights lights(input, triangles);
   EXPECT_EQ(lights.set.infinite_count, 2u);
@@ -128,7 +131,8 @@ TEST(LightBuilder, InfiniteLightsFirstThenTrianglesLast) {
   ASSERT_EQ(lights.set.records.size(), 8u);
   EXPECT_EQ(lights.set.of_input, (std::vector<uint32_t>{2, 0, 3, 1, 4}));
   for (size_t i = 0; i < input.size(); ++i) {
-    EXPECT_EQ(lights.set.records[lights.set.of_input[i]].kind, static_cast<uint32_t>(input[i].kind));
+    EXPECT_EQ(lights.set.records[lights.set.of_input[i]].kind,
+              static_cast<uint32_t>(input[i].kind));
   }
   EXPECT_FLOAT_EQ(lights.set.records[5].area, 1);
   expect_vec(lights.set.records[5].n, 0, 0, 1);
@@ -154,7 +158,8 @@ TEST(LightBuilder, PickPdfIsExact) {
   for (const uint32_t n : {1u, 2u, 3u, 7u, 64u, 1000u, 70001u}) {
     std::vector<EmissiveTriangle> triangles(n, make_triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
     std::mt19937 rng(n);
-    for (auto& t : triangles) t.mean_scale = rng() % 5 == 0 ? 0.f : std::exp(static_cast<float>(rng() % 1000) / 100.f);
+    for (auto& t : triangles)
+      t.mean_scale = rng() % 5 == 0 ? 0.f : std::exp(static_cast<float>(rng() % 1000) / 100.f);
     triangles[0].mean_scale = 1;
     const Lights lights({}, triangles);
     const LightView view = lights.view();
@@ -170,7 +175,8 @@ TEST(LightBuilder, PickPdfIsExact) {
       }
     }
     for (uint32_t i = 0; i < n; ++i) {
-      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, view.lights[i].pick_pdf) << i << " of " << n;
+      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, view.lights[i].pick_pdf)
+          << i << " of " << n;
       ASSERT_EQ(hits[i] > 0, triangles[i].mean_scale > 0);
     }
   }
@@ -193,7 +199,8 @@ TEST(LightBuilder, AliasTableOfMillions) {
 /// Mean of max(bilinear, 0) style radiance over a cell, to be compared with the density.
 TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
   std::mt19937 rng(3);
-  const uint32_t sizes[][2] = {{1, 1}, {2, 1}, {8, 4}, {17, 9}, {64, 32}, {1500, 700}, {2048, 1024}};
+  const uint32_t sizes[][2] = {{1, 1},   {2, 1},      {8, 4},      {17, 9},
+                               {64, 32}, {1500, 700}, {2048, 1024}};
   for (const auto& size : sizes)
     for (int n = 0; n < 3; ++n) {
       const uint32_t w = size[0], h = size[1];
@@ -208,7 +215,8 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
       ASSERT_LE(d.width, 1024u);
       ASSERT_LE(d.height, 512u);
       double mass = 0;
-      for (const float x : d.density) mass += static_cast<double>(x) / (static_cast<double>(d.width) * d.height);
+      for (const float x : d.density)
+        mass += static_cast<double>(x) / (static_cast<double>(d.width) * d.height);
       ASSERT_NEAR(mass, 1, 1e-6);
       ASSERT_EQ(d.marginal.front(), 0.f);
       ASSERT_EQ(d.marginal.back(), 1.f);
@@ -222,14 +230,18 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
           if (!(texel[0] > 0 || texel[1] > 0 || texel[2] > 0)) continue;
           for (int k = 0; k < 100; ++k) {
             const double s = (x + 0.5 + (static_cast<double>(rng() % 1000) / 500 - 1) * 0.999) / w;
-            const double down = (y + 0.5 + (static_cast<double>(rng() % 1000) / 500 - 1) * 0.999) / h;
+            const double down =
+                (y + 0.5 + (static_cast<double>(rng() % 1000) / 500 - 1) * 0.999) / h;
             if (down <= 0.001 || down >= 0.999) continue;
             const auto sf = static_cast<float>(s - std::floor(s)), df = static_cast<float>(down);
-            const auto c = detail::dome_radiance<float>(detail::LightReader<float>(lights.set.records[0], true),
-                                                        lights.views[texture], sf, 1.f - df, true);
+            const auto c = detail::dome_radiance<float>(
+                detail::LightReader<float>(lights.set.records[0], true), lights.views[texture], sf,
+                1.f - df, true);
             if (c.x + c.y + c.z <= 1e-9f) continue;
-            const auto cx = std::min(static_cast<uint32_t>(sf * static_cast<float>(d.width)), d.width - 1);
-            const auto cy = std::min(static_cast<uint32_t>(df * static_cast<float>(d.height)), d.height - 1);
+            const auto cx =
+                std::min(static_cast<uint32_t>(sf * static_cast<float>(d.width)), d.width - 1);
+            const auto cy =
+                std::min(static_cast<uint32_t>(df * static_cast<float>(d.height)), d.height - 1);
             ASSERT_GT(d.density[size_t{cy} * d.width + cx], 0.f) << w << " x " << h;
           }
         }
@@ -265,9 +277,12 @@ TEST(LightBuilder, BadLightsAreRefusedByName) {
     return "";
   };
   EXPECT_EQ(message([](Light&) {}), "");
-  for (const std::string& m : {message([](Light& l) { l.to_world.t.x = kNan; }), message([](Light& l) { l.to_world.row[1].z = kInf; }),
-                               message([](Light& l) { l.color.y = kInf; }), message([](Light& l) { l.width = kNan; }),
-                               message([](Light& l) { l.texture = 3; }), message([](Light& l) { l.kind = LightKind::kTriangle; })}) {
+  for (const std::string& m :
+       {message([](Light& l) { l.to_world.t.x = kNan; }),
+        message([](Light& l) { l.to_world.row[1].z = kInf; }),
+        message([](Light& l) { l.color.y = kInf; }), message([](Light& l) { l.width = kNan; }),
+        message([](Light& l) { l.texture = 3; }),
+        message([](Light& l) { l.kind = LightKind::kTriangle; })}) {
     EXPECT_NE(m.find("/World/light"), std::string::npos) << m;
     EXPECT_EQ(m.find('\n'), std::string::npos);
   }
@@ -283,9 +298,11 @@ TEST(LightBuilder, DegenerateLightsHaveNoProbability) {
       }
     }
   }
-  const Lights set(lights, {make_triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0}), make_triangle({0, 0, 0}, {1, 1, 1}, {2, 2, 2})});
+  const Lights set(lights, {make_triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0}),
+                            make_triangle({0, 0, 0}, {1, 1, 1}, {2, 2, 2})});
   for (const LightRecord& r : set.set.records) {
-    for (const float x : {r.radiance[0], r.area, r.radius, r.pick_pdf, r.n[0], r.n[1], r.n[2]}) EXPECT_TRUE(std::isfinite(x));
+    for (const float x : {r.radiance[0], r.area, r.radius, r.pick_pdf, r.n[0], r.n[1], r.n[2]})
+      EXPECT_TRUE(std::isfinite(x));
   }
   EXPECT_EQ(set.set.records.back().pick_pdf, 0);
 }

@@ -22,8 +22,10 @@ float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& 
   const LightView view = lights.view();
   const LightRecord& r = view.lights[0];
   switch (static_cast<LightKind>(r.kind)) {
-    case LightKind::kDistant: return detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf * r.pick_pdf;
-    case LightKind::kDome: return detail::hit_dome<float>(view, r, dir, true).pdf * r.pick_pdf;
+    case LightKind::kDistant:
+      return detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf * r.pick_pdf;
+    case LightKind::kDome:
+      return detail::hit_dome<float>(view, r, dir, true).pdf * r.pick_pdf;
     case LightKind::kTriangle: {
       const auto t = trace(r, from, dir);
       return t ? triangle_light_pdf<float>(view, 0u, dir, *t, true) : 0.f;
@@ -41,15 +43,20 @@ struct Case {
   Vec3<float> from{0, 0, 0};
 };
 
-/// One case for each way of sampling, seen from the origin, large enough for a histogram to resolve.
+/// One case for each way of sampling, seen from the origin, large enough for a histogram to
+/// resolve.
 std::vector<Case> sampling_cases() {
   std::vector<Case> cases;
-  const auto add = [&](const char* name, const Light& light) { cases.push_back({name, Lights({light}), {0, 0, 0}}); };
-  Light rect = make_light(LightKind::kRect, rotate(25, 15) * translate(0.3f, -0.2f, 1.f) * scale(2, 3, 1));
+  const auto add = [&](const char* name, const Light& light) {
+    cases.push_back({name, Lights({light}), {0, 0, 0}});
+  };
+  Light rect =
+      make_light(LightKind::kRect, rotate(25, 15) * translate(0.3f, -0.2f, 1.f) * scale(2, 3, 1));
   add("rect", rect);
   const Affine shear{{{1, 0.6f, 0}, {0, 1, 0}, {0, 0, 1}}, {0.5f, 0, 1}};
   add("sheared rect", make_light(LightKind::kRect, shear * scale(2, 2, 2)));
-  add("disk", make_light(LightKind::kDisk, rotate(-40, 60) * translate(0.1f, 0.2f, 0.8f) * scale(3, 1.5f, 1)));
+  add("disk", make_light(LightKind::kDisk,
+                         rotate(-40, 60) * translate(0.1f, 0.2f, 0.8f) * scale(3, 1.5f, 1)));
   Light sphere = make_light(LightKind::kSphere, translate(0.3f, 0.6f, -0.5f));
   add("sphere", sphere);
   sphere.radius = 0.83f;
@@ -65,13 +72,17 @@ std::vector<Case> sampling_cases() {
     c.name = "dome with an image " + std::to_string(width) + " wide";
     std::mt19937 rng(9);
     std::vector<float> rgb(size_t{width} * 8 * 3);
-    for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = i / 3 % 5 == 0 ? 8.f : static_cast<float>(rng() % 100) / 100.f;
+    for (size_t i = 0; i < rgb.size(); ++i)
+      rgb[i] = i / 3 % 5 == 0 ? 8.f : static_cast<float>(rng() % 100) / 100.f;
     Light dome = make_light(LightKind::kDome, rotate(0, 35));
     dome.texture = c.lights.add_texture(width, 8, rgb, width == 5 ? Wrap::kRepeat : Wrap::kClamp);
     c.lights.build({dome});
     cases.push_back(std::move(c));
   }
-  Case triangle{"triangle", Lights({}, {make_triangle({-1, -0.5f, 0.7f}, {1.2f, 0.3f, 0.6f}, {-0.2f, 1.5f, -0.9f})}), {0, 0, 0}};
+  Case triangle{
+      "triangle",
+      Lights({}, {make_triangle({-1, -0.5f, 0.7f}, {1.2f, 0.3f, 0.6f}, {-0.2f, 1.5f, -0.9f})}),
+      {0, 0, 0}};
   cases.push_back(std::move(triangle));
   return cases;
 }
@@ -125,7 +136,8 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
         ASSERT_NEAR(*t, s.distance, 1e-3 * *t) << c.name;
         const UInt<float> light = 0;
         if (view.lights[0].kind != static_cast<uint32_t>(LightKind::kTriangle)) {
-          ASSERT_NEAR(light_hit<float>(view, light, c.from, s.wi, *t, true).radiance.y, 3, 1e-5) << c.name;
+          ASSERT_NEAR(light_hit<float>(view, light, c.from, s.wi, *t, true).radiance.y, 3, 1e-5)
+              << c.name;
         }
       }
     }
@@ -162,7 +174,8 @@ TEST(LightSampling, BothHalvesOfMisSumTo1) {
 }
 
 /// Irradiance on a surface at `from` with normal n, by an n x n grid of jittered samples.
-double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<float>& n, int grid = 700) {
+double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<float>& n,
+                  int grid = 700) {
   const LightView view = lights.view();
   std::mt19937 rng(8);
   const auto number = [&rng] { return static_cast<double>(rng() >> 8) * 0x1p-24; };
@@ -173,7 +186,8 @@ double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<floa
       const auto v = std::min(static_cast<float>((j + number()) / grid), kOneMinusEpsilon);
       const auto pick = static_cast<float>(rng() >> 8) * 0x1p-24f;
       const auto s = sample_light<float>(view, from, pick, u, v, true);
-      if (s.valid) sum += static_cast<double>(s.weight.y) * std::max(0.0, static_cast<double>(dot(s.wi, n)));
+      if (s.valid)
+        sum += static_cast<double>(s.weight.y) * std::max(0.0, static_cast<double>(dot(s.wi, n)));
     }
   return sum / grid / grid;
 }
@@ -182,11 +196,14 @@ const Vec3<float> kUp{0, 0, 1}, kOrigin{0, 0, 0};
 
 TEST(Irradiance, RectAboveAPoint) {
   // A rect with a corner above the point: E = L / 2 (a / A atan(b / A) + b / B atan(a / B)),
-  // A = sqrt(1 + a^2), B = sqrt(1 + b^2), sides a and b in units of the height; four corners make one.
+  // A = sqrt(1 + a^2), B = sqrt(1 + b^2), sides a and b in units of the height; four corners make
+  // one.
   for (const float size : {0.1f, 1.f, 10.f}) {
     Light light = make_light(LightKind::kRect, translate(0, 0, 2) * scale(2 * size, 4 * size, 1));
-    const double a = size / 2, b = 2 * size / 2, big_a = std::sqrt(1 + a * a), big_b = std::sqrt(1 + b * b);
-    const double corner = 3 / 2.0 * (a / big_a * std::atan(b / big_a) + b / big_b * std::atan(a / big_b));
+    const double a = size / 2, b = 2 * size / 2, big_a = std::sqrt(1 + a * a),
+                 big_b = std::sqrt(1 + b * b);
+    const double corner =
+        3 / 2.0 * (a / big_a * std::atan(b / big_a) + b / big_b * std::atan(a / big_b));
     EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp) / (4 * corner), 1, 2e-3) << size;
     // Nothing behind it.
     EXPECT_EQ(irradiance(Lights({light}), {0, 0, 5}, -kUp, 10), 0);
@@ -198,7 +215,8 @@ TEST(Irradiance, DiskAboveAPoint) {
     Light light = make_light(LightKind::kDisk, translate(0, 0, 3));
     light.radius = radius;
     const double r2 = static_cast<double>(radius) * radius;
-    EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp) / (kPiD * 3 * r2 / (r2 + 9)), 1, 2e-3) << radius;
+    EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp) / (kPiD * 3 * r2 / (r2 + 9)), 1, 2e-3)
+        << radius;
   }
 }
 
@@ -208,12 +226,14 @@ TEST(Irradiance, SphereNearAndFar) {
     for (const double tilt : {0.0, 0.4}) {
       const double cosine = std::cos(tilt);
       if (1 / distance > cosine) continue;
-      Light light = make_light(LightKind::kSphere, translate(static_cast<float>(distance * std::sin(tilt)), 0,
-                                                            static_cast<float>(distance * cosine)));
+      Light light =
+          make_light(LightKind::kSphere, translate(static_cast<float>(distance * std::sin(tilt)), 0,
+                                                   static_cast<float>(distance * cosine)));
       light.radius = 1;
       if (distance < 1.1 && tilt > 0) continue;  // dips below the horizon
       const double exact = kPiD * 3 / distance / distance * cosine;
-      EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300) / exact, 1, 2e-3) << distance << ", " << tilt;
+      EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300) / exact, 1, 2e-3)
+          << distance << ", " << tilt;
     }
   }
 }
@@ -239,7 +259,8 @@ TEST(Irradiance, DistantLights) {
     light.normalize = false;
     const double s = std::sin(angle / 2 * kPiD / 180);
     if (angle > 0) {
-      EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300) / (3 * kPiD * s * s), 1, 1e-3) << angle;
+      EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300) / (3 * kPiD * s * s), 1, 1e-3)
+          << angle;
     }
   }
 }
@@ -266,7 +287,8 @@ TEST(Irradiance, Domes) {
   for (int j = 0; j < kN; ++j)
     for (int i = 0; i < kN; ++i) {
       const double z = (j + 0.5) / kN, phi = 2 * kPiD * (i + 0.5) / kN;
-      const auto radiance = escaped_radiance<float>(lights.view(), bsdf_testing::direction(z, phi), 0.f, true, true);
+      const auto radiance =
+          escaped_radiance<float>(lights.view(), bsdf_testing::direction(z, phi), 0.f, true, true);
       exact += static_cast<double>(radiance.y) * z * 2 * kPiD / kN / kN;
     }
   EXPECT_NEAR(irradiance(lights, kOrigin, kUp) / exact, 1, 3e-3);
@@ -274,8 +296,10 @@ TEST(Irradiance, Domes) {
 
 TEST(Irradiance, ManyLightsSumUp) {
   // Four lights of very different power and kind, by choice among them.
-  Light rect = make_light(LightKind::kRect, translate(0, 0, 2)), sphere = make_light(LightKind::kSphere, translate(3, 0, 3)),
-        distant = make_light(LightKind::kDistant), disk = make_light(LightKind::kDisk, translate(0, 1, 1));
+  Light rect = make_light(LightKind::kRect, translate(0, 0, 2)),
+        sphere = make_light(LightKind::kSphere, translate(3, 0, 3)),
+        distant = make_light(LightKind::kDistant),
+        disk = make_light(LightKind::kDisk, translate(0, 1, 1));
   distant.normalize = true;
   disk.color = {0.01f, 0.01f, 0.01f};
   const std::vector<Light> all = {rect, sphere, distant, disk};
@@ -285,14 +309,17 @@ TEST(Irradiance, ManyLightsSumUp) {
 }
 
 TEST(Irradiance, TriangleAgreesWithRect) {
-  const EmissiveTriangle a = make_triangle({-1, -1, 2}, {1, -1, 2}, {1, 1, 2}), b = make_triangle({-1, -1, 2}, {1, 1, 2}, {-1, 1, 2});
-  const double rect = irradiance(Lights({make_light(LightKind::kRect, translate(0, 0, 2) * scale(2, 2, 1))}), kOrigin, kUp);
+  const EmissiveTriangle a = make_triangle({-1, -1, 2}, {1, -1, 2}, {1, 1, 2}),
+                         b = make_triangle({-1, -1, 2}, {1, 1, 2}, {-1, 1, 2});
+  const double rect = irradiance(
+      Lights({make_light(LightKind::kRect, translate(0, 0, 2) * scale(2, 2, 1))}), kOrigin, kUp);
   EXPECT_NEAR(irradiance(Lights({}, {a, b}), kOrigin, kUp) / rect, 1, 3e-3);
   EXPECT_NEAR(irradiance(Lights({}, {a, b}), {0, 0, 4}, -kUp) / rect, 1, 3e-3);  // the other side
 }
 
 TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
-  // Top row red, green; bottom row blue, white. The rect shines along -z; it is seen from z < 0, +y up.
+  // Top row red, green; bottom row blue, white. The rect shines along -z; it is seen from z < 0, +y
+  // up.
   Lights lights;
   Light light = make_light(LightKind::kRect);
   light.color = {1, 1, 1};
@@ -302,7 +329,7 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
     return light_hit<float>(lights.view(), 0u, {x, y, -1}, {0, 0, 1}, 1.f, true).radiance;
   };
   // Looking along +z with +y up, right is -x.
-  EXPECT_NEAR(seen(0.25f, 0.25f).x, 1, 1e-5);   // upper left: red
+  EXPECT_NEAR(seen(0.25f, 0.25f).x, 1, 1e-5);  // upper left: red
   EXPECT_NEAR(seen(0.25f, 0.25f).y, 0, 1e-5);
   EXPECT_NEAR(seen(-0.25f, 0.25f).y, 1, 1e-5);  // upper right: green
   EXPECT_NEAR(seen(-0.25f, 0.25f).x, 0, 1e-5);
@@ -314,7 +341,8 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
   // Samples carry the radiance that a hit at the same place gives.
   std::mt19937 rng(2);
   for (int i = 0; i < 1000; ++i) {
-    const auto s = sample_light<float>(lights.view(), {0.1f, 0.2f, -1}, 0.f, static_cast<float>(rng() % 999) / 999.f,
+    const auto s = sample_light<float>(lights.view(), {0.1f, 0.2f, -1}, 0.f,
+                                       static_cast<float>(rng() % 999) / 999.f,
                                        static_cast<float>(rng() % 999) / 999.f, true);
     const auto hit = light_hit<float>(lights.view(), 0u, {0.1f, 0.2f, -1}, s.wi, s.distance, true);
     ASSERT_NEAR(hit.radiance.x, s.weight.x * s.pdf, 1e-4);
@@ -330,7 +358,8 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
   constexpr uint32_t kW = 64, kH = 32;
   std::vector<float> rgb(kW * kH * 3, 0.f);
   const auto paint = [&](uint32_t x, uint32_t y, size_t channel, float value) {
-    for (int dx = -2; dx < 2; ++dx) rgb[3 * (y * kW + (x + kW + static_cast<uint32_t>(dx)) % kW) + channel] = value;
+    for (int dx = -2; dx < 2; ++dx)
+      rgb[3 * (y * kW + (x + kW + static_cast<uint32_t>(dx)) % kW) + channel] = value;
   };
   for (uint32_t y = 14; y < 18; ++y) {
     paint(16, y, 0, 1);  // s = 1/4: red
@@ -341,7 +370,9 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
     for (uint32_t x = 0; x < kW; ++x) rgb[3 * (y * kW + x)] = 7;  // the top: the pole +y
   light.texture = lights.add_texture(kW, kH, rgb);
   lights.build({light});
-  const auto seen = [&](float x, float y, float z) { return escaped_radiance<float>(lights.view(), {x, y, z}, 0.f, true, true); };
+  const auto seen = [&](float x, float y, float z) {
+    return escaped_radiance<float>(lights.view(), {x, y, z}, 0.f, true, true);
+  };
   EXPECT_NEAR(seen(1, 0, 0).x, 1, 1e-5);
   EXPECT_NEAR(seen(0, 0, 1).y, 1, 1e-5);
   EXPECT_NEAR(seen(-1, 0, 0).z, 1, 1e-5);
@@ -364,11 +395,13 @@ TEST(TexturedLights, TriangleReadsItsMaterialsEmission) {
   t.material = material;
   lights.build({}, {t});
   for (int i = 0; i < 2000; ++i) {
-    const auto s = sample_light<float>(lights.view(), {0.3f, 0.2f, 0}, 0.f, static_cast<float>(rng() % 999) / 999.f,
+    const auto s = sample_light<float>(lights.view(), {0.3f, 0.2f, 0}, 0.f,
+                                       static_cast<float>(rng() % 999) / 999.f,
                                        static_cast<float>(rng() % 999) / 999.f, true);
     const Vec3<float> p = Vec3<float>(0.3f, 0.2f, 0) + s.wi * s.distance;
     const auto texel = lookup<float>(lights.views[0], p.x, p.y, 0.f, true);
-    const Vec3<float> expected(std::max(0.f, 2 * texel.r), std::max(0.f, 3 * texel.g), std::max(0.f, 4 * texel.b));
+    const Vec3<float> expected(std::max(0.f, 2 * texel.r), std::max(0.f, 3 * texel.g),
+                               std::max(0.f, 4 * texel.b));
     if (!s.valid) {
       ASSERT_LT(expected.x + expected.y + expected.z, 1e-4);
       continue;
@@ -387,15 +420,19 @@ Lights all_kinds() {
   for (float& x : rgb) x = static_cast<float>(rng() % 1000) / 100.f;
   const uint32_t first = lights.add_texture(24, 12, rgb), second = lights.add_texture(12, 24, rgb);
   std::vector<Light> all;
-  for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere, LightKind::kDistant, LightKind::kDome})
+  for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere,
+                               LightKind::kDistant, LightKind::kDome})
     for (int i = 0; i < 4; ++i) {
       const auto f = static_cast<float>(i);
-      all.push_back(make_light(kind, rotate(40 * i, 70 * i) * translate(f - 1, 2 - f, 2) * scale(1 + f, 1, 2)));
-      if (i > 1 && (kind == LightKind::kRect || kind == LightKind::kDome)) all.back().texture = i == 2 ? first : second;
+      all.push_back(make_light(
+          kind, rotate(40 * i, 70 * i) * translate(f - 1, 2 - f, 2) * scale(1 + f, 1, 2)));
+      if (i > 1 && (kind == LightKind::kRect || kind == LightKind::kDome))
+        all.back().texture = i == 2 ? first : second;
       if (i == 1) all.back().angle = all.back().radius = 0;
       if (kind == LightKind::kDome) all.back().color = {0.001f, 0.002f, 0.003f};
     }
-  std::vector<EmissiveTriangle> triangles = {make_triangle({0, 0, 3}, {2, 0, 3}, {0, 2, 3}), make_triangle({0, 0, -3}, {4, 0, -3}, {0, 4, -4}),
+  std::vector<EmissiveTriangle> triangles = {make_triangle({0, 0, 3}, {2, 0, 3}, {0, 2, 3}),
+                                             make_triangle({0, 0, -3}, {4, 0, -3}, {0, 4, -4}),
                                              make_triangle({1, 1, 1}, {1, 1, 1}, {1, 1, 1})};
   triangles[1].material = lights.add_material(first);
   lights.build(all, triangles, 1.f);
@@ -414,7 +451,8 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
     for (size_t c = 0; c < 3; ++c) in[c][i] = in[c][i] * 8 - 4;
   for (size_t i = 0; i < kN / 4; ++i) in[3][i] = 0.5f;  // packets of one light
   std::vector<uint32_t> ids(kN);
-  for (uint32_t i = 0; i < kN; ++i) ids[i] = i < kN / 4 ? i / 64 % view.count : static_cast<uint32_t>(rng()) % view.count;
+  for (uint32_t i = 0; i < kN; ++i)
+    ids[i] = i < kN / 4 ? i / 64 % view.count : static_cast<uint32_t>(rng()) % view.count;
 
   const auto run = [&]<typename F>(std::vector<float>& out) {
     out.assign(17 * kN, 0.f);
@@ -426,8 +464,9 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
       const Mask<F> active = at(6) < 0.9f;
       const auto s = sample_light<F>(view, p, at(3), at(4), at(5), active);
       const F one(1.f), zero(0.f);
-      for (const F& x : {s.wi.x, s.wi.y, s.wi.z, s.distance, s.weight.x, s.weight.y, s.weight.z, s.pdf,
-                         select(s.is_delta, one, zero), select(s.valid, one, zero)}) put(x);
+      for (const F& x : {s.wi.x, s.wi.y, s.wi.z, s.distance, s.weight.x, s.weight.y, s.weight.z,
+                         s.pdf, select(s.is_delta, one, zero), select(s.valid, one, zero)})
+        put(x);
       const UInt<F> id = load<UInt<F>>(&ids[i]);
       const Vec3<F> dir = square_to_sphere<F>(at(4), at(5));
       const auto hit = light_hit<F>(view, id, p, dir, at(7), active);
@@ -465,20 +504,35 @@ TEST(LightEdges, NoLightsAndDarkLights) {
 TEST(LightEdges, PointsOnAndInsideLightsGiveNoNan) {
   std::vector<Light> all;
   for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere}) {
-    for (const float size : {1.f, 1e-12f, 1e12f, 0.f}) all.push_back(make_light(kind, scale(size, size, size)));
+    for (const float size : {1.f, 1e-12f, 1e12f, 0.f})
+      all.push_back(make_light(kind, scale(size, size, size)));
   }
-  std::vector<EmissiveTriangle> triangles = {make_triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}), make_triangle({0, 0, 0}, {1e-15f, 0, 0}, {0, 1e-15f, 0}),
-                                             make_triangle({0, 0, 0}, {0, 0, 0}, {1, 1, 1})};
+  std::vector<EmissiveTriangle> triangles = {
+      make_triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}),
+      make_triangle({0, 0, 0}, {1e-15f, 0, 0}, {0, 1e-15f, 0}),
+      make_triangle({0, 0, 0}, {0, 0, 0}, {1, 1, 1})};
   std::mt19937 rng(3);
   for (size_t k = 0; k < all.size() + triangles.size(); ++k) {
-    const Lights lights = k < all.size() ? Lights({all[k]}) : Lights({}, {triangles[k - all.size()]});
+    const Lights lights =
+        k < all.size() ? Lights({all[k]}) : Lights({}, {triangles[k - all.size()]});
     const LightView view = lights.view();
-    for (const Vec3<float>& p : {Vec3<float>{0, 0, 0}, {0.1f, 0.1f, 0}, {0, 0, 0.5f}, {0, 0, -0.5f}, {0, 0, 0.25f}, {0, 0, 1e30f}, {1e-30f, 0, -1e-30f},
-                                 {0, 0, -1e-7f}, {kNan, 0, 0}, {kInf, 0, 0}}) {
+    for (const Vec3<float>& p : {Vec3<float>{0, 0, 0},
+                                 {0.1f, 0.1f, 0},
+                                 {0, 0, 0.5f},
+                                 {0, 0, -0.5f},
+                                 {0, 0, 0.25f},
+                                 {0, 0, 1e30f},
+                                 {1e-30f, 0, -1e-30f},
+                                 {0, 0, -1e-7f},
+                                 {kNan, 0, 0},
+                                 {kInf, 0, 0}}) {
       for (int i = 0; i < 100; ++i) {
-        const float u = i == 0 ? 0.f : i == 1 ? kOneMinusEpsilon : static_cast<float>(rng() >> 8) * 0x1p-24f;
+        const float u = i == 0   ? 0.f
+                        : i == 1 ? kOneMinusEpsilon
+                                 : static_cast<float>(rng() >> 8) * 0x1p-24f;
         const auto s = sample_light<float>(view, p, u, u, 1 - u == 1 ? 0.f : 1 - u, true);
-        for (const float x : {s.wi.x, s.wi.y, s.wi.z, s.distance, s.weight.x, s.weight.y, s.pdf}) ASSERT_TRUE(std::isfinite(x));
+        for (const float x : {s.wi.x, s.wi.y, s.wi.z, s.distance, s.weight.x, s.weight.y, s.pdf})
+          ASSERT_TRUE(std::isfinite(x));
         if (s.valid) {
           ASSERT_GT(s.pdf, 0);
           ASSERT_NEAR(dot(s.wi, s.wi), 1, 1e-4);

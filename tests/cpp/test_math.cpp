@@ -17,7 +17,9 @@ constexpr double kPiD = 3.14159265358979323846;
 std::vector<float> cover(float lo, float hi, size_t n = 400000) {
   std::vector<float> x = {lo, hi};
   for (size_t i = 0; i < n; ++i) {
-    x.push_back(static_cast<float>(static_cast<double>(lo) + (static_cast<double>(hi) - lo) * static_cast<double>(i) / static_cast<double>(n)));
+    x.push_back(static_cast<float>(static_cast<double>(lo) + (static_cast<double>(hi) - lo) *
+                                                                 static_cast<double>(i) /
+                                                                 static_cast<double>(n)));
   }
   for (float m = 0x1p-126f; m < hi; m *= 1.0001f) {
     x.push_back(m);
@@ -28,14 +30,19 @@ std::vector<float> cover(float lo, float hi, size_t n = 400000) {
   return x;
 }
 
-double worst_ulps(const std::vector<float>& x, const std::vector<float>& y, const std::function<double(double)>& exact) {
+double worst_ulps(const std::vector<float>& x, const std::vector<float>& y,
+                  const std::function<double(double)>& exact) {
   double worst = 0;
-  for (size_t i = 0; i < x.size(); ++i) worst = std::max(worst, ulps(y[i], exact(static_cast<double>(x[i]))));
+  for (size_t i = 0; i < x.size(); ++i)
+    worst = std::max(worst, ulps(y[i], exact(static_cast<double>(x[i]))));
   return worst;
 }
-double worst_error(const std::vector<float>& x, const std::vector<float>& y, const std::function<double(double)>& exact) {
+double worst_error(const std::vector<float>& x, const std::vector<float>& y,
+                   const std::function<double(double)>& exact) {
   double worst = 0;
-  for (size_t i = 0; i < x.size(); ++i) worst = std::max(worst, std::fabs(static_cast<double>(y[i]) - exact(static_cast<double>(x[i]))));
+  for (size_t i = 0; i < x.size(); ++i)
+    worst =
+        std::max(worst, std::fabs(static_cast<double>(y[i]) - exact(static_cast<double>(x[i]))));
   return worst;
 }
 
@@ -79,7 +86,8 @@ TEST(Math, Atan2AllAround) {
   const auto result = map<float>(y, x, f);
   double worst = 0;
   for (size_t i = 0; i < x.size(); ++i) {
-    worst = std::max(worst, ulps(result[i], std::atan2(static_cast<double>(y[i]), static_cast<double>(x[i]))));
+    worst = std::max(
+        worst, ulps(result[i], std::atan2(static_cast<double>(y[i]), static_cast<double>(x[i]))));
   }
   EXPECT_LE(worst, 4);
   expect_lanes_agree(y, x, f, "atan2");
@@ -123,7 +131,8 @@ TEST(Math, LogOfEveryBinade) {
   std::vector<float> x;
   std::mt19937 rng(4);
   for (int e = -126; e < 128; ++e)
-    for (int i = 0; i < 1000; ++i) x.push_back(std::ldexp(1 + static_cast<float>(rng() >> 9) * 0x1p-23f, e));
+    for (int i = 0; i < 1000; ++i)
+      x.push_back(std::ldexp(1 + static_cast<float>(rng() >> 9) * 0x1p-23f, e));
   for (int i = -2000; i < 2000; ++i) x.push_back(1 + static_cast<float>(i) * 0x1p-20f);
   for (const float v : {0x1p-126f, 0x1.fffffep127f, 1.f}) x.push_back(v);
   while (x.size() % 16 != 0) x.push_back(1.f);
@@ -150,7 +159,8 @@ TEST(Math, Pow) {
   for (size_t i = 0; i < x.size(); ++i) {
     const double exact = std::pow(static_cast<double>(x[i]), static_cast<double>(y[i]));
     // The error of log(x) grows with the exponent.
-    ASSERT_NEAR(result[i] / exact, 1, 4e-7 * (1 + std::fabs(std::log(exact)))) << x[i] << "^" << y[i];
+    ASSERT_NEAR(result[i] / exact, 1, 4e-7 * (1 + std::fabs(std::log(exact))))
+        << x[i] << "^" << y[i];
   }
   expect_lanes_agree(x, y, f, "pow");
   EXPECT_EQ(pow(0.f, 2.f), 0.f);

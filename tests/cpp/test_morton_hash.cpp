@@ -13,14 +13,16 @@ using namespace lane_testing;
 uint32_t interleave(const std::vector<uint32_t>& v, uint32_t bits) {
   uint32_t code = 0;
   for (uint32_t b = 0; b < bits; ++b)
-    for (uint32_t i = 0; i < v.size(); ++i) code |= (v[i] >> b & 1u) << (b * static_cast<uint32_t>(v.size()) + i);
+    for (uint32_t i = 0; i < v.size(); ++i)
+      code |= (v[i] >> b & 1u) << (b * static_cast<uint32_t>(v.size()) + i);
   return code;
 }
 
 TEST(Morton, InterleavesBits) {
   std::mt19937 rng(1);
   for (int n = 0; n < 20000; ++n) {
-    const auto x = static_cast<uint32_t>(rng()), y = static_cast<uint32_t>(rng()), z = static_cast<uint32_t>(rng());
+    const auto x = static_cast<uint32_t>(rng()), y = static_cast<uint32_t>(rng()),
+               z = static_cast<uint32_t>(rng());
     ASSERT_EQ(morton_2(x, y), interleave({x & 0xffff, y & 0xffff}, 16));
     ASSERT_EQ(morton_3(x, y, z), interleave({x & 0x3ff, y & 0x3ff, z & 0x3ff}, 10));
     ASSERT_EQ(compact_bits_2(morton_2(x, y)), x & 0xffff);
@@ -89,7 +91,8 @@ TEST(Hash, TwoWordsRarelyCollide) {
   for (const uint32_t fixed : {0u, 1u, 12345u, 0xffffffffu})
     for (const bool first : {false, true}) {
       all.clear();
-      for (uint32_t i = 0; i < 1u << 20; ++i) all.push_back(first ? hash_u32(i, fixed) : hash_u32(fixed, i));
+      for (uint32_t i = 0; i < 1u << 20; ++i)
+        all.push_back(first ? hash_u32(i, fixed) : hash_u32(fixed, i));
       std::sort(all.begin(), all.end());
       EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
     }

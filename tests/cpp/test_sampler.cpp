@@ -12,15 +12,17 @@ namespace {
 
 using namespace lane_testing;
 
-Sample4<float> draw(SamplerKind kind, uint32_t pixel, uint32_t sample, uint32_t set, uint32_t seed = 0) {
+Sample4<float> draw(SamplerKind kind, uint32_t pixel, uint32_t sample, uint32_t set,
+                    uint32_t seed = 0) {
   return sample_4d<float>(kind, make_sample_key<float>(pixel, sample, seed), set);
 }
 Sample4<float> sobol(uint32_t pixel, uint32_t sample, uint32_t set, uint32_t seed = 0) {
   return draw(SamplerKind::kSobol, pixel, sample, set, seed);
 }
 
-/// Column k of the generator matrix of one dimension, bit 31 the first after the point: the recurrence
-/// of Bratley and Fox (TOMS 659) for a primitive polynomial of degree s with inner coefficients a.
+/// Column k of the generator matrix of one dimension, bit 31 the first after the point: the
+/// recurrence of Bratley and Fox (TOMS 659) for a primitive polynomial of degree s with inner
+/// coefficients a.
 std::vector<uint32_t> sobol_columns(uint32_t s, uint32_t a, std::vector<uint32_t> m, uint32_t n) {
   for (uint32_t k = static_cast<uint32_t>(m.size()); k < n; ++k) {
     uint32_t value = m[k - s] ^ (m[k - s] << s);
@@ -39,7 +41,8 @@ uint32_t reverse(uint32_t x) {
 
 TEST(Sobol, DirectionNumbersAreThoseOfJoeAndKuo) {
   // new-joe-kuo-6: dimension 2: s 1, m 1; 3: s 2, a 1, m 1 3; 4: s 3, a 1, m 1 3 1.
-  const auto c1 = sobol_columns(1, 0, {1}, 20), c2 = sobol_columns(2, 1, {1, 3}, 20), c3 = sobol_columns(3, 1, {1, 3, 1}, 20);
+  const auto c1 = sobol_columns(1, 0, {1}, 20), c2 = sobol_columns(2, 1, {1, 3}, 20),
+             c3 = sobol_columns(3, 1, {1, 3, 1}, 20);
   for (uint32_t k = 0; k < 20; ++k) {
     EXPECT_EQ(reverse(c2[k]), detail::kSobol2[k]) << k;
     EXPECT_EQ(reverse(c3[k]), detail::kSobol3[k]) << k;
@@ -106,7 +109,8 @@ TEST(Sobol, EveryDimensionIsStratifiedSingly) {
         for (uint32_t i = 0; i < n; ++i) {
           const auto s = sobol(pixel, block * n + i, 4);
           const float v[4] = {s.x, s.y, s.z, s.w};
-          for (size_t d = 0; d < 4; ++d) ++count[d][static_cast<size_t>(v[d] * static_cast<float>(n))];
+          for (size_t d = 0; d < 4; ++d)
+            ++count[d][static_cast<size_t>(v[d] * static_cast<float>(n))];
         }
         for (const auto& c : count)
           for (const int k : c) ASSERT_EQ(k, 1);
@@ -114,10 +118,11 @@ TEST(Sobol, EveryDimensionIsStratifiedSingly) {
 }
 
 TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
-  // Shuffled index, textbook generator matrices, and a scramble made digit by digit: walk down the tree,
-  // flipping each bit by what the hash does to it given the bits above.
-  const std::vector<uint32_t> columns[4] = {sobol_columns(0, 0, std::vector<uint32_t>(20, 1), 20), sobol_columns(1, 0, {1}, 20),
-                                            sobol_columns(2, 1, {1, 3}, 20), sobol_columns(3, 1, {1, 3, 1}, 20)};
+  // Shuffled index, textbook generator matrices, and a scramble made digit by digit: walk down the
+  // tree, flipping each bit by what the hash does to it given the bits above.
+  const std::vector<uint32_t> columns[4] = {
+      sobol_columns(0, 0, std::vector<uint32_t>(20, 1), 20), sobol_columns(1, 0, {1}, 20),
+      sobol_columns(2, 1, {1, 3}, 20), sobol_columns(3, 1, {1, 3, 1}, 20)};
   const auto owen = [](uint32_t x, uint32_t seed) {
     uint32_t result = 0;
     for (uint32_t b = 0; b < 32; ++b) {
@@ -130,7 +135,8 @@ TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
   };
   std::mt19937 rng(5);
   for (int n = 0; n < 3000; ++n) {
-    const auto pixel = static_cast<uint32_t>(rng()), sample = static_cast<uint32_t>(rng()) >> 12, seed = static_cast<uint32_t>(rng());
+    const auto pixel = static_cast<uint32_t>(rng()), sample = static_cast<uint32_t>(rng()) >> 12,
+               seed = static_cast<uint32_t>(rng());
     const uint32_t set = static_cast<uint32_t>(rng()) % 40u;
     const uint32_t set_seed = hash_u32(hash_u32(pixel, seed), set);
     const uint32_t index = owen(sample, set_seed) & 0xfffffu;
@@ -140,7 +146,8 @@ TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
       uint32_t x = 0;
       for (uint32_t k = 0; k < 20; ++k)
         if (index >> k & 1u) x ^= columns[d][k];
-      ASSERT_EQ(v[d], static_cast<float>(owen(x, hash_u32(set_seed ^ (d + 1))) >> 8) * 0x1p-24f) << d;
+      ASSERT_EQ(v[d], static_cast<float>(owen(x, hash_u32(set_seed ^ (d + 1))) >> 8) * 0x1p-24f)
+          << d;
     }
   }
 }
@@ -175,9 +182,10 @@ TEST(Sampler, SetsDimensionsPixelsAndSeedsDoNotCorrelate) {
 }
 
 TEST(Sampler, PlanesAcrossSetsAreFilledEvenly) {
-  // Counts in 8 x 8 cells of one dimension of a set against one of another. Within a pixel, scrambled
-  // samples come in correlated pairs, so that one pixel's chi-square scatters far (up to 160 with a perfect
-  // Owen scramble in place of the hash) about a mean of some 56; over pixels it must average to about 63.
+  // Counts in 8 x 8 cells of one dimension of a set against one of another. Within a pixel,
+  // scrambled samples come in correlated pairs, so that one pixel's chi-square scatters far (up to
+  // 160 with a perfect Owen scramble in place of the hash) about a mean of some 56; over pixels it
+  // must average to about 63.
   constexpr uint32_t kN = 4096, kPixels = 40;
   for (const SamplerKind kind : {SamplerKind::kSobol, SamplerKind::kIndependent}) {
     for (const auto& [first, second] : {std::pair{0u, 1u}, {1u, 2u}, {2u, 3u}, {0u, 9u}}) {
@@ -189,11 +197,13 @@ TEST(Sampler, PlanesAcrossSetsAreFilledEvenly) {
           const float x[4] = {s.x, s.y, s.z, s.w}, y[4] = {t.x, t.y, t.z, t.w};
           for (size_t a = 0; a < 4; ++a)
             for (size_t b = 0; b < 4; ++b) {
-              ++count[(a * 4 + b) * 64 + static_cast<size_t>(x[a] * 8) * 8 + static_cast<size_t>(y[b] * 8)];
+              ++count[(a * 4 + b) * 64 + static_cast<size_t>(x[a] * 8) * 8 +
+                      static_cast<size_t>(y[b] * 8)];
             }
         }
         for (size_t i = 0; i < count.size(); ++i) {
-          sum[i / 256][i / 64 % 4] += (count[i] - kN / 64.0) * (count[i] - kN / 64.0) / (kN / 64.0) / kPixels;
+          sum[i / 256][i / 64 % 4] +=
+              (count[i] - kN / 64.0) * (count[i] - kN / 64.0) / (kN / 64.0) / kPixels;
         }
       }
       for (const auto& row : sum)
@@ -239,7 +249,8 @@ TEST(Sobol, ConvergesFasterThanRandom) {
     return sum;
   };
   EXPECT_LT(error(SamplerKind::kSobol, 256), 0.02 * error(SamplerKind::kIndependent, 256));
-  EXPECT_LT(error(SamplerKind::kSobol, 1024), error(SamplerKind::kSobol, 256) / 20);  // n^-3, n^-1 by chance
+  EXPECT_LT(error(SamplerKind::kSobol, 1024),
+            error(SamplerKind::kSobol, 256) / 20);  // n^-3, n^-1 by chance
 }
 
 TEST(Sampler, SetsOfAPathAreDistinct) {
@@ -262,7 +273,8 @@ TEST(Sampler, LanesAndOrderChangeNothing) {
       using U = UInt<F>;
       for (size_t i = 512; i > 0;) {  // backwards
         i -= kWidth<F>;
-        const auto s = sample_4d<F>(kind, make_sample_key<F>(load<U>(&pixel[i]), load<U>(&sample[i]), 7), 3);
+        const auto s =
+            sample_4d<F>(kind, make_sample_key<F>(load<U>(&pixel[i]), load<U>(&sample[i]), 7), 3);
         for (size_t k = 0; k < kWidth<F>; ++k) {
           const auto x = draw(kind, pixel[i + k], sample[i + k], 3, 7);
           ASSERT_EQ(lane(s.x, k), x.x);

@@ -17,10 +17,14 @@ using Color4 = std::array<double, 4>;
 double half_value(uint16_t h) {
   const int exponent = (h >> 10) & 31, mantissa = h & 1023;
   const double sign = (h & 0x8000) ? -1 : 1;
-  if (exponent == 31) return mantissa ? std::nan("") : sign * std::numeric_limits<double>::infinity();
-  return sign * (exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(1024 + mantissa, exponent - 25));
+  if (exponent == 31)
+    return mantissa ? std::nan("") : sign * std::numeric_limits<double>::infinity();
+  return sign *
+         (exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(1024 + mantissa, exponent - 25));
 }
-double srgb_decode(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
+double srgb_decode(double c) {
+  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+}
 
 TEST(Half, EveryValueInEveryLane) {
   for_each_lane_type([]<typename F>() {
@@ -146,7 +150,8 @@ Image shrink(Image& image) {
   Image out;
   out.desc.width = std::max(1u, w / 2);
   out.desc.height = std::max(1u, h / 2);
-  const double sx = static_cast<double>(w) / out.desc.width, sy = static_cast<double>(h) / out.desc.height;
+  const double sx = static_cast<double>(w) / out.desc.width,
+               sy = static_cast<double>(h) / out.desc.height;
   for (uint32_t y = 0; y < out.desc.height; ++y)
     for (uint32_t x = 0; x < out.desc.width; ++x) {
       Color4 sum{};
@@ -172,7 +177,8 @@ TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {
           Image image = make_image(size[0], size[1], channels, format, srgb);
           const Texture texture = make_texture(image);
           const TextureView& view = texture.view();
-          ASSERT_EQ(view.level_count, static_cast<uint32_t>(std::bit_width(std::max(size[0], size[1]))));
+          ASSERT_EQ(view.level_count,
+                    static_cast<uint32_t>(std::bit_width(std::max(size[0], size[1]))));
           Image level = std::move(image);
           for (uint32_t n = 1; n < view.level_count; ++n) {
             level = shrink(level);
@@ -188,9 +194,10 @@ TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {
                     ASSERT_GE(exact, srgb_decode((code - 0.501) / 255) - 1e-7);
                     ASSERT_LE(exact, srgb_decode((code + 0.501) / 255) + 1e-7);
                   } else {
-                    const double step = format == TexelFormat::kU8    ? 0.501 / 255
-                                        : format == TexelFormat::kF16 ? 0.501 * 0x1p-10 * std::max(0.01, std::fabs(exact))
-                                                                      : 1e-6;
+                    const double step = format == TexelFormat::kU8 ? 0.501 / 255
+                                        : format == TexelFormat::kF16
+                                            ? 0.501 * 0x1p-10 * std::max(0.01, std::fabs(exact))
+                                            : 1e-6;
                     ASSERT_NEAR(t[c], exact, step + 1e-6);
                   }
                 }
@@ -202,13 +209,16 @@ TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {
 /// Index of a tap, or -1 for black.
 int64_t wrap_tap(Wrap wrap, int64_t i, int64_t n) {
   switch (wrap) {
-    case Wrap::kRepeat: return ((i % n) + n) % n;
-    case Wrap::kClamp: return std::clamp<int64_t>(i, 0, n - 1);
+    case Wrap::kRepeat:
+      return ((i % n) + n) % n;
+    case Wrap::kClamp:
+      return std::clamp<int64_t>(i, 0, n - 1);
     case Wrap::kMirror: {
       const int64_t m = ((i % (2 * n)) + 2 * n) % (2 * n);
       return m < n ? m : 2 * n - 1 - m;
     }
-    case Wrap::kBlack: return i < 0 || i >= n ? -1 : i;
+    case Wrap::kBlack:
+      return i < 0 || i >= n ? -1 : i;
   }
   return 0;
 }
@@ -225,7 +235,8 @@ Color4 reference(const TextureView& view, uint32_t level, double s, double t) {
       const int64_t v = wrap_tap(view.wrap_t, static_cast<int64_t>(y0) + j, h);
       const double weight = (i ? x - x0 : 1 - (x - x0)) * (j ? y - y0 : 1 - (y - y0));
       std::array<float, 4> texel{0, 0, 0, view.has_alpha ? 0.f : 1.f};
-      if (u >= 0 && v >= 0) texel = texel_at(view, level, static_cast<uint32_t>(u), static_cast<uint32_t>(v));
+      if (u >= 0 && v >= 0)
+        texel = texel_at(view, level, static_cast<uint32_t>(u), static_cast<uint32_t>(v));
       for (size_t c = 0; c < 4; ++c) sum[c] += weight * static_cast<double>(texel[c]);
     }
   return sum;
@@ -233,7 +244,8 @@ Color4 reference(const TextureView& view, uint32_t level, double s, double t) {
 
 Color4 reference(const TextureView& view, double s, double t, double width) {
   const double size = std::max(view.levels[0].width, view.levels[0].height);
-  const double lod = width > 0 ? std::clamp(std::log2(width * size), 0.0, view.level_count - 1.0) : 0.0;
+  const double lod =
+      width > 0 ? std::clamp(std::log2(width * size), 0.0, view.level_count - 1.0) : 0.0;
   const auto fine = static_cast<uint32_t>(lod);
   const uint32_t rough = std::min(fine + 1, view.level_count - 1);
   const Color4 a = reference(view, fine, s, t), b = reference(view, rough, s, t);
@@ -244,11 +256,12 @@ Color4 reference(const TextureView& view, double s, double t, double width) {
 
 /// Looks up all points at lane type F; returns r, g, b, a after one another.
 template <typename F>
-std::vector<float> look_up(const TextureView& view, const std::vector<float>& s, const std::vector<float>& t,
-                           const std::vector<float>& width) {
+std::vector<float> look_up(const TextureView& view, const std::vector<float>& s,
+                           const std::vector<float>& t, const std::vector<float>& width) {
   std::vector<float> out(4 * s.size());
   for (size_t i = 0; i < s.size(); i += kWidth<F>) {
-    const Texel<F> x = lookup<F>(view, load<F>(&s[i]), load<F>(&t[i]), load<F>(&width[i]), Mask<F>(true));
+    const Texel<F> x =
+        lookup<F>(view, load<F>(&s[i]), load<F>(&t[i]), load<F>(&width[i]), Mask<F>(true));
     store(&out[i], x.r);
     store(&out[s.size() + i], x.g);
     store(&out[2 * s.size() + i], x.b);
@@ -267,15 +280,17 @@ TEST(Lookup, AgreesWithTheReferenceInAllFormatsAndWraps) {
       for (const Wrap wrap_s : kWraps)
         for (const Wrap wrap_t : kWraps)
           for (const auto& size : sizes) {
-            Image image = make_image(size[0], size[1], channels, format, channels % 2 == 0, wrap_s, wrap_t);
+            Image image =
+                make_image(size[0], size[1], channels, format, channels % 2 == 0, wrap_s, wrap_t);
             const Texture texture = make_texture(image);
             const auto scalar = look_up<float>(texture.view(), s, t, width);
             for (size_t i = 0; i < s.size(); ++i) {
               const Color4 exact = reference(texture.view(), s[i], t[i], width[i]);
               for (size_t c = 0; c < 4; ++c) {
                 ASSERT_NEAR(scalar[c * s.size() + i], exact[c], 1e-4)
-                    << size[0] << " x " << size[1] << ", " << channels << " channels, at (" << s[i] << ", " << t[i]
-                    << ") width " << width[i] << " wraps " << int(wrap_s) << int(wrap_t);
+                    << size[0] << " x " << size[1] << ", " << channels << " channels, at (" << s[i]
+                    << ", " << t[i] << ") width " << width[i] << " wraps " << int(wrap_s)
+                    << int(wrap_t);
               }
             }
             for_each_packet([&]<typename F>() {
@@ -292,7 +307,8 @@ TEST(Lookup, FinestLevelAloneGivesTheSameBits) {
   const std::vector<float> fine(512, 0.f);
   auto mixed = fine;
   for (size_t i = 0; i < 512; i += 4) mixed[i] = 0.3f;
-  const auto a = look_up<FloatP<16>>(texture.view(), s, t, fine), b = look_up<FloatP<16>>(texture.view(), s, t, mixed);
+  const auto a = look_up<FloatP<16>>(texture.view(), s, t, fine),
+             b = look_up<FloatP<16>>(texture.view(), s, t, mixed);
   for (size_t i = 0; i < a.size(); ++i) {
     if (i % 4 != 0) {
       ASSERT_TRUE(same_bits(a[i], b[i]));
@@ -302,7 +318,8 @@ TEST(Lookup, FinestLevelAloneGivesTheSameBits) {
 
 TEST(Lookup, AnyCoordinateIsSafe) {
   auto values = awkward_floats();
-  for (const float x : {1e6f, -1e6f, 3e9f, 1e15f, 0.99999994f, 1.0000001f, -1e-8f, -0x1p-149f}) values.push_back(x);
+  for (const float x : {1e6f, -1e6f, 3e9f, 1e15f, 0.99999994f, 1.0000001f, -1e-8f, -0x1p-149f})
+    values.push_back(x);
   const auto [s, t] = all_pairs(values);
   for (const Wrap wrap : kWraps)
     for (const uint32_t size : {1u, 7u, 64u})
@@ -326,15 +343,18 @@ TEST(Lookup, AnyCoordinateIsSafe) {
 
 TEST(Lookup, ConstantTexturesAreExact) {
   const std::vector<float> data(7 * 5 * 3, 0.3f);
-  const Texture texture({"grey", data.data(), 7, 5, 3, TexelFormat::kF32, false, Wrap::kRepeat, Wrap::kMirror});
-  const auto s = padded({}, 512, -3.f, 3.f, 41), t = padded({}, 512, -3.f, 3.f, 42), w = padded({}, 512, 0.f, 1.f, 43);
+  const Texture texture(
+      {"grey", data.data(), 7, 5, 3, TexelFormat::kF32, false, Wrap::kRepeat, Wrap::kMirror});
+  const auto s = padded({}, 512, -3.f, 3.f, 41), t = padded({}, 512, -3.f, 3.f, 42),
+             w = padded({}, 512, 0.f, 1.f, 43);
   const auto y = look_up<FloatP<8>>(texture.view(), s, t, w);
   for (size_t i = 0; i < 3 * 512; ++i) ASSERT_NEAR(y[i], 0.3f, 1e-7);
 }
 
 TEST(Lookup, TUpAndRowsDown) {
   const uint8_t rows[2] = {255, 0};  // white above black
-  const Texture texture({"rows", rows, 1, 2, 1, TexelFormat::kU8, false, Wrap::kClamp, Wrap::kClamp});
+  const Texture texture(
+      {"rows", rows, 1, 2, 1, TexelFormat::kU8, false, Wrap::kClamp, Wrap::kClamp});
   EXPECT_EQ(lookup<float>(texture.view(), 0.5f, 1.f, 0.f, true).r, 1.f);
   EXPECT_EQ(lookup<float>(texture.view(), 0.5f, 0.f, 0.f, true).g, 0.f);
   EXPECT_FLOAT_EQ(lookup<float>(texture.view(), 0.5f, 0.5f, 0.f, true).b, 0.5f);
@@ -345,11 +365,13 @@ TEST(Lookup, IdPerLane) {
   std::vector<Texture> textures;
   std::vector<TextureView> views;
   for (uint32_t i = 0; i < 5; ++i) {
-    Image image = make_image(8 + i, 9, 1 + i % 4, kFormats[i % 3], i == 0, kWraps[i % 4], kWraps[i % 3], i);
+    Image image =
+        make_image(8 + i, 9, 1 + i % 4, kFormats[i % 3], i == 0, kWraps[i % 4], kWraps[i % 3], i);
     textures.push_back(make_texture(image));
   }
   for (const Texture& t : textures) views.push_back(t.view());
-  const auto s = padded({}, 4096, -2.f, 2.f, 51), t = padded({}, 4096, -2.f, 2.f, 52), w = padded({}, 4096, 0.f, 0.4f, 53);
+  const auto s = padded({}, 4096, -2.f, 2.f, 51), t = padded({}, 4096, -2.f, 2.f, 52),
+             w = padded({}, 4096, 0.f, 0.4f, 53);
   std::vector<uint32_t> id(4096);
   std::mt19937 rng(54);
   for (size_t i = 0; i < id.size(); ++i) {
@@ -368,8 +390,8 @@ TEST(Lookup, IdPerLane) {
   for_each_lane_type([&]<typename F>() {
     std::vector<float> result(expected.size());
     for (size_t i = 0; i < id.size(); i += kWidth<F>) {
-      const Texel<F> x = lookup<F>(views.data(), load<UInt<F>>(&id[i]), load<F>(&s[i]), load<F>(&t[i]),
-                                   load<F>(&w[i]), Mask<F>(true));
+      const Texel<F> x = lookup<F>(views.data(), load<UInt<F>>(&id[i]), load<F>(&s[i]),
+                                   load<F>(&t[i]), load<F>(&w[i]), Mask<F>(true));
       for (size_t k = 0; k < kWidth<F>; ++k) {
         const float lanes[4] = {lane(x.r, k), lane(x.g, k), lane(x.b, k), lane(x.a, k)};
         std::copy(lanes, lanes + 4, result.begin() + static_cast<std::ptrdiff_t>(4 * (i + k)));
@@ -400,7 +422,8 @@ TEST(Texture, BadValuesBecome0AndAreCounted) {
 
 TEST(Texture, BadDescriptionsAreRefusedByName) {
   const uint8_t pixel[4] = {};
-  const auto message = [&](uint32_t w, uint32_t h, uint32_t channels, const void* data) -> std::string {
+  const auto message = [&](uint32_t w, uint32_t h, uint32_t channels,
+                           const void* data) -> std::string {
     try {
       Texture({"/World/Looks/wood", data, w, h, channels, TexelFormat::kU8});
     } catch (const Error& e) {
@@ -408,8 +431,10 @@ TEST(Texture, BadDescriptionsAreRefusedByName) {
     }
     return "";
   };
-  for (const std::string& m : {message(0, 1, 3, pixel), message(1, 0, 3, pixel), message(65537, 1, 3, pixel), message(1, 1, 0, pixel),
-                               message(1, 1, 5, pixel), message(1, 1, 3, nullptr), message(65536, 65536, 4, pixel)}) {
+  for (const std::string& m :
+       {message(0, 1, 3, pixel), message(1, 0, 3, pixel), message(65537, 1, 3, pixel),
+        message(1, 1, 0, pixel), message(1, 1, 5, pixel), message(1, 1, 3, nullptr),
+        message(65536, 65536, 4, pixel)}) {
     EXPECT_NE(m.find("/World/Looks/wood"), std::string::npos) << m;
     EXPECT_EQ(m.find('\n'), std::string::npos);
   }

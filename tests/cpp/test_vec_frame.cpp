@@ -14,8 +14,9 @@ using V = Vec3<float>;
 std::vector<V> directions() {
   std::vector<V> all;
   for (const float s : {-1.f, 1.f}) {
-    for (const V& v : {V(s, 0, 0), V(0, s, 0), V(0, 0, s), V(0, -0.f, s), V(1e-20f, 0, s), V(1e-4f, -1e-4f, s), V(0.6f, 0.8f, 0.f * s),
-                       V(0.6f, 0, 0.8f * s), V(0.8f, 0.6f, -1e-30f * s)}) {
+    for (const V& v :
+         {V(s, 0, 0), V(0, s, 0), V(0, 0, s), V(0, -0.f, s), V(1e-20f, 0, s), V(1e-4f, -1e-4f, s),
+          V(0.6f, 0.8f, 0.f * s), V(0.6f, 0, 0.8f * s), V(0.8f, 0.6f, -1e-30f * s)}) {
       all.push_back(normalize(v));
     }
   }
@@ -82,7 +83,8 @@ TEST(Vec, Algebra) {
 
 TEST(Vec, NormalizeGivesUnitLength) {
   for (const V& d : directions())
-    for (const float scale : {1e-15f, 1.f, 1e15f}) ASSERT_NEAR(length(normalize(d * scale)), 1, 3e-7);
+    for (const float scale : {1e-15f, 1.f, 1e15f})
+      ASSERT_NEAR(length(normalize(d * scale)), 1, 3e-7);
 }
 
 TEST(Vec, GatherVec3) {
@@ -150,7 +152,8 @@ TEST(Frame, TangentIsKeptWhereItCan) {
 
 TEST(Frame, BadTangentsFallBack) {
   for (const V& n : directions()) {
-    for (const V& tangent : {V(0, 0, 0), V(kNan, 0, 0), V(kInf, 1, 0), n, -n, n * 1e10f, n * 1e-15f, V(1e-30f, 0, 0)}) {
+    for (const V& tangent : {V(0, 0, 0), V(kNan, 0, 0), V(kInf, 1, 0), n, -n, n * 1e10f, n * 1e-15f,
+                             V(1e-30f, 0, 0)}) {
       const Frame<float> f = make_frame(n, tangent);
       ASSERT_NEAR(dot(f.s, f.s), 1, 1e-5);
       ASSERT_NEAR(dot(f.s, f.n), 0, 1e-3);
@@ -187,7 +190,8 @@ TEST(Frame, Trigonometry) {
 }
 
 TEST(Affine, ComposesAndMaps) {
-  const Affine a{{{2, 1, 0}, {0, 3, 1}, {1, 0, 4}}, {5, 6, 7}}, b{{{0, -1, 0}, {1, 0, 0}, {0, 0, 2}}, {1, 2, 3}};
+  const Affine a{{{2, 1, 0}, {0, 3, 1}, {1, 0, 4}}, {5, 6, 7}},
+      b{{{0, -1, 0}, {1, 0, 0}, {0, 0, 2}}, {1, 2, 3}};
   const V p(0.5f, -1, 2);
   expect_same((a * b).point(p), a.point(b.point(p)));
   expect_same((a * b).vector(p), a.vector(b.vector(p)));

@@ -6,15 +6,17 @@
 
 namespace wavecomb::detail {
 
-/// A point p + a u + b v with (a, b) uniform in the unit disk, so of density 1 / area; towards n only.
+/// A point p + a u + b v with (a, b) uniform in the unit disk, so of density 1 / area; towards n
+/// only.
 template <typename F>
-inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& from, const F& u, const F& v) {
+inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& from, const F& u,
+                                 const F& v) {
   const Vec2<F> ab = square_to_disk(u, v);
   const Vec3<F> q = fma(light.u(), ab.x, fma(light.v(), ab.y, light.p()));
   const Direction<F> d = make_direction<F>(q - from);
   const F cos_light = -dot(d.wi, light.n());
-  return {d.wi, d.length, light.radiance(), area_to_solid_angle<F>(d.length2, cos_light, light.area()),
-          Mask<F>(false)};
+  return {d.wi, d.length, light.radiance(),
+          area_to_solid_angle<F>(d.length2, cos_light, light.area()), Mask<F>(false)};
 }
 
 /// What a ray gets from the disk at distance t.

@@ -25,13 +25,14 @@ inline KindSample<F> sample_distant(const LightReader<F>& light, const F& u, con
           select(is_delta, F(1.f), distant_pdf<F>(one_minus_cos)), is_delta};
 }
 
-/// What a ray that left the scene gets. With both unit, 1 - cos(angle) = |dir - axis|^2 / 2, which is
-/// exact for small angles, where 1 - dot(dir, axis) is not.
+/// What a ray that left the scene gets. With both unit, 1 - cos(angle) = |dir - axis|^2 / 2, which
+/// is exact for small angles, where 1 - dot(dir, axis) is not.
 template <typename F>
 inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
   const F one_minus_cos = light.one_minus_cos();
   const Vec3<F> difference = dir + light.n();
-  const Mask<F> inside = (one_minus_cos > 0.f) & (length_squared(difference) * 0.5f <= one_minus_cos);
+  const Mask<F> inside =
+      (one_minus_cos > 0.f) & (length_squared(difference) * 0.5f <= one_minus_cos);
   return {select<F>(inside, light.radiance(), Color<F>(F(0.f))),
           select(inside, distant_pdf<F>(one_minus_cos), F(0.f))};
 }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Dome lights: an environment all around, with or without a latlong image.
 ///
-/// UsdLuxDomeLight takes OpenEXR's convention for latitude-longitude images. In the dome's own space,
+/// UsdLuxDomeLight takes OpenEXR's convention for latitude-longitude images. In the dome's own
+/// space,
 ///     direction = (cos(lat) sin(lon), sin(lat), cos(lat) cos(lon)),
 ///     s = 1/2 - lon / (2 pi),   t = 1/2 + lat / pi   (t up),
-/// so that the top row is +y, the image's centre looks at +z, and s falls towards +x: the quarter of the
-/// image at s = 1/4 looks at +x. From outside the sphere the image would be mirrored; from inside it is not.
+/// so that the top row is +y, the image's centre looks at +z, and s falls towards +x: the quarter
+/// of the image at s = 1/4 looks at +x. From outside the sphere the image would be mirrored; from
+/// inside it is not.
 #pragma once
 
 #include "wavecomb/light/record.h"
@@ -26,8 +28,8 @@ inline Vec3<F> from_dome(const LightReader<F>& light, const Vec3<F>& d) {
   return fma(light.u(), d.x, fma(light.v(), d.y, Vec3<F>(light.n() * d.z)));
 }
 
-/// Radiance at image coordinates s and t, finest level. Taps do not cross the poles, however the texture
-/// wraps; in s the texture's own wrap mode holds (which should be kRepeat).
+/// Radiance at image coordinates s and t, finest level. Taps do not cross the poles, however the
+/// texture wraps; in s the texture's own wrap mode holds (which should be kRepeat).
 template <typename F>
 inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& texture, const F& s,
                               const F& t, const Mask<F>& active) {
@@ -37,7 +39,8 @@ inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& te
   return light.radiance() * not_negative(Color<F>(texel.r, texel.g, texel.b));
 }
 
-/// The last i with cdf[i] <= x among `size` + 1 ascending values that start at `first`; x in [0, 1).
+/// The last i with cdf[i] <= x among `size` + 1 ascending values that start at `first`; x in [0,
+/// 1).
 template <typename F>
 inline UInt<F> find_interval(const float* cdf, const UInt<F>& first, uint32_t size, const F& x,
                              const Mask<F>& active) {
@@ -51,8 +54,8 @@ inline UInt<F> find_interval(const float* cdf, const UInt<F>& first, uint32_t si
   return low;
 }
 
-/// Density over the unit square of cell (x, y) is stored; a direction's density over solid angle is that
-/// divided by 2 pi^2 sin(polar angle).
+/// Density over the unit square of cell (x, y) is stored; a direction's density over solid angle is
+/// that divided by 2 pi^2 sin(polar angle).
 template <typename F>
 inline F dome_pdf(const Distribution2D& d, const UInt<F>& x, const UInt<F>& y, const F& sin_theta,
                   const Mask<F>& active) {
@@ -63,7 +66,8 @@ inline F dome_pdf(const Distribution2D& d, const UInt<F>& x, const UInt<F>& y, c
   return select(good & is_finite(pdf), pdf, F(0.f));
 }
 
-/// A point of the image by its density: the row by the marginal, then the column, each by inversion.
+/// A point of the image by its density: the row by the marginal, then the column, each by
+/// inversion.
 template <typename F>
 inline KindSample<F> sample_dome_image(const LightReader<F>& light, const TextureView& texture,
                                        const Distribution2D& d, const F& u, const F& v,
@@ -73,7 +77,8 @@ inline KindSample<F> sample_dome_image(const LightReader<F>& light, const Textur
     return min(max(F((x - a) / select(size > 0.f, size, F(1.f))), F(0.f)), F(kOneMinusEpsilon));
   };
   const UInt<F> y = find_interval<F>(d.marginal.data(), UInt<F>(0u), d.height, v, active);
-  const F dy = inside(v, gather<F>(d.marginal.data(), y, active), gather<F>(d.marginal.data(), y + 1u, active));
+  const F dy = inside(v, gather<F>(d.marginal.data(), y, active),
+                      gather<F>(d.marginal.data(), y + 1u, active));
   const UInt<F> row = y * (d.width + 1);
   const UInt<F> x = find_interval<F>(d.conditional.data(), row, d.width, u, active);
   const F dx = inside(u, gather<F>(d.conditional.data(), row + x, active),
@@ -84,7 +89,8 @@ inline KindSample<F> sample_dome_image(const LightReader<F>& light, const Textur
   const auto [sin_theta, cos_theta] = sincos_2pi(F(down * 0.5f));
   const auto [sin_lon, cos_lon] = sincos_2pi(F(0.5f - s));
   const Vec3<F> local(sin_theta * sin_lon, cos_theta, sin_theta * cos_lon);
-  return {from_dome<F>(light, local), F(kFarAway), dome_radiance<F>(light, texture, s, F(1.f - down), active),
+  return {from_dome<F>(light, local), F(kFarAway),
+          dome_radiance<F>(light, texture, s, F(1.f - down), active),
           dome_pdf<F>(d, x, y, sin_theta, active), Mask<F>(false)};
 }
 
@@ -96,8 +102,8 @@ inline KindSample<F> sample_dome_constant(const LightReader<F>& light, const F& 
 
 /// One kind of dome light after the other among the active lanes: each image once.
 template <typename F>
-inline KindSample<F> sample_dome(const LightView& view, const LightReader<F>& light, const F& u, const F& v,
-                                 const Mask<F>& active) {
+inline KindSample<F> sample_dome(const LightView& view, const LightReader<F>& light, const F& u,
+                                 const F& v, const Mask<F>& active) {
   KindSample<F> result = sample_dome_constant<F>(light, u, v);
   const UInt<F> texture = light.texture(), index = light.bits(offsetof(LightRecord, distribution));
   Mask<F> pending = active & Mask<F>(texture != UInt<F>(kNoTexture));
@@ -105,10 +111,11 @@ inline KindSample<F> sample_dome(const LightView& view, const LightReader<F>& li
     const auto first = static_cast<size_t>(std::countr_zero(lane_bits<F>(pending)));
     const uint32_t one = lane(index, first);
     const Mask<F> same = pending & Mask<F>(index == UInt<F>(one));
-    const KindSample<F> s = sample_dome_image<F>(light, view.materials.textures[lane(texture, first)],
-                                                 view.distributions[one], u, v, same);
-    result = {select<F>(same, s.wi, result.wi), result.distance, select<F>(same, s.radiance, result.radiance),
-              select(same, s.pdf, result.pdf), result.is_delta};
+    const KindSample<F> s = sample_dome_image<F>(
+        light, view.materials.textures[lane(texture, first)], view.distributions[one], u, v, same);
+    result = {select<F>(same, s.wi, result.wi), result.distance,
+              select<F>(same, s.radiance, result.radiance), select(same, s.pdf, result.pdf),
+              result.is_delta};
     pending = pending & not_(same);
   }
   return result;
@@ -126,11 +133,13 @@ inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, con
   const F s = fnma(atan2(w.x, w.z), F(kInv2Pi), F(0.5f));
   const F down = atan2(sin_theta, w.y) * kInvPi;
   const auto cell = [](const F& x, uint32_t size) {
-    const F i = clamp(floor(F(x * static_cast<float>(size))), F(0.f), F(static_cast<float>(size - 1)));
+    const F i =
+        clamp(floor(F(x * static_cast<float>(size))), F(0.f), F(static_cast<float>(size - 1)));
     return UInt<F>(to_int<F>(i));
   };
-  return {dome_radiance<F>(light, view.materials.textures[record.texture], s, F(1.f - down), active),
-          dome_pdf<F>(d, cell(s, d.width), cell(down, d.height), sin_theta, active)};
+  return {
+      dome_radiance<F>(light, view.materials.textures[record.texture], s, F(1.f - down), active),
+      dome_pdf<F>(d, cell(s, d.width), cell(down, d.height), sin_theta, active)};
 }
 
 }  // namespace wavecomb::detail

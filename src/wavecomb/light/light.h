@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Light sampling: choosing a light, a point on it, and the densities that go with it.
 ///
-/// An estimator of direct light at p is f(wi) |cos| * LightSample::weight * MIS weight; the other half of
-/// MIS comes from light_hit, triangle_light_pdf and escaped_radiance, whose `pdf` is what sample_light
-/// would have given for the same direction.
+/// An estimator of direct light at p is f(wi) |cos| * LightSample::weight * MIS weight; the other
+/// half of MIS comes from light_hit, triangle_light_pdf and escaped_radiance, whose `pdf` is what
+/// sample_light would have given for the same direction.
 #pragma once
 
 #include "wavecomb/core/vec.h"
@@ -17,9 +17,10 @@
 
 namespace wavecomb {
 
-/// A direction towards a light. `pdf` is a solid-angle density that includes the choice of the light;
-/// for delta lights it is the probability of the choice and is_delta is set. `weight` = radiance / pdf
-/// (delta: irradiance at normal incidence / pdf), so that the estimator is f_cos * weight * MIS.
+/// A direction towards a light. `pdf` is a solid-angle density that includes the choice of the
+/// light; for delta lights it is the probability of the choice and is_delta is set. `weight` =
+/// radiance / pdf (delta: irradiance at normal incidence / pdf), so that the estimator is f_cos *
+/// weight * MIS.
 template <typename F>
 struct LightSample {
   Vec3<F> wi;
@@ -30,7 +31,8 @@ struct LightSample {
   Mask<F> valid;  ///< false: no light arrives; weight and pdf are 0, wi is finite
 };
 
-/// Balance heuristic (E. Veach, "Robust Monte Carlo Methods", 1997, eq. 9.8): a / (a + b), 0 where a is 0.
+/// Balance heuristic (E. Veach, "Robust Monte Carlo Methods", 1997, eq. 9.8): a / (a + b), 0 where
+/// a is 0.
 template <typename F>
 inline F balance_weight(const F& a, const F& b) {
   return select(a > 0.f, F(1.f / (1.f + b / select(a > 0.f, a, F(1.f)))), F(0.f));
@@ -38,9 +40,9 @@ inline F balance_weight(const F& a, const F& b) {
 
 namespace detail {
 
-/// Index of a light, by alias table, out of the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)). The
-/// product u_pick * count is formed exactly, so that LightRecord::pick_pdf is exact for any count
-/// below 2^24: k = 2^24 u_pick in base 2^8, digit by digit.
+/// Index of a light, by alias table, out of the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)).
+/// The product u_pick * count is formed exactly, so that LightRecord::pick_pdf is exact for any
+/// count below 2^24: k = 2^24 u_pick in base 2^8, digit by digit.
 template <typename F>
 inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
   using U = UInt<F>;
@@ -69,41 +71,53 @@ template <typename F>
 inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const LightReader<F>& light,
                                  const Vec3<F>& p, const F& u, const F& v, const Mask<F>& lanes) {
   switch (kind) {
-    case LightKind::kRect: return sample_rect<F>(light, view.materials.textures, p, u, v, lanes);
-    case LightKind::kDisk: return sample_disk<F>(light, p, u, v);
-    case LightKind::kSphere: return sample_sphere<F>(light, p, u, v);
-    case LightKind::kDistant: return sample_distant<F>(light, u, v);
-    case LightKind::kDome: return sample_dome<F>(view, light, u, v, lanes);
-    case LightKind::kTriangle: return sample_triangle<F>(light, view.materials, p, u, v, lanes);
+    case LightKind::kRect:
+      return sample_rect<F>(light, view.materials.textures, p, u, v, lanes);
+    case LightKind::kDisk:
+      return sample_disk<F>(light, p, u, v);
+    case LightKind::kSphere:
+      return sample_sphere<F>(light, p, u, v);
+    case LightKind::kDistant:
+      return sample_distant<F>(light, u, v);
+    case LightKind::kDome:
+      return sample_dome<F>(view, light, u, v, lanes);
+    case LightKind::kTriangle:
+      return sample_triangle<F>(light, view.materials, p, u, v, lanes);
   }
   return {};
 }
 
 }  // namespace detail
 
-/// Chooses a light by power and a point on it as seen from p. Numbers in [0, 1); u_pick is a multiple
-/// of 2^-24, as samplers give it.
+/// Chooses a light by power and a point on it as seen from p. Numbers in [0, 1); u_pick is a
+/// multiple of 2^-24, as samplers give it.
 template <typename F>
-inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, const F& u_pick, const F& u,
-                                   const F& v, const Mask<F>& active) {
+inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, const F& u_pick,
+                                   const F& u, const F& v, const Mask<F>& active) {
   const F zero(0.f);
-  LightSample<F> result{Vec3<F>(zero, zero, F(1.f)), F(kFarAway), Color<F>(zero), zero, Mask<F>(false), Mask<F>(false)};
+  LightSample<F> result{Vec3<F>(zero, zero, F(1.f)),
+                        F(kFarAway),
+                        Color<F>(zero),
+                        zero,
+                        Mask<F>(false),
+                        Mask<F>(false)};
   if (view.count == 0 || none(active)) return result;
   const UInt<F> index = detail::pick_light<F>(view, u_pick, active);
   const detail::LightReader<F> light(view.lights, index, active);
   const F pick_pdf = light.pick_pdf();
-  detail::for_each_kind<F>(light.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
-    const detail::KindSample<F> s = detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
-    const F pdf = s.pdf * pick_pdf;
-    const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
-    const F inverse = 1.f / select(valid, pdf, F(1.f));
-    result.wi = select<F>(valid, s.wi, result.wi);
-    result.distance = select(valid, s.distance, result.distance);
-    result.weight = select<F>(valid, s.radiance * inverse, result.weight);
-    result.pdf = select(valid, pdf, result.pdf);
-    result.is_delta = result.is_delta | (valid & s.is_delta);
-    result.valid = result.valid | valid;
-  });
+  detail::for_each_kind<F>(
+      light.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
+        const detail::KindSample<F> s = detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
+        const F pdf = s.pdf * pick_pdf;
+        const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
+        const F inverse = 1.f / select(valid, pdf, F(1.f));
+        result.wi = select<F>(valid, s.wi, result.wi);
+        result.distance = select(valid, s.distance, result.distance);
+        result.weight = select<F>(valid, s.radiance * inverse, result.weight);
+        result.pdf = select(valid, pdf, result.pdf);
+        result.is_delta = result.is_delta | (valid & s.is_delta);
+        result.valid = result.valid | valid;
+      });
   return result;
 }
 
@@ -113,8 +127,8 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` (rect, disk, sphere) sends back along the ray origin + t dir which hit it
-/// at distance t. Other kinds and inactive lanes give 0.
+/// Radiance that light `light` (rect, disk, sphere) sends back along the ray origin + t dir which
+/// hit it at distance t. Other kinds and inactive lanes give 0.
 template <typename F>
 inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const Vec3<F>& origin,
                              const Vec3<F>& dir, const F& t, const Mask<F>& active) {
@@ -122,28 +136,31 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const 
   if (none(active)) return result;
   const detail::LightReader<F> reader(view.lights, light, active);
   const F pick_pdf = reader.pick_pdf();
-  detail::for_each_kind<F>(reader.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
-    detail::KindHit<F> hit{Color<F>(F(0.f)), F(0.f)};
-    if (kind == LightKind::kRect) hit = detail::hit_rect<F>(reader, view.materials.textures, origin, dir, t, lanes);
-    if (kind == LightKind::kDisk) hit = detail::hit_disk<F>(reader, dir, t);
-    if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
-    result.radiance = select<F>(lanes, hit.radiance, result.radiance);
-    result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
-  });
+  detail::for_each_kind<F>(
+      reader.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
+        detail::KindHit<F> hit{Color<F>(F(0.f)), F(0.f)};
+        if (kind == LightKind::kRect)
+          hit = detail::hit_rect<F>(reader, view.materials.textures, origin, dir, t, lanes);
+        if (kind == LightKind::kDisk) hit = detail::hit_disk<F>(reader, dir, t);
+        if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
+        result.radiance = select<F>(lanes, hit.radiance, result.radiance);
+        result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
+      });
   return result;
 }
 
 /// The sampling density of triangle light `light` for a hit at distance t along dir.
 template <typename F>
-inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const Vec3<F>& dir, const F& t,
-                            const Mask<F>& active) {
+inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const Vec3<F>& dir,
+                            const F& t, const Mask<F>& active) {
   if (none(active)) return F(0.f);
   const detail::LightReader<F> reader(view.lights, light, active);
   return select(active, F(detail::triangle_pdf<F>(reader, dir, t) * reader.pick_pdf()), F(0.f));
 }
 
 /// Sum over all infinite lights of radiance * MIS weight for a ray that left the scene along dir;
-/// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays too).
+/// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
+/// too).
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
                                  const Mask<F>& bsdf_is_delta, const Mask<F>& active) {
@@ -151,10 +168,11 @@ inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, cons
   for (uint32_t i = 0; i < view.infinite_count; ++i) {
     const LightRecord& record = view.lights[i];
     const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
-    const detail::KindHit<F> hit = is_dome
-        ? detail::hit_dome<F>(view, record, dir, active)
-        : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
-    const F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
+    const detail::KindHit<F> hit =
+        is_dome ? detail::hit_dome<F>(view, record, dir, active)
+                : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
+    const F weight =
+        select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
     sum += hit.radiance * weight;
   }
   return select<F>(active, sum, Color<F>(F(0.f)));

@@ -16,8 +16,8 @@ inline constexpr float kFarAway = 1e30f;
 
 namespace detail {
 
-/// Fields of the light in each lane: one scalar load where all active lanes have the same light, else
-/// gathers. Inactive lanes hold anything that their neighbours hold, or 0.
+/// Fields of the light in each lane: one scalar load where all active lanes have the same light,
+/// else gathers. Inactive lanes hold anything that their neighbours hold, or 0.
 template <typename F>
 struct LightReader {
   const LightRecord* base;
@@ -39,7 +39,10 @@ struct LightReader {
   }
   /// The same record in all lanes.
   LightReader(const LightRecord& record, const Mask<F>& active_)
-      : base(&record), first_word(0u), shared(reinterpret_cast<const float*>(&record)), active(active_) {}
+      : base(&record),
+        first_word(0u),
+        shared(reinterpret_cast<const float*>(&record)),
+        active(active_) {}
 
   F real(size_t offset_bytes) const {
     const auto word = static_cast<uint32_t>(offset_bytes / 4);
@@ -67,7 +70,7 @@ struct LightReader {
 /// What one light gives a shading point, before the choice of the light is counted.
 template <typename F>
 struct KindSample {
-  Vec3<F> wi;         ///< unit direction to the light
+  Vec3<F> wi;  ///< unit direction to the light
   F distance;
   Color<F> radiance;  ///< delta lights: the irradiance at normal incidence
   F pdf;              ///< over solid angle; delta lights: 1; 0: no sample
@@ -82,8 +85,8 @@ struct KindHit {
 };
 
 /// The density over solid angle that a density of 1 / area becomes at distance^2 `d2`, where the
-/// direction makes an angle of cosine `cos_light` with the light's normal; 0 where the light is seen
-/// from behind or on edge, is degenerate, or the density is out of range.
+/// direction makes an angle of cosine `cos_light` with the light's normal; 0 where the light is
+/// seen from behind or on edge, is degenerate, or the density is out of range.
 template <typename F>
 inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   const F projected = cos_light * area;

@@ -23,12 +23,14 @@ inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* te
 /// A point q = p + a u + b v, with density 1 / area; towards n only.
 template <typename F>
 inline KindSample<F> sample_rect(const LightReader<F>& light, const TextureView* textures,
-                                 const Vec3<F>& from, const F& u, const F& v, const Mask<F>& active) {
+                                 const Vec3<F>& from, const F& u, const F& v,
+                                 const Mask<F>& active) {
   const Vec3<F> q = fma(light.u(), u, fma(light.v(), v, light.p()));
   const Direction<F> d = make_direction<F>(q - from);
   const F cos_light = -dot(d.wi, light.n());
   const F pdf = area_to_solid_angle<F>(d.length2, cos_light, light.area());
-  return {d.wi, d.length, rect_radiance<F>(light, textures, u, v, active & (pdf > 0.f)), pdf, Mask<F>(false)};
+  return {d.wi, d.length, rect_radiance<F>(light, textures, u, v, active & (pdf > 0.f)), pdf,
+          Mask<F>(false)};
 }
 
 /// What a ray gets from the rect at distance t.
@@ -46,7 +48,8 @@ inline KindHit<F> hit_rect(const LightReader<F>& light, const TextureView* textu
   const F inverse = 1.f / select(m2 > 0.f, m2, F(1.f));
   const F a = dot(cross(h, edge_v), m) * inverse;
   const F b = dot(cross(edge_u, h), m) * inverse;
-  const Color<F> radiance = rect_radiance<F>(light, textures, clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f)), front);
+  const Color<F> radiance =
+      rect_radiance<F>(light, textures, clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f)), front);
   return {select<F>(front, radiance, Color<F>(F(0.f))),
           area_to_solid_angle<F>(F(t * t), cos_light, light.area())};
 }

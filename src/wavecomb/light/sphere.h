@@ -10,10 +10,10 @@ namespace wavecomb::detail {
 /// The cone of directions in which a sphere is seen.
 template <typename F>
 struct SphereCone {
-  Vec3<F> axis;      ///< unit, to the centre
+  Vec3<F> axis;           ///< unit, to the centre
   F distance2, distance;  ///< to the centre
-  F one_minus_cos;   ///< of the half angle, exact also for small ones
-  Mask<F> outside;   ///< the point sees the sphere from outside; else nothing of it
+  F one_minus_cos;        ///< of the half angle, exact also for small ones
+  Mask<F> outside;        ///< the point sees the sphere from outside; else nothing of it
 };
 
 /// sin^2 = r^2 / d^2, and 1 - cos = sin^2 / (1 + cos) rather than a difference near 0.
@@ -27,7 +27,8 @@ inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>
   return {d.wi, d.length2, d.length, sin2 / (1.f + safe_sqrt(F(1.f - sin2))), outside};
 }
 
-/// 1 / (2 pi (1 - cos)): uniform over the cone. 0 from inside, and where the sphere is too small to see.
+/// 1 / (2 pi (1 - cos)): uniform over the cone. 0 from inside, and where the sphere is too small to
+/// see.
 template <typename F>
 inline F sphere_cone_pdf(const SphereCone<F>& cone) {
   const Mask<F> good = cone.outside & (cone.one_minus_cos > 0.f);
@@ -38,7 +39,8 @@ inline F sphere_cone_pdf(const SphereCone<F>& cone) {
 /// A direction uniform in the cone that the sphere fills (P. Shirley, C. Wang, K. Zimmerman, "Monte
 /// Carlo Techniques for Direct Lighting Calculations", ACM TOG 15(1) 1996); radius 0: its centre.
 template <typename F>
-inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& from, const F& u, const F& v) {
+inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& from, const F& u,
+                                   const F& v) {
   const SphereCone<F> cone = make_sphere_cone<F>(light, from);
   const F radius = light.radius();
   const Mask<F> is_point = radius == 0.f;

@@ -7,11 +7,11 @@
 
 namespace wavecomb::detail {
 
-/// Radiance that the emission slot of each lane's material gives at `uv`: texel * scale + bias, read at
-/// the finest level, in [0, 1e18] as material/ keeps it.
+/// Radiance that the emission slot of each lane's material gives at `uv`: texel * scale + bias,
+/// read at the finest level, in [0, 1e18] as material/ keeps it.
 template <typename F>
-inline Color<F> textured_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                                  const Mask<F>& active) {
+inline Color<F> textured_emission(const MaterialView& view, const UInt<F>& material,
+                                  const Vec2<F>& uv, const Mask<F>& active) {
   using R = TextureUseRecord;
   constexpr auto kWords = static_cast<uint32_t>(sizeof(R) / 4);
   const UInt<F> first = (material * kSlotCount + static_cast<uint32_t>(Slot::kEmission)) * kWords;
@@ -27,7 +27,8 @@ inline Color<F> textured_emission(const MaterialView& view, const UInt<F>& mater
   const auto channel = [&](const F& value, size_t i) {
     return fma(value, real(offsetof(R, scale), i), real(offsetof(R, bias), i));
   };
-  const F c[4] = {channel(texel.r, 0), channel(texel.g, 1), channel(texel.b, 2), channel(texel.a, 3)};
+  const F c[4] = {channel(texel.r, 0), channel(texel.g, 1), channel(texel.b, 2),
+                  channel(texel.a, 3)};
   const UInt<F> which = float_bits<F>(real(offsetof(R, channel), 0));
   F one = c[0];
   for (uint32_t i = 1; i < 4; ++i) one = select(Mask<F>(which == UInt<F>(i)), c[i], one);
@@ -39,7 +40,8 @@ inline Color<F> textured_emission(const MaterialView& view, const UInt<F>& mater
 /// A point q = p + b1 u + b2 v, with density 1 / area.
 template <typename F>
 inline KindSample<F> sample_triangle(const LightReader<F>& light, const MaterialView& materials,
-                                     const Vec3<F>& from, const F& u, const F& v, const Mask<F>& active) {
+                                     const Vec3<F>& from, const F& u, const F& v,
+                                     const Mask<F>& active) {
   const Vec2<F> b = square_to_triangle(u, v);
   const Vec3<F> q = fma(light.u(), b.x, fma(light.v(), b.y, light.p()));
   const Direction<F> d = make_direction<F>(q - from);
@@ -49,11 +51,13 @@ inline KindSample<F> sample_triangle(const LightReader<F>& light, const Material
   const UInt<F> material = light.bits(offsetof(LightRecord, material));
   const Mask<F> textured = active & (pdf > 0.f) & Mask<F>(material != UInt<F>(kNoLight));
   if (any(textured)) {
-    const Vec2<F> uv0 = light.vec2(offsetof(LightRecord, uv0)), uv1 = light.vec2(offsetof(LightRecord, uv1)),
+    const Vec2<F> uv0 = light.vec2(offsetof(LightRecord, uv0)),
+                  uv1 = light.vec2(offsetof(LightRecord, uv1)),
                   uv2 = light.vec2(offsetof(LightRecord, uv2));
     const Vec2<F> uv{fma(F(uv1.x - uv0.x), b.x, fma(F(uv2.x - uv0.x), b.y, uv0.x)),
                      fma(F(uv1.y - uv0.y), b.x, fma(F(uv2.y - uv0.y), b.y, uv0.y))};
-    radiance = select<F>(textured, textured_emission<F>(materials, material, uv, textured), radiance);
+    radiance =
+        select<F>(textured, textured_emission<F>(materials, material, uv, textured), radiance);
   }
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }

@@ -15,7 +15,8 @@ constexpr uint32_t kMaxWidth = 1024, kMaxHeight = 512;
 /// cumulative values can tell it apart and no lit cell is missed.
 constexpr double kFloor = 1e-3;
 
-/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; parts of one cell sum to 1.
+/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; parts of one cell
+/// sum to 1.
 template <typename Add>
 void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
   const uint64_t begin = i * cells, end = begin + cells;  // in units of 1 / (n cells)
@@ -33,8 +34,8 @@ uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
   return wrap == Wrap::kBlack ? size : i;
 }
 
-/// Luminance of rows of an image, each averaged over columns of cells. A function that is linear between
-/// texel centres has the mean (a + 6 b + c) / 8 over the texel b between a and c.
+/// Luminance of rows of an image, each averaged over columns of cells. A function that is linear
+/// between texel centres has the mean (a + 6 b + c) / 8 over the texel b between a and c.
 class RowMeans {
  public:
   RowMeans(const TextureView& texture, const Vec3<float>& color, uint32_t cells)
@@ -44,7 +45,9 @@ class RowMeans {
     const auto n = static_cast<uint32_t>(line_.size());
     for (uint32_t x = 0; x < n; ++x) {
       const auto t = texel_at(texture_, 0, x, y);
-      const auto lit = [](float texel, float scale) { return std::max(0.0, double{texel}) * double{scale}; };
+      const auto lit = [](float texel, float scale) {
+        return std::max(0.0, double{texel}) * double{scale};
+      };
       line_[x] = 0.212656 * lit(t[0], color_.x) + 0.715158 * lit(t[1], color_.y) +
                  0.072186 * lit(t[2], color_.z);
     }
@@ -52,7 +55,8 @@ class RowMeans {
     std::vector<double> smooth(n), cells(cells_, 0.0);
     for (uint32_t x = 0; x < n; ++x) {
       smooth[x] = (at(neighbour(texture_.wrap_s, x, -1, n)) + 6 * line_[x] +
-                   at(neighbour(texture_.wrap_s, x, 1, n))) / 8;
+                   at(neighbour(texture_.wrap_s, x, 1, n))) /
+                  8;
     }
     for (uint32_t x = 0; x < n; ++x) {
       for_each_overlap(x, n, cells_, [&](size_t c, double part) { cells[c] += part * smooth[x]; });
@@ -78,7 +82,8 @@ double accumulate(std::vector<double>& weights, float* cdf) {
   }
   const size_t n = weights.size();
   if (!(sum > 0)) {  // never chosen; some valid table
-    for (size_t i = 0; i <= n; ++i) cdf[i] = static_cast<float>(static_cast<double>(i) / static_cast<double>(n));
+    for (size_t i = 0; i <= n; ++i)
+      cdf[i] = static_cast<float>(static_cast<double>(i) / static_cast<double>(n));
     return 0;
   }
   const double least = kFloor * sum / static_cast<double>(n);
@@ -143,7 +148,8 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
     const double row_part = (double{d.marginal[y + 1]} - double{d.marginal[y]}) * d.height;
     const float* cdf = d.conditional.data() + size_t{y} * (d.width + 1);
     for (uint32_t x = 0; x < d.width; ++x) {
-      d.density[size_t{y} * d.width + x] = static_cast<float>(row_part * (double{cdf[x + 1]} - double{cdf[x]}) * d.width);
+      d.density[size_t{y} * d.width + x] =
+          static_cast<float>(row_part * (double{cdf[x + 1]} - double{cdf[x]}) * d.width);
     }
   }
   return d;

@@ -17,14 +17,24 @@ struct Double3 {
   double x, y, z;
   Double3 operator*(double s) const { return {x * s, y * s, z * s}; }
 };
-Double3 to_double(const Vec3<float>& v) { return {v.x, v.y, v.z}; }
-Double3 to_double(const float* v) { return {v[0], v[1], v[2]}; }
-Double3 subtract(const Double3& a, const Double3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Double3 to_double(const Vec3<float>& v) {
+  return {v.x, v.y, v.z};
+}
+Double3 to_double(const float* v) {
+  return {v[0], v[1], v[2]};
+}
+Double3 subtract(const Double3& a, const Double3& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
 Double3 cross(const Double3& a, const Double3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-double dot(const Double3& a, const Double3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-double length(const Double3& a) { return std::sqrt(dot(a, a)); }
+double dot(const Double3& a, const Double3& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+double length(const Double3& a) {
+  return std::sqrt(dot(a, a));
+}
 /// a / |a|; +z for the zero vector.
 Double3 unit(const Double3& a) {
   const double n = length(a);
@@ -35,7 +45,9 @@ void put(float (&to)[3], const Double3& v) {
   to[1] = static_cast<float>(v.y);
   to[2] = static_cast<float>(v.z);
 }
-double luminance(double r, double g, double b) { return 0.212656 * r + 0.715158 * g + 0.072186 * b; }
+double luminance(double r, double g, double b) {
+  return 0.212656 * r + 0.715158 * g + 0.072186 * b;
+}
 
 /// Areas below are too small to be told from 0 in float: such lights are dark.
 constexpr double kLeastArea = 1e-36;
@@ -43,10 +55,13 @@ constexpr double kLeastArea = 1e-36;
 constexpr double kMostRadiance = 1e30;
 
 void put_radiance(LightRecord& record, const Double3& v) {
-  put(record.radiance, {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
+  put(record.radiance,
+      {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
 }
 
-bool finite(const Vec3<float>& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Vec3<float>& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 void check(const Light& light, size_t texture_count) {
   const std::string where = "light '" + light.name + "': ";
@@ -66,7 +81,9 @@ void check(const Light& light, size_t texture_count) {
   }
 }
 
-bool is_infinite(LightKind kind) { return kind == LightKind::kDistant || kind == LightKind::kDome; }
+bool is_infinite(LightKind kind) {
+  return kind == LightKind::kDistant || kind == LightKind::kDome;
+}
 
 /// A record in the making, and the power that its choice rests on.
 struct Made {
@@ -74,9 +91,10 @@ struct Made {
   double power = 0;
 };
 
-/// Area, directions of emission and radiance of a light in the plane with the given edges or half axes.
-void finish_flat(Made& made, const Light& light, const Double3& u, const Double3& v, double area_factor,
-                 const Double3& color, double mean) {
+/// Area, directions of emission and radiance of a light in the plane with the given edges or half
+/// axes.
+void finish_flat(Made& made, const Light& light, const Double3& u, const Double3& v,
+                 double area_factor, const Double3& color, double mean) {
   const Double3 m = cross(u, v);
   // Light leaves on the side that -z is mapped to, whatever the handedness of the map.
   const Double3 minus_z = to_double(light.to_world.axis(2)) * -1.0;
@@ -113,7 +131,8 @@ void make_sphere(Made& made, const Light& light, const Double3& color, double me
   if (!there) made.record.radius = 1e-18f;  // 0 would make it a point light
 }
 
-void make_distant(Made& made, const Light& light, const Double3& color, double mean, double scene_radius) {
+void make_distant(Made& made, const Light& light, const Double3& color, double mean,
+                  double scene_radius) {
   put(made.record.n, unit(to_double(light.to_world.axis(2)) * -1.0));
   const double half = std::clamp(double{light.angle}, 0.0, 360.0) / 2 * kPiD / 180;
   const double half_sin = std::sin(half / 2);
@@ -152,7 +171,8 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
     made.record.distribution = static_cast<uint32_t>(set.distributions.size());
     set.distributions.push_back(build_dome_distribution(
         textures[light.texture]->view(),
-        {made.record.radiance[0], made.record.radiance[1], made.record.radiance[2]}, &mean_radiance));
+        {made.record.radiance[0], made.record.radiance[1], made.record.radiance[2]},
+        &mean_radiance));
     if (set.distributions.back().width == 0) {  // black
       set.distributions.pop_back();
       made.record.texture = kNoTexture;
@@ -181,7 +201,9 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
       if (light.texture != kNoTexture) {
         const float* texel = textures[light.texture]->mean();
         // A mean of negative values says nothing; some floor keeps the light in the game.
-        mean = std::max(luminance(color.x * double{texel[0]}, color.y * double{texel[1]}, color.z * double{texel[2]}), 1e-3 * mean);
+        mean = std::max(luminance(color.x * double{texel[0]}, color.y * double{texel[1]},
+                                  color.z * double{texel[2]}),
+                        1e-3 * mean);
       }
       // Seen from the front, looking along +z with +y up, +x is to the left: s runs along -x.
       const double w = std::fabs(double{light.width}), h = std::fabs(double{light.height});
@@ -195,10 +217,17 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
       finish_flat(made, light, x * radius, y * radius, kPiD, color, mean);
       break;
     }
-    case LightKind::kSphere: make_sphere(made, light, color, mean); break;
-    case LightKind::kDistant: make_distant(made, light, color, mean, scene_radius); break;
-    case LightKind::kDome: make_dome(made, set, light, color, mean, scene_radius, textures); break;
-    case LightKind::kTriangle: break;
+    case LightKind::kSphere:
+      make_sphere(made, light, color, mean);
+      break;
+    case LightKind::kDistant:
+      make_distant(made, light, color, mean, scene_radius);
+      break;
+    case LightKind::kDome:
+      make_dome(made, set, light, color, mean, scene_radius, textures);
+      break;
+    case LightKind::kTriangle:
+      break;
   }
   return made;
 }
@@ -222,7 +251,9 @@ Made make_triangle(const EmissiveTriangle& t) {
   std::copy(t.uv0, t.uv0 + 2, r.uv0);
   std::copy(t.uv1, t.uv1 + 2, r.uv1);
   std::copy(t.uv2, t.uv2 + 2, r.uv2);
-  const double mean = luminance(double{t.radiance[0]}, double{t.radiance[1]}, double{t.radiance[2]}) * double{t.mean_scale};
+  const double mean =
+      luminance(double{t.radiance[0]}, double{t.radiance[1]}, double{t.radiance[2]}) *
+      double{t.mean_scale};
   made.power = area < kLeastArea ? 0 : 2 * kPiD * area * mean;
   return made;
 }
@@ -306,7 +337,8 @@ void build_alias_table(std::span<const double> weights, std::vector<AliasEntry>&
   }
   // Thresholds are multiples of 2^-24 so that comparing with them is exact.
   const auto keep = [&](uint32_t i, double part) {
-    table[i].threshold = static_cast<float>(std::clamp(std::nearbyint(part * kNumbers), 0.0, kNumbers) / kNumbers);
+    table[i].threshold =
+        static_cast<float>(std::clamp(std::nearbyint(part * kNumbers), 0.0, kNumbers) / kNumbers);
   };
   while (!small.empty() && !large.empty()) {
     const uint32_t s = small.back(), l = large.back();
@@ -321,14 +353,15 @@ void build_alias_table(std::span<const double> weights, std::vector<AliasEntry>&
   }
   for (const uint32_t i : large) keep(i, 1);
   // Left by rounding: full bins, or empty ones that any light may fill.
-  const auto brightest = static_cast<uint32_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
+  const auto brightest =
+      static_cast<uint32_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
   for (const uint32_t i : small) {
     keep(i, weights[i] > 0 ? 1 : 0);
     table[i].alias = weights[i] > 0 ? i : brightest;
   }
 
-  // Count the numbers k of 2^24 that lead to each light: those of bin b are ceil(b 2^24 / n) and on; the
-  // kept ones have k n - b 2^24 < threshold 2^24.
+  // Count the numbers k of 2^24 that lead to each light: those of bin b are ceil(b 2^24 / n) and
+  // on; the kept ones have k n - b 2^24 < threshold 2^24.
   std::vector<uint64_t> hits(n, 0);
   const auto ceil_div = [](uint64_t a, uint64_t b) { return (a + b - 1) / b; };
   constexpr uint64_t kAll = uint64_t{1} << 24;
@@ -339,7 +372,8 @@ void build_alias_table(std::span<const double> weights, std::vector<AliasEntry>&
     hits[b] += middle - begin;
     hits[table[b].alias] += end - middle;
   }
-  for (size_t i = 0; i < n; ++i) probability[i] = static_cast<float>(static_cast<double>(hits[i]) / kNumbers);
+  for (size_t i = 0; i < n; ++i)
+    probability[i] = static_cast<float>(static_cast<double>(hits[i]) / kNumbers);
 }
 
 }  // namespace wavecomb

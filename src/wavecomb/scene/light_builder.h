@@ -20,22 +20,22 @@ struct EmissiveTriangle {
   uint32_t material = kNoLight;
   /// Emitted radiance, W / (m^2 sr), to both sides; not read by kernels where `material` is set.
   float radiance[3] = {0, 0, 0};
-  /// Luminance to expect of the emission is luminance(radiance) * mean_scale. With a texture, put the
-  /// texture's mean (times scale, plus bias) into `radiance` and leave this at 1. Only the choice of
-  /// lights depends on it.
+  /// Luminance to expect of the emission is luminance(radiance) * mean_scale. With a texture, put
+  /// the texture's mean (times scale, plus bias) into `radiance` and leave this at 1. Only the
+  /// choice of lights depends on it.
   float mean_scale = 1;
 };
 
-/// All lights of a scene, ready for kernels. Order of `records`: infinite lights, then rects, disks and
-/// spheres, then the triangles; each kind of group in the order of the input.
+/// All lights of a scene, ready for kernels. Order of `records`: infinite lights, then rects, disks
+/// and spheres, then the triangles; each kind of group in the order of the input.
 struct LightSet {
   std::vector<LightRecord> records;
   std::vector<AliasEntry> alias;  ///< as many as records
   std::vector<Distribution2D> distributions;
   uint32_t infinite_count = 0;
-  uint32_t first_triangle = 0;      ///< record of emissive triangle i is first_triangle + i
-  std::vector<uint32_t> of_input;   ///< record of each input light
-  double total_power = 0;           ///< estimate that the choice of lights rests on, W
+  uint32_t first_triangle = 0;     ///< record of emissive triangle i is first_triangle + i
+  std::vector<uint32_t> of_input;  ///< record of each input light
+  double total_power = 0;          ///< estimate that the choice of lights rests on, W
 
   /// What kernels take. Contract: points into this set, which must stay where it is.
   LightView view(const MaterialView& materials) const;
@@ -46,33 +46,35 @@ inline constexpr uint32_t kMaxLights = (1u << 24) - 1;
 
 /// Builds the records.
 ///
-/// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the light's size:
+/// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the light's
+/// size:
 ///   rect, disk, sphere   the area in world space as transformed
-///   distant              pi sin^2(half angle) up to 90 degrees, pi (2 - sin^2) above, 1 for angle 0
-///   dome                 not at all
-/// A distant light of angle 0 gives the irradiance `color` at normal incidence. A sphere of radius 0 is a
-/// point light: its radiant intensity is `color`, or with `normalize` color / 4, which is what a
-/// normalized sphere tends to as it shrinks. Rects and disks shine to the side that -z is mapped to, also
-/// where the transform mirrors. Negative colours count as 0.
+///   distant              pi sin^2(half angle) up to 90 degrees, pi (2 - sin^2) above, 1 for angle
+///   0 dome                 not at all
+/// A distant light of angle 0 gives the irradiance `color` at normal incidence. A sphere of radius
+/// 0 is a point light: its radiant intensity is `color`, or with `normalize` color / 4, which is
+/// what a normalized sphere tends to as it shrinks. Rects and disks shine to the side that -z is
+/// mapped to, also where the transform mirrors. Negative colours count as 0.
 ///
-/// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by the
-/// power that they send through it. Throws Error naming the light for values that are not finite, unknown
-/// textures and more than kMaxLights lights.
+/// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
+/// the power that they send through it. Throws Error naming the light for values that are not
+/// finite, unknown textures and more than kMaxLights lights.
 LightSet build_lights(std::span<const Light> lights, std::span<const EmissiveTriangle> triangles,
                       const Vec3<float>& centre, float radius,
                       std::span<const std::unique_ptr<Texture>> textures);
 
-/// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of at
-/// most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance, times the
-/// sine of the polar angle. Row 0 is the top (the pole +y). Positive wherever the bilinear texture is.
-/// `mean_luminance` receives the mean over the sphere. An all-black texture gives width 0.
+/// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
+/// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,
+/// times the sine of the polar angle. Row 0 is the top (the pole +y). Positive wherever the
+/// bilinear texture is. `mean_luminance` receives the mean over the sphere. An all-black texture
+/// gives width 0.
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color,
                                        double* mean_luminance);
 
-/// Vose's alias table for the given weights (>= 0), and the probability that each entry really has when
-/// the random number is a multiple of 2^-24. Entries of weight 0 are never chosen, all others have some
-/// floor of probability. All weights 0: probabilities 0.
-/// M. Vose, "A Linear Algorithm for Generating Random Numbers with a Given Distribution", 1991.
+/// Vose's alias table for the given weights (>= 0), and the probability that each entry really has
+/// when the random number is a multiple of 2^-24. Entries of weight 0 are never chosen, all others
+/// have some floor of probability. All weights 0: probabilities 0. M. Vose, "A Linear Algorithm for
+/// Generating Random Numbers with a Given Distribution", 1991.
 void build_alias_table(std::span<const double> weights, std::vector<AliasEntry>& table,
                        std::vector<float>& probability);
 

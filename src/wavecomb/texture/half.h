@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// The float of the half in the low 16 bits; exact, infinities and NaN included. No denormal float takes
-/// part, so that flush-to-zero modes change nothing.
+/// The float of the half in the low 16 bits; exact, infinities and NaN included. No denormal float
+/// takes part, so that flush-to-zero modes change nothing.
 template <typename F>
 inline F half_to_float(const UInt<F>& half) {
   const UInt<F> exponent = half & 0x7c00u;

@@ -39,15 +39,18 @@ struct LevelLanes {
 template <typename F>
 inline LevelLanes<F> broadcast_level(const TextureLevel& level) {
   using U = UInt<F>;
-  return {U(level.width), U(level.height), U(level.tiles_x), U(static_cast<uint32_t>(level.offset))};
+  return {U(level.width), U(level.height), U(level.tiles_x),
+          U(static_cast<uint32_t>(level.offset))};
 }
 /// Level `index` (< level_count) in each lane.
 template <typename F>
-inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& index, const Mask<F>& active) {
+inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& index,
+                                  const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TextureLevel) / 4;
   const UInt<F> word = index * kWords;
   const auto read = [&](size_t offset_bytes) {
-    return float_bits<F>(gather<F>(texture.levels, word + static_cast<uint32_t>(offset_bytes / 4), active));
+    return float_bits<F>(
+        gather<F>(texture.levels, word + static_cast<uint32_t>(offset_bytes / 4), active));
   };
   // Offsets fit in 32 bits: storage is below 2^31 words of at most 4 texels, checked by Texture;
   // the low half of a 64-bit number comes first on the machines that we build for.
@@ -58,8 +61,8 @@ inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& ind
 /// Two neighbouring texels along one axis and how far the point is from the first to the second.
 template <typename F>
 struct Taps {
-  UInt<F> i0, i1;  ///< always below the size
-  F weight;        ///< of i1, in [0, 1)
+  UInt<F> i0, i1;    ///< always below the size
+  F weight;          ///< of i1, in [0, 1)
   Mask<F> in0, in1;  ///< false: the tap is off the image of a texture that is black there
 };
 
@@ -68,13 +71,16 @@ template <typename F>
 inline F wrap_coordinate(Wrap wrap, const F& x) {
   const F zero(0.f), one(1.f);
   switch (wrap) {
-    case Wrap::kRepeat: return clamp(F(x - floor(x)), zero, one);
-    case Wrap::kClamp: return clamp(x, zero, one);
+    case Wrap::kRepeat:
+      return clamp(F(x - floor(x)), zero, one);
+    case Wrap::kClamp:
+      return clamp(x, zero, one);
     case Wrap::kMirror: {
       const F fold = fnma(floor(F(x * 0.5f)), F(2.f), x);  // in [0, 2]
       return clamp(select(fold > 1.f, F(2.f - fold), fold), zero, one);
     }
-    case Wrap::kBlack: return clamp(select(x == x, x, zero), F(-2.f), F(3.f));
+    case Wrap::kBlack:
+      return clamp(select(x == x, x, zero), F(-2.f), F(3.f));
   }
   return zero;
 }
@@ -91,7 +97,8 @@ inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
     // a is -1 to size - 1 (size where rounding took x there), b one more.
     const Int<F> a_in = select(Mask<F>(a > last), zero, a);
     taps.i0 = UInt<F>(select(a_low, last, a_in));
-    taps.i1 = UInt<F>(select(b_high, select(Mask<F>(b > n), select(Mask<F>(n > Int<F>(1)), Int<F>(1), zero), zero), b));
+    taps.i1 = UInt<F>(select(
+        b_high, select(Mask<F>(b > n), select(Mask<F>(n > Int<F>(1)), Int<F>(1), zero), zero), b));
   } else {
     if (wrap == Wrap::kBlack) {
       taps.in0 = not_(a_low) & Mask<F>(a <= last);
@@ -170,8 +177,8 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
 
 /// Bilinear lookup in one level; s and t as wrap_coordinate gives them.
 template <typename F>
-inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level, const F& s, const F& t,
-                         const Mask<F>& active) {
+inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level, const F& s,
+                         const F& t, const Mask<F>& active) {
   const F width(Int<F>(level.width)), height(Int<F>(level.height));
   // Rows count from the top, t from the bottom.
   const Taps<F> x = make_taps<F>(texture.wrap_s, fma(s, width, F(-0.5f)), level.width);
@@ -184,25 +191,29 @@ inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level,
     }
     return texel;
   };
-  const Texel<F> top = lerp_texel<F>(tap(x.i0, y.i0, x.in0 & y.in0), tap(x.i1, y.i0, x.in1 & y.in0), x.weight);
-  const Texel<F> low = lerp_texel<F>(tap(x.i0, y.i1, x.in0 & y.in1), tap(x.i1, y.i1, x.in1 & y.in1), x.weight);
+  const Texel<F> top =
+      lerp_texel<F>(tap(x.i0, y.i0, x.in0 & y.in0), tap(x.i1, y.i0, x.in1 & y.in0), x.weight);
+  const Texel<F> low =
+      lerp_texel<F>(tap(x.i0, y.i1, x.in0 & y.in1), tap(x.i1, y.i1, x.in1 & y.in1), x.weight);
   return lerp_texel<F>(top, low, y.weight);
 }
 
 }  // namespace detail
 
-/// Trilinear lookup in one texture (the same in all lanes). `s`, `t`: texture coordinates, t up (USD's
-/// convention: (0, 0) is the lower left corner of the image, texel centres are at half texels).
-/// `width`: footprint in uv units (lod = log2(width * max(texture width, height)), clamped); width <= 0
-/// or NaN reads the finest level. Any s and t are safe; NaN counts as 0. Off a texture that is black
-/// outside, each tap is black, and transparent if the texture has alpha. Inactive lanes are unspecified.
+/// Trilinear lookup in one texture (the same in all lanes). `s`, `t`: texture coordinates, t up
+/// (USD's convention: (0, 0) is the lower left corner of the image, texel centres are at half
+/// texels). `width`: footprint in uv units (lod = log2(width * max(texture width, height)),
+/// clamped); width <= 0 or NaN reads the finest level. Any s and t are safe; NaN counts as 0. Off a
+/// texture that is black outside, each tap is black, and transparent if the texture has alpha.
+/// Inactive lanes are unspecified.
 template <typename F>
 inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const F& width,
                        const Mask<F>& active) {
   const F s_in = detail::wrap_coordinate<F>(texture.wrap_s, s);
   const F t_in = detail::wrap_coordinate<F>(texture.wrap_t, t);
   const TextureLevel& finest = texture.levels[0];
-  const float size = static_cast<float>(finest.width > finest.height ? finest.width : finest.height);
+  const float size =
+      static_cast<float>(finest.width > finest.height ? finest.width : finest.height);
   const F texels_wide = width * size;
   const Mask<F> coarse = (texels_wide > 1.f) & active;
   if (none(coarse)) {
@@ -214,19 +225,21 @@ inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const
   const F base = max(floor(lod), F(0.f));
   const F weight = select(coarse, F(lod - base), F(0.f));
   const UInt<F> level = select(coarse, UInt<F>(to_int<F>(base)), UInt<F>(0u));
-  const Texel<F> fine = detail::bilinear<F>(texture, detail::gather_level<F>(texture, level, active), s_in, t_in, active);
+  const Texel<F> fine = detail::bilinear<F>(
+      texture, detail::gather_level<F>(texture, level, active), s_in, t_in, active);
   const Mask<F> mixed = (weight > 0.f) & active;
   if (none(mixed)) return fine;
   const UInt<F> next = select(mixed, level + 1u, level);
-  const Texel<F> rough = detail::bilinear<F>(texture, detail::gather_level<F>(texture, next, mixed), s_in, t_in, mixed);
+  const Texel<F> rough = detail::bilinear<F>(texture, detail::gather_level<F>(texture, next, mixed),
+                                             s_in, t_in, mixed);
   return detail::select_texel<F>(mixed, detail::lerp_texel<F>(fine, rough, weight), fine);
 }
 
 /// Lookup where each lane has its own texture id (index into `textures`); runs `lookup` once per
 /// distinct id among the active lanes. Lanes with id kNoTexture give (0, 0, 0, 1).
 template <typename F>
-inline Texel<F> lookup(const TextureView* textures, const UInt<F>& id, const F& s, const F& t, const F& width,
-                       const Mask<F>& active) {
+inline Texel<F> lookup(const TextureView* textures, const UInt<F>& id, const F& s, const F& t,
+                       const F& width, const Mask<F>& active) {
   Texel<F> result{F(0.f), F(0.f), F(0.f), F(1.f)};
   Mask<F> pending = active & Mask<F>(id != UInt<F>(kNoTexture));
   while (any(pending)) {

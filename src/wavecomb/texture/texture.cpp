@@ -16,15 +16,19 @@ namespace wavecomb {
 namespace {
 
 constexpr std::align_val_t kAlignment{64};
-constexpr uint64_t kMaxBytes = uint64_t{1} << 33;  // 2^31 words: what a signed 32-bit gather reaches
+constexpr uint64_t kMaxBytes = uint64_t{1}
+                               << 33;  // 2^31 words: what a signed 32-bit gather reaches
 
 using Color4 = std::array<float, 4>;
 
 size_t value_bytes(TexelFormat format) {
   switch (format) {
-    case TexelFormat::kU8: return 1;
-    case TexelFormat::kF16: return 2;
-    case TexelFormat::kF32: return 4;
+    case TexelFormat::kU8:
+      return 1;
+    case TexelFormat::kF16:
+      return 2;
+    case TexelFormat::kF32:
+      return 4;
   }
   return 0;
 }
@@ -34,8 +38,8 @@ void check(const TextureDesc& desc) {
   const std::string size = std::to_string(desc.width) + " x " + std::to_string(desc.height);
   if (desc.width == 0 || desc.height == 0) throw Error(where + "has no pixels (" + size + ")");
   if (desc.width > Texture::kMaxSize || desc.height > Texture::kMaxSize) {
-    throw Error(where + "is " + size + "; the largest side is " + std::to_string(Texture::kMaxSize) +
-                "; make it smaller");
+    throw Error(where + "is " + size + "; the largest side is " +
+                std::to_string(Texture::kMaxSize) + "; make it smaller");
   }
   if (desc.channels < 1 || desc.channels > 4) {
     throw Error(where + "has " + std::to_string(desc.channels) + " channels; 1 to 4 can be read");
@@ -55,8 +59,8 @@ size_t texel_index(const TextureLevel& level, uint32_t x, uint32_t y) {
 void put(std::byte* storage, const TextureView& view, size_t i, bool is_alpha, float value) {
   if (view.format == TexelFormat::kU8) {
     const float unit = std::clamp(value, 0.f, 1.f);
-    const uint8_t code = view.srgb && !is_alpha ? linear_to_srgb(unit)
-                                                : static_cast<uint8_t>(unit * 255.f + 0.5f);
+    const uint8_t code =
+        view.srgb && !is_alpha ? linear_to_srgb(unit) : static_cast<uint8_t>(unit * 255.f + 0.5f);
     std::memcpy(storage + i, &code, 1);
   } else if (view.format == TexelFormat::kF16) {
     const uint16_t code = float_to_half(value);
@@ -123,7 +127,8 @@ Image shrink(uint32_t width, uint32_t height, uint32_t channels, const Fetch& fe
         const float* p = from + size_t{box.first} * channels;
         for (uint32_t c = 0; c < channels; ++c) {
           float sum = 0;
-          for (size_t i = 0; i < box.weights.size(); ++i) sum += box.weights[i] * p[i * channels + c];
+          for (size_t i = 0; i < box.weights.size(); ++i)
+            sum += box.weights[i] * p[i * channels + c];
           to[size_t{x} * channels + c] += rows[y].weights[j] * sum;
         }
       }
@@ -140,7 +145,8 @@ class RowReader {
 
   const float* operator()(uint32_t y) const {
     const size_t bytes = value_bytes(desc_.format);
-    const auto* p = static_cast<const std::byte*>(desc_.data) + size_t{y} * desc_.width * desc_.channels * bytes;
+    const auto* p = static_cast<const std::byte*>(desc_.data) +
+                    size_t{y} * desc_.width * desc_.channels * bytes;
     nonfinite_ = 0;
     for (uint32_t x = 0; x < desc_.width; ++x) {
       float v[4] = {0, 0, 0, 1};
@@ -175,7 +181,8 @@ class RowReader {
   mutable uint64_t nonfinite_ = 0;
 };
 
-void put_row(std::byte* storage, const TextureView& view, uint32_t level, uint32_t y, const float* row) {
+void put_row(std::byte* storage, const TextureView& view, uint32_t level, uint32_t y,
+             const float* row) {
   for (uint32_t x = 0; x < view.levels[level].width; ++x) {
     const size_t first = texel_index(view.levels[level], x, y) * view.channels;
     for (uint32_t c = 0; c < view.channels; ++c) {
@@ -186,7 +193,9 @@ void put_row(std::byte* storage, const TextureView& view, uint32_t level, uint32
 
 }  // namespace
 
-void Texture::Free::operator()(std::byte* p) const { ::operator delete[](p, kAlignment); }
+void Texture::Free::operator()(std::byte* p) const {
+  ::operator delete[](p, kAlignment);
+}
 
 Texture::Texture(const TextureDesc& desc) : name_(desc.name) {
   check(desc);
@@ -224,7 +233,8 @@ Texture::Texture(const TextureDesc& desc) : name_(desc.name) {
     const float* row = read(y);
     nonfinite_count_ += read.nonfinite();
     put_row(storage_.get(), view_, 0, y, row);
-    for (size_t i = 0; i < size_t{desc.width} * view_.channels; ++i) sum[i % view_.channels] += double{row[i]};
+    for (size_t i = 0; i < size_t{desc.width} * view_.channels; ++i)
+      sum[i % view_.channels] += double{row[i]};
   }
   const double count = double(desc.width) * double(desc.height);
   for (uint32_t c = 0; c < view_.channels; ++c) mean_[c] = static_cast<float>(sum[c] / count);
@@ -236,7 +246,8 @@ Texture::Texture(const TextureDesc& desc) : name_(desc.name) {
     if (n == 1) {
       image = shrink(desc.width, desc.height, view_.channels, read);
     } else {
-      image = shrink(image.width, image.height, view_.channels, [&image](uint32_t y) { return image.row(y); });
+      image = shrink(image.width, image.height, view_.channels,
+                     [&image](uint32_t y) { return image.row(y); });
     }
     for (uint32_t y = 0; y < image.height; ++y) put_row(storage_.get(), view_, n, y, image.row(y));
   }

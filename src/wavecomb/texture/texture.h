@@ -26,7 +26,8 @@ struct TextureDesc {
   const void* data = nullptr;
   uint32_t width = 0, height = 0, channels = 0;
   TexelFormat format = TexelFormat::kU8;
-  bool srgb = false;  ///< u8 values are sRGB-encoded colour (alpha never is); ignored for half and float
+  bool srgb =
+      false;  ///< u8 values are sRGB-encoded colour (alpha never is); ignored for half and float
   Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
 };
 
@@ -35,7 +36,7 @@ struct TextureLevel {
   uint32_t width, height;  ///< in texels
   uint32_t tiles_x;        ///< tiles in a row of tiles
   uint32_t pad;
-  uint64_t offset;         ///< of the level's first tile, in texels from the start of the storage
+  uint64_t offset;  ///< of the level's first tile, in texels from the start of the storage
 };
 static_assert(sizeof(TextureLevel) == 24);
 
@@ -55,11 +56,13 @@ struct TextureView {
   TextureLevel levels[kMaxLevels] = {};
 };
 
-/// Linear r, g, b, a of the texel in column x, row y (0: top) of a level. For tools and tests; slow.
+/// Linear r, g, b, a of the texel in column x, row y (0: top) of a level. For tools and tests;
+/// slow.
 std::array<float, 4> texel_at(const TextureView& view, uint32_t level, uint32_t x, uint32_t y);
 
-/// An immutable texture with its mip pyramid: each level is the box filter, in linear light, of the one
-/// before at half its size, rounded down (odd sizes: boxes of 2 1/2 texels and so on, by exact overlap).
+/// An immutable texture with its mip pyramid: each level is the box filter, in linear light, of the
+/// one before at half its size, rounded down (odd sizes: boxes of 2 1/2 texels and so on, by exact
+/// overlap).
 class Texture {
  public:
   /// Largest width and height.
