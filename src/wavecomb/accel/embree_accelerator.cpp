@@ -6,7 +6,6 @@
 #include <tbb/task_arena.h>
 
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -14,18 +13,18 @@
 
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/lanes.h"
 
 namespace wavecomb {
 namespace {
 
-/// Hits whose barycentrics are within this of an edge may lie in the neighbour as well: the traversal's
-/// robust edge tests overlap by some roundings of the larger triangle.
-constexpr float kEdge = 0x1p-13f;
-
-/// Handed through Embree to the presence filter.
-struct QueryContext {
+/// Handed through Embree to the filters: the rays' paths, and the closest hits so far of the packet's rays.
+/// Packets are traced at widths that Embree has natively, so lane i there is lane i here.
+struct alignas(64) QueryContext {
   RTCRayQueryContext base;
   const PresenceKeys* keys;
+  const unsigned *inst, *geom, *prim;  ///< of the hits that Embree holds, W each
+  alignas(64) float t[16];             ///< their true distances
 };
 
 /// What a geometry with partly present materials knows of itself.
@@ -65,6 +64,59 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
                    RTCHitN_v(args->hit, n, i), RTCRayN_id(args->ray, n, i), *context->keys);
     if (!present) args->valid[i] = 0;
   }
+}
+
+/// Hits farther than the closest by less than this fraction are looked at still.
+constexpr float kSlack = 1.f + 0x1p-20f;
+
+/// Makes the closest hit independent of the order in which triangles are tried. Embree keeps whichever of
+/// two hits it tries last when they are equally far up to rounding (on shared edges, where surfaces cross
+/// or lie in one another), and in a packet that order depends on the other rays. Here the smaller distance
+/// wins, and of equal ones the smaller id. So that no candidate is missed, the search goes on a little
+/// beyond the closest hit: tfar is put back by `slack`.
+template <unsigned N>
+inline void keep_closest(const RTCFilterFunctionNArguments* args) {
+  auto* best = reinterpret_cast<QueryContext*>(args->context);
+  int* valid = args->valid;
+  float* tfar = &RTCRayN_tfar(args->ray, N, 0);
+  using F = Lanes<N>;
+  using U = UInt<F>;
+  const F t = load<F>(tfar), best_t = load<F>(best->t);
+  Mask<F> take = t < best_t;
+  const Mask<F> tie = t == best_t;
+  if (any(tie)) {
+    const U i = load<U>(&RTCHitN_instID(args->hit, N, 0, 0)), bi = load<U>(best->inst);
+    const U g = load<U>(&RTCHitN_geomID(args->hit, N, 0)), bg = load<U>(best->geom);
+    const U p = load<U>(&RTCHitN_primID(args->hit, N, 0)), bp = load<U>(best->prim);
+    take = take | (tie & Mask<F>((i < bi) | ((i == bi) & ((g < bg) | ((g == bg) & (p < bp))))));
+  }
+  take = take & Mask<F>(load<U>(valid) != U(0u));
+  store(best->t, select(take, t, best_t));
+  store(tfar, select(take, F(t * kSlack), t));
+  store(valid, select(Mask<U>(take), U(0xffffffffu), U(0u)));
+}
+
+void closest_filter(const RTCFilterFunctionNArguments* args) {
+  switch (args->N) {
+    case 16: return keep_closest<16>(args);
+    case 8: return keep_closest<8>(args);
+    case 4: return keep_closest<4>(args);
+    default: return keep_closest<1>(args);
+  }
+}
+
+/// How closest hits are asked for.
+RTCIntersectArguments intersect_arguments(QueryContext& context, const PresenceKeys& keys, bool coherent) {
+  rtcInitRayQueryContext(&context.base);
+  context.keys = &keys;
+  RTCIntersectArguments args;
+  rtcInitIntersectArguments(&args);
+  args.flags = static_cast<RTCRayQueryFlags>(
+      (coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT) |
+      RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
+  args.filter = closest_filter;
+  args.context = &context.base;
+  return args;
 }
 
 bool mesh_has_presence(const Scene& scene, const Mesh& mesh) {
@@ -112,7 +164,8 @@ struct EmbreeAccelerator::Impl {
 
   RTCScene new_scene() const {
     RTCScene s = rtcNewScene(device);
-    rtcSetSceneFlags(s, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(s, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST |
+                                                   RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS));
     rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
     return s;
   }
@@ -252,51 +305,41 @@ struct EmbreeAccelerator::Impl {
     check("building the hierarchy");
   }
 
-  /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise. Returns a bit
-  /// for each hit on an edge of its triangle.
-  uint32_t store_hits(const float* tfar, const float* u, const float* v, const unsigned* prim,
+  /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
+  void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
                       const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
                       size_t n) const {
-    uint32_t on_edge = 0;
     for (size_t i = 0; i < n; ++i) {
       const bool instanced = inst[i] != RTC_INVALID_GEOMETRY_ID;
       const uint32_t top_id = instanced ? inst[i] : geom[i];
       const bool missed = geom[i] == RTC_INVALID_GEOMETRY_ID;
       const bool light = top_id >= first_light;
-      out.t[base + i] = tfar[i];
+      out.t[base + i] = t[i];
       out.u[base + i] = u[i];
       out.v[base + i] = v[i];
       out.prim[base + i] = prim[i];
       out.geom[base + i] = light ? top_id - first_light : (instanced ? geom[i] : geom[i] - first_world);
       out.inst[base + i] = missed ? kNoHit : (light ? kLightShape : (instanced ? inst[i] : 0));
-      const bool inside = u[i] > kEdge && v[i] > kEdge && u[i] + v[i] < 1.f - kEdge;
-      on_edge |= static_cast<uint32_t>(!missed && !inside) << i;
-    }
-    return on_edge;
-  }
-
-  /// Settles hits on edges. There two triangles may be equally far, to the last bit or nearly, and which one
-  /// a packet reports depends on the rays beside. A ray alone always gets the same answer.
-  void settle_edges(uint32_t on_edge, const RaySpan& rays, const HitSpan& hits, size_t base,
-                    RTCIntersectArguments& args) const {
-    for (; on_edge != 0; on_edge &= on_edge - 1) {
-      const size_t i = base + static_cast<size_t>(std::countr_zero(on_edge));
-      if (hits.inst[i] == kLightShape &&
-          view.lights.lights[hits.geom[i]].kind != static_cast<uint32_t>(LightKind::kRect))
-        continue;  // one primitive, whose u and v are always 0
-      intersect_alone(rays, hits, i, args);
     }
   }
 
-  void intersect_alone(const RaySpan& rays, const HitSpan& hits, size_t i,
-                       RTCIntersectArguments& args) const {
-    RTCRayHit rh{};
-    rh.ray = load_ray(rays, i);
-    rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(top, &rh, &args);
-    store_hits(&rh.ray.tfar, &rh.hit.u, &rh.hit.v, &rh.hit.primID, &rh.hit.geomID, &rh.hit.instID[0],
-               hits, i, 1);
+  void intersect_alone(const RaySpan& rays, const HitSpan& hits, bool coherent,
+                       const PresenceKeys& keys) const {
+    for (size_t i = 0; i < rays.size; ++i) {
+      RTCRayHit rh{};
+      QueryContext context;
+      RTCIntersectArguments args = intersect_arguments(context, keys, coherent);
+      rh.ray = load_ray(rays, i);
+      rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      context.t[0] = std::numeric_limits<float>::infinity();
+      context.inst = rh.hit.instID;
+      context.geom = &rh.hit.geomID;
+      context.prim = &rh.hit.primID;
+      rtcIntersect1(top, &rh, &args);
+      store_hits(context.t, &rh.hit.u, &rh.hit.v, &rh.hit.primID, &rh.hit.geomID, &rh.hit.instID[0],
+                 hits, i, 1);
+    }
   }
 
   template <uint32_t W, typename Ray>
@@ -326,15 +369,22 @@ struct EmbreeAccelerator::Impl {
   }
 
   template <uint32_t W>
-  void intersect_packets(const RaySpan& rays, const HitSpan& hits, RTCIntersectArguments& args) const {
+  void intersect_packets(const RaySpan& rays, const HitSpan& hits, bool coherent,
+                         const PresenceKeys& keys) const {
     alignas(64) typename PacketTypes<W>::RayHit rh;
+    QueryContext context;
+    RTCIntersectArguments args = intersect_arguments(context, keys, coherent);
     alignas(64) int valid[W];
+    context.inst = rh.hit.instID[0];
+    context.geom = rh.hit.geomID;
+    context.prim = rh.hit.primID;
     for (size_t base = 0; base < rays.size; base += W) {
       const size_t n = std::min<size_t>(W, rays.size - base);
       load_rays<W>(rh.ray, valid, rays, base, n);
       for (uint32_t i = 0; i < W; ++i) {
         rh.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
         rh.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        context.t[i] = std::numeric_limits<float>::infinity();
       }
       if constexpr (W == 16)
         rtcIntersect16(valid, top, &rh, &args);
@@ -342,9 +392,8 @@ struct EmbreeAccelerator::Impl {
         rtcIntersect8(valid, top, &rh, &args);
       else
         rtcIntersect4(valid, top, &rh, &args);
-      const uint32_t on_edge = store_hits(rh.ray.tfar, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID,
-                                          rh.hit.instID[0], hits, base, n);
-      if (on_edge != 0) settle_edges(on_edge, rays, hits, base, args);
+      store_hits(context.t, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID, rh.hit.instID[0], hits, base,
+                 n);
     }
   }
 
@@ -401,20 +450,13 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
-  QueryContext context;
-  rtcInitRayQueryContext(&context.base);
-  context.keys = &keys;
-  RTCIntersectArguments args;
-  rtcInitIntersectArguments(&args);
-  args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
-  args.context = &context.base;
   switch (width) {
-    case 16: return impl_->intersect_packets<16>(rays, hits, args);
-    case 8: return impl_->intersect_packets<8>(rays, hits, args);
-    case 4: return impl_->intersect_packets<4>(rays, hits, args);
+    case 16: return impl_->intersect_packets<16>(rays, hits, coherent, keys);
+    case 8: return impl_->intersect_packets<8>(rays, hits, coherent, keys);
+    case 4: return impl_->intersect_packets<4>(rays, hits, coherent, keys);
     default: break;
   }
-  for (size_t i = 0; i < rays.size; ++i) impl_->intersect_alone(rays, hits, i, args);
+  impl_->intersect_alone(rays, hits, coherent, keys);
 }
 
 void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,

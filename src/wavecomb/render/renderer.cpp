@@ -161,16 +161,18 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
     }
   };
 
-  // The work runs in an arena of its own; this thread watches, reports and cancels.
-  tbb::task_arena arena(static_cast<int>(threads), 0);
+  // The work runs in an arena that a thread of its own enters; this one watches, reports and cancels.
+  const tbb::global_control parallelism(
+      tbb::global_control::max_allowed_parallelism,
+      std::max<size_t>(threads, static_cast<size_t>(tbb::info::default_concurrency())));
   std::mutex mutex;
   std::condition_variable finished;
   bool is_finished = false;
   std::exception_ptr failure;
-  arena.enqueue([&] {
+  std::thread runner([&] {
     std::exception_ptr error;
     try {
-      run_passes();
+      tbb::task_arena(static_cast<int>(threads)).execute(run_passes);
     } catch (...) {
       error = std::current_exception();
     }
@@ -179,13 +181,13 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
     is_finished = true;
     finished.notify_all();
   });
+  std::exception_ptr thrown;
   {
     std::unique_lock lock(mutex);
     while (!finished.wait_for(lock, std::chrono::milliseconds(100), [&] { return is_finished; })) {
       if (!progress) continue;
       lock.unlock();
       bool go_on = false;
-      std::exception_ptr thrown;
       try {
         go_on = progress(done, total);
       } catch (...) {
@@ -195,10 +197,11 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
       if (go_on) continue;
       cancel = true;
       finished.wait(lock, [&] { return is_finished; });
-      if (thrown) std::rethrow_exception(thrown);
       break;
     }
   }
+  runner.join();
+  if (thrown) std::rethrow_exception(thrown);
   if (failure) std::rethrow_exception(failure);
   if (progress && !cancel) progress(done, total);
 
