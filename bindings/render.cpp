@@ -57,17 +57,17 @@ const Names<Traversal> kTraversals{
 const Names<bool> kFresnel{"fresnel", {{"exact", false}, {"schlick", true}}};
 
 template <typename Class, typename Enum>
-void def_enum(Class& c, const char* attribute, Enum Settings::*member, const Names<Enum>& names) {
+void def_enum(Class& c, const char* attribute, Enum Settings::* member, const Names<Enum>& names) {
   c.def_prop_rw(
       attribute, [member, &names](const Settings& s) { return std::string(names.name(s.*member)); },
       [member, &names](Settings& s, const std::string& text) { s.*member = names.parse(text); });
 }
 
 constexpr const char* kAttributes[] = {
-    "width",          "height",         "spp",         "max_depth",  "seed",
-    "sampler",        "filter",         "filter_width", "roulette",  "roulette_depth",
-    "clamp_indirect", "fresnel",        "cosine_sampling", "integrator", "threads",
-    "wave_size",      "lanes",          "traversal",      "policy",      "materialize"};
+    "width",           "height",       "spp",      "max_depth",      "seed",           "sampler",
+    "filter",          "filter_width", "roulette", "roulette_depth", "clamp_indirect", "fresnel",
+    "cosine_sampling", "integrator",   "threads",  "wave_size",      "lanes",          "traversal",
+    "policy",          "materialize"};
 
 nb::dict to_dict(nb::handle settings) {
   nb::dict d;
@@ -109,9 +109,9 @@ nb::dict statistics_dict(const Result& r) {
   };
   d["samples_per_s"] = rate(s.samples);
   d["rays_per_s"] = rate(s.rays + s.shadow_rays);
-  d["lane_utilisation"] = s.packet_lanes > 0 ? static_cast<double>(s.records) /
-                                                   static_cast<double>(s.packet_lanes)
-                                             : 1.0;
+  d["lane_utilisation"] = s.packet_lanes > 0
+                              ? static_cast<double>(s.records) / static_cast<double>(s.packet_lanes)
+                              : 1.0;
   d["threads"] = s.threads;
   d["wave_size"] = s.wave_size;
   d["lanes"] = s.lanes;

@@ -22,7 +22,9 @@ using Color3 = std::tuple<float, float, float>;
 template <typename T>
 using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 
-Vec3<float> vec3(const Color3& c) { return {std::get<0>(c), std::get<1>(c), std::get<2>(c)}; }
+Vec3<float> vec3(const Color3& c) {
+  return {std::get<0>(c), std::get<1>(c), std::get<2>(c)};
+}
 
 /// Keeps arrays alive from C++; they are let go of with the GIL held.
 std::shared_ptr<const void> hold(nb::list arrays) {
@@ -61,16 +63,18 @@ Enum choose(const std::string& what, const std::string& value,
 }
 
 Wrap wrap(const std::string& name) {
-  return choose<Wrap>("wrap", name, {{"repeat", Wrap::kRepeat},
-                                     {"clamp", Wrap::kClamp},
-                                     {"mirror", Wrap::kMirror},
-                                     {"black", Wrap::kBlack}});
+  return choose<Wrap>("wrap", name,
+                      {{"repeat", Wrap::kRepeat},
+                       {"clamp", Wrap::kClamp},
+                       {"mirror", Wrap::kMirror},
+                       {"black", Wrap::kBlack}});
 }
 
 template <size_t N>
 void fill(std::array<float, N>& to, const nb::handle& from, const char* what) {
   const auto values = nb::cast<std::vector<float>>(from);
-  if (values.size() != N) throw Error(std::string(what) + " must have " + std::to_string(N) + " numbers");
+  if (values.size() != N)
+    throw Error(std::string(what) + " must have " + std::to_string(N) + " numbers");
   std::copy(values.begin(), values.end(), to.begin());
 }
 
@@ -104,8 +108,9 @@ ProgramId program(const std::string& name) {
   throw Error("program '" + name + "' is not known; it must be one of " + list);
 }
 
-uint32_t add_texture(SceneBuilder& builder, const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& pixels,
-                     bool srgb, const std::string& wrap_s, const std::string& wrap_t,
+uint32_t add_texture(SceneBuilder& builder,
+                     const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& pixels, bool srgb,
+                     const std::string& wrap_s, const std::string& wrap_t,
                      const std::string& name) {
   TextureDesc desc;
   desc.name = name;
@@ -120,7 +125,9 @@ uint32_t add_texture(SceneBuilder& builder, const nb::ndarray<nb::c_contig, nb::
     desc.format = TexelFormat::kF16;
   else
     throw Error("texture '" + name + "' must be of uint8, float16 or float32");
-  const auto size = [&](size_t i) { return static_cast<uint32_t>(std::min<size_t>(pixels.shape(i), 1u << 30)); };
+  const auto size = [&](size_t i) {
+    return static_cast<uint32_t>(std::min<size_t>(pixels.shape(i), 1u << 30));
+  };
   desc.data = pixels.data();
   desc.height = size(0);
   desc.width = size(1);
@@ -131,10 +138,11 @@ uint32_t add_texture(SceneBuilder& builder, const nb::ndarray<nb::c_contig, nb::
   return builder.add_texture(desc);
 }
 
-uint32_t add_material(SceneBuilder& builder, const std::string& program_name, const std::string& name,
-                      const Color3& base_color, const Color3& specular_color, const Color3& emission,
-                      float roughness, float metallic, float clearcoat, float clearcoat_roughness,
-                      float opacity, float ior, float opacity_threshold, const Color3& conductor_eta,
+uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
+                      const std::string& name, const Color3& base_color,
+                      const Color3& specular_color, const Color3& emission, float roughness,
+                      float metallic, float clearcoat, float clearcoat_roughness, float opacity,
+                      float ior, float opacity_threshold, const Color3& conductor_eta,
                       const Color3& conductor_k, bool specular_workflow, bool presence,
                       const nb::dict& textures) {
   Material m;
@@ -161,21 +169,25 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name, co
 }
 
 /// Per vertex when (n, k), per corner when (m, 3, k).
-Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, const std::string& name) {
+Attribute attribute_of(const std::optional<Array<float>>& values, size_t k,
+                       const std::string& name) {
   if (!values) return Attribute::kNone;
   if (values->ndim() == 2 && values->shape(1) == k) return Attribute::kVertex;
-  if (values->ndim() == 3 && values->shape(1) == 3 && values->shape(2) == k) return Attribute::kCorner;
+  if (values->ndim() == 3 && values->shape(1) == 3 && values->shape(2) == k)
+    return Attribute::kCorner;
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
 
 uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
                   const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
-                  const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
+                  const std::optional<Array<float>>& normals,
+                  const std::optional<Array<float>>& uvs,
                   const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
                   const std::string& name) {
   Mesh mesh;
   mesh.name = name;
-  if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 || indices.shape(1) != 3)
+  if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 ||
+      indices.shape(1) != 3)
     throw Error("mesh '" + name + "' needs positions of shape (n, 3) and indices of shape (m, 3)");
   if (indices.dtype() != nb::dtype<uint32_t>() && indices.dtype() != nb::dtype<int32_t>())
     throw Error("mesh '" + name + "' needs indices of int32 or uint32");
@@ -223,8 +235,8 @@ void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
 
 uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
-                   const std::string& name, const Color3& color, float width, float height, float radius,
-                   float angle, bool normalize, std::optional<uint32_t> texture) {
+                   const std::string& name, const Color3& color, float width, float height,
+                   float radius, float angle, bool normalize, std::optional<uint32_t> texture) {
   Light light;
   light.name = name;
   light.kind = choose<LightKind>("light kind", kind,
@@ -244,7 +256,8 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   return builder.add_light(std::move(light));
 }
 
-void set_camera(SceneBuilder& builder, const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
+void set_camera(SceneBuilder& builder,
+                const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
                 const std::tuple<float, float, float, float>& window, float lens_radius,
                 float focus_distance, float near_clip, float far_clip) {
   Camera camera;
@@ -296,22 +309,23 @@ void bind_scene(nb::module_& m) {
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
-           "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black, "roughness"_a = 0.5f,
-           "metallic"_a = 0.f, "clearcoat"_a = 0.f, "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f,
-           "ior"_a = 1.5f, "opacity_threshold"_a = 0.f, "conductor_eta"_a = black,
-           "conductor_k"_a = black, "specular_workflow"_a = false, "presence"_a = false,
-           "textures"_a = nb::dict())
-      .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(), "normals"_a = nb::none(),
-           "uvs"_a = nb::none(), "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
-           "name"_a = "")
+           "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
+           "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,
+           "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f, "ior"_a = 1.5f,
+           "opacity_threshold"_a = 0.f, "conductor_eta"_a = black, "conductor_k"_a = black,
+           "specular_workflow"_a = false, "presence"_a = false, "textures"_a = nb::dict())
+      .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
+           "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
+           "material"_a = kInheritMaterial, "name"_a = "")
       .def("add_group", &SceneBuilder::add_group, "name"_a = "")
       .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
            "materials"_a = nb::none())
       .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
-           "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f, "angle"_a = 0.53f,
-           "normalize"_a = false, "texture"_a = nb::none())
-      .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a, "lens_radius"_a = 0.f,
-           "focus_distance"_a = 1.f, "near_clip"_a = 0.f, "far_clip"_a = 1e30f)
+           "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f,
+           "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none())
+      .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
+           "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,
+           "far_clip"_a = 1e30f)
       .def("build", &SceneBuilder::build);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Builds a scene in C++ and renders it: a plastic sphere on a floor under a square light.
-//   cmake -S examples/cpp -B build/example && cmake --build build/example && build/example/render_sphere
+//   cmake -S examples/cpp -B build/examples -DCMAKE_PREFIX_PATH=<where wavecomb is installed>
+//   cmake --build build/examples && build/examples/example_render_sphere
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -18,7 +19,8 @@ int main() try {
   for (uint32_t j = 0; j <= kUp; ++j)
     for (uint32_t i = 0; i <= kAround; ++i) {
       const float theta = 3.14159265f * float(j) / kUp, phi = 6.28318531f * float(i) / kAround;
-      points.insert(points.end(), {std::sin(theta) * std::cos(phi), std::cos(theta), -std::sin(theta) * std::sin(phi)});
+      points.insert(points.end(), {std::sin(theta) * std::cos(phi), std::cos(theta),
+                                   -std::sin(theta) * std::sin(phi)});
       if (i == kAround || j == kUp) continue;
       const uint32_t a = j * (kAround + 1) + i, b = a + kAround + 1;
       triangles.insert(triangles.end(), {a, b, b + 1, a, b + 1, a + 1});
@@ -35,11 +37,16 @@ int main() try {
   grey.base_color = {0.6f, 0.6f, 0.6f};
   const uint32_t red_id = builder.add_material(red), grey_id = builder.add_material(grey);
   // Arrays are not copied: they must live as long as the scene.
-  builder.add_to_group(0, builder.add_mesh({.name = "sphere", .positions = points, .indices = triangles,
-                                            .normals = points, .normals_at = wc::Attribute::kVertex,
+  builder.add_to_group(0, builder.add_mesh({.name = "sphere",
+                                            .positions = points,
+                                            .indices = triangles,
+                                            .normals = points,
+                                            .normals_at = wc::Attribute::kVertex,
                                             .material = red_id}));
-  builder.add_to_group(0, builder.add_mesh({.name = "floor", .positions = floor_points,
-                                            .indices = floor_triangles, .material = grey_id}));
+  builder.add_to_group(0, builder.add_mesh({.name = "floor",
+                                            .positions = floor_points,
+                                            .indices = floor_triangles,
+                                            .material = grey_id}));
   wc::Light lamp;  // a square that shines along its -z, turned to shine down from y = 4
   lamp.to_world = {{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}, {1, 4, 1}};
   lamp.width = lamp.height = 2;
@@ -57,7 +64,8 @@ int main() try {
   std::FILE* file = std::fopen("sphere.ppm", "wb");
   if (!file) throw wc::Error("sphere.ppm cannot be written here; try another folder");
   std::fprintf(file, "P6 256 256 255\n");
-  for (float x : picture.beauty) std::fputc(int(255.f * std::pow(std::min(x, 1.f), 1 / 2.2f)), file);
+  for (float x : picture.beauty)
+    std::fputc(int(255.f * std::pow(std::min(x, 1.f), 1 / 2.2f)), file);
   std::fclose(file);
   std::printf("sphere.ppm: %.1f million samples/s\n",
               1e-6 * double(renderer.statistics().samples) / renderer.statistics().render_s);

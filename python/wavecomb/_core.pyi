@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The native core: scenes in, pictures out. Arrays are NumPy arrays and are not copied where said so."""
+"""The native core: scenes in, pictures out.
+
+Arrays are NumPy arrays and are not copied where said so.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -40,8 +43,11 @@ class Scene:
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
 
 class SceneBuilder:
-    """Collects a scene; ids are handed out from 0 in order. Transforms are in USD's row-vector convention
-    (translation in the last row), float64 or float32, shape (4, 4)."""
+    """Collects a scene; ids are handed out from 0 in order.
+
+    Transforms are in USD's row-vector convention (translation in the last row),
+    float64 or float32, shape (4, 4).
+    """
 
     def __init__(self) -> None: ...
     def add_texture(
@@ -53,9 +59,10 @@ class SceneBuilder:
         wrap_t: str = "repeat",
         name: str = "",
     ) -> int:
-        """Pixels (height, width, channels 1 to 4), uint8, float16 or float32, C order, row 0 at the top.
+        """Pixels (height, width, 1 to 4 channels): uint8, float16 or float32, top row first.
 
-        wrap: repeat, clamp, mirror, black. srgb matters for uint8 only. Tiled and mip-mapped inside.
+        wrap: repeat, clamp, mirror, black. srgb matters for uint8 only.
+        Tiled and mip-mapped inside.
         """
     def add_material(
         self,
@@ -83,10 +90,10 @@ class SceneBuilder:
         textures: slot -> {"texture": id, "channel": "rgb"|"r"|"g"|"b"|"a", "scale": 4 floats,
         "bias": 4 floats, "uv": 6 floats}; value = texel * scale + bias at
         u' = uv[0] u + uv[1] v + uv[2], v' = uv[3] u + uv[4] v + uv[5]. Slots: base_color,
-        specular_color, emission, roughness, metallic, clearcoat, clearcoat_roughness, opacity, normal
-        (tangent space, value already in [-1, 1] after scale and bias).
-        For a metal: base_color is the reflectance at normal incidence, specular_color the tint at 82 degrees
-        (black: none given, untinted).
+        specular_color, emission, roughness, metallic, clearcoat, clearcoat_roughness, opacity,
+        normal (tangent space, value already in [-1, 1] after scale and bias).
+        For a metal: base_color is the reflectance at normal incidence, specular_color the tint at
+        82 degrees (black: none given, untinted).
         """
     def add_mesh(
         self,
@@ -99,9 +106,10 @@ class SceneBuilder:
         material: int = ...,
         name: str = "",
     ) -> int:
-        """Positions (n, 3), triangles (m, 3) counter-clockwise from outside; normals (n, 3) per vertex or
-        (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,). No copy of C-ordered arrays
-        of these types: they are kept alive. Do not change them afterwards."""
+        """Positions (n, 3), triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
+        vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,).
+        No copy of C-ordered arrays of these types: they are kept alive. Do not change them
+        afterwards."""
     def add_group(self, name: str = "") -> int:
         """A new empty group; group 0, the world, is there."""
     def add_to_group(self, group: int, mesh: int) -> None: ...
@@ -112,8 +120,8 @@ class SceneBuilder:
         transforms: NDArray[Any],
         materials: NDArray[np.uint32] | None = None,
     ) -> None:
-        """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it that
-        have none of their own. Nested to any depth without copies of geometry."""
+        """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it
+        that have none of their own. Nested to any depth without copies of geometry."""
     def add_light(
         self,
         kind: str,
@@ -128,8 +136,8 @@ class SceneBuilder:
         normalize: bool = False,
         texture: int | None = None,
     ) -> int:
-        """Kinds: rect, disk, sphere, distant, dome, as UsdLux. color = colour * intensity * 2^exposure *
-        colour temperature."""
+        """Kinds: rect, disk, sphere, distant, dome, as UsdLux. color = colour * intensity *
+        2^exposure * colour temperature."""
     def set_camera(
         self,
         transform: NDArray[Any],
@@ -186,7 +194,7 @@ class Result:
         """(height, width, 3), world space."""
     @property
     def depth(self) -> NDArray[np.float32]:
-        """(height, width), distance from the camera along its axis; infinite where nothing was hit."""
+        """(height, width), along the camera's axis; infinite where nothing was hit."""
     @property
     def samples(self) -> NDArray[np.uint32]: ...
     @property
@@ -201,9 +209,9 @@ def render(
     settings: Settings,
     progress: Callable[[int, int], bool | None] | None = None,
 ) -> Result:
-    """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling thread
-    (GIL held); returning False cancels, and the result holds what was done. KeyboardInterrupt raised
-    in the callback also stops the render. Raises Error."""
+    """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling
+    thread (GIL held); returning False cancels, and the result holds what was done.
+    KeyboardInterrupt raised in the callback also stops the render. Raises Error."""
 
 def lane_widths() -> list[int]: ...
 def build_info() -> dict[str, str]:

@@ -75,12 +75,10 @@ std::vector<Case> all_cases() {
     add("plastic" + tail, ProgramId::kPlastic, [&](P& p) { p.roughness = r; });
     add("principled" + tail, ProgramId::kPrincipled, [&](P& p) { p.roughness = r; });
   }
-  add(
-      "glass schlick", ProgramId::kDielectric, [](P&) {}, true);
+  add("glass schlick", ProgramId::kDielectric, [](P&) {}, true);
   add("bubble", ProgramId::kDielectric, [](P& p) { p.ior = 0.75f; });
   add("diamond", ProgramId::kDielectric, [](P& p) { p.ior = 2.4f, p.roughness = 0.6f; });
-  add(
-      "plastic schlick", ProgramId::kPlastic, [](P&) {}, true);
+  add("plastic schlick", ProgramId::kPlastic, [](P&) {}, true);
   add("principled metal", ProgramId::kPrincipled,
       [](P& p) { p.metallic = 0.9f, p.roughness = 0.3f; });
   add("principled specular", ProgramId::kPrincipled, [](P& p) {
@@ -95,8 +93,7 @@ std::vector<Case> all_cases() {
   add("principled smooth coat", ProgramId::kPrincipled, [](P& p) { p.clearcoat = 0.5f; });
   add("principled pane", ProgramId::kPrincipled,
       [](P& p) { p.opacity = 0.3f, p.clearcoat = 0.7f; });
-  add(
-      "principled schlick", ProgramId::kPrincipled, [](P&) {}, true);
+  add("principled schlick", ProgramId::kPrincipled, [](P&) {}, true);
   return cases;
 }
 

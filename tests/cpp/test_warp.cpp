@@ -173,20 +173,15 @@ TEST(Warp, CornersAreInRange) {
 TEST(Warp, Lanes) {
   const auto u = padded({0.f, 0.5f, kOneMinusEpsilon}, 4093, 0.f, kOneMinusEpsilon, 1);
   const auto v = padded({0.5f, 0.5f, 0.f}, 4093, 0.f, kOneMinusEpsilon, 2);
-  expect_lanes_agree(
-      u, v, [](auto a, auto b) { return square_to_disk(a, b).x; }, "disk");
-  expect_lanes_agree(
-      u, v, [](auto a, auto b) { return square_to_disk(a, b).y; }, "disk");
+  expect_lanes_agree(u, v, [](auto a, auto b) { return square_to_disk(a, b).x; }, "disk");
+  expect_lanes_agree(u, v, [](auto a, auto b) { return square_to_disk(a, b).y; }, "disk");
   expect_lanes_agree(
       u, v, [](auto a, auto b) { return square_to_cosine_hemisphere(a, b).z; }, "hemisphere");
-  expect_lanes_agree(
-      u, v, [](auto a, auto b) { return square_to_sphere(a, b).x; }, "sphere");
+  expect_lanes_agree(u, v, [](auto a, auto b) { return square_to_sphere(a, b).x; }, "sphere");
   expect_lanes_agree(
       u, v, [](auto a, auto b) { return square_to_cone(a, b, decltype(a)(0.1f)).y; }, "cone");
-  expect_lanes_agree(
-      u, v, [](auto a, auto b) { return square_to_triangle(a, b).x; }, "triangle");
-  expect_lanes_agree(
-      u, v, [](auto a, auto b) { return square_to_triangle(a, b).y; }, "triangle");
+  expect_lanes_agree(u, v, [](auto a, auto b) { return square_to_triangle(a, b).x; }, "triangle");
+  expect_lanes_agree(u, v, [](auto a, auto b) { return square_to_triangle(a, b).y; }, "triangle");
 }
 
 }  // namespace

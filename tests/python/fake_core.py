@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from wavecomb.errors import WavecombError
 
 import wavecomb
+from wavecomb.errors import WavecombError
 
 
 class Error(ValueError):

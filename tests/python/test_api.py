@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_core import Fake, install
+
+import wavecomb
 from wavecomb.errors import WavecombError
 from wavecomb.image import read_image, read_layers
 from wavecomb.stats import COUNTS, PHASES, write_stats
-
-import wavecomb
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from wavecomb.image import read_layers
 
 pytest.importorskip("wavecomb._core")
@@ -307,9 +308,8 @@ def test_unwritable_output_is_found_before_rendering(tmp_path: Path) -> None:
 
 
 def test_python_script_gets_exceptions(tmp_path: Path) -> None:
-    from wavecomb.errors import WavecombError
-
     import wavecomb as module
+    from wavecomb.errors import WavecombError
 
     with pytest.raises(WavecombError, match=r"no\.usda"):
         module.render(tmp_path / "no.usda")

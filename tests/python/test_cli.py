@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from fake_core import Error, Fake, install
+
 from wavecomb.cli import main
 from wavecomb.image import read_layers, read_metadata, write_exr
 

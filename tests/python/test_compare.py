@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from wavecomb.compare import compare, luminance
 from wavecomb.heatmap import colour_map, heat_map, write_heat_map
 from wavecomb.image import read_image, srgb_from_linear, write_exr

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from wavecomb.files import check_writable, replacing
 
 from wavecomb import image
+from wavecomb.files import check_writable, replacing
 
 
 @pytest.fixture

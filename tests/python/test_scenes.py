@@ -13,6 +13,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
+
 from wavecomb.scenes import SCENES, SceneError, write_scene
 from wavecomb.scenes.dragon import MIN_TRIANGLES, dragon
 from wavecomb.scenes.materials import PROGRAMS

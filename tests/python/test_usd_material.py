@@ -7,6 +7,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from usd_recorder import QUAD, Recorder, load, said, write
+
 from wavecomb.usd import load_stage
 
 BIND = '(prepend apiSchemas = ["MaterialBindingAPI"])'

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from usd_recorder import QUAD, load, said
+
 from wavecomb.usd.triangulate import MeshError, clip_ears, triangulate
 
 

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from usd_recorder import ASSETS, QUAD, Recorder, load, said, write
+
 from wavecomb.usd import WavecombError, load_stage
 
 

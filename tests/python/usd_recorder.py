@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import numpy as np
+
 from wavecomb.usd import LoadedStage, load_stage
 
 INHERIT = 0xFFFFFFFF

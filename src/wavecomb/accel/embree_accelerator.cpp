@@ -18,8 +18,9 @@
 namespace wavecomb {
 namespace {
 
-/// Handed through Embree to the filters: the rays' paths, and the closest hits so far of the packet's rays.
-/// Packets are traced at widths that Embree has natively, so lane i there is lane i here.
+/// Handed through Embree to the filters: the rays' paths, and the closest hits so far of the
+/// packet's rays. Packets are traced at widths that Embree has natively, so lane i there is lane i
+/// here.
 struct alignas(64) QueryContext {
   RTCRayQueryContext base;
   const PresenceKeys* keys;
@@ -69,11 +70,11 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
 /// Hits farther than the closest by less than this fraction are looked at still.
 constexpr float kSlack = 1.f + 0x1p-20f;
 
-/// Makes the closest hit independent of the order in which triangles are tried. Embree keeps whichever of
-/// two hits it tries last when they are equally far up to rounding (on shared edges, where surfaces cross
-/// or lie in one another), and in a packet that order depends on the other rays. Here the smaller distance
-/// wins, and of equal ones the smaller id. So that no candidate is missed, the search goes on a little
-/// beyond the closest hit: tfar is put back by `slack`.
+/// Makes the closest hit independent of the order in which triangles are tried. Embree keeps
+/// whichever of two hits it tries last when they are equally far up to rounding (on shared edges,
+/// where surfaces cross or lie in one another), and in a packet that order depends on the other
+/// rays. Here the smaller distance wins, and of equal ones the smaller id. So that no candidate is
+/// missed, the search goes on a little beyond the closest hit: tfar is put back by `slack`.
 template <unsigned N>
 inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
@@ -98,15 +99,20 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
 
 void closest_filter(const RTCFilterFunctionNArguments* args) {
   switch (args->N) {
-    case 16: return keep_closest<16>(args);
-    case 8: return keep_closest<8>(args);
-    case 4: return keep_closest<4>(args);
-    default: return keep_closest<1>(args);
+    case 16:
+      return keep_closest<16>(args);
+    case 8:
+      return keep_closest<8>(args);
+    case 4:
+      return keep_closest<4>(args);
+    default:
+      return keep_closest<1>(args);
   }
 }
 
 /// How closest hits are asked for.
-RTCIntersectArguments intersect_arguments(QueryContext& context, const PresenceKeys& keys, bool coherent) {
+RTCIntersectArguments intersect_arguments(QueryContext& context, const PresenceKeys& keys,
+                                          bool coherent) {
   rtcInitRayQueryContext(&context.base);
   context.keys = &keys;
   RTCIntersectArguments args;
@@ -159,7 +165,8 @@ struct EmbreeAccelerator::Impl {
     if (error == RTC_ERROR_NONE) return;
     const char* why = error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory; use fewer triangles"
                                                        : rtcGetDeviceLastErrorMessage(device);
-    throw Error(std::string("the ray tracer failed while ") + doing + ": " + (why ? why : "unknown"));
+    throw Error(std::string("the ray tracer failed while ") + doing + ": " +
+                (why ? why : "unknown"));
   }
 
   RTCScene new_scene() const {
@@ -183,10 +190,11 @@ struct EmbreeAccelerator::Impl {
     }
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, 12,
                                mesh.vertex_count());
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0, 12,
-                               mesh.triangle_count());
-    if (mesh_has_presence(*scene, mesh) || (can_inherit_presence && mesh.material == kInheritMaterial &&
-                                            mesh.face_materials.empty())) {
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(),
+                               0, 12, mesh.triangle_count());
+    if (mesh_has_presence(*scene, mesh) ||
+        (can_inherit_presence && mesh.material == kInheritMaterial &&
+         mesh.face_materials.empty())) {
       users.push_back(std::make_unique<GeometryUser>(GeometryUser{&view, mesh_id}));
       rtcSetGeometryUserData(g, users.back().get());
       rtcSetGeometryIntersectFilterFunction(g, presence_filter);
@@ -242,9 +250,9 @@ struct EmbreeAccelerator::Impl {
       RTCGeometry instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
       rtcSetGeometryInstancedScene(instance, unit);
       const float s = std::sqrt(light.area);
-      const float columns[12] = {light.u[0],     light.u[1],     light.u[2],     light.v[0],
-                                 light.v[1],     light.v[2],     light.n[0] * s, light.n[1] * s,
-                                 light.n[2] * s, light.p[0],     light.p[1],     light.p[2]};
+      const float columns[12] = {light.u[0],     light.u[1], light.u[2],     light.v[0],
+                                 light.v[1],     light.v[2], light.n[0] * s, light.n[1] * s,
+                                 light.n[2] * s, light.p[0], light.p[1],     light.p[2]};
       rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
       rtcCommitGeometry(instance);
       rtcAttachGeometryByID(top, instance, id);
@@ -282,8 +290,9 @@ struct EmbreeAccelerator::Impl {
       RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
       rtcSetGeometryInstancedScene(g, group_scenes[instances[i].group]);
       const Affine& m = instances[i].to_world;
-      const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y, m.row[1].y, m.row[2].y,
-                                 m.row[0].z, m.row[1].z, m.row[2].z, m.t.x,      m.t.y,      m.t.z};
+      const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y,
+                                 m.row[1].y, m.row[2].y, m.row[0].z, m.row[1].z,
+                                 m.row[2].z, m.t.x,      m.t.y,      m.t.z};
       rtcSetGeometryTransform(g, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
       rtcCommitGeometry(g);
       rtcAttachGeometryByID(top, g, static_cast<unsigned>(i + 1));
@@ -307,8 +316,8 @@ struct EmbreeAccelerator::Impl {
 
   /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
-                      const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
-                      size_t n) const {
+                  const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
+                  size_t n) const {
     for (size_t i = 0; i < n; ++i) {
       const bool instanced = inst[i] != RTC_INVALID_GEOMETRY_ID;
       const uint32_t top_id = instanced ? inst[i] : geom[i];
@@ -318,7 +327,8 @@ struct EmbreeAccelerator::Impl {
       out.u[base + i] = u[i];
       out.v[base + i] = v[i];
       out.prim[base + i] = prim[i];
-      out.geom[base + i] = light ? top_id - first_light : (instanced ? geom[i] : geom[i] - first_world);
+      out.geom[base + i] =
+          light ? top_id - first_light : (instanced ? geom[i] : geom[i] - first_world);
       out.inst[base + i] = missed ? kNoHit : (light ? kLightShape : (instanced ? inst[i] : 0));
     }
   }
@@ -392,8 +402,8 @@ struct EmbreeAccelerator::Impl {
         rtcIntersect8(valid, top, &rh, &args);
       else
         rtcIntersect4(valid, top, &rh, &args);
-      store_hits(context.t, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID, rh.hit.instID[0], hits, base,
-                 n);
+      store_hits(context.t, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID, rh.hit.instID[0],
+                 hits, base, n);
     }
   }
 
@@ -451,10 +461,14 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
   switch (width) {
-    case 16: return impl_->intersect_packets<16>(rays, hits, coherent, keys);
-    case 8: return impl_->intersect_packets<8>(rays, hits, coherent, keys);
-    case 4: return impl_->intersect_packets<4>(rays, hits, coherent, keys);
-    default: break;
+    case 16:
+      return impl_->intersect_packets<16>(rays, hits, coherent, keys);
+    case 8:
+      return impl_->intersect_packets<8>(rays, hits, coherent, keys);
+    case 4:
+      return impl_->intersect_packets<4>(rays, hits, coherent, keys);
+    default:
+      break;
   }
   impl_->intersect_alone(rays, hits, coherent, keys);
 }
@@ -468,10 +482,14 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
   rtcInitOccludedArguments(&args);
   args.context = &context.base;
   switch (width) {
-    case 16: return impl_->occluded_packets<16>(rays, occluded, args);
-    case 8: return impl_->occluded_packets<8>(rays, occluded, args);
-    case 4: return impl_->occluded_packets<4>(rays, occluded, args);
-    default: break;
+    case 16:
+      return impl_->occluded_packets<16>(rays, occluded, args);
+    case 8:
+      return impl_->occluded_packets<8>(rays, occluded, args);
+    case 4:
+      return impl_->occluded_packets<4>(rays, occluded, args);
+    default:
+      break;
   }
   for (size_t i = 0; i < rays.size; ++i) {
     RTCRay ray = Impl::load_ray(rays, i);

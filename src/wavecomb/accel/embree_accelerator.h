@@ -12,13 +12,14 @@ namespace wavecomb {
 /// Rays to trace, column by column. Directions are unit, tnear is 0.
 struct RaySpan {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
-  const float* tfar;      ///< null: no limit
-  const uint32_t* slot;   ///< for presence, see PresenceKeys; may be null
+  const float* tfar;     ///< null: no limit
+  const uint32_t* slot;  ///< for presence, see PresenceKeys; may be null
   size_t size;
 };
 
-/// Where hits go: barycentric u, v as in HitBuffer; `inst` is an index into SceneView::instances and `geom`
-/// a geometry within its group, or `inst` is kLightShape and geom is the light's number among the records.
+/// Where hits go: barycentric u, v as in HitBuffer; `inst` is an index into SceneView::instances
+/// and `geom` a geometry within its group, or `inst` is kLightShape and geom is the light's number
+/// among the records.
 struct HitSpan {
   float *t, *u, *v;
   uint32_t *prim, *geom, *inst;
@@ -26,21 +27,24 @@ struct HitSpan {
 inline constexpr uint32_t kNoHit = 0xffffffffu;
 inline constexpr uint32_t kLightShape = 0xfffffffeu;
 
-/// What decides whether a partly present surface is there for a path: random numbers keyed by the path, so
-/// that no traversal order matters. Indexed by slot.
+/// What decides whether a partly present surface is there for a path: random numbers keyed by the
+/// path, so that no traversal order matters. Indexed by slot.
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
-  uint32_t salt = 0;  ///< different for every depth and for shadow rays, so that crossings are independent
+  /// Different for every depth and for shadow rays, so that crossings are independent.
+  uint32_t salt = 0;
 };
 
-/// A two-level bounding volume hierarchy: each group of meshes committed once, instanced any number of
-/// times; the world's own meshes in the top level.
+/// A two-level bounding volume hierarchy: each group of meshes committed once, instanced any number
+/// of times; the world's own meshes in the top level.
 ///
-/// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is thread-safe.
+/// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is
+/// thread-safe.
 class EmbreeAccelerator {
  public:
-  /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory ...).
+  /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory
+  /// ...).
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads);
   ~EmbreeAccelerator();
 

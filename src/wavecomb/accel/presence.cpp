@@ -42,8 +42,8 @@ float opacity_at(const SceneView& scene, const MaterialRecord& material, uint32_
 
 }  // namespace
 
-bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u, float v,
-                uint32_t slot, const PresenceKeys& keys) {
+bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
+                float v, uint32_t slot, const PresenceKeys& keys) {
   const MeshRecord& record = scene.meshes[mesh];
   uint32_t material = record.material;
   if (record.face_materials != 0)

@@ -9,10 +9,10 @@
 
 namespace wavecomb {
 
-/// True where the material at barycentrics (u, v) of triangle `prim` is present for the path in `slot`:
-/// always for opacity 1, never for 0, else by a random number keyed by (path, ray, instance, triangle),
-/// so that traversal order and packet make-up cannot matter.
-bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u, float v,
-                uint32_t slot, const PresenceKeys& keys);
+/// True where the material at barycentrics (u, v) of triangle `prim` is present for the path in
+/// `slot`: always for opacity 1, never for 0, else by a random number keyed by (path, ray,
+/// instance, triangle), so that traversal order and packet make-up cannot matter.
+bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
+                float v, uint32_t slot, const PresenceKeys& keys);
 
 }  // namespace wavecomb

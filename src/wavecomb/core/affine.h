@@ -33,8 +33,8 @@ struct Affine {
   }
   bool is_identity() const {
     return row[0].x == 1 && row[0].y == 0 && row[0].z == 0 && row[1].x == 0 && row[1].y == 1 &&
-           row[1].z == 0 && row[2].x == 0 && row[2].y == 0 && row[2].z == 1 && t.x == 0 && t.y == 0 &&
-           t.z == 0;
+           row[1].z == 0 && row[2].x == 0 && row[2].y == 0 && row[2].z == 1 && t.x == 0 &&
+           t.y == 0 && t.z == 0;
   }
   /// The map that first applies `b`, then `a`.
   friend Affine operator*(const Affine& a, const Affine& b) {

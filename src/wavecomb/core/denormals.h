@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Flushes denormal floats to zero on this thread for as long as it lives: they are slow and mean nothing
-/// here, and every worker must treat them alike for pictures to be equal.
+/// Flushes denormal floats to zero on this thread for as long as it lives: they are slow and mean
+/// nothing here, and every worker must treat them alike for pictures to be equal.
 class DenormalsOff {
  public:
 #if defined(__SSE__)

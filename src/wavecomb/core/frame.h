@@ -12,13 +12,11 @@ struct Frame {
   Vec3<F> s, t, n;
 
   Vec3<F> to_local(const Vec3<F>& v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
-  Vec3<F> to_world(const Vec3<F>& v) const {
-    return fma(s, v.x, fma(t, v.y, Vec3<F>(n * v.z)));
-  }
+  Vec3<F> to_world(const Vec3<F>& v) const { return fma(s, v.x, fma(t, v.y, Vec3<F>(n * v.z))); }
 };
 
-/// A frame around the unit vector `n`, without a branch (Duff et al., "Building an Orthonormal Basis,
-/// Revisited", JCGT 6(1) 2017).
+/// A frame around the unit vector `n`, without a branch (Duff et al., "Building an Orthonormal
+/// Basis, Revisited", JCGT 6(1) 2017).
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n) {
   const F sign = copysign(F(1.f), n.z);
@@ -30,8 +28,8 @@ inline Frame<F> make_frame(const Vec3<F>& n) {
 }
 
 /// A frame around the unit vector `n` whose s is `tangent` made orthogonal to n; falls back to
-/// make_frame where the tangent is parallel to n (within 1e-3), zero or not finite. The bound is far above
-/// rounding, which would else decide on s.
+/// make_frame where the tangent is parallel to n (within 1e-3), zero or not finite. The bound is
+/// far above rounding, which would else decide on s.
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);

@@ -17,8 +17,8 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hash of two words (the second may be uniform). A bijection of either one while the other stays, so
-/// that no two pixels share a seed's numbers.
+/// Hash of two words (the second may be uniform). A bijection of either one while the other stays,
+/// so that no two pixels share a seed's numbers.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
   return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lanes: the float types that every kernel is a template on, and the few operations they share.
 ///
-/// A kernel takes `F`, which is `float` in the reference integrator and `FloatP<W>` in the wave. Each
-/// operation below rounds in the same way for both, so a kernel gives the same bits at any width.
-/// That is why minimum, maximum and fma are ours: Dr.Jit's differ between scalar and packet for NaN
-/// and contraction. This is the only file that includes Dr.Jit.
+/// A kernel takes `F`, which is `float` in the reference integrator and `FloatP<W>` in the wave.
+/// Each operation below rounds in the same way for both, so a kernel gives the same bits at any
+/// width. That is why minimum, maximum and fma are ours: Dr.Jit's differ between scalar and packet
+/// for NaN and contraction. This is the only file that includes Dr.Jit.
 #pragma once
 
 #include <drjit/packet.h>
@@ -62,8 +62,8 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// What lanes are made of. Argument-dependent lookup finds Dr.Jit's functions of the same name beside
-/// ours; theirs are not constrained, so that this constraint makes ours the better match.
+/// What lanes are made of. Argument-dependent lookup finds Dr.Jit's functions of the same name
+/// beside ours; theirs are not constrained, so that this constraint makes ours the better match.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
@@ -75,14 +75,14 @@ namespace detail {
 using U16 = UInt<FloatP<16>>;
 using U16Mask = drjit::mask_t<U16>;
 }  // namespace detail
-#define WAVECOMB_COMPARE_U16(op, predicate)                                                  \
-  inline detail::U16Mask operator op(const detail::U16& a, const detail::U16& b) {           \
-    return detail::U16Mask::from_k(_mm512_cmp_epu32_mask(a.m, b.m, predicate));              \
-  }                                                                                          \
-  template <typename T>                                                                      \
-    requires std::is_integral_v<T>                                                           \
-  inline detail::U16Mask operator op(const detail::U16& a, const T& b) {                     \
-    return a op detail::U16(static_cast<uint32_t>(b));                                       \
+#define WAVECOMB_COMPARE_U16(op, predicate)                                        \
+  inline detail::U16Mask operator op(const detail::U16& a, const detail::U16& b) { \
+    return detail::U16Mask::from_k(_mm512_cmp_epu32_mask(a.m, b.m, predicate));    \
+  }                                                                                \
+  template <typename T>                                                            \
+    requires std::is_integral_v<T>                                                 \
+  inline detail::U16Mask operator op(const detail::U16& a, const T& b) {           \
+    return a op detail::U16(static_cast<uint32_t>(b));                             \
   }
 WAVECOMB_COMPARE_U16(<, _MM_CMPINT_LT)
 WAVECOMB_COMPARE_U16(<=, _MM_CMPINT_LE)
@@ -141,7 +141,8 @@ inline F clamp(const F& x, const F& lo, const F& hi) {
   return min(max(x, lo), hi);
 }
 
-/// a b + c, rounded once where the target has FMA, twice where it has not; alike for scalar and packet.
+/// a b + c, rounded once where the target has FMA, twice where it has not; alike for scalar and
+/// packet.
 template <LaneValue F>
 inline F fma(const F& a, const std::type_identity_t<F>& b, const std::type_identity_t<F>& c) {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
@@ -311,9 +312,10 @@ namespace detail {
 /// pointer that may not alias them, which GCC 12 miscompiles.
 template <typename T>
 struct InMemory {
-  using Value = std::conditional_t<std::is_same_v<T, FloatP<kWidth<T>>>, float,
-                                   std::conditional_t<std::is_same_v<T, Int<T>>, int32_t,
-                                   std::conditional_t<std::is_same_v<T, UInt<T>>, uint32_t, uint64_t>>>;
+  using Value = std::conditional_t<
+      std::is_same_v<T, FloatP<kWidth<T>>>, float,
+      std::conditional_t<std::is_same_v<T, Int<T>>, int32_t,
+                         std::conditional_t<std::is_same_v<T, UInt<T>>, uint32_t, uint64_t>>>;
   alignas(64) Value value[kWidth<T>];
 
   InMemory() : value{} {}
@@ -334,7 +336,8 @@ inline T gather_words(const void* base, const Index& index, const M& active) {
   InMemory<T> result;
   for (uint32_t bits = mask_bits(active); bits != 0; bits &= bits - 1) {
     const auto i = static_cast<size_t>(std::countr_zero(bits));
-    const uint64_t address = reinterpret_cast<uint64_t>(base) + 4 * static_cast<uint64_t>(at.value[i]);
+    const uint64_t address =
+        reinterpret_cast<uint64_t>(base) + 4 * static_cast<uint64_t>(at.value[i]);
     std::memcpy(result.value + i, reinterpret_cast<const void*>(address), 4);
   }
   return load<T>(result.value);
@@ -342,8 +345,8 @@ inline T gather_words(const void* base, const Index& index, const M& active) {
 }
 }  // namespace detail
 
-/// base[index] in each active lane, 0 elsewhere. `T` is a float or uint lane type; indices of active
-/// lanes are below 2^31.
+/// base[index] in each active lane, 0 elsewhere. `T` is a float or uint lane type; indices of
+/// active lanes are below 2^31.
 template <typename T>
 inline T gather(const void* base, const UInt<T>& index, const Mask<T>& active) {
   if constexpr (kIsScalar<T>)
@@ -390,7 +393,8 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
     if (bits) std::memcpy(p, &value, sizeof(T));
 #if defined(__AVX512F__)
   } else if constexpr (kWidth<T> == 16) {
-    // Compress in the register, then store whole: a compressing store to memory is far slower on Zen 4.
+    // Compress in the register, then store whole: a compressing store to memory is far slower on
+    // Zen 4.
     const __m512i v = std::bit_cast<__m512i>(value.m);
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), v));
 #endif

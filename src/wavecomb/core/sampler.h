@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Counter-based sample values: every number is a function of (pixel, sample, set, seed) and of nothing
-/// else, so no schedule can change it.
+/// Counter-based sample values: every number is a function of (pixel, sample, set, seed) and of
+/// nothing else, so no schedule can change it.
 ///
 /// Owen-scrambled Sobol by hashing, four dimensions at a time, sets padded by independent shuffles
-/// (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020). Direction numbers: Joe and Kuo 2008.
+/// (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020). Direction numbers: Joe and Kuo
+/// 2008.
 #pragma once
 
 #include "wavecomb/core/hash.h"
 #include "wavecomb/core/settings.h"
 
 namespace wavecomb {
-
-
 
 /// What the values of one path are keyed by: a hash of (pixel, seed) and the sample's number.
 template <typename F>
@@ -31,11 +30,16 @@ struct Sample4 {
   F x, y, z, w;
 };
 
-/// Sets of four dimensions. A path's first set places it on the film and the lens; each vertex has two:
-/// one for its light (choice, u, v, roulette), one for its BSDF (lobe, u, v, light-texture spare).
+/// Sets of four dimensions. A path's first set places it on the film and the lens; each vertex has
+/// two: one for its light (choice, u, v, roulette), one for its BSDF (lobe, u, v, light-texture
+/// spare).
 inline constexpr uint32_t kCameraSet = 0;
-inline constexpr uint32_t light_set(uint32_t depth) { return 1 + 2 * depth; }
-inline constexpr uint32_t bsdf_set(uint32_t depth) { return 2 + 2 * depth; }
+inline constexpr uint32_t light_set(uint32_t depth) {
+  return 1 + 2 * depth;
+}
+inline constexpr uint32_t bsdf_set(uint32_t depth) {
+  return 2 + 2 * depth;
+}
 
 namespace detail {
 
@@ -48,8 +52,8 @@ inline U reverse_bits(U x) {
   return (x >> 16) | (x << 16);
 }
 
-/// Laine and Karras' permutation: bit k of the result depends on bits 0..k only, so that on reversed
-/// bits it is an Owen scramble (constants: Burley 2020, section 4).
+/// Laine and Karras' permutation: bit k of the result depends on bits 0..k only, so that on
+/// reversed bits it is an Owen scramble (constants: Burley 2020, section 4).
 template <typename U>
 inline U laine_karras(U x, const U& seed) {
   x += seed;
@@ -63,9 +67,9 @@ inline U laine_karras(U x, const U& seed) {
 /// Bits of the sample number that are used: sequences of up to 2^20 samples a pixel.
 inline constexpr int kIndexBits = 20;
 
-/// Sobol dimensions 2 and 3, columns bit-reversed: primitive polynomials x^2 + x + 1 and x^3 + x + 1.
+/// Sobol dimensions 2 and 3, columns bit-reversed. Primitive polynomials: x^2 + x + 1, x^3 + x + 1.
 inline constexpr uint32_t kSobol2[kIndexBits] = {
-    0x1,   0x3,    0x6,    0x9,    0x17,   0x3a,    0x71,    0xa3,    0x116,   0x339,
+    0x1,   0x3,   0x6,    0x9,    0x17,   0x3a,   0x71,    0xa3,    0x116,   0x339,
     0x677, 0x9aa, 0x1601, 0x3903, 0x7706, 0xaa09, 0x10117, 0x3033a, 0x60671, 0x909a3};
 inline constexpr uint32_t kSobol3[kIndexBits] = {
     0x1,   0x3,   0x4,    0xa,    0x1f,   0x2e,   0x45,    0xc9,    0x11b,   0x2a4,

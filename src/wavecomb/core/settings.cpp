@@ -14,8 +14,8 @@ void check_range(const char* option, double value, double lo, double hi) {
     return v == std::floor(v) && std::abs(v) < 1e15 ? std::to_string(static_cast<long long>(v))
                                                     : std::to_string(v);
   };
-  throw Error(std::string(option) + " is " + text(value) + "; it must be from " + text(lo) + " to " +
-              text(hi));
+  throw Error(std::string(option) + " is " + text(value) + "; it must be from " + text(lo) +
+              " to " + text(hi));
 }
 
 }  // namespace
@@ -29,6 +29,7 @@ void Settings::check() const {
   check_range("filter_width", filter_width, 0.01, 32);
   check_range("roulette_depth", roulette_depth, 0, 4096);
   check_range("clamp_indirect", clamp_indirect, 0, 1e30);
+  check_range("cost_weight", cost_weight, 0, 1);
   check_range("threads", threads, 0, 1024);
   if (wave_size != 0) check_range("wave_size", wave_size, 64, 1 << 20);
   if (lanes != 0 && lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16)

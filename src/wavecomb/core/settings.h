@@ -10,7 +10,12 @@ namespace wavecomb {
 enum class SamplerKind : uint8_t { kSobol, kIndependent };
 enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
-enum class RouletteKind : uint8_t { kOff, kThroughput };
+enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
+/// Order of rays before traversal.
+enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kAuto };
+/// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model for
+/// roulette, so that pictures are reproducible.
+enum class CostSource : uint8_t { kAuto, kMeasured, kModel };
 /// How rays are given to the accelerator: in packets, or each alone.
 enum class Traversal : uint8_t { kPackets, kSingle };
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
@@ -27,22 +32,26 @@ struct Settings {
   uint32_t seed = 0;
   SamplerKind sampler = SamplerKind::kSobol;
   FilterKind filter = FilterKind::kBlackmanHarris;
-  float filter_width = 3.f;      ///< full width in pixels (box: 1 is the pixel itself)
+  float filter_width = 3.f;  ///< full width in pixels (box: 1 is the pixel itself)
   RouletteKind roulette = RouletteKind::kThroughput;
-  uint32_t roulette_depth = 3;   ///< first vertex after which a path may end
-  float clamp_indirect = 0;      ///< largest luminance of one indirect contribution; 0: off
+  uint32_t roulette_depth = 3;  ///< first vertex after which a path may end
+  float clamp_indirect = 0;     ///< largest luminance of one indirect contribution; 0: off
   bool schlick_fresnel = false;
-  bool cosine_sampling = false;  ///< sample every non-delta bounce by cosine (the dissertation's way)
+  /// Sample every non-delta bounce by cosine (the dissertation's way).
+  bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   // ---- below: how it is computed; never changes the picture ----
-  uint32_t threads = 0;          ///< 0: all that the process may use
-  uint32_t wave_size = 0;        ///< paths per wave, 64 to 2^20; 0: default
-  uint32_t lanes = 0;            ///< 1, 4, 8, 16; 0: widest built
+  uint32_t threads = 0;    ///< 0: all that the process may use
+  uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0: default
+  uint32_t lanes = 0;      ///< 1, 4, 8, 16; 0: widest built
   /// Packets are faster. They can show in one place: where two surfaces lie exactly in one another
   /// (z-fighting), which of them is seen depends on the packet's make-up; single rays always agree.
   Traversal traversal = Traversal::kPackets;
   std::string policy = "program";
-  Materialize materialize = Materialize::kAuto;
+  Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster
+  RayOrder ray_order = RayOrder::kSlot;            ///< of bounce rays
+  RayOrder shadow_order = RayOrder::kSlot;         ///< of shadow rays
+  float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
   /// Throws Error naming the option and what it may be.
   void check() const;

@@ -10,22 +10,25 @@
 
 namespace wavecomb {
 
-/// Columns of floats or uint32 in one allocation, each aligned to 64 bytes and padded so that a packet
-/// may be read or written at any index below the capacity.
+/// Columns of floats or uint32 in one allocation, each aligned to 64 bytes and padded so that a
+/// packet may be read or written at any index below the capacity.
 class SoaBlock {
  public:
   static constexpr size_t kPad = 16;  ///< values past the capacity
 
   SoaBlock() = default;
   SoaBlock(size_t columns, size_t capacity)
-      : stride_(((capacity + kPad) + 15) / 16 * 16 + 16),  // 16 more: columns do not share cache sets
+      : stride_(((capacity + kPad) + 15) / 16 * 16 +
+                16),  // 16 more: columns do not share cache sets
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {
     if (!data_) throw std::bad_alloc();
     for (size_t i = 0; i < columns * stride_; ++i) data_.get()[i] = 0;  // first touch by the owner
   }
 
-  float* floats(size_t column) const { return reinterpret_cast<float*>(data_.get() + column * stride_); }
+  float* floats(size_t column) const {
+    return reinterpret_cast<float*>(data_.get() + column * stride_);
+  }
   uint32_t* uints(size_t column) const { return data_.get() + column * stride_; }
   size_t bytes() const { return bytes_; }
 

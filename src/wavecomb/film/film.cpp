@@ -6,7 +6,9 @@
 namespace wavecomb {
 namespace {
 
-double inverse(uint32_t n) { return n == 0 ? 0.0 : 1.0 / n; }
+double inverse(uint32_t n) {
+  return n == 0 ? 0.0 : 1.0 / n;
+}
 
 }  // namespace
 

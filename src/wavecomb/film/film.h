@@ -10,8 +10,8 @@ namespace wavecomb {
 
 /// Sums of samples per pixel, in double precision, so that 65,536 samples stay exact to float.
 ///
-/// Contract: a pixel is written by one thread at a time, its samples in sample order; different pixels may
-/// be written at once. Row 0 is the top.
+/// Contract: a pixel is written by one thread at a time, its samples in sample order; different
+/// pixels may be written at once. Row 0 is the top.
 class Film {
  public:
   Film(uint32_t width, uint32_t height, bool with_aovs);
@@ -24,7 +24,7 @@ class Film {
   struct AovPixel {
     double albedo[3] = {0, 0, 0};
     double normal[3] = {0, 0, 0};
-    double depth = 0;          ///< sum over samples that hit something
+    double depth = 0;  ///< sum over samples that hit something
     uint32_t depth_samples = 0;
   };
 

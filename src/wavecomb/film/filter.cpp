@@ -10,11 +10,14 @@ namespace {
 double filter_value(FilterKind kind, double x) {
   constexpr double kPi = 3.14159265358979323846;
   switch (kind) {
-    case FilterKind::kBox: return 1.0;
-    case FilterKind::kGaussian: return std::exp(-0.5 * 9.0 * x * x) - std::exp(-0.5 * 9.0);
+    case FilterKind::kBox:
+      return 1.0;
+    case FilterKind::kGaussian:
+      return std::exp(-0.5 * 9.0 * x * x) - std::exp(-0.5 * 9.0);
     case FilterKind::kBlackmanHarris: {
       const double a = kPi * (x + 1.0);
-      return 0.35875 - 0.48829 * std::cos(a) + 0.14128 * std::cos(2 * a) - 0.01168 * std::cos(3 * a);
+      return 0.35875 - 0.48829 * std::cos(a) + 0.14128 * std::cos(2 * a) -
+             0.01168 * std::cos(3 * a);
     }
   }
   return 1.0;

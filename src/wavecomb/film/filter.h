@@ -8,9 +8,9 @@
 
 namespace wavecomb {
 
-/// Inverse cumulative distribution of a separable, non-negative pixel filter along one axis: importance
-/// sampled, so that every sample has weight 1 and belongs to one pixel (Ernst, Stamminger and Greiner,
-/// "Filter Importance Sampling", RT 2006).
+/// Inverse cumulative distribution of a separable, non-negative pixel filter along one axis:
+/// importance sampled, so that every sample has weight 1 and belongs to one pixel (Ernst,
+/// Stamminger and Greiner, "Filter Importance Sampling", RT 2006).
 class FilterTable {
  public:
   static constexpr uint32_t kBins = 1024;

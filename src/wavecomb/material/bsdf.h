@@ -3,12 +3,15 @@
 /// away from the surface, |w| = 1.
 ///
 /// A program is a class template `Bsdf<F>` with
-///   static constexpr ProgramId kProgram; uint32_t kSlots (what it reads); bool kHasNonDelta;
+///
+///   static constexpr ProgramId kProgram;
+///   static constexpr uint32_t kSlots;      what it reads
+///   static constexpr bool kHasNonDelta;
 ///   Bsdf(const ShadingParams<F>&, bool schlick);
-///   Color<F> albedo() const;                                  for the AOV: diffuse and specular
-///   colour Mask<F> has_non_delta() const;                            lanes where light sampling
-///   makes sense BsdfEval<F> eval(wo, wi) const; BsdfSample<F> sample(wo, u_lobe, u, v) const;
-///   numbers in [0, 1)
+///   Color<F> albedo() const;               for the AOV: diffuse and specular colour
+///   Mask<F> has_non_delta() const;         lanes where light sampling makes sense
+///   BsdfEval<F> eval(wo, wi) const;
+///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    numbers in [0, 1)
 #pragma once
 
 #include "wavecomb/core/vec.h"

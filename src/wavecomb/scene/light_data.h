@@ -16,20 +16,22 @@ enum class LightKind : uint8_t { kRect, kDisk, kSphere, kDistant, kDome, kTriang
 inline constexpr uint32_t kLightKindCount = 6;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 
-/// A light as the stage gives it, in its own space (UsdLux: rect, disk in the xy plane, shining along -z;
-/// distant shining along -z; dome's pole +y, texture's centre towards +z ... as UsdLuxDomeLight says).
+/// A light as the stage gives it, in its own space (UsdLux: rect, disk in the xy plane, shining
+/// along -z; distant shining along -z; dome's pole +y, texture's centre towards +z ... as
+/// UsdLuxDomeLight says).
 struct Light {
   std::string name;
   LightKind kind = LightKind::kRect;
   Affine to_world;
-  /// Emitted radiance (area lights and dome: W / (m^2 sr)); for a distant light of angle 0 and for a
-  /// sphere of radius 0 (a point light), see `color`'s use in light/.
+  /// Emitted radiance (area lights and dome: W / (m^2 sr)); for a distant light of angle 0 and for
+  /// a sphere of radius 0 (a point light), see `color`'s use in light/.
   Vec3<float> color{1, 1, 1};
-  float width = 1, height = 1;   ///< rect, before to_world
-  float radius = 0.5f;           ///< disk, sphere, before to_world
-  float angle = 0.53f;           ///< distant: apparent diameter in degrees
-  bool normalize = false;        ///< UsdLux: divide by the area in world space (distant: by its solid angle)
-  uint32_t texture = kNoTexture; ///< rect (u right, v up as seen from the front), dome (latlong)
+  float width = 1, height = 1;  ///< rect, before to_world
+  float radius = 0.5f;          ///< disk, sphere, before to_world
+  float angle = 0.53f;          ///< distant: apparent diameter in degrees
+  /// UsdLux: divide by the area in world space (distant: by its solid angle).
+  bool normalize = false;
+  uint32_t texture = kNoTexture;  ///< rect (u right, v up as seen from the front), dome (latlong)
 };
 
 /// A light as lanes read it: 32 words. Vectors are in world space. Use by kind:
@@ -47,12 +49,12 @@ struct alignas(64) LightRecord {
   float area;
   float radius;
   float one_minus_cos;
-  float pick_pdf;          ///< probability of choosing this light
+  float pick_pdf;  ///< probability of choosing this light
   uint32_t kind;
   uint32_t texture;
-  uint32_t material;       ///< triangle: material whose emission slot is textured, else kNoLight
+  uint32_t material;  ///< triangle: material whose emission slot is textured, else kNoLight
   float uv0[2], uv1[2], uv2[2];
-  uint32_t distribution;   ///< dome: index into LightView::distributions
+  uint32_t distribution;  ///< dome: index into LightView::distributions
   uint32_t pad;
 };
 static_assert(sizeof(LightRecord) == 128);

@@ -20,21 +20,23 @@ inline constexpr const char* kProgramNames[kProgramCount] = {"diffuse", "metal",
 
 /// Parameters that a texture can drive. Each has a constant, used where no texture is connected.
 enum class Slot : uint8_t {
-  kBaseColor,           ///< rgb: albedo; metal: reflectance at normal incidence (F0); dielectric: tint
-  kSpecularColor,       ///< rgb: metal: tint at 82 degrees (F82); principled, specular workflow: F0
-  kEmission,            ///< rgb: radiance
-  kRoughness,           ///< perceptual; alpha = roughness^2
+  kBaseColor,      ///< rgb: albedo; metal: reflectance at normal incidence (F0); dielectric: tint
+  kSpecularColor,  ///< rgb: metal: tint at 82 degrees (F82); principled, specular workflow: F0
+  kEmission,       ///< rgb: radiance
+  kRoughness,      ///< perceptual; alpha = roughness^2
   kMetallic,
   kClearcoat,
   kClearcoatRoughness,
   kOpacity,
-  kNormal,              ///< rgb: tangent-space normal, already scaled and biased to [-1, 1]
+  kNormal,  ///< rgb: tangent-space normal, already scaled and biased to [-1, 1]
 };
 inline constexpr uint32_t kSlotCount = 9;
 inline constexpr const char* kSlotNames[kSlotCount] = {
-    "base_color", "specular_color", "emission",            "roughness", "metallic",
-    "clearcoat",  "clearcoat_roughness", "opacity", "normal"};
-inline constexpr uint32_t slot_bit(Slot s) { return 1u << static_cast<uint32_t>(s); }
+    "base_color", "specular_color",      "emission", "roughness", "metallic",
+    "clearcoat",  "clearcoat_roughness", "opacity",  "normal"};
+inline constexpr uint32_t slot_bit(Slot s) {
+  return 1u << static_cast<uint32_t>(s);
+}
 
 /// How a slot reads a texture: value = texel * scale + bias at uv' = transform(uv).
 struct TextureUse {
@@ -62,8 +64,8 @@ struct Material {
   float opacity_threshold = 0;  ///< > 0: opacity below it is 0, else 1
   /// Conductor by measured index (metal only): used where any k > 0, in place of F0 and F82.
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
-  bool specular_workflow = false;    ///< principled: F0 from specular_color rather than metallic
-  bool presence = false;             ///< principled: opacity is presence (cut-out) rather than transparency
+  bool specular_workflow = false;  ///< principled: F0 from specular_color rather than metallic
+  bool presence = false;  ///< principled: opacity is presence (cut-out) rather than transparency
   std::array<TextureUse, kSlotCount> textures;
 
   bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
@@ -104,7 +106,8 @@ struct MaterialView {
   const MaterialRecord* materials = nullptr;
   const TextureUseRecord* uses = nullptr;
   const TextureView* textures = nullptr;
-  bool schlick_fresnel = false;  ///< a render setting: Schlick's approximation in place of exact Fresnel
+  /// A render setting: Schlick's approximation in place of exact Fresnel.
+  bool schlick_fresnel = false;
 };
 
 }  // namespace wavecomb

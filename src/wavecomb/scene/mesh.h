@@ -18,15 +18,15 @@ enum class Attribute : uint8_t {
   kCorner,  ///< one value per corner, 3 per triangle in order
 };
 
-/// An indexed triangle mesh. Arrays belong to the caller and are not copied; `owner` keeps them alive for
-/// as long as a Scene uses them.
+/// An indexed triangle mesh. Arrays belong to the caller and are not copied; `owner` keeps them
+/// alive for as long as a Scene uses them.
 struct Mesh {
   std::string name;
-  std::span<const float> positions;    ///< 3 per vertex
-  std::span<const uint32_t> indices;   ///< 3 per triangle, counter-clockwise from outside
-  std::span<const float> normals;      ///< 3 per vertex or corner; empty: flat
+  std::span<const float> positions;   ///< 3 per vertex
+  std::span<const uint32_t> indices;  ///< 3 per triangle, counter-clockwise from outside
+  std::span<const float> normals;     ///< 3 per vertex or corner; empty: flat
   Attribute normals_at = Attribute::kNone;
-  std::span<const float> uvs;          ///< 2 per vertex or corner; empty: uv = barycentrics
+  std::span<const float> uvs;  ///< 2 per vertex or corner; empty: uv = barycentrics
   Attribute uvs_at = Attribute::kNone;
   std::span<const uint32_t> face_materials;  ///< one per triangle, or empty
   uint32_t material = kInheritMaterial;      ///< where face_materials is empty
@@ -41,7 +41,8 @@ struct alignas(64) MeshRecord {
   uint64_t positions, indices, normals, uvs, face_materials;
   uint32_t material;
   uint32_t flags;
-  uint32_t pad[4];
+  float uv_density;  ///< sqrt(uv area / area) over all triangles, object space; 0 without uvs
+  uint32_t pad[3];
 };
 static_assert(sizeof(MeshRecord) == 64);
 enum MeshFlags : uint32_t {

@@ -33,7 +33,32 @@ void check_attribute(const Mesh& mesh, std::span<const float> values, Attribute 
                 what + " where " + std::to_string(want / arity) + " are needed");
 }
 
-uint64_t address(const void* p) { return reinterpret_cast<uint64_t>(p); }
+uint64_t address(const void* p) {
+  return reinterpret_cast<uint64_t>(p);
+}
+
+/// sqrt(uv area / area) of the whole mesh, 0 where it has no uvs.
+float uv_density(const Mesh& mesh) {
+  if (mesh.uvs_at == Attribute::kNone) return 0;
+  double area = 0, uv_area = 0;
+  for (size_t f = 0; f < mesh.triangle_count(); ++f) {
+    const float *p[3], *t[3];
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t vertex = mesh.indices[3 * f + k];
+      p[k] = &mesh.positions[3 * vertex];
+      t[k] = &mesh.uvs[2 * (mesh.uvs_at == Attribute::kCorner ? 3 * f + k : vertex)];
+    }
+    const double a[3] = {double{p[1][0]} - p[0][0], double{p[1][1]} - p[0][1], double{p[1][2]} - p[0][2]};
+    const double b[3] = {double{p[2][0]} - p[0][0], double{p[2][1]} - p[0][1], double{p[2][2]} - p[0][2]};
+    const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2],
+                 z = a[0] * b[1] - a[1] * b[0];
+    area += std::sqrt(x * x + y * y + z * z);
+    uv_area += std::abs((double{t[1][0]} - t[0][0]) * (double{t[2][1]} - t[0][1]) -
+                        (double{t[1][1]} - t[0][1]) * (double{t[2][0]} - t[0][0]));
+  }
+  const double density = area > 0 ? std::sqrt(uv_area / area) : 0;
+  return std::isfinite(density) ? static_cast<float>(density) : 0.f;
+}
 
 MeshRecord make_mesh_record(const Mesh& mesh) {
   MeshRecord r{};
@@ -43,6 +68,7 @@ MeshRecord make_mesh_record(const Mesh& mesh) {
   r.uvs = address(mesh.uvs.data());
   r.face_materials = address(mesh.face_materials.empty() ? nullptr : mesh.face_materials.data());
   r.material = mesh.material;
+  r.uv_density = uv_density(mesh);
   if (mesh.normals_at == Attribute::kVertex) r.flags |= kNormalsPerVertex;
   if (mesh.normals_at == Attribute::kCorner) r.flags |= kNormalsPerCorner;
   if (mesh.uvs_at == Attribute::kVertex) r.flags |= kUvsPerVertex;
@@ -133,7 +159,9 @@ uint64_t Scene::instanced_triangles() const {
   return n;
 }
 
-SceneBuilder::SceneBuilder() : groups_(1), children_(1) { groups_[0].name = "world"; }
+SceneBuilder::SceneBuilder() : groups_(1), children_(1) {
+  groups_[0].name = "world";
+}
 
 uint32_t SceneBuilder::add_texture(const TextureDesc& desc) {
   textures_.push_back(std::make_unique<Texture>(desc));
@@ -148,15 +176,17 @@ uint32_t SceneBuilder::add_material(Material material) {
     if (use.texture >= textures_.size())
       throw Error(name + " reads texture " + std::to_string(use.texture) +
                   ", which was never added; add textures before materials");
-    if (use.channel > 4) throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
+    if (use.channel > 4)
+      throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
   }
   for (const Vec3<float>& v : {material.base_color, material.specular_color, material.emission,
                                material.conductor_eta, material.conductor_k})
     if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
-  for (float x : {material.roughness, material.metallic, material.clearcoat,
-                  material.clearcoat_roughness, material.opacity, material.ior,
-                  material.opacity_threshold})
-    if (!std::isfinite(x)) throw Error(name + " has a parameter that is not finite; give finite numbers");
+  for (float x :
+       {material.roughness, material.metallic, material.clearcoat, material.clearcoat_roughness,
+        material.opacity, material.ior, material.opacity_threshold})
+    if (!std::isfinite(x))
+      throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
   materials_.push_back(std::move(material));
   return static_cast<uint32_t>(materials_.size() - 1);
@@ -180,8 +210,8 @@ uint32_t SceneBuilder::add_mesh(Mesh mesh) {
   check_attribute(mesh, mesh.normals, mesh.normals_at, 3, "normals");
   check_attribute(mesh, mesh.uvs, mesh.uvs_at, 2, "texture coordinates");
   if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.triangle_count())
-    throw Error(name + " has " + std::to_string(mesh.face_materials.size()) + " face materials for " +
-                std::to_string(mesh.triangle_count()) + " triangles");
+    throw Error(name + " has " + std::to_string(mesh.face_materials.size()) +
+                " face materials for " + std::to_string(mesh.triangle_count()) + " triangles");
   meshes_.push_back(std::move(mesh));
   return static_cast<uint32_t>(meshes_.size() - 1);
 }
@@ -240,7 +270,8 @@ void SceneBuilder::set_camera(const Camera& camera) {
 void SceneBuilder::flatten(uint32_t group, const Affine& to_world, uint32_t material,
                            std::vector<uint32_t>& path, std::vector<Instance>& out) const {
   if (std::find(path.begin(), path.end(), group) != path.end())
-    throw Error(quoted("group", groups_[group].name) + " holds itself; break the cycle of instances");
+    throw Error(quoted("group", groups_[group].name) +
+                " holds itself; break the cycle of instances");
   if (group != 0 && !groups_[group].meshes.empty()) {
     if (out.size() >= 0x0fffffffu) throw Error("more than 268 million instances; use fewer");
     out.push_back({group, to_world, material});
@@ -279,7 +310,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   materials_.push_back(fallback);
   for (const Mesh& mesh : meshes_) {
     const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
-    if (bad(mesh.material) || std::any_of(mesh.face_materials.begin(), mesh.face_materials.end(), bad))
+    if (bad(mesh.material) ||
+        std::any_of(mesh.face_materials.begin(), mesh.face_materials.end(), bad))
       throw Error(quoted("mesh", mesh.name) + " uses a material that was never added");
   }
   for (Instance& i : scene->instances_) {
@@ -329,8 +361,9 @@ void SceneBuilder::make_records(Scene& scene) const {
     const Bounds& b = bounds[i.group];
     if (b.empty()) continue;
     for (int corner = 0; corner < 8; ++corner)
-      scene.bounds_.add(i.to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
-                                          corner & 4 ? b.hi.z : b.lo.z}));
+      scene.bounds_.add(
+          i.to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
+                            corner & 4 ? b.hi.z : b.lo.z}));
   }
 }
 
@@ -356,7 +389,8 @@ void SceneBuilder::make_lights(Scene& scene) const {
       for (uint32_t mesh_id : group.meshes) {
         const Mesh& mesh = scene.meshes_[mesh_id];
         const auto material_of = [&](size_t face) {
-          const uint32_t m = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[face];
+          const uint32_t m =
+              mesh.face_materials.empty() ? mesh.material : mesh.face_materials[face];
           return m == kInheritMaterial ? record.material : m;
         };
         bool emissive = false;

@@ -20,12 +20,12 @@ namespace wavecomb {
 
 /// An instance as lanes read it: 32 words. Instance 0 is the world itself (identity).
 struct alignas(64) InstanceRecord {
-  float to_world[12];   ///< rows of A, each followed by its translation
-  float normal[9];      ///< rows of the cofactor matrix of A (times the sign of det A): maps normals
-  uint32_t geometry;    ///< first of its group's entries in SceneView::geometry_mesh
-  uint32_t material;    ///< for meshes whose material is kInheritMaterial
-  uint32_t emissive;    ///< first of its entries in SceneView::emissive_lights
-  uint32_t identity;    ///< 1 when to_world is the identity
+  float to_world[12];  ///< rows of A, each followed by its translation
+  float normal[9];     ///< rows of the cofactor matrix of A (times the sign of det A): maps normals
+  uint32_t geometry;   ///< first of its group's entries in SceneView::geometry_mesh
+  uint32_t material;   ///< for meshes whose material is kInheritMaterial
+  uint32_t emissive;   ///< first of its entries in SceneView::emissive_lights
+  uint32_t identity;   ///< 1 when to_world is the identity
   float pad[7];
 };
 static_assert(sizeof(InstanceRecord) == 128);
@@ -34,8 +34,9 @@ static_assert(sizeof(InstanceRecord) == 128);
 struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
-  const uint32_t* geometry_mesh = nullptr;    ///< mesh of (instance.geometry + geometry id)
-  const uint32_t* emissive_lights = nullptr;  ///< first triangle light of (instance.emissive + geometry id)
+  const uint32_t* geometry_mesh = nullptr;  ///< mesh of (instance.geometry + geometry id)
+  /// First triangle light of (instance.emissive + geometry id).
+  const uint32_t* emissive_lights = nullptr;
   const uint32_t* material_program = nullptr;
   MaterialView materials;
   LightView lights;
@@ -119,8 +120,8 @@ class Scene {
 
 /// Collects a scene. Ids are handed out from 0 in order of addition.
 ///
-/// Contract: one thread at a time. Arrays of meshes stay the caller's and must live as long as the Scene
-/// (Mesh::owner sees to it). Every function throws Error with one line that names the object.
+/// Contract: one thread at a time. Arrays of meshes stay the caller's and must live as long as the
+/// Scene (Mesh::owner sees to it). Every function throws Error with one line that names the object.
 class SceneBuilder {
  public:
   SceneBuilder();
@@ -130,8 +131,8 @@ class SceneBuilder {
   uint32_t add_texture(const TextureDesc& desc);
   /// Texture ids in the material must exist.
   uint32_t add_material(Material material);
-  /// Checks sizes and indices. Faces with points that are not finite are refused by name; faces without
-  /// area stay (they are never hit).
+  /// Checks sizes and indices. Faces with points that are not finite are refused by name; faces
+  /// without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
   /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.
   uint32_t add_group(std::string name);
@@ -143,8 +144,9 @@ class SceneBuilder {
   uint32_t add_light(Light light);
   void set_camera(const Camera& camera);
 
-  /// Checks everything that spans objects (cycles of groups, singular transforms, materials) and makes the
-  /// scene. The builder is empty afterwards. Meshes without any material get a grey diffuse one.
+  /// Checks everything that spans objects (cycles of groups, singular transforms, materials) and
+  /// makes the scene. The builder is empty afterwards. Meshes without any material get a grey
+  /// diffuse one.
   std::shared_ptr<const Scene> build();
 
  private:
