@@ -6,6 +6,9 @@
 #include <nanobind/stl/vector.h>
 #include <tbb/version.h>
 
+#include <map>
+#include <memory>
+
 #include "bind.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/render/renderer.h"
@@ -44,8 +47,21 @@ const Names<FilterKind> kFilters{"filter",
                                  {{"box", FilterKind::kBox},
                                   {"gaussian", FilterKind::kGaussian},
                                   {"blackman-harris", FilterKind::kBlackmanHarris}}};
-const Names<RouletteKind> kRoulettes{
-    "roulette", {{"off", RouletteKind::kOff}, {"throughput", RouletteKind::kThroughput}}};
+const Names<RouletteKind> kRoulettes{"roulette",
+                                     {{"off", RouletteKind::kOff},
+                                      {"throughput", RouletteKind::kThroughput},
+                                      {"cost-aware", RouletteKind::kCostAware}}};
+const std::vector<std::pair<const char*, RayOrder>> kOrders{
+    {"slot", RayOrder::kSlot},
+    {"morton", RayOrder::kMorton},
+    {"morton-octant", RayOrder::kMortonOctant},
+    {"auto", RayOrder::kAuto}};
+const Names<RayOrder> kRayOrders{"ray_order", kOrders};
+const Names<RayOrder> kShadowOrders{"shadow_order", kOrders};
+const Names<CostSource> kCosts{"costs",
+                               {{"auto", CostSource::kAuto},
+                                {"measured", CostSource::kMeasured},
+                                {"model", CostSource::kModel}}};
 const Names<IntegratorKind> kIntegrators{
     "integrator",
     {{"wavefront", IntegratorKind::kWavefront}, {"reference", IntegratorKind::kReference}}};
@@ -63,11 +79,14 @@ void def_enum(Class& c, const char* attribute, Enum Settings::* member, const Na
       [member, &names](Settings& s, const std::string& text) { s.*member = names.parse(text); });
 }
 
-constexpr const char* kAttributes[] = {
-    "width",           "height",       "spp",      "max_depth",      "seed",           "sampler",
-    "filter",          "filter_width", "roulette", "roulette_depth", "clamp_indirect", "fresnel",
-    "cosine_sampling", "integrator",   "threads",  "wave_size",      "lanes",          "traversal",
-    "policy",          "materialize"};
+constexpr const char* kAttributes[] = {"width",           "height",         "spp",
+                                       "max_depth",       "seed",           "sampler",
+                                       "filter",          "filter_width",   "roulette",
+                                       "roulette_depth",  "clamp_indirect", "fresnel",
+                                       "cosine_sampling", "integrator",     "threads",
+                                       "wave_size",       "lanes",          "traversal",
+                                       "policy",          "materialize",    "ray_order",
+                                       "shadow_order",    "costs",          "cost_weight"};
 
 nb::dict to_dict(nb::handle settings) {
   nb::dict d;
@@ -79,13 +98,148 @@ nb::dict to_dict(nb::handle settings) {
 struct Result {
   Picture picture;
   RenderStatistics statistics;
-  nb::object settings;
+  CostProfile profile;
+  nb::dict settings;
 };
+
+/// Python's side of a policy: order() gets NumPy arrays and fills `keys`. Arrays are valid during
+/// the call.
+class PythonPolicy final : public SchedulingPolicy {
+ public:
+  explicit PythonPolicy(nb::object object) : object_(std::move(object)) {
+    name_ = nb::cast<std::string>(object_.attr("name"));
+    for (nb::handle column : nb::cast<nb::tuple>(nb::tuple(object_.attr("columns"))))
+      columns_ |= column_bit(nb::cast<std::string>(column));
+  }
+  ~PythonPolicy() override {
+    const nb::gil_scoped_acquire gil;
+    object_.reset();
+  }
+  PythonPolicy(const PythonPolicy&) = delete;
+  PythonPolicy& operator=(const PythonPolicy&) = delete;
+
+  std::string_view name() const override { return name_; }
+  uint32_t columns() const override { return columns_; }
+  bool order(const ShadingQueueView& queue, const CostSnapshot& costs,
+             std::span<uint64_t> keys) const override {
+    const nb::gil_scoped_acquire gil;
+    nb::dict view;
+    view["program"] = array(queue.program);
+    view["material"] = array(queue.material);
+    view["depth"] = queue.depth;
+    if (columns_ & kThroughputColumn) view["throughput"] = array(queue.throughput);
+    if (columns_ & kPositionColumn) view["position_key"] = array(queue.position_key);
+    if (columns_ & kTextureColumn) view["texture_key"] = array(queue.texture_key);
+    nb::dict cost;
+    cost["material_ns"] = array(std::span<const float>(costs.material_ns));
+    cost["texture_ns"] = array(std::span<const float>(costs.texture_ns));
+    cost["mean_ns"] = costs.mean_ns;
+    const size_t shape[1] = {keys.size()};
+    const nb::object out =
+        nb::cast(nb::ndarray<nb::numpy, uint64_t>(keys.data(), 1, shape, nb::handle()),
+                 nb::rv_policy::reference);
+    const nb::object keep = object_.attr("order")(view, cost, out);
+    return keep.is_none() || nb::cast<bool>(keep);
+  }
+
+ private:
+  static uint32_t column_bit(const std::string& name) {
+    if (name == "throughput") return kThroughputColumn;
+    if (name == "position_key") return kPositionColumn;
+    if (name == "texture_key") return kTextureColumn;
+    throw Error("policy column '" + name +
+                "' is not known; there are throughput, position_key, texture_key");
+  }
+  template <typename T>
+  static nb::object array(std::span<const T> values) {
+    const size_t shape[1] = {values.size()};
+    return nb::cast(nb::ndarray<nb::numpy, const T>(values.data(), 1, shape, nb::handle()),
+                    nb::rv_policy::reference);
+  }
+
+  nb::object object_;
+  std::string name_;
+  uint32_t columns_ = 0;
+};
+
+CostProfile to_profile(const nb::dict& d) {
+  CostProfile profile;
+  const auto read = [&](const char* key, auto& entries) {
+    if (!d.contains(key)) return;
+    for (const auto& [name, ns] : nb::cast<nb::dict>(d[key]))
+      entries.emplace_back(nb::cast<std::string>(name), nb::cast<float>(ns));
+  };
+  read("materials", profile.materials);
+  read("textures", profile.textures);
+  return profile;
+}
+
+nb::dict from_profile(const CostProfile& profile) {
+  nb::dict d, materials, textures;
+  for (const auto& [name, ns] : profile.materials) materials[name.c_str()] = ns;
+  for (const auto& [name, ns] : profile.textures) textures[name.c_str()] = ns;
+  d["materials"] = materials;
+  d["textures"] = textures;
+  return d;
+}
 
 template <typename T>
 auto image(nb::handle owner, const std::vector<T>& values, const Picture& p, size_t channels) {
   const size_t shape[3] = {p.height, p.width, channels};
   return nb::ndarray<nb::numpy, const T>(values.data(), channels == 1 ? 2 : 3, shape, owner);
+}
+
+/// Lists by depth: rays, shadow rays, records, and how many paths ended there.
+nb::dict depths_dict(const RenderStatistics& s) {
+  nb::dict d;
+  std::vector<uint64_t> ended;
+  for (size_t i = 0; i < s.rays_at.size(); ++i)
+    ended.push_back(s.rays_at[i] - (i + 1 < s.rays_at.size() ? s.rays_at[i + 1] : 0));
+  d["rays"] = s.rays_at;
+  d["shadow_rays"] = s.shadow_rays_at;
+  d["records"] = s.records_at;
+  d["paths_ended"] = ended;
+  return d;
+}
+
+nb::list materials_list(const RenderStatistics& s) {
+  nb::list out;
+  for (const MaterialStatistics& m : s.materials) {
+    nb::dict d;
+    d["name"] = m.name;
+    d["program"] = m.program;
+    d["records"] = m.records;
+    d["timed_records"] = m.timed_records;
+    d["ns_per_record"] = m.measured_ns;
+    d["calibrated_ns"] = m.calibrated_ns;
+    d["predicted_ns"] = m.predicted_ns;
+    out.append(d);
+  }
+  return out;
+}
+
+/// Sums over the materials of each program that shaded anything.
+nb::dict programs_dict(const RenderStatistics& s) {
+  struct Sum {
+    uint64_t records = 0, timed = 0;
+    double ns = 0;
+  };
+  std::map<std::string, Sum> sums;
+  for (const MaterialStatistics& m : s.materials) {
+    Sum& sum = sums[m.program];
+    sum.records += m.records;
+    sum.timed += m.timed_records;
+    sum.ns += m.measured_ns * static_cast<double>(m.timed_records);
+  }
+  nb::dict out;
+  for (const auto& [name, sum] : sums) {
+    if (sum.records == 0) continue;
+    nb::dict d;
+    d["records"] = sum.records;
+    d["ns_per_record"] = sum.timed > 0 ? sum.ns / static_cast<double>(sum.timed) : 0.0;
+    out[name.c_str()] = d;
+  }
+  return out;
 }
 
 nb::dict statistics_dict(const Result& r) {
@@ -112,6 +266,22 @@ nb::dict statistics_dict(const Result& r) {
   d["lane_utilisation"] = s.packet_lanes > 0
                               ? static_cast<double>(s.records) / static_cast<double>(s.packet_lanes)
                               : 1.0;
+  d["depths"] = depths_dict(s);
+  nb::dict coherence, costs;
+  coherence["run_length"] = s.run_length;
+  coherence["material_homogeneity"] = s.material_homogeneity;
+  coherence["texture_homogeneity"] = s.texture_homogeneity;
+  d["coherence"] = coherence;
+  d["materials"] = materials_list(s);
+  d["programs"] = programs_dict(s);
+  costs["r2"] = s.cost_r2;
+  costs["mean_error"] = s.cost_mean_error;
+  costs["materials"] = s.cost_materials;
+  costs["calibration_s"] = s.calibration_s;
+  d["cost_prediction"] = costs;
+  nb::dict uses;
+  for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
+  d["policy_uses"] = uses;
   d["threads"] = s.threads;
   d["wave_size"] = s.wave_size;
   d["lanes"] = s.lanes;
@@ -124,7 +294,7 @@ nb::dict statistics_dict(const Result& r) {
 }
 
 Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_object,
-              const nb::object& progress) {
+              const nb::object& progress, const nb::object& policy, const nb::object& costs) {
   const Settings settings = nb::cast<Settings>(settings_object);
   Result result;
   result.settings = to_dict(settings_object);
@@ -135,12 +305,21 @@ Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_obj
     const nb::object go_on = progress(done, total);
     return go_on.is_none() || nb::cast<bool>(go_on);
   };
+  std::unique_ptr<PythonPolicy> own_policy;
+  if (!policy.is_none()) {
+    own_policy = std::make_unique<PythonPolicy>(policy);
+    result.settings["policy"] = std::string(own_policy->name());
+  }
+  CostProfile profile;
+  if (!costs.is_none()) profile = to_profile(nb::cast<nb::dict>(costs));
   {
     const nb::gil_scoped_release release;
     settings.check();
     WavefrontRenderer renderer(scene, settings.threads);
-    result.picture = renderer.render(settings, callback);
+    result.picture =
+        renderer.render(settings, callback, own_policy.get(), costs.is_none() ? nullptr : &profile);
     result.statistics = renderer.statistics();
+    result.profile = renderer.cost_profile();
   }
   return result;
 }
@@ -173,6 +352,7 @@ void bind_render(nb::module_& m) {
       .def_rw("wave_size", &Settings::wave_size)
       .def_rw("lanes", &Settings::lanes)
       .def_rw("policy", &Settings::policy)
+      .def_rw("cost_weight", &Settings::cost_weight)
       .def("check", &Settings::check)
       .def("to_dict", [](nb::handle_t<Settings> self) { return to_dict(self); });
   def_enum(c, "sampler", &Settings::sampler, kSamplers);
@@ -181,6 +361,9 @@ void bind_render(nb::module_& m) {
   def_enum(c, "integrator", &Settings::integrator, kIntegrators);
   def_enum(c, "materialize", &Settings::materialize, kMaterialize);
   def_enum(c, "traversal", &Settings::traversal, kTraversals);
+  def_enum(c, "ray_order", &Settings::ray_order, kRayOrders);
+  def_enum(c, "shadow_order", &Settings::shadow_order, kShadowOrders);
+  def_enum(c, "costs", &Settings::costs, kCosts);
   def_enum(c, "fresnel", &Settings::schlick_fresnel, kFresnel);
 
   nb::class_<Result>(m, "Result")
@@ -210,9 +393,11 @@ void bind_render(nb::module_& m) {
                      return image(self, p.samples, p, 1);
                    })
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
+      .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
       .def_prop_ro("stats", &statistics_dict);
 
-  m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none());
+  m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
+        "policy"_a = nb::none(), "costs"_a = nb::none());
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);
   m.def("peak_rss_bytes", &peak_rss_bytes);

@@ -164,7 +164,7 @@ class Settings:
     sampler: str  # "sobol" | "independent"
     filter: str  # "blackman-harris" | "gaussian" | "box"
     filter_width: float  # pixels
-    roulette: str  # "throughput" | "off"
+    roulette: str  # "throughput" | "off" | "cost-aware"
     roulette_depth: int
     clamp_indirect: float  # 0: off
     fresnel: str  # "exact" | "schlick"
@@ -176,6 +176,10 @@ class Settings:
     traversal: str  # "packets" | "single"
     policy: str  # "program"
     materialize: str  # "auto" | "on" | "off"
+    ray_order: str  # of bounce rays: "slot" | "morton" | "morton-octant" | "auto"
+    shadow_order: str  # of shadow rays, likewise
+    costs: str  # "auto" | "measured" | "model"
+    cost_weight: float  # of a pass in the moving average
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:
         """Raises Error naming the setting and what it may be."""
@@ -200,6 +204,10 @@ class Result:
     @property
     def cancelled(self) -> bool: ...
     @property
+    def costs(self) -> dict[str, dict[str, float]]:
+        """{"materials": {name: ns}, "textures": {name: ns}}: a profile that a later render can start
+        from."""
+    @property
     def stats(self) -> dict[str, Any]:
         """settings, seconds {build, render}, phases_s, counts, samples_per_s, rays_per_s,
         peak_rss_bytes (all plain ints, floats, strings and dicts)."""
@@ -208,6 +216,8 @@ def render(
     scene: Scene,
     settings: Settings,
     progress: Callable[[int, int], bool | None] | None = None,
+    policy: Any = None,
+    costs: dict[str, dict[str, float]] | None = None,
 ) -> Result:
     """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling
     thread (GIL held); returning False cancels, and the result holds what was done.

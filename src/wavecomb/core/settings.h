@@ -13,8 +13,8 @@ enum class IntegratorKind : uint8_t { kWavefront, kReference };
 enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
 /// Order of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kAuto };
-/// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model for
-/// roulette, so that pictures are reproducible.
+/// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model
+/// for roulette, so that pictures are reproducible.
 enum class CostSource : uint8_t { kAuto, kMeasured, kModel };
 /// How rays are given to the accelerator: in packets, or each alone.
 enum class Traversal : uint8_t { kPackets, kSingle };
@@ -35,7 +35,10 @@ struct Settings {
   float filter_width = 3.f;  ///< full width in pixels (box: 1 is the pixel itself)
   RouletteKind roulette = RouletteKind::kThroughput;
   uint32_t roulette_depth = 3;  ///< first vertex after which a path may end
-  float clamp_indirect = 0;     ///< largest luminance of one indirect contribution; 0: off
+  /// Costs decide over the picture through cost-aware roulette only, and then kMeasured makes it
+  /// vary.
+  CostSource costs = CostSource::kAuto;
+  float clamp_indirect = 0;  ///< largest luminance of one indirect contribution; 0: off
   bool schlick_fresnel = false;
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;
@@ -49,8 +52,8 @@ struct Settings {
   Traversal traversal = Traversal::kPackets;
   std::string policy = "program";
   Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster
-  RayOrder ray_order = RayOrder::kSlot;            ///< of bounce rays
-  RayOrder shadow_order = RayOrder::kSlot;         ///< of shadow rays
+  RayOrder ray_order = RayOrder::kSlot;          ///< of bounce rays
+  RayOrder shadow_order = RayOrder::kSlot;       ///< of shadow rays
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
   /// Throws Error naming the option and what it may be.

@@ -14,12 +14,12 @@ namespace wavecomb {
 /// A camera with its window fitted to a picture of width x height pixels.
 struct CameraSetup {
   Affine to_world;
-  Vec3<float> backward;    ///< unit vector along the camera's z axis
-  float x0, y1;            ///< window's upper left corner on the plane z = -1
-  float step_x, step_y;    ///< window size of a pixel
+  Vec3<float> backward;  ///< unit vector along the camera's z axis
+  float x0, y1;          ///< window's upper left corner on the plane z = -1
+  float step_x, step_y;  ///< window size of a pixel
   float lens_radius, focus_distance, near_clip, far_clip;
-  const float* filter;     ///< FilterTable::offsets()
-  bool has_far;            ///< the far plane cuts something off
+  const float* filter;  ///< FilterTable::offsets()
+  bool has_far;         ///< the far plane cuts something off
 
   /// Widens the window to the picture's shape (UsdRender's expandAperture).
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table);
@@ -44,22 +44,25 @@ inline F filter_offset(const float* table, const F& u, const Mask<F>& active) {
 
 /// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set.
 template <typename F>
-inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y, const Sample4<F>& r,
-                               const Mask<F>& active) {
+inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y,
+                               const Sample4<F>& r, const Mask<F>& active) {
   const F fx = x + 0.5f + filter_offset<F>(camera.filter, r.x, active);
   const F fy = y + 0.5f + filter_offset<F>(camera.filter, r.y, active);
-  Vec3<F> d{fma(fx, F(camera.step_x), F(camera.x0)), fma(fy, F(-camera.step_y), F(camera.y1)), F(-1.f)};
+  Vec3<F> d{fma(fx, F(camera.step_x), F(camera.x0)), fma(fy, F(-camera.step_y), F(camera.y1)),
+            F(-1.f)};
   Vec3<F> o(F(0.f));
   if (camera.lens_radius > 0) {
     const Vec2<F> lens = square_to_disk(r.z, r.w);
     o = {lens.x * camera.lens_radius, lens.y * camera.lens_radius, F(0.f)};
     // Through the point in focus: d * focus_distance, seen from the lens, scaled back to z = -1.
-    d = {fma(o.x, F(-1.f / camera.focus_distance), d.x), fma(o.y, F(-1.f / camera.focus_distance), d.y),
-         F(-1.f)};
+    d = {fma(o.x, F(-1.f / camera.focus_distance), d.x),
+         fma(o.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
   }
   o = fma(d, F(camera.near_clip), o);
   const Affine& m = camera.to_world;
-  const auto rotate = [&](const Vec3<float>& row, const Vec3<F>& v) { return dot(Vec3<F>(row), v); };
+  const auto rotate = [&](const Vec3<float>& row, const Vec3<F>& v) {
+    return dot(Vec3<F>(row), v);
+  };
   const Vec3<F> world{rotate(m.row[0], d), rotate(m.row[1], d), rotate(m.row[2], d)};
   const F len = length(world);
   CameraRay<F> ray;

@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// A slot is one (pixel, sample) for life and owns its radiance. Everything that travels with the ray is in
-/// the queues; this is what stays.
+/// A slot is one (pixel, sample) for life and owns its radiance. Everything that travels with the
+/// ray is in the queues; this is what stays.
 ///
 /// Contract: owned by one wave. AOV columns are there only where asked for.
 class PathPool {

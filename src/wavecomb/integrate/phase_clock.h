@@ -18,13 +18,15 @@ enum class Phase : uint8_t {
   kShade,
   kShadow,
   kResolve,
+  kMetrics,  ///< looking at what the others did; part of no picture
 };
-inline constexpr size_t kPhaseCount = 9;
+inline constexpr size_t kPhaseCount = 10;
 inline constexpr const char* kPhaseNames[kPhaseCount] = {
-    "generate", "order_rays", "trace", "keys", "sort", "materialize", "shade", "shadow", "resolve"};
+    "generate",    "order_rays", "trace",  "keys",    "sort",
+    "materialize", "shade",      "shadow", "resolve", "metrics"};
 
-/// Exclusive phases: entering one ends the one before, so that phases add up to the time between start()
-/// and stop(). Read per batch of work, never per ray.
+/// Exclusive phases: entering one ends the one before, so that phases add up to the time between
+/// start() and stop(). Read per batch of work, never per ray.
 class PhaseClock {
  public:
   using Clock = std::chrono::steady_clock;

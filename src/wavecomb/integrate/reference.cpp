@@ -52,7 +52,13 @@ class PathTracer {
             shape_emission<F>(scene, settings_, depth, hit.geom, o, hit.t, path, true);
         return result;
       }
-      const VertexResult<F> v = shade(key, depth, hit, path);
+      const uint32_t mesh = mesh_of(hit), material = material_of(hit, mesh);
+      if (settings_.cost_aware && depth >= settings_.roulette_depth) {
+        const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
+        if (!(cost_aware_number<F>(key, depth) < q)) return result;
+        path.throughput *= 1.f / q;
+      }
+      const VertexResult<F> v = shade(key, depth, hit, mesh, material, path);
       result.radiance += v.emitted;
       if (depth == 0) {
         result.albedo = v.albedo;
@@ -80,7 +86,7 @@ class PathTracer {
     const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1};
     keys_.salt = 2 * depth;
     context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
-    ++counts_.rays;
+    counts_.add_rays(depth, 1);
     return h;
   }
 
@@ -89,27 +95,34 @@ class PathTracer {
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
     context_.accel->occluded(ray, &blocked, 1, keys_);
-    ++counts_.shadow_rays;
+    counts_.add_shadow_rays(depth, 1);
     return blocked != 0;
   }
 
-  VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const Hit& hit,
-                        const PathState<F>& path) {
+  uint32_t mesh_of(const Hit& hit) const {
     const SceneView& scene = context_.scene;
-    ++counts_.records;
-    const InstanceRecord& instance = scene.instances[hit.inst];
-    const uint32_t mesh = scene.geometry_mesh[instance.geometry + hit.geom];
-    const MeshRecord& record = scene.meshes[mesh];
+    return scene.geometry_mesh[scene.instances[hit.inst].geometry + hit.geom];
+  }
+
+  uint32_t material_of(const Hit& hit, uint32_t mesh) const {
+    const MeshRecord& record = context_.scene.meshes[mesh];
     uint32_t material = record.material;
     if (record.face_materials != 0)
       material = reinterpret_cast<const uint32_t*>(record.face_materials)[hit.prim];
-    if (material == kInheritMaterial) material = instance.material;
+    return material == kInheritMaterial ? context_.scene.instances[hit.inst].material : material;
+  }
+
+  VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const Hit& hit, uint32_t mesh,
+                        uint32_t material, const PathState<F>& path) {
+    const SceneView& scene = context_.scene;
+    counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v};
     VertexResult<F> v{};
-    visit_program<F>(static_cast<ProgramId>(scene.material_program[material]), [&]<typename Bsdf>() {
-      v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path,
-                                depth == 0, true);
-    });
+    visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
+                     [&]<typename Bsdf>() {
+                       v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom,
+                                                 hit.t, material, path, depth == 0, true);
+                     });
     return v;
   }
 

@@ -2,18 +2,41 @@
 /// What is counted while rendering.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace wavecomb {
 
+/// Depths that are counted one by one; deeper ones are added to the last.
+inline constexpr uint32_t kCountedDepths = 32;
+
 /// Counts of one worker, added up at the end.
 struct Counts {
-  uint64_t samples = 0;      ///< paths started
-  uint64_t rays = 0;         ///< camera and bounce rays traced
+  uint64_t samples = 0;  ///< paths started
+  uint64_t rays = 0;     ///< camera and bounce rays traced
   uint64_t shadow_rays = 0;
-  uint64_t records = 0;      ///< hits shaded
-  uint64_t packets = 0;      ///< shading packets run
-  uint64_t packet_lanes = 0; ///< lanes of those packets, full or not
+  uint64_t records = 0;       ///< hits shaded
+  uint64_t packets = 0;       ///< shading packets run
+  uint64_t packet_lanes = 0;  ///< lanes of those packets, full or not
+  /// Rays, shadow rays and records of each depth (0: camera rays and what they hit).
+  std::array<uint64_t, kCountedDepths> rays_at{}, shadow_rays_at{}, records_at{};
+
+  static uint32_t bucket(uint32_t depth) {
+    return depth < kCountedDepths ? depth : kCountedDepths - 1;
+  }
+  void add_rays(uint32_t depth, uint64_t n) {
+    rays += n;
+    rays_at[bucket(depth)] += n;
+  }
+  void add_shadow_rays(uint32_t depth, uint64_t n) {
+    shadow_rays += n;
+    shadow_rays_at[bucket(depth)] += n;
+  }
+  void add_records(uint32_t depth, uint64_t n) {
+    records += n;
+    records_at[bucket(depth)] += n;
+  }
 
   void add(const Counts& o) {
     samples += o.samples;
@@ -22,6 +45,11 @@ struct Counts {
     records += o.records;
     packets += o.packets;
     packet_lanes += o.packet_lanes;
+    for (size_t d = 0; d < kCountedDepths; ++d) {
+      rays_at[d] += o.rays_at[d];
+      shadow_rays_at[d] += o.shadow_rays_at[d];
+      records_at[d] += o.records_at[d];
+    }
   }
 };
 

@@ -20,12 +20,12 @@ struct MeshHit {
 template <typename F>
 struct Surface {
   Vec3<F> p;
-  Vec3<F> ng;        ///< unit geometric normal, outside by winding
-  Vec3<F> ns;        ///< unit shading normal on the same side as ng
-  Vec3<F> dpdu;      ///< tangent along u, any length; zero where uv is not asked for
+  Vec3<F> ng;    ///< unit geometric normal, outside by winding
+  Vec3<F> ns;    ///< unit shading normal on the same side as ng
+  Vec3<F> dpdu;  ///< tangent along u, any length; zero where uv is not asked for
   Vec2<F> uv;
-  F uv_per_length;   ///< sqrt(uv area / world area) of the triangle
-  F offset;          ///< bound of the error of p along ng
+  F uv_per_length;     ///< sqrt(uv area / world area) of the triangle
+  F offset;            ///< bound of the error of p along ng
   Vec3<F> terminator;  ///< from p to the smooth surface that the vertex normals suggest, along ng
 };
 
@@ -60,7 +60,8 @@ struct MeshArrays {
 };
 
 template <typename F>
-inline MeshArrays<F> mesh_arrays(const SceneView& scene, const UInt<F>& mesh, const Mask<F>& active) {
+inline MeshArrays<F> mesh_arrays(const SceneView& scene, const UInt<F>& mesh,
+                                 const Mask<F>& active) {
   MeshArrays<F> a;
   if (is_uniform<F>(mesh, active)) {
     const MeshRecord& r = scene.meshes[any(active) ? first_active(mesh, Mask<UInt<F>>(active)) : 0];
@@ -139,8 +140,9 @@ inline Vec3<F> abs3(const Vec3<F>& v) {
 /// `dir` is the unit direction of the ray that hit.
 ///
 /// The offset bounds the distance between p and the true surface: interpolation, transform and the
-/// traversal's own rounding, in the manner of Pharr, Jakob, Humphreys, "Physically Based Rendering",
-/// section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II.
+/// traversal's own rounding, in the manner of Pharr, Jakob, Humphreys, "Physically Based
+/// Rendering", section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator",
+/// Ray Tracing Gems II.
 template <typename F>
 inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir,
                                 bool with_uv, bool with_terminator, const Mask<F>& active) {
@@ -165,12 +167,16 @@ inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, c
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
 
-  // What was rounded: the interpolated point in all its terms, and, less so, the triangle's corners that
-  // traversal subtracts the ray's origin from. All axes count, since the traversal's products mix them.
+  // What was rounded: the interpolated point in all its terms, and, less so, the triangle's corners
+  // that traversal subtracts the ray's origin from. All axes count, since the traversal's products
+  // mix them.
   const Vec3<F> q0 = detail::abs3(p0), q1 = detail::abs3(p1), q2 = detail::abs3(p2);
   const Vec3<F> size = (q0 * abs(b0) + q1 * b1 + q2 * b2) + max(q0, max(q1, q2)) * F(0.25f);
-  const auto magnitude = [&](int i, const F& t) { return dot(detail::abs3(maps.row[i]), size) + abs(t); };
-  s.offset = max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
+  const auto magnitude = [&](int i, const F& t) {
+    return dot(detail::abs3(maps.row[i]), size) + abs(t);
+  };
+  s.offset =
+      max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
 
   s.ns = s.ng;
   s.terminator = Vec3<F>(F(0.f));
@@ -217,7 +223,8 @@ inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, c
   s.dpdu = Vec3<F>(F(0.f));
   s.uv_per_length = F(0.f);
   if (with_uv) {
-    const Mask<F> has_uv = Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u)) & active;
+    const Mask<F> has_uv =
+        Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u)) & active;
     Vec2<F> t0{F(0.f), F(0.f)}, t1{F(1.f), F(0.f)}, t2{F(0.f), F(1.f)};
     if (any(has_uv)) {
       const Mask<U> pick(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));

@@ -3,10 +3,12 @@
 /// integrators, wave and reference, run this and nothing else.
 ///
 /// The estimator, for a path that reaches x_k with throughput T_k:
-///   L += T_k Le(x_k) w_bsdf                                     (emission met by the bounce before)
-///   L += T_k f |cos| Le / p_light  w_light  V                   (one light sample, balance heuristic)
-///   T_{k+1} = T_k f |cos| / p_bsdf / q                          (bounce, survival probability q)
-/// with w_bsdf = p_bsdf / (p_bsdf + p_light), w_light = p_light / (p_bsdf + p_light) (Veach 1997, 9.2).
+///   L += T_k Le(x_k) w_bsdf                                     (emission met by the bounce
+///   before) L += T_k f |cos| Le / p_light  w_light  V                   (one light sample, balance
+///   heuristic) T_{k+1} = T_k f |cos| / p_bsdf / q                          (bounce, survival
+///   probability q)
+/// with w_bsdf = p_bsdf / (p_bsdf + p_light), w_light = p_light / (p_bsdf + p_light) (Veach
+/// 1997, 9.2).
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -15,6 +17,7 @@
 #include "wavecomb/light/light.h"
 #include "wavecomb/material/params.h"
 #include "wavecomb/material/program_table.h"
+#include "wavecomb/schedule/cost_snapshot.h"
 
 namespace wavecomb {
 
@@ -22,7 +25,8 @@ namespace wavecomb {
 struct ShadeSettings {
   SamplerKind sampler;
   uint32_t max_depth;
-  bool roulette;
+  bool roulette;    ///< by throughput, after a vertex
+  bool cost_aware;  ///< by throughput and cost, before a vertex
   uint32_t roulette_depth;
   float clamp_indirect;  ///< 0: off
   bool schlick_fresnel;
@@ -32,18 +36,20 @@ struct ShadeSettings {
       : sampler(s.sampler),
         max_depth(s.max_depth),
         roulette(s.roulette == RouletteKind::kThroughput),
+        cost_aware(s.roulette == RouletteKind::kCostAware),
         roulette_depth(s.roulette_depth),
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),
         cosine_sampling(s.cosine_sampling) {}
 };
 
-/// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the hit.
+/// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the
+/// hit.
 template <typename F>
 struct PathState {
   Vec3<F> dir;
   Color<F> throughput;
-  F pdf;        ///< of the bounce before; 0: delta or camera
+  F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
 };
@@ -51,20 +57,20 @@ struct PathState {
 /// What shading a vertex gives. Lanes outside the masks hold anything.
 template <typename F>
 struct VertexResult {
-  Color<F> emitted;       ///< to add to the path's radiance, clamped
-  Mask<F> has_shadow;     ///< a shadow ray is wanted
+  Color<F> emitted;    ///< to add to the path's radiance, clamped
+  Mask<F> has_shadow;  ///< a shadow ray is wanted
   Vec3<F> shadow_o, shadow_d;
   F shadow_tfar;
-  Color<F> direct;        ///< to add where the shadow ray is free, clamped
-  Mask<F> alive;          ///< the path goes on
-  Vec3<F> o;              ///< of the next ray; its direction and the rest is in `next`
+  Color<F> direct;  ///< to add where the shadow ray is free, clamped
+  Mask<F> alive;    ///< the path goes on
+  Vec3<F> o;        ///< of the next ray; its direction and the rest is in `next`
   PathState<F> next;
-  Color<F> albedo;        ///< first-hit AOVs
+  Color<F> albedo;  ///< first-hit AOVs
   Vec3<F> normal;
 };
 
-/// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and NaN-free: a
-/// contribution that is not finite is dropped.
+/// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
+/// NaN-free: a contribution that is not finite is dropped.
 template <typename F>
 inline Color<F> clean(const Color<F>& c, float limit) {
   const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
@@ -76,7 +82,8 @@ inline Color<F> clean(const Color<F>& c, float limit) {
   return r;
 }
 
-/// The limit for a contribution that light brings after `bounces` scatterings: direct light is free.
+/// The limit for a contribution that light brings after `bounces` scatterings: direct light is
+/// free.
 inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
   return bounces > 1 ? s.clamp_indirect : 0.f;
 }
@@ -84,14 +91,14 @@ inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
 /// Balance heuristic for the technique with density `a` against `b`; 1 where a was a delta (a = 0).
 template <typename F>
 inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
-  return select(bsdf_pdf > 0.f, F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))),
-                F(1.f));
+  return select(bsdf_pdf > 0.f,
+                F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
 /// Radiance of a light's own shape met by a path.
 template <typename F>
-inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
-                               const UInt<F>& light, const Vec3<F>& o, const F& t,
+inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
+                               uint32_t depth, const UInt<F>& light, const Vec3<F>& o, const F& t,
                                const PathState<F>& path, const Mask<F>& active) {
   const LightHit<F> hit = light_hit<F>(scene.lights, light, o, path.dir, t, active);
   const F w = bounce_weight<F>(path.pdf, hit.pdf);
@@ -101,19 +108,55 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
 /// Radiance of the environment met by a path that left the scene.
 template <typename F>
 inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings& settings,
-                                     uint32_t depth, const PathState<F>& path, const Mask<F>& active) {
+                                     uint32_t depth, const PathState<F>& path,
+                                     const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le = escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
-/// Shades vertex `depth` (0: the camera's first hit) of the active lanes' paths with program `Bsdf`.
-/// `material` and `geom` (geometry within the instance's group) belong to `hit`; t is the length of the ray.
+/// Cost-aware roulette: the probability of shading a vertex that a path has reached.
+///
+/// The efficiency 1 / (variance x cost) is greatest when a path goes on with a probability
+/// proportional to
+///   sqrt(E[contribution^2] / cost)
+/// of what comes next (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The contribution is
+/// throughput times an unknown incident radiance, taken to be alike everywhere, so that
+///   q = T / sqrt(cost of this material / mean cost),
+/// clamped to [0.05, 1]. Surfaces that shine are always shaded.
+template <typename F>
+inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
+                             const UInt<F>& material, const PathState<F>& path,
+                             const Mask<F>& active) {
+  using U = UInt<F>;
+  const F cost = gather<F>(costs.material_ns.data(), material, active);
+  const F relative = max(F(cost * (1.f / costs.mean_ns)), F(1e-3f));
+  const F t = max_component(path.throughput) * path.eta_scale;
+  const U flags = gather<U>(scene.materials.materials,
+                            material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
+                                static_cast<uint32_t>(offsetof(MaterialRecord, flags) / 4),
+                            Mask<U>(active));
+  const Mask<F> shines = Mask<F>((flags & static_cast<uint32_t>(kEmits)) != U(0u));
+  return select(active & not_(shines), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
+}
+
+/// The random number that cost_aware_survival is compared with; none of the sampler's.
+template <typename F>
+inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
+  using U = UInt<F>;
+  const U path = hash_u32<U>(key.pixel_hash, key.sample);
+  return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
+}
+
+/// Shades vertex `depth` (0: the camera's first hit) of the active lanes' paths with program
+/// `Bsdf`. `material` and `geom` (geometry within the instance's group) belong to `hit`; t is the
+/// length of the ray.
 template <typename Bsdf, typename F>
 inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings& settings,
                                     const SampleKey<F>& key, uint32_t depth, const MeshHit<F>& hit,
                                     const UInt<F>& geom, const F& t, const UInt<F>& material,
-                                    const PathState<F>& path, bool wants_aovs, const Mask<F>& active) {
+                                    const PathState<F>& path, bool wants_aovs,
+                                    const Mask<F>& active) {
   using U = UInt<F>;
   VertexResult<F> out;
   out.emitted = Color<F>(F(0.f));
@@ -150,25 +193,26 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
       F light_pdf(0.f);
       if (scene.has_emissive_meshes) {
         constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
-        const U first = gather<U>(scene.instances,
-                                  hit.inst * kWords +
-                                      static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
-                                  Mask<U>(emits));
+        const U first = gather<U>(
+            scene.instances,
+            hit.inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+            Mask<U>(emits));
         const U base = gather<U>(scene.emissive_lights, first + geom, Mask<U>(emits));
         const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
         if (any(sampled))
-          light_pdf = select(sampled,
-                             triangle_light_pdf<F>(scene.lights, base + hit.prim, path.dir, t, sampled),
-                             F(0.f));
+          light_pdf = select(
+              sampled, triangle_light_pdf<F>(scene.lights, base + hit.prim, path.dir, t, sampled),
+              F(0.f));
       }
       const F w = bounce_weight<F>(path.pdf, light_pdf);
-      const Color<F> e = clean<F>(path.throughput * params.emission * w, clamp_limit(settings, depth));
+      const Color<F> e =
+          clean<F>(path.throughput * params.emission * w, clamp_limit(settings, depth));
       out.emitted = select<F>(emits, e, Color<F>(F(0.f)));
     }
   }
 
-  // The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing but its
-  // own hit, whatever its neighbours are.
+  // The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing
+  // but its own hit, whatever its neighbours are.
   Vec3<F> n = s.ns;
   Vec3<F> tangent(F(0.f));
   if (textured) {
@@ -178,8 +222,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
       Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
       const F towards = select(dot(path.dir, s.ng) < 0.f, F(1.f), F(-1.f));
       const F seen = -dot(path.dir, bumped) * towards;
-      bumped = select<F>(seen < 1e-3f, normalize(fma(path.dir, F(-towards * (1e-3f - seen)), bumped)),
-                         bumped);
+      bumped = select<F>(seen < 1e-3f,
+                         normalize(fma(path.dir, F(-towards * (1e-3f - seen)), bumped)), bumped);
       n = select<F>(mapped, bumped, n);
     }
   }
@@ -211,8 +255,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
             ? select(F(wo.z * wi.z) > 0.f, cosine_hemisphere_pdf(abs(wi.z)), F(0.f))
             : e.pdf;
     const F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
-    const Color<F> c = clean<F>(path.throughput * e.f_cos * l.weight * w,
-                                clamp_limit(settings, depth + 1));
+    const Color<F> c =
+        clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
     out.shadow_o = spawn_origin<F>(s, l.wi);

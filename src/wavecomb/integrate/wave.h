@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A wave: the paths of one batch of pixels and samples, run to the end by one worker on its own buffers.
+/// A wave: the paths of one batch of pixels and samples, run to the end by one worker on its own
+/// buffers.
 #pragma once
 
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
+#include "wavecomb/integrate/calibration.h"
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/phase_clock.h"
 #include "wavecomb/integrate/statistics.h"
+#include "wavecomb/schedule/chooser.h"
+#include "wavecomb/schedule/coherence.h"
+#include "wavecomb/schedule/cost_tracker.h"
 #include "wavecomb/schedule/policy.h"
 #include "wavecomb/schedule/radix_sort.h"
+#include "wavecomb/schedule/ray_order.h"
 #include "wavecomb/schedule/ray_queue.h"
 #include "wavecomb/schedule/shading_queue.h"
 
@@ -24,10 +32,19 @@ struct WaveContext {
   const EmbreeAccelerator* accel;
   const Settings* settings;
   const CameraSetup* camera;
-  const SchedulingPolicy* policy;
-  const CostSnapshot* costs;
-  Film* film;  ///< each wave writes its own pixels only
+  /// The policy; where there are several, each worker chooses among them, queue by queue.
+  std::span<const SchedulingPolicy* const> policies;
+  std::span<const MaterialTraits> traits;
+  const CostSnapshot* costs;           ///< for the order of shading
+  const CostSnapshot* roulette_costs;  ///< for cost-aware roulette
+  OrderGrid grid;                      ///< for ray orders and hit positions
+  Film* film;                          ///< each wave writes its own pixels only
   uint32_t traversal_width;
+  bool wants_position;  ///< some policy reads position keys
+
+  bool orders_rays() const {
+    return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
+  }
 };
 
 /// Pixels (x | y << 16) and their samples [first_sample, first_sample + samples).
@@ -43,30 +60,58 @@ struct WaveTask {
 ///
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
-  Wave(uint32_t capacity, bool with_aovs)
-      : pool(capacity, with_aovs),
+  Wave(uint32_t capacity, const WaveContext& context)
+      : pool(capacity, context.film->has_aovs()),
         rays(capacity),
         hits(capacity),
         shading(capacity),
         shadows(capacity),
-        sorter(capacity) {}
+        columns(3, capacity),
+        sorter(capacity),
+        ray_sorter(context.orders_rays() ? capacity : 0),
+        ray_indices(context.orders_rays() ? capacity : 0),
+        scratch(context.traits.size()),
+        costs(context.traits.size()),
+        policy_chooser(context.policies.size()),
+        ray_chooser(kRayOrders),
+        shadow_chooser(kRayOrders) {
+    if (context.settings->ray_order != RayOrder::kSlot) other_rays = RayQueue(capacity);
+    if (context.settings->shadow_order != RayOrder::kSlot) other_shadows = ShadowQueue(capacity);
+  }
+  static constexpr size_t kRayOrders = 3;  ///< slot, morton, morton-octant
 
   PathPool pool;
   RayQueue rays;
   HitBuffer hits;
   ShadingQueue shading;
   ShadowQueue shadows;
-  RadixSorter sorter;
+  RayQueue other_rays;  ///< where ordered rays are put, if they are ordered
+  ShadowQueue other_shadows;
+  SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
+  RadixSorter sorter, ray_sorter;
+  std::vector<uint32_t> ray_indices;
+  std::vector<float> scratch;  ///< one a material, for policies
+  CostTracker costs;
+  Chooser policy_chooser, ray_chooser, shadow_chooser;
+  CoherenceCounts coherence;
+  uint32_t queues = 0;  ///< shading queues so far; coherence is measured on some
   PhaseClock clock;
   Counts counts;
 
   size_t bytes() const {
-    return pool.bytes() + rays.bytes() + hits.bytes() + shading.bytes() + shadows.bytes();
+    return pool.bytes() + rays.bytes() + hits.bytes() + shading.bytes() + shadows.bytes() +
+           columns.bytes() + other_rays.bytes() + other_shadows.bytes();
   }
 };
 
-/// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* -> resolve.
+/// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* ->
+/// resolve.
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
+
+/// Shades synthetic hits of one material with kernels of `W` lanes and returns the time, in
+/// nanoseconds.
+template <size_t W>
+double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits);
 
 }  // namespace wavecomb

@@ -33,23 +33,32 @@ double seconds_since(Clock::time_point start) {
 constexpr uint32_t kDefaultWaveSize = 4096;
 constexpr uint32_t kPassSamples = 16;
 
-using WaveFunction = void (*)(Wave&, const WaveContext&, const WaveTask&);
+/// The kernels of one width.
+struct LaneKernels {
+  void (*run)(Wave&, const WaveContext&, const WaveTask&) = nullptr;
+  double (*time_material)(Wave&, const WaveContext&, const CalibrationHits&) = nullptr;
+};
 
-WaveFunction wave_function(uint32_t lanes) {
+LaneKernels lane_kernels(uint32_t lanes) {
   switch (lanes) {
 #ifdef WAVECOMB_HAS_LANES_1
-    case 1: return &run_wave<1>;
+    case 1:
+      return {&run_wave<1>, &time_material<1>};
 #endif
 #ifdef WAVECOMB_HAS_LANES_4
-    case 4: return &run_wave<4>;
+    case 4:
+      return {&run_wave<4>, &time_material<4>};
 #endif
 #ifdef WAVECOMB_HAS_LANES_8
-    case 8: return &run_wave<8>;
+    case 8:
+      return {&run_wave<8>, &time_material<8>};
 #endif
 #ifdef WAVECOMB_HAS_LANES_16
-    case 16: return &run_wave<16>;
+    case 16:
+      return {&run_wave<16>, &time_material<16>};
 #endif
-    default: return nullptr;
+    default:
+      return {};
   }
 }
 
@@ -59,8 +68,49 @@ uint32_t choose_lanes(uint32_t wanted) {
   if (std::find(built.begin(), built.end(), wanted) != built.end()) return wanted;
   std::string list;
   for (uint32_t w : built) list += (list.empty() ? "" : ", ") + std::to_string(w);
-  throw Error("lanes is " + std::to_string(wanted) + ", which this build has no kernels for; it has " +
-              list);
+  throw Error("lanes is " + std::to_string(wanted) +
+              ", which this build has no kernels for; it has " + list);
+}
+
+/// The policies that `name` stands for: one, or those that "adaptive" chooses among, "none" first.
+std::vector<std::unique_ptr<SchedulingPolicy>> choose_policies(const std::string& name) {
+  std::vector<std::unique_ptr<SchedulingPolicy>> policies;
+  if (name == "adaptive")
+    for (const char* one : {"none", "program", "material", "texture", "texture-locality"})
+      policies.push_back(make_policy(one));
+  else
+    policies.push_back(make_policy(name));
+  return policies;
+}
+
+/// The grid over the scene for Morton codes.
+OrderGrid order_grid(const Bounds& bounds) {
+  OrderGrid grid;
+  if (bounds.empty()) return grid;
+  const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
+  const float hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
+  for (int i = 0; i < 3; ++i) {
+    grid.lo[i] = lo[i];
+    grid.scale[i] = hi[i] > lo[i] ? 1024.f / (hi[i] - lo[i]) : 0.f;
+  }
+  return grid;
+}
+
+void apply_profile(const Scene& scene, const CostProfile& profile, CostSnapshot& costs) {
+  const auto find = [](const auto& entries, const std::string& name) {
+    for (const auto& [entry, ns] : entries)
+      if (entry == name) return ns;
+    return 0.f;
+  };
+  for (size_t m = 0; m < costs.material_ns.size(); ++m)
+    if (const float ns = find(profile.materials, scene.materials()[m].name); ns > 0)
+      costs.material_ns[m] = ns;
+  for (size_t t = 0; t < costs.texture_ns.size(); ++t)
+    if (const float ns = find(profile.textures, scene.textures()[t]->name()); ns > 0)
+      costs.texture_ns[t] = ns;
+  double sum = 0;
+  for (float ns : costs.material_ns) sum += ns;
+  costs.mean_ns = static_cast<float>(sum / static_cast<double>(costs.material_ns.size()));
 }
 
 /// What one worker owns.
@@ -76,8 +126,29 @@ struct WavefrontRenderer::Impl {
   std::shared_ptr<const Scene> scene;
   std::unique_ptr<EmbreeAccelerator> accel;
   RenderStatistics statistics;
+  CostSnapshot costs;  ///< after the last render
   double build_s = 0;
+
+  /// Costs measured on synthetic hits: the quickest of three runs each.
+  CostSnapshot calibrate(Wave& wave, const WaveContext& context, const LaneKernels& kernels) const;
 };
+
+CostSnapshot WavefrontRenderer::Impl::calibrate(Wave& wave, const WaveContext& context,
+                                                const LaneKernels& kernels) const {
+  CostSnapshot costs = model_costs(*scene);
+  CostTracker tracker(context.traits.size());
+  for (CalibrationHits& hits : find_calibration_hits(*scene)) {
+    hits.count = std::min<uint32_t>(256, static_cast<uint32_t>(wave.rays.capacity()));
+    double ns = kernels.time_material(wave, context, hits);
+    for (int repeat = 0; repeat < 2; ++repeat)
+      ns = std::min(ns, kernels.time_material(wave, context, hits));
+    const std::vector<uint32_t> materials(hits.count, hits.material);
+    tracker.charge(materials, ns);
+  }
+  std::fill(costs.texture_ns.begin(), costs.texture_ns.end(), 0.f);
+  merge_costs(tracker, context.traits, 1.f, costs);
+  return costs;
+}
 
 WavefrontRenderer::WavefrontRenderer(std::shared_ptr<const Scene> scene, uint32_t threads)
     : impl_(std::make_unique<Impl>()) {
@@ -89,17 +160,45 @@ WavefrontRenderer::WavefrontRenderer(std::shared_ptr<const Scene> scene, uint32_
 
 WavefrontRenderer::~WavefrontRenderer() = default;
 
-const RenderStatistics& WavefrontRenderer::statistics() const { return impl_->statistics; }
+const RenderStatistics& WavefrontRenderer::statistics() const {
+  return impl_->statistics;
+}
 
-Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallback& progress) {
+CostProfile WavefrontRenderer::cost_profile() const {
+  CostProfile profile;
+  const CostSnapshot& costs = impl_->costs;
+  for (size_t m = 0; m < costs.material_ns.size(); ++m)
+    profile.materials.emplace_back(impl_->scene->materials()[m].name, costs.material_ns[m]);
+  for (size_t t = 0; t < costs.texture_ns.size(); ++t)
+    profile.textures.emplace_back(impl_->scene->textures()[t]->name(), costs.texture_ns[t]);
+  return profile;
+}
+
+Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallback& progress,
+                                  const SchedulingPolicy* own_policy, const CostProfile* profile) {
   settings.check();
+  const Scene& scene = *impl_->scene;
   const uint32_t lanes = choose_lanes(settings.lanes);
-  const uint32_t threads =
-      settings.threads != 0 ? settings.threads : static_cast<uint32_t>(tbb::info::default_concurrency());
-  const auto policy = make_policy(settings.policy);
-  const CostSnapshot costs;
+  const LaneKernels kernels = lane_kernels(lanes);
+  const uint32_t threads = settings.threads != 0
+                               ? settings.threads
+                               : static_cast<uint32_t>(tbb::info::default_concurrency());
+  std::vector<std::unique_ptr<SchedulingPolicy>> owned;
+  std::vector<const SchedulingPolicy*> policies;
+  if (own_policy) {
+    policies.push_back(own_policy);
+  } else {
+    owned = choose_policies(settings.policy);
+    for (const auto& policy : owned) policies.push_back(policy.get());
+  }
+  const bool wants_position = std::any_of(policies.begin(), policies.end(), [](const auto* policy) {
+    return (policy->columns() & kPositionColumn) != 0;
+  });
+  const std::vector<MaterialTraits> traits = material_traits(scene);
+  CostSnapshot& costs = impl_->costs;
+  costs = model_costs(scene);
   const FilterTable filter(settings.filter, settings.filter_width);
-  const CameraSetup camera(impl_->scene->camera(), settings.width, settings.height, filter);
+  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
   Film film(settings.width, settings.height, true);
   const std::vector<uint32_t> pixels = morton_pixel_order(settings.width, settings.height);
   const bool reference = settings.integrator == IntegratorKind::kReference;
@@ -111,21 +210,23 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
       std::min<uint64_t>(settings.wave_size != 0 ? settings.wave_size : kDefaultWaveSize, share));
   // At least enough samples a pass for a wave to be full when the picture is smaller than a wave.
   const uint32_t fill = static_cast<uint32_t>((wave_size + pixels.size() - 1) / pixels.size());
-  const uint32_t pass_samples =
-      std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});
+  const uint32_t pass_samples = std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});
   const uint32_t pixels_per_wave = std::max(1u, wave_size / pass_samples);
 
-  const WaveContext context{impl_->scene->view(),
-                            impl_->accel.get(),
-                            &settings,
-                            &camera,
-                            policy.get(),
-                            &costs,
-                            &film,
-                            settings.traversal == Traversal::kSingle
-                                ? 1u
-                                : std::min(lanes, impl_->accel->native_width())};
-  const WaveFunction wave_function_ = wave_function(lanes);
+  CostSnapshot roulette_costs = costs;
+  const WaveContext context{
+      scene.view(),
+      impl_->accel.get(),
+      &settings,
+      &camera,
+      policies,
+      traits,
+      &costs,
+      &roulette_costs,
+      order_grid(scene.bounds()),
+      &film,
+      settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, impl_->accel->native_width()),
+      wants_position};
 
   std::vector<Worker> workers(threads);
   std::atomic<uint64_t> done{0};
@@ -138,12 +239,46 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
     if (reference) {
       run_reference(context, task, worker.clock, worker.counts);
     } else {
-      if (!worker.wave) worker.wave = std::make_unique<Wave>(wave_size, true);
-      wave_function_(*worker.wave, context, task);
+      if (!worker.wave) worker.wave = std::make_unique<Wave>(wave_size, context);
+      kernels.run(*worker.wave, context, task);
     }
     done += task.path_count();
   };
+  const bool measures = settings.costs != CostSource::kModel && !reference;
+  CostTracker measured(traits.size());  // of the pass
+  std::vector<double> total_ns(traits.size());
+  std::vector<uint64_t> total_timed(traits.size());
+  CostPrediction prediction;
+  CostSnapshot calibrated = costs;
+  double calibration_s = 0;
+  const auto start_costs = [&] {
+    if (measures) {
+      const DenormalsOff denormals_off;
+      const Clock::time_point begin = Clock::now();
+      Wave wave(std::max(wave_size, 256u), context);
+      costs = impl_->calibrate(wave, context, kernels);
+      calibration_s = seconds_since(begin);
+    }
+    if (profile) apply_profile(scene, *profile, costs);
+    calibrated = costs;
+    // Roulette decides over the picture: it keeps to costs that do not vary, unless told otherwise.
+    if (settings.costs == CostSource::kMeasured || profile) roulette_costs = costs;
+  };
+  const auto merge_pass = [&] {
+    for (Worker& worker : workers)
+      if (worker.wave) measured.take(worker.wave->costs);
+    for (size_t m = 0; m < traits.size(); ++m) {
+      total_ns[m] += measured.ns()[m];
+      total_timed[m] += measured.timed()[m];
+    }
+    if (!measures) return;
+    const CostPrediction p = merge_costs(measured, traits, settings.cost_weight, costs);
+    if (p.materials > 0) prediction = p;
+    if (settings.costs == CostSource::kMeasured) roulette_costs = costs;
+    measured = CostTracker(traits.size());
+  };
   const auto run_passes = [&] {
+    start_costs();
     const size_t waves = (pixels.size() + pixels_per_wave - 1) / pixels_per_wave;
     for (uint32_t first = 0; first < settings.spp && !cancel; first += pass_samples) {
       const uint32_t samples = std::min(pass_samples, settings.spp - first);
@@ -152,16 +287,18 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
           [&](const tbb::blocked_range<size_t>& range) {
             for (size_t w = range.begin(); w != range.end() && !cancel; ++w) {
               const size_t begin = w * pixels_per_wave;
-              const auto count = static_cast<uint32_t>(
-                  std::min<size_t>(pixels_per_wave, pixels.size() - begin));
+              const auto count =
+                  static_cast<uint32_t>(std::min<size_t>(pixels_per_wave, pixels.size() - begin));
               run_task({pixels.data() + begin, count, first, samples});
             }
           },
           tbb::simple_partitioner());
+      merge_pass();
     }
   };
 
-  // The work runs in an arena that a thread of its own enters; this one watches, reports and cancels.
+  // The work runs in an arena that a thread of its own enters; this one watches, reports and
+  // cancels.
   const tbb::global_control parallelism(
       tbb::global_control::max_allowed_parallelism,
       std::max<size_t>(threads, static_cast<size_t>(tbb::info::default_concurrency())));
@@ -213,15 +350,22 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   s.wave_size = wave_size;
   s.lanes = reference ? 1 : lanes;
   s.cancelled = cancel;
+  s.calibration_s = calibration_s;
   PhaseClock clock;
   Counts counts;
+  CoherenceCounts coherence;
+  std::vector<uint64_t> seen(traits.size()), uses(policies.size());
   for (const Worker& worker : workers) {
     clock.add(worker.clock);
     counts.add(worker.counts);
     if (!worker.wave) continue;
-    clock.add(worker.wave->clock);
-    counts.add(worker.wave->counts);
-    s.wave_bytes += worker.wave->bytes();
+    const Wave& wave = *worker.wave;
+    clock.add(wave.clock);
+    counts.add(wave.counts);
+    coherence.add(wave.coherence);
+    s.wave_bytes += wave.bytes();
+    for (size_t m = 0; m < traits.size(); ++m) seen[m] += wave.costs.seen()[m];
+    for (size_t p = 0; p < policies.size(); ++p) uses[p] += wave.policy_chooser.used()[p];
   }
   for (size_t i = 0; i < kPhaseCount; ++i)
     s.phases_s.emplace_back(kPhaseNames[i], 1e-9 * static_cast<double>(clock.ns()[i]));
@@ -231,6 +375,35 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   s.records = counts.records;
   s.packets = counts.packets;
   s.packet_lanes = counts.packet_lanes;
+  const auto depths = [](const auto& at) {
+    size_t n = at.size();
+    while (n > 0 && at[n - 1] == 0) --n;
+    return std::vector<uint64_t>(at.begin(), at.begin() + static_cast<std::ptrdiff_t>(n));
+  };
+  s.rays_at = depths(counts.rays_at);
+  s.shadow_rays_at = depths(counts.shadow_rays_at);
+  s.records_at = depths(counts.records_at);
+  s.run_length = coherence.run_length();
+  s.material_homogeneity = coherence.material_homogeneity();
+  s.texture_homogeneity = coherence.texture_homogeneity();
+  for (size_t m = 0; m < traits.size(); ++m) {
+    MaterialStatistics material;
+    material.name = scene.materials()[m].name;
+    material.program = kProgramNames[traits[m].program];
+    material.records = seen[m];
+    material.timed_records = total_timed[m];
+    if (total_timed[m] > 0)
+      material.measured_ns = total_ns[m] / static_cast<double>(total_timed[m]);
+    material.calibrated_ns = calibrated.material_ns[m];
+    material.predicted_ns = costs.material_ns[m];
+    s.materials.push_back(std::move(material));
+  }
+  s.cost_r2 = prediction.r2;
+  s.cost_mean_error = prediction.mean_error;
+  s.cost_materials = prediction.materials;
+  if (policies.size() > 1)
+    for (size_t p = 0; p < policies.size(); ++p)
+      s.policy_uses.emplace_back(std::string(policies[p]->name()), uses[p]);
   s.accelerator_bytes = impl_->accel->bytes();
   s.peak_rss_bytes = peak_rss_bytes();
 
@@ -241,7 +414,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
 std::vector<uint32_t> lane_widths() {
   std::vector<uint32_t> widths;
   for (uint32_t w : {1u, 4u, 8u, 16u})
-    if (wave_function(w)) widths.push_back(w);
+    if (lane_kernels(w).run) widths.push_back(w);
   return widths;
 }
 

@@ -69,6 +69,12 @@ struct Material {
   std::array<TextureUse, kSlotCount> textures;
 
   bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
+  /// Whether it can shine: its program reads the emission slot and finds something there.
+  bool emits() const {
+    const bool can = program == ProgramId::kEmissive || program == ProgramId::kPrincipled;
+    return can &&
+           (emission.x > 0 || emission.y > 0 || emission.z > 0 || has_texture(Slot::kEmission));
+  }
   /// Whether rays must ask how much of the surface is there.
   bool needs_presence() const {
     return (presence || opacity_threshold > 0) && (opacity < 1 || has_texture(Slot::kOpacity));
@@ -92,6 +98,7 @@ enum MaterialFlags : uint32_t {
   kSpecularWorkflow = 1,
   kPresence = 2,
   kConductorIndex = 4,
+  kEmits = 8,
 };
 
 /// A TextureUse as lanes read it: 16 words.

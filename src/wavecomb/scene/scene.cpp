@@ -48,8 +48,10 @@ float uv_density(const Mesh& mesh) {
       p[k] = &mesh.positions[3 * vertex];
       t[k] = &mesh.uvs[2 * (mesh.uvs_at == Attribute::kCorner ? 3 * f + k : vertex)];
     }
-    const double a[3] = {double{p[1][0]} - p[0][0], double{p[1][1]} - p[0][1], double{p[1][2]} - p[0][2]};
-    const double b[3] = {double{p[2][0]} - p[0][0], double{p[2][1]} - p[0][1], double{p[2][2]} - p[0][2]};
+    const double a[3] = {double{p[1][0]} - p[0][0], double{p[1][1]} - p[0][1],
+                         double{p[1][2]} - p[0][2]};
+    const double b[3] = {double{p[2][0]} - p[0][0], double{p[2][1]} - p[0][1],
+                         double{p[2][2]} - p[0][2]};
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2],
                  z = a[0] * b[1] - a[1] * b[0];
     area += std::sqrt(x * x + y * y + z * z);
@@ -101,6 +103,7 @@ MaterialRecord make_material_record(const Material& m) {
   if (m.specular_workflow) r.flags |= kSpecularWorkflow;
   if (m.needs_presence()) r.flags |= kPresence;
   if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
+  if (m.emits()) r.flags |= kEmits;
   r.program = static_cast<uint32_t>(m.program);
   return r;
 }
@@ -371,12 +374,7 @@ void SceneBuilder::make_lights(Scene& scene) const {
   // Triangles of meshes whose material emits become lights of their own.
   std::vector<EmissiveTriangle> triangles;
   std::vector<uint32_t>& table = scene.emissive_lights_;
-  const auto emits = [&](uint32_t material) {
-    const Material& m = scene.materials_[material];
-    const bool can = m.program == ProgramId::kEmissive || m.program == ProgramId::kPrincipled;
-    return can && (m.emission.x > 0 || m.emission.y > 0 || m.emission.z > 0 ||
-                   m.has_texture(Slot::kEmission));
-  };
+  const auto emits = [&](uint32_t material) { return scene.materials_[material].emits(); };
   bool any_emissive = false;
   for (uint32_t m = 0; m < scene.materials_.size(); ++m) any_emissive = any_emissive || emits(m);
 

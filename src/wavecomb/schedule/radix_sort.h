@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Least-significant-digit radix sort of 64-bit keys, 8 bits a pass; digits that are equal in all keys
-/// cost one look and no pass.
+/// Least-significant-digit radix sort of 64-bit keys, 8 bits a pass; digits that are equal in all
+/// keys cost one look and no pass.
 ///
 /// Contract: owned by one wave; allocates in the constructor only.
 class RadixSorter {

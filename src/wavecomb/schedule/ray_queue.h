@@ -9,14 +9,15 @@ namespace wavecomb {
 /// Rays side by side, in traversal order. That order is made from the rays alone: slot order as
 /// generated, survivors keeping their places, so it is the same under every shading policy.
 ///
-/// Contract: owned by one wave; `size` entries are valid; arrays have room for a packet past the end.
+/// Contract: owned by one wave; `size` entries are valid; arrays have room for a packet past the
+/// end.
 class RayQueue {
  public:
   RayQueue() = default;
   explicit RayQueue(size_t capacity) : block_(kColumns, capacity), capacity_(capacity) {
     size_t c = 0;
-    for (float** f : {&ox, &oy, &oz, &dx, &dy, &dz, &throughput_r, &throughput_g, &throughput_b, &pdf,
-                      &eta_scale, &cone_width, &cone_spread})
+    for (float** f : {&ox, &oy, &oz, &dx, &dy, &dz, &throughput_r, &throughput_g, &throughput_b,
+                      &pdf, &eta_scale, &cone_width, &cone_spread})
       *f = block_.floats(c++);
     slot = block_.uints(c++);
     alive = block_.uints(c++);
@@ -25,11 +26,12 @@ class RayQueue {
   float *ox, *oy, *oz;  ///< origin, world space
   float *dx, *dy, *dz;  ///< unit direction
   float *throughput_r, *throughput_g, *throughput_b;
-  float* pdf;           ///< density of the bounce that made the ray; 0: delta or camera, no MIS
-  float* eta_scale;     ///< product of eta^2 of the interfaces crossed, for roulette
-  float *cone_width, *cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
-  uint32_t* slot;       ///< path slot in the pool
-  uint32_t* alive;      ///< while shading writes: nonzero where the entry holds a new ray
+  float* pdf;        ///< density of the bounce that made the ray; 0: delta or camera, no MIS
+  float* eta_scale;  ///< product of eta^2 of the interfaces crossed, for roulette
+  float *cone_width,
+      *cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
+  uint32_t* slot;    ///< path slot in the pool
+  uint32_t* alive;   ///< while shading writes: nonzero where the entry holds a new ray
   size_t size = 0;
 
   static constexpr size_t kColumns = 15;

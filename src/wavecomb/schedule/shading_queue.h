@@ -11,22 +11,38 @@
 
 namespace wavecomb {
 
-/// Hits as records, column by column, in arrival order (which is the rays' order), with a logical order
-/// beside them. `sorted_indices` says in which order records are shaded; `materialize()` moves the columns
-/// into it.
+/// Hits as records, column by column, in arrival order (which is the rays' order), with a logical
+/// order beside them. `sorted_indices` says in which order records are shaded; `materialize()`
+/// moves the columns into it.
 ///
-/// Contract: owned by one wave; `size` records are valid. The record's number in arrival order is where
-/// shading puts the path's next ray, so that no shading order shows in the ray order.
+/// Contract: owned by one wave; `size` records are valid. The record's number in arrival order is
+/// where shading puts the path's next ray, so that no shading order shows in the ray order.
 class ShadingQueue {
  public:
   /// Columns of a record. Floats first.
   enum Column : uint32_t {
-    kDx, kDy, kDz,                                    ///< direction of the ray that hit
-    kThroughputR, kThroughputG, kThroughputB,
-    kPdf, kEtaScale, kConeWidth, kConeSpread,         ///< cone at the hit
-    kT, kU, kV,
-    kSlot, kInst, kMesh, kGeom, kPrim, kMaterial, kProgram,
-    kArrival,                                         ///< the record's number in arrival order
+    kDx,
+    kDy,
+    kDz,  ///< direction of the ray that hit
+    kThroughputR,
+    kThroughputG,
+    kThroughputB,
+    kPdf,
+    kEtaScale,
+    kConeWidth,
+    kConeSpread,  ///< cone at the hit
+    kT,
+    kU,
+    kV,
+    kSlot,
+    kInst,
+    kMesh,
+    kGeom,
+    kPrim,
+    kMaterial,
+    kProgram,
+    kArrival,      ///< the record's number in arrival order
+    kPositionKey,  ///< Morton code of the hit; where a policy asks
     kColumns
   };
 
@@ -39,7 +55,7 @@ class ShadingQueue {
 
   size_t size = 0;
   uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 while `ordered`
-  bool ordered = false;                ///< false: shaded in arrival order, sorted_indices is not read
+  bool ordered = false;  ///< false: shaded in arrival order, sorted_indices is not read
 
   uint32_t* uints(Column c) const { return columns_[c]; }
   float* floats(Column c) const { return reinterpret_cast<float*>(columns_[c]); }

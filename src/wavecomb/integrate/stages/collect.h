@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 3a: hits become shading records; paths that left the scene or met a light's shape end here.
+/// Stage 3a: hits become shading records; paths that left the scene or met a light's shape end
+/// here.
 #pragma once
 
+#include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
 
@@ -10,7 +12,8 @@ namespace wavecomb {
 namespace detail {
 
 template <typename F>
-inline void add_radiance(PathPool& pool, const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) {
+inline void add_radiance(PathPool& pool, const UInt<F>& slot, const Color<F>& c,
+                         const Mask<F>& active) {
   const auto add = [&](float* to, const F& x) {
     scatter<F>(to, gather<F>(to, slot, active) + x, slot, active);
   };
@@ -27,9 +30,12 @@ inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inst, const U
   const Mask<U> on(active);
   constexpr uint32_t kMeshWords = sizeof(MeshRecord) / 4;
   const U word = mesh * kMeshWords;
-  U material = gather<U>(scene.meshes, word + static_cast<uint32_t>(offsetof(MeshRecord, material) / 4), on);
-  const U lo = gather<U>(scene.meshes, word + static_cast<uint32_t>(offsetof(MeshRecord, face_materials) / 4), on);
-  const U hi = gather<U>(scene.meshes, word + static_cast<uint32_t>(offsetof(MeshRecord, face_materials) / 4 + 1), on);
+  U material =
+      gather<U>(scene.meshes, word + static_cast<uint32_t>(offsetof(MeshRecord, material) / 4), on);
+  const U lo = gather<U>(
+      scene.meshes, word + static_cast<uint32_t>(offsetof(MeshRecord, face_materials) / 4), on);
+  const U hi = gather<U>(
+      scene.meshes, word + static_cast<uint32_t>(offsetof(MeshRecord, face_materials) / 4 + 1), on);
   const Mask<U> by_face = on & Mask<U>((lo | hi) != U(0u));
   if (any(by_face)) {
     using U64 = UInt64<F>;
@@ -39,7 +45,8 @@ inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inst, const U
   const Mask<U> inherits = on & Mask<U>(material == U(kInheritMaterial));
   if (any(inherits)) {
     constexpr uint32_t kInstanceWords = sizeof(InstanceRecord) / 4;
-    const U at = inst * kInstanceWords + static_cast<uint32_t>(offsetof(InstanceRecord, material) / 4);
+    const U at =
+        inst * kInstanceWords + static_cast<uint32_t>(offsetof(InstanceRecord, material) / 4);
     material = select(inherits, gather<U>(scene.instances, at, inherits), material);
   }
   return material;
@@ -49,15 +56,16 @@ inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inst, const U
 
 /// Distance along the camera's axis, into the depth AOV.
 template <typename F>
-inline void store_depth(PathPool& pool, const CameraSetup& camera, const Vec3<F>& o, const Vec3<F>& d,
-                        const F& t, const UInt<F>& slot, const Mask<F>& active) {
+inline void store_depth(PathPool& pool, const CameraSetup& camera, const Vec3<F>& o,
+                        const Vec3<F>& d, const F& t, const UInt<F>& slot, const Mask<F>& active) {
   const Vec3<F> p = fma(d, t, o) - Vec3<F>(camera.to_world.t);
   scatter<F>(pool.depth, -dot(p, Vec3<F>(camera.backward)), slot, active);
 }
 
 /// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order.
 template <typename F>
-void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
+void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+             uint32_t depth) {
   using U = UInt<F>;
   const RayQueue& rays = wave.rays;
   const HitBuffer& hits = wave.hits;
@@ -70,7 +78,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const U inst = load<U>(hits.inst + i);
     const Mask<F> missed = active & Mask<F>(inst == U(kNoHit));
     const Mask<F> shape = active & Mask<F>(inst == U(kLightShape));
-    const Mask<F> surface = active & not_(missed) & not_(shape);
+    Mask<F> surface = active & not_(missed) & not_(shape);
     const F t = load<F>(hits.t + i);
     const U slot = load<U>(rays.slot + i);
     PathState<F> path;
@@ -100,15 +108,23 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
 
     const U prim = load<U>(hits.prim + i);
     const U geom = load<U>(hits.geom + i);
-    const Mask<U> on(surface);
+    Mask<U> on(surface);
     constexpr uint32_t kInstanceWords = sizeof(InstanceRecord) / 4;
-    const U first = gather<U>(scene.instances,
-                              inst * kInstanceWords +
-                                  static_cast<uint32_t>(offsetof(InstanceRecord, geometry) / 4),
-                              on);
+    const U first = gather<U>(
+        scene.instances,
+        inst * kInstanceWords + static_cast<uint32_t>(offsetof(InstanceRecord, geometry) / 4), on);
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, on);
     const U material = detail::hit_material<F>(scene, inst, mesh, prim, surface);
     const U program = gather<U>(scene.material_program, material, on);
+    if (settings.cost_aware && depth >= settings.roulette_depth) {
+      const SampleKey<F> key{gather<U>(wave.pool.pixel_hash, slot, on),
+                             gather<U>(wave.pool.sample, slot, on)};
+      const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, path, surface);
+      surface = surface & (cost_aware_number<F>(key, depth) < q);
+      path.throughput *= F(1.f) / q;
+      if (none(surface)) continue;
+      on = Mask<U>(surface);
+    }
 
     using Q = ShadingQueue;
     const auto put = [&](Q::Column column, const F& x) {
@@ -137,13 +153,18 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     put_id(Q::kPrim, prim);
     put_id(Q::kMaterial, material);
     put_id(Q::kProgram, program);
+    if (context.wants_position) {
+      const Vec3<F> o{load<F>(rays.ox + i), load<F>(rays.oy + i), load<F>(rays.oz + i)};
+      put_id(Q::kPositionKey, position_key<F>(context.grid, fma(path.dir, t, o)));
+    }
     const size_t added = count<F>(surface);
     n += added;
   }
   queue.size = n;
   uint32_t* arrival = queue.uints(ShadingQueue::kArrival);
   for (uint32_t i = 0; i < n; i += kWidth<F>) store(arrival + i, lane_index<F>() + i);
-  wave.counts.records += n;
+  wave.counts.add_records(depth, n);
+  ++wave.queues;
 }
 
 }  // namespace wavecomb

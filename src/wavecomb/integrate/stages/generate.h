@@ -29,16 +29,16 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const U sample = slot - index * task.samples + task.first_sample;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, settings.seed);
     const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
-    const CameraRay<F> ray = camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r,
-                                           active);
+    const CameraRay<F> ray =
+        camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active);
     store(pool.r + i, F(0.f));
     store(pool.g + i, F(0.f));
     store(pool.b + i, F(0.f));
     store(pool.pixel_hash + i, key.pixel_hash);
     store(pool.sample + i, sample);
     if (pool.has_aovs) {
-      for (float* column : {pool.albedo_r, pool.albedo_g, pool.albedo_b, pool.normal_x, pool.normal_y,
-                            pool.normal_z})
+      for (float* column : {pool.albedo_r, pool.albedo_g, pool.albedo_b, pool.normal_x,
+                            pool.normal_y, pool.normal_z})
         store(column + i, F(0.f));
       store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
     }

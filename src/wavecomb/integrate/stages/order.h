@@ -2,25 +2,158 @@
 /// Stage 3b: the policy gives the shading queue its order.
 #pragma once
 
+#include "wavecomb/core/math.h"
+#include "wavecomb/core/morton.h"
+#include "wavecomb/integrate/surface.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
 
+/// Where in its textures a record reads: UDIM tile 7 bits | mip level 4 | Morton of uv on a 128 x
+/// 128 grid
+/// 14. An estimate for keys: the level comes from the mesh's mean uv density, texture transforms
+/// are left out.
+template <typename F>
+UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone_width,
+                    const Mask<F>& active) {
+  using U = UInt<F>;
+  const auto mesh = detail::mesh_arrays<F>(scene, hit.mesh, active);
+  const Mask<F> has_uv = active & Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u));
+  const U corner = hit.prim * 3u;
+  const Mask<U> per_corner(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
+  const auto uv_of = [&](uint32_t k) {
+    const U vertex = mesh.indices.template at<U>(corner + k, has_uv);
+    return mesh.uvs.vec2(select(per_corner, corner + k, vertex), has_uv);
+  };
+  const Vec2<F> t0 = uv_of(0), t1 = uv_of(1), t2 = uv_of(2);
+  const F b0 = 1.f - hit.u - hit.v;
+  const auto mix = [&](const F& a, const F& b, const F& c) {
+    const F x = fma(c, hit.v, fma(b, hit.u, F(a * b0)));
+    return clamp(select(is_finite(x), x, F(0.f)), F(-1e6f), F(1e6f));
+  };
+  const F u = mix(t0.x, t1.x, t2.x), v = mix(t0.y, t1.y, t2.y);
+  const F fu = floor(u), fv = floor(v);
+  const U tile = (U(to_int<F>(fu)) + U(to_int<F>(fv)) * 10u) & 0x7fu;
+  const U cell = morton_2<U>(U(to_int<F>(F((u - fu) * 128.f))) & 0x7fu,
+                             U(to_int<F>(F((v - fv) * 128.f))) & 0x7fu);
+  const F density = gather<F>(scene.meshes,
+                              hit.mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
+                                  static_cast<uint32_t>(offsetof(MeshRecord, uv_density) / 4),
+                              active);
+  // Level of a 2^15-texel texture, from the exponent of the footprint: floor(log2(width)) + 15.
+  const F width = clamp(F(cone_width * density), F(0x1p-15f), F(1.f));
+  const U level = ((float_bits<F>(width) >> 23) - 112u) & 0xfu;
+  return select(Mask<U>(has_uv), (tile << 18) | (level << 14) | cell, U(0u));
+}
+
+/// Works out the columns of ShadingQueueView in `wanted`.
+template <typename F>
+void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
+  using U = UInt<F>;
+  using Q = ShadingQueue;
+  const ShadingQueue& queue = wave.shading;
+  for (size_t i = 0; i < queue.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(queue.size - i);
+    const auto real = [&](Q::Column c) { return load<F>(queue.floats(c) + i); };
+    const auto id = [&](Q::Column c) { return load<U>(queue.uints(c) + i); };
+    if (wanted & kThroughputColumn)
+      store(
+          wave.columns.floats(0) + i,
+          luminance(Vec3<F>(real(Q::kThroughputR), real(Q::kThroughputG), real(Q::kThroughputB))));
+    if (wanted & kPositionColumn) store(wave.columns.uints(1) + i, id(Q::kPositionKey));
+    if (wanted & kTextureColumn) {
+      const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), real(Q::kU), real(Q::kV)};
+      store(wave.columns.uints(2) + i,
+            texture_key<F>(context.scene, hit, real(Q::kConeWidth), active));
+    }
+  }
+}
+
+/// Packets that shading would run: in arrival order, and with each program's records together.
+struct PacketEstimate {
+  double arrival = 0, grouped = 0;
+};
+inline PacketEstimate estimate_packets(std::span<const uint32_t> program, size_t width) {
+  PacketEstimate e;
+  std::array<uint32_t, kProgramCount> histogram{};
+  size_t run = 0;
+  for (size_t i = 0; i < program.size(); ++i) {
+    ++histogram[program[i]];
+    ++run;
+    if (i + 1 == program.size() || program[i + 1] != program[i]) {
+      e.arrival += static_cast<double>((run + width - 1) / width);
+      run = 0;
+    }
+  }
+  for (uint32_t n : histogram) e.grouped += static_cast<double>((n + width - 1) / width);
+  return e;
+}
+
+/// Which policy was used, for the chooser to learn from.
+struct OrderChoice {
+  size_t arm = 0;
+  Work work;
+  double prepare_ns = 0;
+};
+
 /// Keys -> stable sort -> sorted_indices -> materialize, each in its own phase.
-inline void order_records(Wave& wave, const WaveContext& context, uint32_t depth) {
+template <typename F>
+OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth) {
+  using Clock = PhaseClock::Clock;
   ShadingQueue& queue = wave.shading;
-  if (queue.size < 2) return;
+  OrderChoice choice;
+  if (queue.size < 2) return choice;
   wave.clock.enter(Phase::kKeys);
-  const ShadingQueueView view{{queue.uints(ShadingQueue::kProgram), queue.size},
+  const std::span<const uint32_t> program{queue.uints(ShadingQueue::kProgram), queue.size};
+  const bool chooses = context.policies.size() > 1;
+  Clock::time_point start;
+  if (chooses) {
+    start = Clock::now();
+    const PacketEstimate packets = estimate_packets(program, kWidth<F>);
+    std::array<Work, 16> work;
+    const auto records = static_cast<double>(queue.size);
+    for (size_t arm = 0; arm < context.policies.size(); ++arm)
+      work[arm] = {arm == 0 ? packets.arrival : packets.grouped, records};
+    choice.arm = wave.policy_chooser.choose(depth, {work.data(), context.policies.size()});
+    choice.work = work[choice.arm];
+  }
+  const SchedulingPolicy& policy = *context.policies[choice.arm];
+  const uint32_t wanted = policy.columns();
+  if (wanted != 0) fill_columns<F>(wave, context, wanted);
+  const auto column = [&](auto* data, QueueColumn c) {
+    return std::span(static_cast<const std::remove_pointer_t<decltype(data)>*>(data),
+                     (wanted & c) != 0 ? queue.size : 0);
+  };
+  const ShadingQueueView view{program,
                               {queue.uints(ShadingQueue::kMaterial), queue.size},
+                              column(wave.columns.floats(0), kThroughputColumn),
+                              column(wave.columns.uints(1), kPositionColumn),
+                              column(wave.columns.uints(2), kTextureColumn),
+                              context.traits,
+                              wave.scratch,
                               depth};
-  const bool wanted = context.policy->order(view, *context.costs, {wave.sorter.keys(), queue.size});
-  if (!wanted) return;
-  wave.clock.enter(Phase::kSort);
-  queue.ordered = wave.sorter.sort(queue.size, queue.sorted_indices);
-  if (!queue.ordered || context.settings->materialize != Materialize::kOn) return;
-  wave.clock.enter(Phase::kMaterialize);
-  queue.materialize();
+  if (policy.order(view, *context.costs, {wave.sorter.keys(), queue.size})) {
+    wave.clock.enter(Phase::kSort);
+    queue.ordered = wave.sorter.sort(queue.size, queue.sorted_indices);
+    if (queue.ordered && context.settings->materialize == Materialize::kOn) {
+      wave.clock.enter(Phase::kMaterialize);
+      queue.materialize();
+    }
+  }
+  if (chooses)
+    choice.prepare_ns = std::chrono::duration<double, std::nano>(Clock::now() - start).count();
+  return choice;
+}
+
+/// Adds every sixteenth queue to the measures of coherence, in the order in which it is shaded.
+template <typename F>
+void watch_coherence(Wave& wave, const WaveContext& context) {
+  if (wave.queues % 16 != 1) return;
+  const ShadingQueue& queue = wave.shading;
+  fill_columns<F>(wave, context, kTextureColumn);
+  measure_coherence(
+      {queue.uints(ShadingQueue::kMaterial), queue.size}, {wave.columns.uints(2), queue.size},
+      {queue.sorted_indices, queue.ordered ? queue.size : 0}, context.traits, wave.coherence);
 }
 
 }  // namespace wavecomb

@@ -7,11 +7,11 @@
 
 namespace wavecomb {
 
-/// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. New rays and shadow
-/// rays go to the places of their records in arrival order; compact() closes the gaps.
+/// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. New rays
+/// and shadow rays go to the places of their records in arrival order; compact() closes the gaps.
 template <typename Bsdf, typename F>
-void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
-                 size_t begin, size_t end) {
+void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                 uint32_t depth, size_t begin, size_t end) {
   using U = UInt<F>;
   using Q = ShadingQueue;
   const ShadingQueue& queue = wave.shading;
@@ -22,7 +22,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
-    const U at = queue.ordered ? load<U>(queue.sorted_indices + i) : lane_index<F>() + static_cast<uint32_t>(i);
+    const U at = queue.ordered ? load<U>(queue.sorted_indices + i)
+                               : lane_index<F>() + static_cast<uint32_t>(i);
     const auto real = [&](Q::Column c) {
       return queue.ordered ? gather<F>(queue.floats(c), at, active) : load<F>(queue.floats(c) + i);
     };
@@ -104,30 +105,53 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   }
 }
 
-/// End of the run of equal programs that starts at `begin`.
-inline size_t run_end(const ShadingQueue& queue, size_t begin) {
+/// Records in one batch at most: their columns stay in the first-level cache, and time is taken per
+/// batch.
+inline constexpr size_t kMaxBatch = 256;
+
+/// End of the batch that starts at `begin`: a run of one program.
+inline size_t batch_end(const ShadingQueue& queue, size_t begin) {
   const uint32_t* program = queue.uints(ShadingQueue::kProgram);
   const uint32_t* order = queue.ordered ? queue.sorted_indices : nullptr;
+  const size_t limit = std::min(queue.size, begin + kMaxBatch);
   const uint32_t first = order ? program[order[begin]] : program[begin];
   size_t end = begin + 1;
   if (order)
-    while (end < queue.size && program[order[end]] == first) ++end;
+    while (end < limit && program[order[end]] == first) ++end;
   else
-    while (end < queue.size && program[end] == first) ++end;
+    while (end < limit && program[end] == first) ++end;
   return end;
 }
 
-/// Shades the whole queue: a batch per run of one program.
+/// Charges a batch's time to the materials of its records.
+inline void charge_batch(Wave& wave, size_t begin, size_t end,
+                         PhaseClock::Clock::time_point start) {
+  const double ns =
+      std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count();
+  const ShadingQueue& queue = wave.shading;
+  const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
+  std::array<uint32_t, kMaxBatch> materials;
+  for (size_t i = begin; i < end; ++i)
+    materials[i - begin] = material[queue.ordered ? queue.sorted_indices[i] : i];
+  wave.costs.charge({materials.data(), end - begin}, ns);
+}
+
+/// Shades the whole queue, batch by batch.
 template <typename F>
 void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
   const ShadingQueue& queue = wave.shading;
+  wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
-    const size_t end = run_end(queue, begin);
+    const size_t end = batch_end(queue, begin);
     const uint32_t at = queue.ordered ? queue.sorted_indices[begin] : static_cast<uint32_t>(begin);
     const auto program = static_cast<ProgramId>(queue.uints(ShadingQueue::kProgram)[at]);
+    const bool timed = wave.costs.wants(end - begin);
+    PhaseClock::Clock::time_point start;
+    if (timed) start = PhaseClock::Clock::now();
     visit_program<F>(program, [&]<typename Bsdf>() {
       shade_batch<Bsdf, F>(wave, context, settings, depth, begin, end);
     });
+    if (timed) charge_batch(wave, begin, end, start);
     begin = end;
   }
 }
@@ -148,8 +172,8 @@ void compact(Wave& wave) {
   };
   RayQueue& r = wave.rays;
   r.size = squeeze(r.alive, [&](size_t from, size_t to, const Mask<F>& keep) {
-    for (float* c : {r.ox, r.oy, r.oz, r.dx, r.dy, r.dz, r.throughput_r, r.throughput_g, r.throughput_b,
-                     r.pdf, r.eta_scale, r.cone_width, r.cone_spread})
+    for (float* c : {r.ox, r.oy, r.oz, r.dx, r.dy, r.dz, r.throughput_r, r.throughput_g,
+                     r.throughput_b, r.pdf, r.eta_scale, r.cone_width, r.cone_spread})
       compress_store<F>(c + to, load<F>(c + from), keep);
     compress_store<U>(r.slot + to, load<U>(r.slot + from), Mask<U>(keep));
   });

@@ -18,11 +18,11 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   const HitBuffer& h = wave.hits;
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
                            depth == 0, presence_keys(wave.pool, depth, false));
-  wave.counts.rays += q.size;
+  wave.counts.add_rays(depth, q.size);
 }
 
-/// Adds what the unblocked shadow rays bring to their slots. A slot has at most one, so the order of the
-/// queue cannot matter.
+/// Adds what the unblocked shadow rays bring to their slots. A slot has at most one, so the order
+/// of the queue cannot matter.
 template <typename F>
 void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;
@@ -43,7 +43,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
     add(pool.g, q.g);
     add(pool.b, q.b);
   }
-  wave.counts.shadow_rays += q.size;
+  wave.counts.add_shadow_rays(depth, q.size);
 }
 
 }  // namespace wavecomb

@@ -15,6 +15,8 @@ class NonePolicy final : public SchedulingPolicy {
 
 }  // namespace
 
-std::unique_ptr<SchedulingPolicy> make_none_policy() { return std::make_unique<NonePolicy>(); }
+std::unique_ptr<SchedulingPolicy> make_none_policy() {
+  return std::make_unique<NonePolicy>();
+}
 
 }  // namespace wavecomb

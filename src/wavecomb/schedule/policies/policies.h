@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Every policy's maker; one file each beside this one.
+/// Every policy's maker; one file each beside this one. How to add one: docs/writing-a-policy.md.
 #pragma once
 
+#include <bit>
 #include <memory>
 
 #include "wavecomb/schedule/policy.h"
@@ -10,5 +11,15 @@ namespace wavecomb {
 
 std::unique_ptr<SchedulingPolicy> make_none_policy();
 std::unique_ptr<SchedulingPolicy> make_program_policy();
+std::unique_ptr<SchedulingPolicy> make_material_policy();
+std::unique_ptr<SchedulingPolicy> make_texture_policy();
+std::unique_ptr<SchedulingPolicy> make_texture_locality_policy();
+std::unique_ptr<SchedulingPolicy> make_cost_benefit_policy();
+std::unique_ptr<SchedulingPolicy> make_random_runs_policy();
+
+/// Bits of a non-negative float: ascending as integers exactly as the floats ascend.
+inline uint64_t ascending_bits(float x) {
+  return std::bit_cast<uint32_t>(x < 0.f ? 0.f : x);
+}
 
 }  // namespace wavecomb

@@ -17,6 +17,8 @@ class ProgramPolicy final : public SchedulingPolicy {
 
 }  // namespace
 
-std::unique_ptr<SchedulingPolicy> make_program_policy() { return std::make_unique<ProgramPolicy>(); }
+std::unique_ptr<SchedulingPolicy> make_program_policy() {
+  return std::make_unique<ProgramPolicy>();
+}
 
 }  // namespace wavecomb

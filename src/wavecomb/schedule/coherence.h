@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+/// How coherent an order is. Worked out on a sample of queues, outside the phases that it
+/// describes.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "wavecomb/schedule/policy.h"
+
+namespace wavecomb {
+
+/// Sums of one worker; ratios are taken at the end.
+struct CoherenceCounts {
+  uint64_t records = 0;        ///< of the queues looked at
+  uint64_t runs = 0;           ///< maximal runs of consecutive records of one material
+  uint64_t pairs = 0;          ///< neighbours in shading order
+  uint64_t same_material = 0;  ///< pairs that read the same material record (its own cache lines)
+  uint64_t texture_pairs = 0;  ///< pairs of which both read a texture
+  uint64_t same_texels =
+      0;  ///< of those: same texture, tile, level and cell of the 128 x 128 uv grid
+
+  void add(const CoherenceCounts& o) {
+    records += o.records;
+    runs += o.runs;
+    pairs += o.pairs;
+    same_material += o.same_material;
+    texture_pairs += o.texture_pairs;
+    same_texels += o.same_texels;
+  }
+  /// Mean number of consecutive records of one material.
+  double run_length() const {
+    return runs ? static_cast<double>(records) / static_cast<double>(runs) : 0;
+  }
+  double material_homogeneity() const { return ratio(same_material, pairs); }
+  double texture_homogeneity() const { return ratio(same_texels, texture_pairs); }
+
+ private:
+  static double ratio(uint64_t a, uint64_t b) {
+    return b ? static_cast<double>(a) / static_cast<double>(b) : 0;
+  }
+};
+
+/// Adds a queue in the order in which it is shaded (`order` empty: as it stands).
+void measure_coherence(std::span<const uint32_t> material, std::span<const uint32_t> texture_key,
+                       std::span<const uint32_t> order, std::span<const MaterialTraits> materials,
+                       CoherenceCounts& counts);
+
+}  // namespace wavecomb
