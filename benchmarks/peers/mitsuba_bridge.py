@@ -1,0 +1,487 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded scene for Mitsuba 3: the same arrays, lights, camera and nearest materials.
+
+What corresponds exactly: geometry; rect, sphere and dome lights; emissive meshes that are closed
+(ours shine to both sides, Mitsuba's outwards); diffuse, smooth metal of a measured index, smooth
+dielectric; the camera, with a box filter. GGX agrees to within noise where little is scattered
+between facets (Mitsuba does not give that back). What is only the nearest: metal by colour (no
+Schlick there), plastic, principled. A distant light of some angle becomes a far sphere.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from recording import INHERIT, Mesh, Placed, RecordingBuilder
+
+Matrix = NDArray[np.float64]
+_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
+"""Half a turn about y: between what looks or shines along -z and what does along +z."""
+
+_FAR = 1e4
+"""Distance of the sphere that stands for a distant light, in sizes of the scene."""
+
+
+def find_llvm() -> None:
+    """Names a libLLVM that Dr.Jit can use (16 or newer), where the environment does not."""
+    if "DRJIT_LIBLLVM_PATH" in os.environ:
+        return
+    for folder in ("/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib64"):
+        for version in (19, 20, 18, 17, 16):
+            for name in (
+                f"libLLVM-{version}.so",
+                f"libLLVM.so.{version}",
+                f"libLLVM-{version}.so.1",
+            ):
+                if (Path(folder) / name).exists():
+                    os.environ["DRJIT_LIBLLVM_PATH"] = str(Path(folder) / name)
+                    return
+
+
+def load_mitsuba(variant: str | None = None, threads: int | None = None) -> ModuleType:
+    """Mitsuba in a variant; None: llvm_ad_rgb where it runs, else scalar_rgb.
+
+    Raises:
+        ImportError: Mitsuba or the variant is not there.
+    """
+    find_llvm()
+    mi = importlib.import_module("mitsuba")
+    for name in [variant] if variant else ["llvm_ad_rgb", "scalar_rgb"]:
+        try:
+            mi.set_variant(name)
+            if name.startswith("llvm"):
+                dr = importlib.import_module("drjit")
+                if threads:
+                    dr.set_thread_count(threads)
+                dr.eval(dr.arange(mi.Float, 3) + 1)
+            mi.set_log_level(mi.LogLevel.Error)
+            return mi
+        except Exception as error:  # Dr.Jit raises several kinds where LLVM is missing
+            last = error
+    raise ImportError(f"Mitsuba has no variant that runs here: {last}")
+
+
+@dataclass(frozen=True)
+class PeerSettings:
+    """How Mitsuba renders.
+
+    Attributes:
+        width: Pixels.
+        height: Pixels.
+        max_depth: Scattering vertices, as Wavecomb counts them.
+        rr_depth: Vertices before roulette; by default none.
+        instancing: Shape groups, as far as Mitsuba allows them; else all is copied.
+    """
+
+    width: int
+    height: int
+    max_depth: int = 8
+    rr_depth: int = 1_000_000
+    instancing: bool = False
+
+
+class MitsubaScene:
+    """A recorded scene in Mitsuba's hands."""
+
+    def __init__(self, mi: ModuleType, recorded: RecordingBuilder, settings: PeerSettings) -> None:
+        self.mi = mi
+        self.recorded = recorded
+        self.settings = settings
+        self._bsdfs: dict[int, Any] = {}
+        self._textures: dict[str, Any] = {}
+        scene: dict[str, Any] = {
+            "type": "scene",
+            "integrator": {
+                "type": "path",
+                "max_depth": settings.max_depth + 1,
+                "rr_depth": settings.rr_depth,
+            },
+            "sensor": self._sensor(),
+        }
+        for k, light in enumerate(recorded.lights):
+            scene[f"light{k}"] = self._light(light)
+        scene.update(self._geometry())
+        self.scene = mi.load_dict(scene)
+
+    def render(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
+        """(height, width, 3)."""
+        image = np.array(self.mi.render(self.scene, spp=spp, seed=seed))
+        return image.reshape(self.settings.height, self.settings.width, -1)[:, :, :3]
+
+    # ---- camera ----------------------------------------------------------------------------------
+
+    def _sensor(self) -> dict[str, Any]:
+        camera = self.recorded.camera
+        x0, x1, y0, y1 = camera["window"]
+        if abs(x0 + x1) > 1e-6 or abs(y0 + y1) > 1e-6:
+            raise NotImplementedError("a camera with an aperture offset")
+        half_x, half_y = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+        half_x = max(half_x, half_y * self.settings.width / self.settings.height)
+        sensor = {
+            "type": "perspective",
+            "to_world": self._transform(_TURN @ camera["transform"]),
+            "fov": float(np.degrees(2.0 * np.arctan(half_x))),
+            "fov_axis": "x",
+            "near_clip": max(camera.get("near_clip", 0.0), 1e-6),
+            "far_clip": min(camera.get("far_clip", 1e30), 1e7),
+            "film": {
+                "type": "hdrfilm",
+                "width": self.settings.width,
+                "height": self.settings.height,
+                "rfilter": {"type": "box"},
+                "pixel_format": "rgb",
+                "component_format": "float32",
+            },
+            "sampler": {"type": "independent"},
+        }
+        if camera.get("lens_radius", 0.0) > 0.0:
+            sensor["type"] = "thinlens"
+            sensor["aperture_radius"] = camera["lens_radius"]
+            sensor["focus_distance"] = camera["focus_distance"]
+        return sensor
+
+    def _transform(self, rows: Matrix) -> Any:
+        """A transform of row vectors (translation in the last row)."""
+        return self.mi.ScalarTransform4f(np.ascontiguousarray(rows.T))
+
+    # ---- lights ----------------------------------------------------------------------------------
+
+    def _light(self, light: dict[str, Any]) -> dict[str, Any]:
+        kind, rows = light["kind"], light["transform"]
+        colour = np.asarray(light.get("color", (1, 1, 1)), np.float64)
+        if light.get("texture") is not None and kind != "dome":
+            raise NotImplementedError("textured area lights")
+        if kind == "rect":
+            half = np.diag([0.5 * light["width"], 0.5 * light["height"], 1.0, 1.0])
+            to_world = _TURN @ half @ rows
+            area = 4.0 * np.linalg.norm(np.cross(to_world[0, :3], to_world[1, :3]))
+            radiance = colour / area if light.get("normalize") else colour
+            return self._lamp(
+                {"type": "rectangle", "to_world": self._transform(to_world)}, radiance
+            )
+        if kind == "sphere":
+            radius = light["radius"] * abs(np.linalg.det(rows[:3, :3])) ** (1 / 3)
+            if radius == 0.0:
+                position = [float(v) for v in rows[3, :3]]
+                return {"type": "point", "position": position, "intensity": self._rgb(colour)}
+            area = 4.0 * np.pi * radius**2
+            radiance = colour / area if light.get("normalize") else colour
+            centre = [float(v) for v in rows[3, :3]]
+            return self._lamp({"type": "sphere", "center": centre, "radius": radius}, radiance)
+        if kind == "distant":
+            return self._distant(light, rows, colour)
+        if kind == "dome":
+            return self._dome(light, rows, colour)
+        raise NotImplementedError(f"light of kind {kind}")
+
+    def _rgb(self, colour: NDArray[Any]) -> dict[str, Any]:
+        return {"type": "rgb", "value": [float(v) for v in colour]}
+
+    def _lamp(self, shape: dict[str, Any], radiance: NDArray[Any]) -> dict[str, Any]:
+        """A shape that shines and reflects nothing (Mitsuba's default would reflect a half)."""
+        shape["emitter"] = {"type": "area", "radiance": self._rgb(radiance)}
+        shape["bsdf"] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
+        return shape
+
+    def _distant(
+        self, light: dict[str, Any], rows: Matrix, colour: NDArray[np.float64]
+    ) -> dict[str, Any]:
+        along = -rows[2, :3] / np.linalg.norm(rows[2, :3])
+        half = np.radians(light.get("angle", 0.53)) / 2.0
+        if half == 0.0:
+            direction = [float(v) for v in along]
+            return {"type": "directional", "direction": direction, "irradiance": self._rgb(colour)}
+        radiance = colour / (np.pi * np.sin(half) ** 2) if light.get("normalize") else colour
+        distance = _FAR * self._extent()
+        centre = [float(v) for v in -along * distance]
+        sphere = {"type": "sphere", "center": centre, "radius": float(distance * np.sin(half))}
+        return self._lamp(sphere, radiance)
+
+    def _extent(self) -> float:
+        assert self.recorded.scene is not None
+        return float(np.abs(np.array(self.recorded.scene.bounds)).max())
+
+    def _dome(
+        self, light: dict[str, Any], rows: Matrix, colour: NDArray[np.float64]
+    ) -> dict[str, Any]:
+        if light.get("texture") is None:
+            return {"type": "constant", "radiance": self._rgb(colour)}
+        texture = self.recorded.textures[light["texture"]]
+        image = _linear(texture)[:, :, :3] * colour
+        frame = rows.copy()
+        frame[:3, :3] /= np.linalg.norm(frame[:3, :3], axis=1)[:, None]
+        return {
+            "type": "envmap",
+            "bitmap": self.mi.Bitmap(np.ascontiguousarray(_rows_to_poles(image), np.float32)),
+            "to_world": self._transform(frame),
+        }
+
+    # ---- geometry --------------------------------------------------------------------------------
+
+    def _geometry(self) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        groups: dict[tuple[int, int], str] = {}
+        for k, placed in enumerate(self.recorded.placed()):
+            mesh = self.recorded.meshes[placed.mesh]
+            key = (placed.mesh, placed.material)
+            if self.settings.instancing and self._may_be_instanced(mesh, placed):
+                if key not in groups:
+                    groups[key] = f"group{len(groups)}"
+                    parts = self._parts(mesh, placed.material, np.eye(4), groups[key])
+                    out[groups[key]] = {"type": "shapegroup", **parts}
+                out[f"instance{k}"] = {
+                    "type": "instance",
+                    "group": {"type": "ref", "id": groups[key]},
+                    "to_world": self._transform(placed.transform),
+                }
+            else:
+                out.update(self._parts(mesh, placed.material, placed.transform, f"mesh{k}"))
+        return out
+
+    def _may_be_instanced(self, mesh: Mesh, placed: Placed) -> bool:
+        """Mitsuba allows no emitters in a group."""
+        ids = [placed.material] if mesh.face_materials is None else np.unique(mesh.face_materials)
+        unit = np.array_equal(placed.transform, np.eye(4))
+        return not unit and not any(self._emission(int(number)) for number in ids)
+
+    def _parts(self, mesh: Mesh, inherited: int, transform: Matrix, name: str) -> dict[str, Any]:
+        """A mesh, cut by material."""
+        if mesh.face_materials is None:
+            return {name: self._mesh(mesh, None, inherited, transform, name)}
+        parts = {}
+        for number in np.unique(mesh.face_materials):
+            faces = np.flatnonzero(mesh.face_materials == number)
+            chosen = inherited if number == INHERIT else int(number)
+            part = f"{name}_{number}"
+            parts[part] = self._mesh(mesh, faces, chosen, transform, part)
+        return parts
+
+    def _mesh(
+        self,
+        mesh: Mesh,
+        faces: NDArray[Any] | None,
+        material: int,
+        transform: Matrix,
+        name: str,
+    ) -> Any:
+        indices = mesh.indices if faces is None else mesh.indices[faces]
+        positions, normals, uvs = mesh.positions, mesh.normals, mesh.uvs
+        corner = any(a is not None and a.ndim == 3 for a in (normals, uvs))
+        if corner or faces is not None:
+            flat = indices.reshape(-1)
+            positions = positions[flat]
+            chosen = slice(None) if faces is None else faces
+
+            def spread(a: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+                if a is None:
+                    return None
+                return a[chosen].reshape(-1, a.shape[2]) if a.ndim == 3 else a[flat]
+
+            normals, uvs = spread(normals), spread(uvs)
+            indices = np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
+        linear = transform[:3, :3]
+        positions = positions @ linear + transform[3, :3]
+        if normals is not None:
+            normals = normals @ np.linalg.inv(linear).T
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        if np.linalg.det(linear) < 0.0:
+            indices = indices[:, ::-1]
+        mi = self.mi
+        properties = mi.Properties()
+        properties["mesh_bsdf"] = self._bsdf(material)
+        emission = self._emission(material)
+        if emission:
+            radiance = {"type": "area", "radiance": self._rgb(np.array(emission))}
+            properties["mesh_emitter"] = mi.load_dict(radiance)
+        made = mi.Mesh(
+            name,
+            vertex_count=len(positions),
+            face_count=len(indices),
+            has_vertex_normals=normals is not None,
+            has_vertex_texcoords=uvs is not None,
+            props=properties,
+        )
+        params = mi.traverse(made)
+        params["vertex_positions"] = np.ascontiguousarray(positions, np.float32).ravel()
+        params["faces"] = np.ascontiguousarray(indices, np.uint32).ravel()
+        if normals is not None:
+            params["vertex_normals"] = np.ascontiguousarray(normals, np.float32).ravel()
+        if uvs is not None:
+            up = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
+            params["vertex_texcoords"] = np.ascontiguousarray(up, np.float32).ravel()
+        params.update()
+        return made
+
+    # ---- materials -------------------------------------------------------------------------------
+
+    def _emission(self, number: int) -> tuple[float, ...] | None:
+        if number == INHERIT:
+            return None
+        emission = self.recorded.materials[number].get("emission", (0, 0, 0))
+        return tuple(float(v) for v in emission) if any(v > 0 for v in emission) else None
+
+    def _bsdf(self, number: int) -> Any:
+        if number not in self._bsdfs:
+            self._bsdfs[number] = self.mi.load_dict(self._material(number))
+        return self._bsdfs[number]
+
+    def _material(self, number: int) -> dict[str, Any]:
+        if number == INHERIT:
+            return {"type": "twosided", "bsdf": {"type": "diffuse"}}
+        m = self.recorded.materials[number]
+        program = m["program"]
+        if program == "dielectric":
+            return self._dielectric(m)
+        makers = {
+            "diffuse": self._diffuse,
+            "metal": self._metal,
+            "plastic": self._plastic,
+            "principled": self._principled,
+        }
+        if program == "emissive":
+            inner: dict[str, Any] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
+        else:
+            inner = makers[program](m)
+        if m.get("textures", {}).get("normal"):
+            use = m["textures"]["normal"]
+            image = 0.5 + 0.5 * self._values(use)
+            inner = {"type": "normalmap", "normalmap": self._bitmap(use, image), "bsdf": inner}
+        return {"type": "twosided", "bsdf": inner}
+
+    def _diffuse(self, m: dict[str, Any]) -> dict[str, Any]:
+        return {"type": "diffuse", "reflectance": self._colour(m, "base_color", (0.18,) * 3)}
+
+    def _metal(self, m: dict[str, Any]) -> dict[str, Any]:
+        out: dict[str, Any] = {"type": "conductor"}
+        if any(m.get("conductor_eta", (0, 0, 0))):
+            out["eta"] = self._rgb(np.array(m["conductor_eta"]))
+            out["k"] = self._rgb(np.array(m["conductor_k"]))
+        else:
+            out["material"] = "none"
+            out["specular_reflectance"] = self._colour(m, "base_color", (0.18,) * 3)
+        return self._rough(out, m)
+
+    def _rough(self, out: dict[str, Any], m: dict[str, Any]) -> dict[str, Any]:
+        """The rough twin of a smooth material where roughness asks for it."""
+        use = m.get("textures", {}).get("roughness")
+        roughness = m.get("roughness", 0.5)
+        if use is None and roughness < 0.0317:
+            return out
+        out["type"] = "rough" + out["type"]
+        out["distribution"] = "ggx"
+        if use is None or out["type"] == "roughplastic":
+            out["alpha"] = float(roughness) ** 2
+        else:
+            out["alpha"] = self._bitmap(use, np.maximum(self._values(use), 0.02) ** 2)
+        return out
+
+    def _dielectric(self, m: dict[str, Any]) -> dict[str, Any]:
+        out = {
+            "type": "dielectric",
+            "int_ior": float(m.get("ior", 1.5)),
+            "ext_ior": 1.0,
+            "specular_transmittance": self._colour(m, "base_color", (1.0,) * 3),
+        }
+        return self._rough(out, m)
+
+    def _plastic(self, m: dict[str, Any]) -> dict[str, Any]:
+        out = {
+            "type": "plastic",
+            "int_ior": float(m.get("ior", 1.5)),
+            "ext_ior": 1.0,
+            "nonlinear": True,
+            "diffuse_reflectance": self._colour(m, "base_color", (0.18,) * 3),
+        }
+        return self._rough(out, m)
+
+    def _principled(self, m: dict[str, Any]) -> dict[str, Any]:
+        return {
+            "type": "principled",
+            "base_color": self._colour(m, "base_color", (0.18,) * 3),
+            "roughness": self._number(m, "roughness", 0.5),
+            "metallic": self._number(m, "metallic", 0.0),
+            "eta": max(float(m.get("ior", 1.5)), 1.01),
+            "clearcoat": self._number(m, "clearcoat", 0.0),
+            "clearcoat_gloss": 1.0 - float(m.get("clearcoat_roughness", 0.01)),
+        }
+
+    # ---- textures --------------------------------------------------------------------------------
+
+    def _colour(self, m: dict[str, Any], slot: str, default: tuple[float, ...]) -> Any:
+        use = m.get("textures", {}).get(slot)
+        if use is None:
+            return self._rgb(np.array(m.get(slot, default)))
+        return self._bitmap(use, np.clip(self._values(use), 0.0, 1.0))
+
+    def _number(self, m: dict[str, Any], slot: str, default: float) -> Any:
+        use = m.get("textures", {}).get(slot)
+        if use is None:
+            return float(m.get(slot, default))
+        return self._bitmap(use, np.clip(self._values(use), 0.0, 1.0))
+
+    def _values(self, use: dict[str, Any]) -> NDArray[np.float32]:
+        """Texels of a use, channel chosen, scaled and biased: (h, w, 1 or 3)."""
+        pixels = _linear(self.recorded.textures[use["texture"]])
+        four = np.ones((*pixels.shape[:2], 4), np.float32)
+        four[:, :, : pixels.shape[2]] = pixels
+        if pixels.shape[2] <= 2:
+            four[:, :, 1:3] = pixels[:, :, :1]
+        scale, bias = (
+            np.asarray(use.get(k, d), np.float32) for k, d in (("scale", 1), ("bias", 0))
+        )
+        four = four * scale + bias
+        channel = use.get("channel", "rgb")
+        return four[:, :, :3] if channel == "rgb" else four[:, :, ["rgba".index(channel)]]
+
+    def _bitmap(self, use: dict[str, Any], values: NDArray[np.float32]) -> Any:
+        a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
+        key = repr((sorted(use.items()), float(values.mean()), values.shape))
+        if key not in self._textures:
+            texture = self.recorded.textures[use["texture"]]
+            wrap = {"repeat": "repeat", "mirror": "mirror"}.get(texture.get("wrap_s", ""), "clamp")
+            # Mitsuba's v runs down: w = 1 - v.
+            to_uv = np.array([[a, -b, b + c], [-d, e, 1.0 - e - f], [0.0, 0.0, 1.0]])
+            self._textures[key] = self.mi.load_dict(
+                {
+                    "type": "bitmap",
+                    "bitmap": self.mi.Bitmap(np.ascontiguousarray(values, np.float32)),
+                    "raw": True,
+                    "wrap_mode": wrap,
+                    "to_uv": self.mi.ScalarTransform3f(to_uv),
+                }
+            )
+        return self._textures[key]
+
+
+def _linear(texture: dict[str, Any]) -> NDArray[np.float32]:
+    """Pixels of a recorded texture, linear float32."""
+    pixels = texture["pixels"]
+    if pixels.dtype != np.uint8:
+        return np.asarray(pixels, np.float32)
+    values = pixels.astype(np.float32) / 255.0
+    if not texture["srgb"]:
+        return values
+    low = values[:, :, :3] <= 0.04045
+    curve = np.where(low, values[:, :, :3] / 12.92, ((values[:, :, :3] + 0.055) / 1.055) ** 2.4)
+    values[:, :, :3] = curve
+    return values
+
+
+def _rows_to_poles(image: NDArray[Any]) -> NDArray[np.float32]:
+    """A latlong image whose first and last rows are at the poles, as Mitsuba takes them.
+
+    Ours and OpenEXR's rows have their centres half a row inwards.
+    """
+    height = len(image)
+    at = np.arange(height) * (height / (height - 1)) - 0.5
+    low = np.clip(np.floor(at).astype(int), 0, height - 1)
+    high = np.minimum(low + 1, height - 1)
+    part = np.clip(at - low, 0.0, 1.0)[:, None, None]
+    return (image[low] * (1.0 - part) + image[high] * part).astype(np.float32)

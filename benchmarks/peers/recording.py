@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene builder that keeps what it is given, beside making the native scene of it.
+
+Other renderers are fed from the record, so that they get the very arrays that Wavecomb gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb import _core
+from wavecomb.usd import load_stage
+
+INHERIT = 0xFFFFFFFF
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Arguments of ``SceneBuilder.add_mesh``."""
+
+    positions: NDArray[np.float32]
+    indices: NDArray[np.uint32]
+    normals: NDArray[np.float32] | None
+    uvs: NDArray[np.float32] | None
+    face_materials: NDArray[np.uint32] | None
+    material: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A mesh as it is seen once: its number, its transform (row vectors), what it inherits."""
+
+    mesh: int
+    transform: Matrix
+    material: int
+
+
+@dataclass
+class Group:
+    """Meshes and groups that are placed together."""
+
+    meshes: list[int] = field(default_factory=list)
+    children: list[tuple[int, Matrix, NDArray[np.uint32] | None]] = field(default_factory=list)
+
+
+class RecordingBuilder:
+    """Stands in for ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``."""
+
+    def __init__(self) -> None:
+        self._native = _core.SceneBuilder()
+        self.scene: _core.Scene | None = None
+        self.textures: list[dict[str, Any]] = []
+        self.materials: list[dict[str, Any]] = []
+        self.meshes: list[Mesh] = []
+        self.groups = [Group()]
+        self.lights: list[dict[str, Any]] = []
+        self.camera: dict[str, Any] = {}
+
+    def add_texture(self, pixels: NDArray[Any], **options: Any) -> int:
+        """Keeps a texture."""
+        self.textures.append({"pixels": pixels, **options})
+        return self._native.add_texture(pixels, **options)
+
+    def add_material(self, program: str, **parameters: Any) -> int:
+        """Keeps a material."""
+        self.materials.append({"program": program, **parameters})
+        return self._native.add_material(program, **parameters)
+
+    def add_mesh(
+        self,
+        positions: NDArray[np.float32],
+        indices: NDArray[np.uint32],
+        *,
+        normals: NDArray[np.float32] | None = None,
+        uvs: NDArray[np.float32] | None = None,
+        face_materials: NDArray[np.uint32] | None = None,
+        material: int = INHERIT,
+        name: str = "",
+    ) -> int:
+        """Keeps a mesh."""
+        number = self._native.add_mesh(
+            positions,
+            indices,
+            normals=normals,
+            uvs=uvs,
+            face_materials=face_materials,
+            material=material,
+            name=name,
+        )
+        self.meshes.append(Mesh(positions, indices, normals, uvs, face_materials, material, name))
+        return number
+
+    def add_group(self, name: str = "") -> int:
+        """Keeps an empty group."""
+        self.groups.append(Group())
+        return self._native.add_group(name)
+
+    def add_to_group(self, group: int, mesh: int) -> None:
+        """Keeps a mesh in a group."""
+        self.groups[group].meshes.append(mesh)
+        self._native.add_to_group(group, mesh)
+
+    def add_instances(
+        self,
+        parent: int,
+        child: int,
+        transforms: NDArray[Any],
+        materials: NDArray[np.uint32] | None = None,
+    ) -> None:
+        """Keeps placements of a group."""
+        self.groups[parent].children.append((child, np.asarray(transforms), materials))
+        self._native.add_instances(parent, child, transforms, materials)
+
+    def add_light(self, kind: str, transform: NDArray[Any], **options: Any) -> int:
+        """Keeps a light."""
+        self.lights.append(
+            {"kind": kind, "transform": np.asarray(transform, np.float64), **options}
+        )
+        return self._native.add_light(kind, transform, **options)
+
+    def set_camera(self, transform: NDArray[Any], **options: Any) -> None:
+        """Keeps the camera."""
+        self.camera = {"transform": np.asarray(transform, np.float64), **options}
+        self._native.set_camera(transform, **options)
+
+    def build(self) -> RecordingBuilder:
+        """Makes the native scene, and stands in for it."""
+        self.scene = self._native.build()
+        return self
+
+    def placed(self) -> list[Placed]:
+        """All meshes as seen, instances one by one."""
+
+        def expand(group: int, matrix: Matrix, inherited: int) -> Iterator[Placed]:
+            for number in self.groups[group].meshes:
+                own = self.meshes[number].material
+                yield Placed(number, matrix, inherited if own == INHERIT else own)
+            for child, transforms, materials in self.groups[group].children:
+                for k, transform in enumerate(transforms):
+                    chosen = INHERIT if materials is None else int(materials[k])
+                    passed = inherited if chosen == INHERIT else chosen
+                    yield from expand(child, np.asarray(transform, np.float64) @ matrix, passed)
+
+        return list(expand(0, np.eye(4), INHERIT))
+
+
+def record(stage: Path) -> RecordingBuilder:
+    """Loads a USD stage, and keeps what the scene was made of."""
+    factory: Any = RecordingBuilder
+    recorded: Any = load_stage(stage, builder_factory=factory).scene
+    return recorded
