@@ -205,8 +205,10 @@ class Result:
     def cancelled(self) -> bool: ...
     @property
     def costs(self) -> dict[str, dict[str, float]]:
-        """{"materials": {name: ns}, "textures": {name: ns}}: a profile that a later render can start
-        from."""
+        """{"materials": {name: ns}, "textures": {name: ns}}.
+
+        A profile that a later render can start from.
+        """
     @property
     def stats(self) -> dict[str, Any]:
         """settings, seconds {build, render}, phases_s, counts, samples_per_s, rays_per_s,
