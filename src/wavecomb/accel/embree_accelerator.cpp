@@ -11,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "wavecomb/accel/light_shapes.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/lanes.h"
@@ -108,6 +109,54 @@ void closest_filter(const RTCFilterFunctionNArguments* args) {
     default:
       return keep_closest<1>(args);
   }
+}
+
+/// Ray i of a packet against the round light that a geometry's user pointer names; 0: missed.
+float meet_round_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
+  const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
+  const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
+  const float t = intersect_round_light(*static_cast<const LightRecord*>(user), o, d);
+  return t > 0.f && t <= RTCRayN_tfar(ray, n, i) ? t : 0.f;
+}
+
+/// Keeps the closest hit by the same rule as keep_closest.
+void intersect_round_lights(const RTCIntersectFunctionNArguments* args) {
+  auto* best = reinterpret_cast<QueryContext*>(args->context);
+  const unsigned n = args->N;
+  RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
+  RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] == 0) continue;
+    const float t = meet_round_light(args->geometryUserPtr, ray, n, i);
+    if (t == 0.f || t > best->t[i]) continue;
+    // A tie goes to the smaller instance, which the world's is not, then to the smaller geometry.
+    if (t == best->t[i] && (RTCHitN_instID(hit, n, i, 0) != RTC_INVALID_GEOMETRY_ID ||
+                            RTCHitN_geomID(hit, n, i) < args->geomID))
+      continue;
+    best->t[i] = t;
+    RTCRayN_tfar(ray, n, i) = t * kSlack;
+    RTCHitN_u(hit, n, i) = RTCHitN_v(hit, n, i) = 0.f;
+    RTCHitN_primID(hit, n, i) = 0;
+    RTCHitN_geomID(hit, n, i) = args->geomID;
+    RTCHitN_instID(hit, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+void occlude_round_lights(const RTCOccludedFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] != 0 && meet_round_light(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
+      RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
+}
+
+void round_light_box(const RTCBoundsFunctionArguments* args) {
+  const Bounds b = round_light_bounds(*static_cast<const LightRecord*>(args->geometryUserPtr));
+  RTCBounds& out = *args->bounds_o;
+  out.lower_x = b.lo.x;
+  out.lower_y = b.lo.y;
+  out.lower_z = b.lo.z;
+  out.upper_x = b.hi.x;
+  out.upper_y = b.hi.y;
+  out.upper_z = b.hi.z;
 }
 
 /// How closest hits are asked for.
@@ -223,41 +272,16 @@ struct EmbreeAccelerator::Impl {
       rtcCommitGeometry(g);
       rtcAttachGeometryByID(top, g, id);
       rtcReleaseGeometry(g);
-    } else if (kind == LightKind::kSphere) {
-      RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
-      auto* p = static_cast<float*>(
-          rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, 1));
-      for (int i = 0; i < 3; ++i) p[i] = light.p[i];
-      p[3] = light.radius;
+    } else {
+      RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+      rtcSetGeometryUserPrimitiveCount(g, 1);
+      rtcSetGeometryUserData(g, const_cast<LightRecord*>(&light));  // only read
+      rtcSetGeometryBoundsFunction(g, round_light_box, nullptr);
+      rtcSetGeometryIntersectFunction(g, intersect_round_lights);
+      rtcSetGeometryOccludedFunction(g, occlude_round_lights);
       rtcCommitGeometry(g);
       rtcAttachGeometryByID(top, g, id);
       rtcReleaseGeometry(g);
-    } else {  // a disk: a unit disc under the map whose columns are the half axes
-      RTCScene unit = new_scene();
-      RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
-      auto* p = static_cast<float*>(
-          rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, 1));
-      auto* n = static_cast<float*>(
-          rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_NORMAL, 0, RTC_FORMAT_FLOAT3, 12, 1));
-      p[0] = p[1] = p[2] = 0;
-      p[3] = 1;
-      n[0] = n[1] = 0;
-      n[2] = 1;
-      rtcCommitGeometry(g);
-      rtcAttachGeometry(unit, g);
-      rtcReleaseGeometry(g);
-      rtcCommitScene(unit);
-      RTCGeometry instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
-      rtcSetGeometryInstancedScene(instance, unit);
-      const float s = std::sqrt(light.area);
-      const float columns[12] = {light.u[0],     light.u[1], light.u[2],     light.v[0],
-                                 light.v[1],     light.v[2], light.n[0] * s, light.n[1] * s,
-                                 light.n[2] * s, light.p[0], light.p[1],     light.p[2]};
-      rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-      rtcCommitGeometry(instance);
-      rtcAttachGeometryByID(top, instance, id);
-      rtcReleaseGeometry(instance);
-      group_scenes.push_back(unit);
     }
   }
 
