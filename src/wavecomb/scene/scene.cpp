@@ -10,6 +10,10 @@
 namespace wavecomb {
 namespace {
 
+constexpr uint64_t kUncounted = ~uint64_t{0};
+constexpr uint64_t kMaxInstances = 0x0fffffff;
+constexpr uint32_t kMaxNesting = 4096;
+
 std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
 }
@@ -179,6 +183,14 @@ uint32_t SceneBuilder::add_material(Material material) {
     if (use.texture >= textures_.size())
       throw Error(name + " reads texture " + std::to_string(use.texture) +
                   ", which was never added; add textures before materials");
+    for (const std::span<const float> values :
+         {std::span<const float>(use.scale), std::span<const float>(use.bias),
+          std::span<const float>(use.uv)})
+      for (float x : values)
+        if (!std::isfinite(x))
+          throw Error(name +
+                      " reads a texture through a number that is not finite; mend its scale, bias "
+                      "or transform");
     if (use.channel > 4)
       throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
   }
@@ -267,30 +279,48 @@ void SceneBuilder::set_camera(const Camera& camera) {
   if (!(camera.lens_radius >= 0) || !std::isfinite(camera.lens_radius) ||
       (camera.lens_radius > 0 && !(camera.focus_distance > 0)))
     throw Error("the camera's lens needs a radius of 0 or more and a focus distance above 0");
+  if (!(camera.near_clip >= 0) || !(camera.far_clip > camera.near_clip))
+    throw Error("the camera's clipping range must start at 0 or more and end beyond its start");
   camera_ = camera;
 }
 
-void SceneBuilder::flatten(uint32_t group, const Affine& to_world, uint32_t material,
-                           std::vector<uint32_t>& path, std::vector<Instance>& out) const {
-  if (std::find(path.begin(), path.end(), group) != path.end())
+uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
+                                        std::vector<uint64_t>& of_group) const {
+  constexpr uint64_t kUnderWay = ~uint64_t{0} - 1;
+  uint64_t& known = of_group[group];
+  if (known == kUnderWay)
     throw Error(quoted("group", groups_[group].name) +
                 " holds itself; break the cycle of instances");
-  if (group != 0 && !groups_[group].meshes.empty()) {
-    if (out.size() >= 0x0fffffffu) throw Error("more than 268 million instances; use fewer");
-    out.push_back({group, to_world, material});
+  if (known != kUncounted) return known;
+  if (depth > kMaxNesting)
+    throw Error("groups are nested more than " + std::to_string(kMaxNesting) +
+                " deep; flatten some");
+  known = kUnderWay;
+  uint64_t count = group != 0 && !groups_[group].meshes.empty() ? 1 : 0;
+  for (const Node& node : children_[group]) {
+    count += count_placements(node.child, depth + 1, of_group);
+    if (count > kMaxInstances) throw Error("more than 268 million instances; use fewer");
   }
-  path.push_back(group);
+  return known = count;
+}
+
+void SceneBuilder::flatten(uint32_t group, const Affine& to_world, uint32_t material,
+                           const std::vector<uint64_t>& placements,
+                           std::vector<Instance>& out) const {
+  if (group != 0 && !groups_[group].meshes.empty()) out.push_back({group, to_world, material});
   for (const Node& node : children_[group])
-    flatten(node.child, to_world * node.transform,
-            node.material == kInheritMaterial ? material : node.material, path, out);
-  path.pop_back();
+    if (placements[node.child] != 0)
+      flatten(node.child, to_world * node.transform,
+              node.material == kInheritMaterial ? material : node.material, placements, out);
 }
 
 std::shared_ptr<const Scene> SceneBuilder::build() {
   std::shared_ptr<Scene> scene(new Scene);
-  std::vector<uint32_t> path;
+  // Counted first: shared groups can be placed in 2^n ways, and most of them may hold nothing.
+  std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
-  flatten(0, Affine{}, kInheritMaterial, path, flat);
+  flat.reserve(count_placements(0, 0, placements));
+  flatten(0, Affine{}, kInheritMaterial, placements, flat);
   size_t singular = 0;
   for (Instance& i : flat) {
     const float det = i.to_world.determinant();

@@ -155,8 +155,10 @@ class SceneBuilder {
     Affine transform;
     uint32_t material;
   };
+  /// Instances of groups with meshes that one placement of `group` makes; finds cycles.
+  uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
   void flatten(uint32_t group, const Affine& to_world, uint32_t material,
-               std::vector<uint32_t>& path, std::vector<Instance>& out) const;
+               const std::vector<uint64_t>& placements, std::vector<Instance>& out) const;
   void make_records(Scene& scene) const;
   void make_lights(Scene& scene) const;
 
