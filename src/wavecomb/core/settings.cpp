@@ -2,6 +2,7 @@
 #include "wavecomb/core/settings.h"
 
 #include <cmath>
+#include <cstdio>
 
 #include "wavecomb/core/error.h"
 
@@ -11,8 +12,10 @@ namespace {
 void check_range(const char* option, double value, double lo, double hi) {
   if (value >= lo && value <= hi) return;
   const auto text = [](double v) {
-    return v == std::floor(v) && std::abs(v) < 1e15 ? std::to_string(static_cast<long long>(v))
-                                                    : std::to_string(v);
+    if (v == std::floor(v) && std::abs(v) < 1e15) return std::to_string(static_cast<long long>(v));
+    char digits[32];
+    std::snprintf(digits, sizeof(digits), "%g", v);
+    return std::string(digits);
   };
   throw Error(std::string(option) + " is " + text(value) + "; it must be from " + text(lo) +
               " to " + text(hi));
@@ -26,9 +29,9 @@ void Settings::check() const {
   check_range("width x height", static_cast<double>(width) * height, 1, kMaxPixels);
   check_range("spp", spp, 1, 1 << 20);
   check_range("max_depth", max_depth, 0, 4096);
-  check_range("filter_width", filter_width, 0.01, 32);
+  check_range("filter_width", filter_width, 0.01f, 32);
   check_range("roulette_depth", roulette_depth, 0, 4096);
-  check_range("clamp_indirect", clamp_indirect, 0, 1e30);
+  check_range("clamp_indirect", clamp_indirect, 0, 1e30f);
   check_range("cost_weight", cost_weight, 0, 1);
   check_range("threads", threads, 0, 1024);
   if (wave_size != 0) check_range("wave_size", wave_size, 64, 1 << 20);
