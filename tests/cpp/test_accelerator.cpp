@@ -1,0 +1,664 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/accel/embree_accelerator.h"
+
+#include <numeric>
+
+#include "scene_testing.h"
+#include "wavecomb/accel/presence.h"
+#include "wavecomb/core/denormals.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace scene_testing;
+
+/// Columns of rays, padded for packets.
+struct Rays {
+  std::vector<float> ox, oy, oz, dx, dy, dz, tfar;
+  std::vector<uint32_t> slot;
+  size_t size = 0;
+
+  explicit Rays(size_t n = 0) { resize(n); }
+  void resize(size_t n) {
+    size = n;
+    for (auto* c : {&ox, &oy, &oz, &dx, &dy, &dz}) c->resize(n + 16, 0.f);
+    tfar.resize(n + 16, kInf);
+    slot.resize(n + 16, 0);
+    std::iota(slot.begin(), slot.begin() + static_cast<long>(n), 0u);
+  }
+  /// A ray from `o` towards `to`.
+  void aim(size_t i, const std::array<double, 3>& o, const std::array<double, 3>& to) {
+    const double d[3] = {to[0] - o[0], to[1] - o[1], to[2] - o[2]};
+    const double l = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    float* const from[3] = {&ox[i], &oy[i], &oz[i]};
+    float* const dir[3] = {&dx[i], &dy[i], &dz[i]};
+    for (int c = 0; c < 3; ++c) {
+      *from[c] = static_cast<float>(o[c]);
+      *dir[c] = static_cast<float>(d[c] / l);
+    }
+  }
+  RaySpan span(size_t begin, size_t n, bool limited) const {
+    const auto b = static_cast<std::ptrdiff_t>(begin);
+    return {ox.data() + b,
+            oy.data() + b,
+            oz.data() + b,
+            dx.data() + b,
+            dy.data() + b,
+            dz.data() + b,
+            limited ? tfar.data() + b : nullptr,
+            slot.data() + b,
+            n};
+  }
+};
+
+struct Hits {
+  std::vector<float> t, u, v;
+  std::vector<uint32_t> prim, geom, inst;
+  explicit Hits(size_t n)
+      : t(n + 16), u(n + 16), v(n + 16), prim(n + 16), geom(n + 16), inst(n + 16) {}
+  HitSpan span(size_t b) {
+    return {t.data() + b,    u.data() + b,    v.data() + b,
+            prim.data() + b, geom.data() + b, inst.data() + b};
+  }
+};
+
+/// Keys of presence for n slots.
+struct Keys {
+  std::vector<uint32_t> pixel_hash, sample;
+  explicit Keys(size_t n) : pixel_hash(n + 16), sample(n + 16) {
+    std::mt19937 rng(7);
+    for (uint32_t& x : pixel_hash) x = rng();
+    for (size_t i = 0; i < sample.size(); ++i) sample[i] = static_cast<uint32_t>(i % 17);
+  }
+  PresenceKeys keys(uint32_t salt = 0) const { return {pixel_hash.data(), sample.data(), salt}; }
+};
+
+/// Traces in calls of at most `chunk` rays.
+Hits trace(const EmbreeAccelerator& accel, const Rays& rays, uint32_t width, bool coherent,
+           const PresenceKeys& keys, bool limited = false, size_t chunk = 1u << 30) {
+  Hits hits(rays.size);
+  for (size_t b = 0; b < rays.size; b += chunk)
+    accel.intersect(rays.span(b, std::min(chunk, rays.size - b), limited), hits.span(b), width,
+                    coherent, keys);
+  return hits;
+}
+std::vector<uint32_t> blocked(const EmbreeAccelerator& accel, const Rays& rays, uint32_t width,
+                              const PresenceKeys& keys, size_t chunk = 1u << 30) {
+  std::vector<uint32_t> out(rays.size + 16);
+  for (size_t b = 0; b < rays.size; b += chunk)
+    accel.occluded(rays.span(b, std::min(chunk, rays.size - b), true), out.data() + b, width, keys);
+  out.resize(rays.size);
+  return out;
+}
+
+bool same_hit(const Hits& a, size_t i, const Hits& b, size_t j) {
+  if (a.inst[i] == kNoHit || b.inst[j] == kNoHit) return a.inst[i] == b.inst[j];
+  return std::memcmp(&a.t[i], &b.t[j], 4) == 0 && std::memcmp(&a.u[i], &b.u[j], 4) == 0 &&
+         std::memcmp(&a.v[i], &b.v[j], 4) == 0 && a.prim[i] == b.prim[j] &&
+         a.geom[i] == b.geom[j] && a.inst[i] == b.inst[j];
+}
+void expect_same_hits(const Hits& a, const Hits& b, size_t n, const std::string& what) {
+  size_t differing = 0, first = 0;
+  for (size_t i = n; i-- > 0;)
+    if (!same_hit(a, i, b, i)) {
+      ++differing;
+      first = i;
+    }
+  EXPECT_EQ(differing, 0u) << what << ": first " << first << ", t " << a.t[first] << " and "
+                           << b.t[first] << ", prim " << a.prim[first] << " and " << b.prim[first];
+}
+
+/// Expects the same hits, bit for bit, for every width, tails, coherence and order of the rays.
+void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const Rays& rays,
+                                          bool coherent_too = true) {
+  const DenormalsOff denormals_off;
+  const Keys keys(rays.size);
+  const Hits single = trace(accel, rays, 1, false, keys.keys());
+  const std::vector<uint32_t> shadow = blocked(accel, rays, 1, keys.keys());
+  for (const uint32_t width : {4u, 8u, 16u}) {
+    const std::string name = "packets of " + std::to_string(width);
+    for (const bool coherent : {false, true}) {
+      if (coherent && !coherent_too) continue;
+      expect_same_hits(single, trace(accel, rays, width, coherent, keys.keys()), rays.size,
+                       name + (coherent ? ", coherent" : ""));
+    }
+    // Seven valid lanes, and one: tails.
+    expect_same_hits(single, trace(accel, rays, width, false, keys.keys(), false, width - 1),
+                     rays.size, name + " less one");
+    EXPECT_EQ(shadow, blocked(accel, rays, width, keys.keys())) << name << ", occlusion";
+  }
+  expect_same_hits(single, trace(accel, rays, 16, false, keys.keys(), false, 7), rays.size,
+                   "7 lanes of 16");
+  EXPECT_EQ(shadow, blocked(accel, rays, 16, keys.keys(), 7)) << "7 lanes of 16, occlusion";
+
+  std::vector<uint32_t> order(rays.size);
+  std::iota(order.begin(), order.end(), 0u);
+  std::shuffle(order.begin(), order.end(), std::mt19937(3));
+  Rays shuffled(rays.size);
+  const auto move = [&](const auto& from, auto& to) {
+    for (size_t i = 0; i < rays.size; ++i) to[i] = from[order[i]];
+  };
+  move(rays.ox, shuffled.ox), move(rays.oy, shuffled.oy), move(rays.oz, shuffled.oz);
+  move(rays.dx, shuffled.dx), move(rays.dy, shuffled.dy), move(rays.dz, shuffled.dz);
+  move(rays.tfar, shuffled.tfar), move(rays.slot, shuffled.slot);
+  const Hits mixed = trace(accel, shuffled, 16, false, keys.keys());
+  size_t differing = 0;
+  for (size_t i = 0; i < rays.size; ++i) differing += !same_hit(single, order[i], mixed, i);
+  EXPECT_EQ(differing, 0u) << "shuffled";
+}
+
+/// Rays between random points of a cube.
+Rays random_rays(size_t n, float half, uint32_t seed) {
+  Rays rays(n);
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> uniform(-half, half);
+  for (size_t i = 0; i < n; ++i) {
+    std::array<double, 3> a, b;
+    for (double& x : a) x = uniform(rng);
+    for (double& x : b) x = uniform(rng);
+    rays.aim(i, a, b);
+    rays.tfar[i] = std::abs(static_cast<float>(uniform(rng)));
+  }
+  return rays;
+}
+
+const std::vector<Affine>& transforms() {
+  static const std::vector<Affine> all = {
+      translate(1, 0.5f, -1) * rotate(1, 40),
+      translate(-1.5f, 0, 0) * scale(-1, 1, 1),                            // mirrored
+      translate(0, -1.5f, 0.5f) * rotate(0, 70) * scale(2, 0.3f, 1),       // stretched
+      translate(0, 1.5f, 0) * rotate(2, 25) * scale(0.5f, -1.5f, -3),      // both
+      Affine{{{1, 0.7f, 0}, {0, 1, -0.4f}, {0.2f, 0, 0.8f}}, {1, -1, 1}},  // sheared
+      scale(-0.3f, -0.3f, -0.3f)};
+  return all;
+}
+/// A soup in the world and instances of a group of two more.
+std::shared_ptr<const Scene> soup_scene(uint32_t triangles) {
+  SceneBuilder b;
+  b.add_to_group(0, b.add_mesh(make_mesh(soup(triangles, 1))));
+  b.add_to_group(0, b.add_mesh(make_mesh(soup(triangles / 2, 2, 0.2f))));
+  const uint32_t group = b.add_group("group");
+  b.add_to_group(group, b.add_mesh(make_mesh(soup(triangles, 3))));
+  b.add_to_group(group, b.add_mesh(make_mesh(soup(triangles / 2, 4, 0.7f))));
+  for (const Affine& m : transforms()) b.add_instance(0, group, m);
+  return b.build();
+}
+
+struct ExactHit {
+  double t, u, v, edge;  ///< edge: how far from the triangle's edge, in barycentrics
+  uint32_t prim, geom, inst;
+};
+
+/// All hits of a ray by double-precision arithmetic (Moeller and Trumbore), nearest first. `slack`
+/// widens triangles by that much in barycentrics.
+class BruteForce {
+ public:
+  explicit BruteForce(const Scene& scene) {
+    const auto add = [&](uint32_t inst, const Affine& m, const Group& group) {
+      uint32_t geom = 0;
+      for (const uint32_t id : group.meshes) {
+        const Mesh& mesh = scene.meshes()[id];
+        for (uint32_t f = 0; f < mesh.triangle_count(); ++f) {
+          Triangle t{{}, f, geom, inst};
+          for (size_t k = 0; k < 3; ++k) {
+            const float* p = &mesh.positions[3 * mesh.indices[3 * f + k]];
+            for (int r = 0; r < 3; ++r) {
+              const Vec3<float>& row = m.row[r];
+              const double translation = r == 0 ? m.t.x : (r == 1 ? m.t.y : m.t.z);
+              t.p[k][r] = static_cast<double>(row.x) * p[0] + static_cast<double>(row.y) * p[1] +
+                          static_cast<double>(row.z) * p[2] + translation;
+            }
+          }
+          triangles_.push_back(t);
+        }
+        ++geom;
+      }
+    };
+    add(0, Affine{}, scene.groups()[0]);
+    for (uint32_t i = 0; i < scene.instances().size(); ++i)
+      add(i + 1, scene.instances()[i].to_world, scene.groups()[scene.instances()[i].group]);
+  }
+
+  std::vector<ExactHit> hits(const Rays& rays, size_t i, double slack) const {
+    const double o[3] = {rays.ox[i], rays.oy[i], rays.oz[i]};
+    const double d[3] = {rays.dx[i], rays.dy[i], rays.dz[i]};
+    std::vector<ExactHit> all;
+    for (const Triangle& t : triangles_) {
+      double e1[3], e2[3], s[3], h[3], q[3];
+      for (int c = 0; c < 3; ++c) {
+        e1[c] = t.p[1][c] - t.p[0][c];
+        e2[c] = t.p[2][c] - t.p[0][c];
+        s[c] = o[c] - t.p[0][c];
+      }
+      cross(d, e2, h);
+      const double det = dot(e1, h);
+      if (det == 0) continue;
+      const double u = dot(s, h) / det;
+      if (u < -slack || u > 1 + slack) continue;
+      cross(s, e1, q);
+      const double v = dot(d, q) / det;
+      if (v < -slack || u + v > 1 + slack) continue;
+      const double distance = dot(e2, q) / det;
+      if (distance <= 0) continue;
+      all.push_back({distance, u, v, std::min({u, v, 1 - u - v}), t.prim, t.geom, t.inst});
+    }
+    std::sort(all.begin(), all.end(),
+              [](const ExactHit& a, const ExactHit& b) { return a.t < b.t; });
+    return all;
+  }
+
+ private:
+  struct Triangle {
+    double p[3][3];
+    uint32_t prim, geom, inst;
+  };
+  static double dot(const double* a, const double* b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  }
+  static void cross(const double* a, const double* b, double* c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+  }
+  std::vector<Triangle> triangles_;
+};
+
+TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
+  const auto scene = soup_scene(60);
+  const EmbreeAccelerator accel(scene, 2);
+  const BruteForce exact(*scene);
+  const size_t n = size_for_build(20000);
+  const Rays rays = random_rays(n, 3, 11);
+  const Hits hits = trace(accel, rays, 16, false, Keys(n).keys());
+  size_t hit_count = 0, clear_count = 0;
+  for (size_t i = 0; i < n; ++i) {
+    // The hit found is one of the exact ones, and no clear one lies before it.
+    const std::vector<ExactHit> all = exact.hits(rays, i, 1e-4);
+    const bool found = hits.inst[i] != kNoHit;
+    hit_count += found;
+    const ExactHit* match = nullptr;
+    for (const ExactHit& h : all)
+      if (found && h.prim == hits.prim[i] && h.geom == hits.geom[i] && h.inst == hits.inst[i])
+        match = &h;
+    if (found) {
+      ASSERT_NE(match, nullptr) << "ray " << i;
+      EXPECT_NEAR(hits.t[i], match->t, 2e-4) << "ray " << i;
+      EXPECT_NEAR(hits.u[i], match->u, 1e-2) << "ray " << i;
+      EXPECT_NEAR(hits.v[i], match->v, 1e-2) << "ray " << i;
+    }
+    for (const ExactHit& h : all) {
+      if (h.edge < 1e-3 || (match && h.t > match->t - 1e-3) || h.t < 1e-4) continue;
+      ADD_FAILURE() << "ray " << i << " missed a triangle at " << h.t;
+    }
+    clear_count += match && match->edge > 1e-3;
+  }
+  EXPECT_GT(hit_count, n / 2);
+  EXPECT_GT(clear_count, hit_count * 9 / 10);
+}
+
+TEST(Accelerator, HitsDoNotDependOnPackets) {
+  const auto scene = soup_scene(3000);
+  const EmbreeAccelerator accel(scene, 2);
+  expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(100000), 3, 5));
+}
+
+TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
+  // Coherent rays from one point, which is what the coherent flag is for.
+  for (const auto& scene : {mixed(), cornell(), emissive_meshes()}) {
+    const EmbreeAccelerator accel(scene, 2);
+    const size_t side = size_for_build(240, 4);
+    Rays rays(side * side);
+    for (size_t i = 0; i < rays.size; ++i) {
+      const double x = static_cast<double>(i % side) / static_cast<double>(side) - 0.5;
+      const double y = static_cast<double>(i / side) / static_cast<double>(side) - 0.5;
+      rays.aim(i, {0.1, 0.6, 5}, {4 * x, 4 * y + 0.2, 0});
+    }
+    expect_hits_do_not_depend_on_packets(accel, rays);
+  }
+}
+
+/// Rays at the vertices, the middles of edges and other points of edges of a mesh: from anywhere,
+/// or like a camera's from one point.
+Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed,
+                   bool from_one_point) {
+  Rays rays(n);
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (size_t i = 0; i < n; ++i) {
+    const size_t f = rng() % mesh.triangle_count(), k = rng() % 3;
+    const auto point = [&](size_t corner) {
+      const float* p = &mesh.positions[3 * mesh.indices[3 * f + corner % 3]];
+      const Vec3<float> w = m.point({p[0], p[1], p[2]});
+      return std::array<double, 3>{w.x, w.y, w.z};
+    };
+    const auto a = point(k), b = point(k + 1);
+    constexpr double kWhere[4] = {0, 0.5, 0.25, -1};
+    double s = kWhere[i % 4];
+    if (s < 0) s = uniform(rng);
+    std::array<double, 3> to, from;
+    for (size_t c = 0; c < 3; ++c) {
+      to[c] = a[c] + s * (b[c] - a[c]);
+      from[c] = to[c] + 10 * (uniform(rng) - 0.5);
+    }
+    if (i % 3 == 0) from = {to[0], to[1] + 4, to[2]};  // straight down
+    from[1] = std::max(from[1], 2.0);
+    if (from_one_point) from = {0.5, 12, 0.25};
+    rays.aim(i, from, to);
+  }
+  return rays;
+}
+
+TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
+  for (const float bump : {0.f, 0.4f}) {
+    for (const bool instanced : {false, true}) {
+      SceneBuilder b;
+      const Mesh mesh = make_mesh(grid(16, bump, 9));
+      const Affine m =
+          instanced ? rotate(1, 33) * scale(-1.3f, 0.8f, 0.7f) * translate(-8, 0, -8) : Affine{};
+      const uint32_t id = b.add_mesh(mesh);
+      if (instanced) {
+        const uint32_t group = b.add_group("grid");
+        b.add_to_group(group, id);
+        b.add_instance(0, group, m);
+      } else {
+        b.add_to_group(0, id);
+      }
+      const EmbreeAccelerator accel(b.build(), 2);
+      SCOPED_TRACE(testing::Message() << "bump " << bump << (instanced ? ", instanced" : ""));
+      const Rays rays = rays_at_edges(mesh, m, size_for_build(50000), 21, false);
+      // Embree's coherent traversal tests boxes of a whole packet, and thereby some triangles that
+      // a ray alone passes at a rounding's distance. It is for rays from one point.
+      expect_hits_do_not_depend_on_packets(accel, rays, false);
+      expect_hits_do_not_depend_on_packets(accel,
+                                           rays_at_edges(mesh, m, size_for_build(50000), 22, true));
+      if (bump > 0) continue;
+      // And none slips through: the grid has no holes. (At its rim a ray may pass.)
+      const Hits hits = trace(accel, rays, 16, false, Keys(rays.size).keys());
+      size_t missed = 0;
+      for (size_t i = 0; i < rays.size; ++i) missed += hits.inst[i] == kNoHit;
+      EXPECT_LT(missed, rays.size / 12);
+    }
+  }
+}
+
+TEST(Accelerator, ClosedMeshesHaveNoHoles) {
+  SceneBuilder b;
+  const Mesh mesh = make_mesh(sphere(12, false));
+  b.add_to_group(0, b.add_mesh(mesh));
+  const EmbreeAccelerator accel(b.build(), 1);
+  const size_t n = size_for_build(50000);
+  Rays rays(n);
+  std::mt19937 rng(2);
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  for (size_t i = 0; i < n; ++i) {
+    const float* p = &mesh.positions[3 * mesh.indices[rng() % mesh.indices.size()]];
+    rays.aim(i, {uniform(rng), uniform(rng), uniform(rng)}, {p[0], p[1], p[2]});
+  }
+  for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+    const Hits hits = trace(accel, rays, width, false, Keys(n).keys());
+    size_t missed = 0;
+    for (size_t i = 0; i < n; ++i) missed += hits.inst[i] == kNoHit;
+    // Rays aim at vertices exactly; robust traversal lets one in some ten thousand through.
+    EXPECT_LE(missed, n / 10000 + 1) << width;
+    const auto shadow = blocked(accel, rays, width, Keys(n).keys());
+    EXPECT_GE(std::count(shadow.begin(), shadow.end(), 1u) + static_cast<long>(n / 10000 + 1),
+              static_cast<long>(n))
+        << width;
+  }
+}
+
+// Two triangles in the very same place: which of them is reported is a matter of ids, not of
+// packets.
+TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
+  SceneBuilder b;
+  b.add_to_group(0, b.add_mesh(make_mesh(grid(8, 0.3f, 1))));
+  b.add_to_group(0, b.add_mesh(make_mesh(grid(8, 0.3f, 1))));
+  const EmbreeAccelerator accel(b.build(), 1);
+  Rays rays = random_rays(20000, 1, 3);
+  for (size_t i = 0; i < rays.size; ++i)
+    rays.aim(i, {4, 5, 4}, {4 + 4 * rays.ox[i], 0, 4 + 4 * rays.oz[i]});
+  expect_hits_do_not_depend_on_packets(accel, rays);
+}
+
+TEST(Accelerator, OcclusionAgreesWithIntersection) {
+  const auto scene = soup_scene(300);
+  const EmbreeAccelerator accel(scene, 2);
+  const size_t n = size_for_build(50000);
+  const Rays rays = random_rays(n, 3, 17);
+  const Keys keys(n);
+  const Hits all = trace(accel, rays, 16, false, keys.keys());
+  const Hits near = trace(accel, rays, 16, false, keys.keys(), true);
+  const std::vector<uint32_t> shadow = blocked(accel, rays, 16, keys.keys());
+  size_t count = 0;
+  for (size_t i = 0; i < n; ++i) {
+    // tfar cuts off what lies behind it, and nothing else.
+    const bool expected = all.inst[i] != kNoHit && all.t[i] <= rays.tfar[i];
+    EXPECT_EQ(near.inst[i] != kNoHit, expected) << i;
+    if (expected) {
+      EXPECT_TRUE(same_hit(all, i, near, i)) << i;
+    }
+    EXPECT_EQ(shadow[i], expected ? 1u : 0u) << i;
+    count += expected;
+  }
+  EXPECT_GT(count, n / 10);
+  EXPECT_LT(count, n * 9 / 10);
+}
+
+TEST(Accelerator, LightShapesAreFoundByTheirRecord) {
+  SceneBuilder b;
+  b.add_light(make_light(LightKind::kSphere, {1, 1, 1}, translate(4, 0, 0)));
+  b.add_light(make_light(LightKind::kDome, {1, 1, 1}));  // comes first among the records
+  b.add_light(make_light(LightKind::kDisk, {1, 1, 1}, translate(0, 4, 0) * rotate(0, -90)));
+  b.add_light(make_light(LightKind::kRect, {1, 1, 1},
+                         translate(0, 0, -4) * rotate(1, 180) * scale(-2, 0.5f, 1)));
+  Light point = make_light(LightKind::kSphere, {1, 1, 1}, translate(-4, 0, 0));
+  point.radius = 0;
+  b.add_light(point);
+  b.add_light(make_light(LightKind::kDistant, {1, 1, 1}));
+  const auto scene = b.build();
+  const EmbreeAccelerator accel(scene, 1);
+  const auto& record = scene->light_set().of_input;
+  Rays rays(9);
+  const auto from_centre = [&](size_t i, double x, double y, double z) {
+    rays.aim(i, {0, 0, 0}, {x, y, z});
+  };
+  from_centre(0, 4, 0.4, 0);     // sphere of radius 0.5 at 4
+  from_centre(1, 4, 0.6, 0);     // beside it
+  from_centre(2, 0.4, 4, 0.25);  // disk of radius 0.5
+  from_centre(3, 0.4, 4, 0.35);
+  from_centre(4, 0.9, 0.2, -4);  // rect of 2 x 0.5
+  from_centre(5, 0.9, 0.3, -4);
+  from_centre(6, -4, 0, 0);  // a point light has no shape
+  from_centre(7, 1, 1, 1);
+  rays.aim(8, {0, 0, -8}, {0, 0.1, 0});  // the rect from behind
+  const Keys keys(9);
+  for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+    const Hits hits = trace(accel, rays, width, false, keys.keys());
+    const auto expect = [&](size_t i, uint32_t input, double t) {
+      EXPECT_EQ(hits.inst[i], kLightShape) << i;
+      EXPECT_EQ(hits.geom[i], record[input]) << i;
+      EXPECT_NEAR(hits.t[i], t, 2e-5) << i;
+    };
+    // |o + t d - c| = r: t = b - sqrt(b^2 - c).
+    const double b4 = 16 / std::sqrt(16.16);
+    expect(0, 0, b4 - std::sqrt(b4 * b4 - 16 + 0.25));
+    expect(2, 2, std::sqrt(16 + 0.16 + 0.0625));
+    expect(4, 3, std::sqrt(16 + 0.81 + 0.04));
+    expect(8, 3, std::sqrt(16 + 0.01 / 4));
+    for (const size_t i : {1u, 3u, 5u, 6u, 7u}) EXPECT_EQ(hits.inst[i], kNoHit) << i;
+    const auto shadow = blocked(accel, rays, width, keys.keys());
+    EXPECT_EQ(shadow, (std::vector<uint32_t>{1, 0, 1, 0, 1, 0, 0, 0, 1}));
+  }
+}
+
+TEST(Accelerator, LightShapesDoNotDependOnPackets) {
+  SceneBuilder b;
+  std::mt19937 rng(4);
+  std::uniform_real_distribution<float> uniform(-2, 2);
+  for (int i = 0; i < 60; ++i) {
+    const LightKind kind = i % 3 == 0   ? LightKind::kRect
+                           : i % 3 == 1 ? LightKind::kDisk
+                                        : LightKind::kSphere;
+    const float x = uniform(rng), y = uniform(rng), z = uniform(rng), a = uniform(rng);
+    b.add_light(make_light(kind, {1, 1, 1},
+                           translate(x, y, z) * rotate(i % 2, 90 * a) * scale(0.8f, 0.5f, 0.5f)));
+  }
+  const EmbreeAccelerator accel(b.build(), 1);
+  expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(30000), 3, 8));
+}
+
+/// A stack of `n` partly present squares, z = 0, -1 .. , and one opaque behind them.
+std::shared_ptr<const Scene> leaves(int n, float opacity, float threshold, bool textured,
+                                    bool instanced) {
+  SceneBuilder b;
+  Material m = make_material(ProgramId::kPrincipled);
+  m.presence = threshold == 0;
+  m.opacity = opacity;
+  m.opacity_threshold = threshold;
+  if (textured) {
+    const uint32_t t = add_texture(b, 2, 1, 1, {0.f, 1.f}, Wrap::kClamp);
+    m.textures[static_cast<size_t>(Slot::kOpacity)] = use(t, 0);
+  }
+  const uint32_t leaf = b.add_material(m);
+  const uint32_t group = b.add_group("leaf");
+  b.add_to_group(group, b.add_mesh(make_mesh(quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}))));
+  for (int i = 0; i < n; ++i) {
+    const auto z = static_cast<float>(-i);
+    if (instanced)
+      b.add_instance(0, group, translate(0, 0, z), leaf);
+    else
+      b.add_to_group(0, b.add_mesh(make_mesh(quad({-1, -1, z}, {2, 0, 0}, {0, 2, 0}), leaf)));
+  }
+  b.add_to_group(0, b.add_mesh(make_mesh(quad({-9, -9, -20}, {18, 0, 0}, {0, 18, 0}))));
+  return b.build();
+}
+
+TEST(Accelerator, PresenceIsAProbability) {
+  const size_t n = size_for_build(20000, 4);
+  Rays rays(n);
+  std::mt19937 rng(1);
+  std::uniform_real_distribution<double> uniform(-0.95, 0.95);
+  for (size_t i = 0; i < n; ++i) {
+    const double x = uniform(rng), y = uniform(rng);
+    rays.aim(i, {x, y, 5}, {x, y, 0});
+  }
+  const Keys keys(n);
+  for (const bool instanced : {false, true}) {
+    for (const float opacity : {0.f, 0.25f, 0.5f, 1.f}) {
+      const auto scene = leaves(3, opacity, 0, false, instanced);
+      const EmbreeAccelerator accel(scene, 1);
+      SCOPED_TRACE(testing::Message() << "opacity " << opacity << (instanced ? ", instanced" : ""));
+      expect_hits_do_not_depend_on_packets(accel, rays);
+      const Hits hits = trace(accel, rays, 16, false, keys.keys());
+      double count[4] = {0, 0, 0, 0};
+      for (size_t i = 0; i < n; ++i) {
+        ASSERT_NE(hits.inst[i], kNoHit);
+        const int layer = static_cast<int>(std::lround(hits.t[i] - 5));
+        ++count[layer > 3 ? 3 : layer];
+      }
+      double expected = static_cast<double>(n), left = 1;
+      for (int layer = 0; layer < 4; ++layer) {
+        const double p = left * (layer < 3 ? opacity : 1);
+        expected = p * static_cast<double>(n);
+        left -= p;
+        // 16 comparisons: 4.5 sigma is 1e-4 in all.
+        EXPECT_NEAR(count[layer], expected, 4.5 * std::sqrt(expected * (1 - p)) + 1e-9) << layer;
+      }
+      // Another salt is another draw.
+      const Hits again = trace(accel, rays, 16, false, keys.keys(1));
+      size_t same = 0;
+      for (size_t i = 0; i < n; ++i) same += hits.t[i] == again.t[i];
+      if (opacity == 0 || opacity == 1) {
+        EXPECT_EQ(same, n);
+      } else {
+        EXPECT_LT(same, n * 3 / 4);
+      }
+    }
+  }
+}
+
+TEST(Accelerator, PresenceByTextureAndThreshold) {
+  const size_t n = 4096;
+  Rays rays(n);
+  for (size_t i = 0; i < n; ++i) {
+    const double x = (static_cast<double>(i) + 0.5) / n * 1.98 - 0.99;
+    rays.aim(i, {x, 0.3, 5}, {x, 0.3, 0});
+  }
+  const Keys keys(n);
+  for (const bool instanced : {false, true}) {
+    for (const float threshold : {0.f, 0.5f, 0.9f}) {
+      const auto scene = leaves(1, 1, threshold, true, instanced);
+      const EmbreeAccelerator accel(scene, 1);
+      expect_hits_do_not_depend_on_packets(accel, rays);
+      const Hits hits = trace(accel, rays, 16, false, keys.keys());
+      for (size_t i = 0; i < n; ++i) {
+        // Opacity goes from 0 at u = 1/4 to 1 at u = 3/4.
+        const double opacity = std::clamp(rays.ox[i] + 0.5, 0.0, 1.0);
+        const bool present = hits.t[i] < 10;
+        if (std::abs(opacity - threshold) < 1e-3) continue;
+        if (threshold > 0) {
+          EXPECT_EQ(present, opacity > threshold) << opacity;
+        } else if (opacity == 0 || opacity == 1) {
+          EXPECT_EQ(present, opacity == 1) << opacity;
+        }
+      }
+    }
+  }
+}
+
+TEST(Accelerator, PresenceByItself) {
+  const auto scene = leaves(1, 1, 0.5f, true, false);
+  const uint32_t mesh = scene->groups()[0].meshes[0];
+  const Keys keys(1);
+  for (int i = 0; i < 100; ++i) {
+    const float u = (static_cast<float>(i) + 0.5f) / 100;
+    // Triangle 0 is (0, 0), (1, 0), (1, 1) in uv: u = b1 + b2, v = b2.
+    EXPECT_EQ(is_present(scene->view(), 0, mesh, 0, u, 0, 0, keys.keys()), u > 0.5f) << u;
+  }
+}
+
+TEST(Accelerator, MemoryIsAccounted) {
+  SceneBuilder small, large;
+  small.add_to_group(0, small.add_mesh(make_mesh(soup(100, 1))));
+  large.add_to_group(0, large.add_mesh(make_mesh(soup(20000, 1))));
+  const EmbreeAccelerator a(small.build(), 1), b(large.build(), 1);
+  EXPECT_GT(a.bytes(), 100u);
+  EXPECT_GT(b.bytes(), a.bytes() + 20000u * 16);
+  EXPECT_LT(b.bytes(), 20000u * 1000);
+}
+
+TEST(Accelerator, EmptySceneAndZeroAreaFaces) {
+  SceneBuilder empty;
+  const EmbreeAccelerator nothing(empty.build(), 1);
+  SceneBuilder flat;
+  MeshData m;
+  m.vertex(0, 0, 0);
+  m.vertex(1, 0, 0);
+  m.vertex(2, 0, 0);
+  m.triangle(0, 1, 2);  // a line
+  m.triangle(0, 0, 0);  // a point
+  flat.add_to_group(0, flat.add_mesh(make_mesh(m)));
+  flat.add_to_group(0, flat.add_mesh(make_mesh(MeshData{})));
+  const auto flat_scene = flat.build();
+  EXPECT_EQ(flat_scene->unique_triangles(), 2u);
+  const EmbreeAccelerator line(flat_scene, 1);
+  Rays rays(40);
+  for (size_t i = 0; i < 40; ++i) rays.aim(i, {0.05 * static_cast<double>(i), 3, 0}, {0.1, 0, 0});
+  const Keys keys(40);
+  for (const auto* accel : {&nothing, &line})
+    for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+      const Hits hits = trace(*accel, rays, width, true, keys.keys());
+      for (size_t i = 0; i < 40; ++i) EXPECT_EQ(hits.inst[i], kNoHit);
+      const auto shadow = blocked(*accel, rays, width, keys.keys());
+      EXPECT_EQ(std::count(shadow.begin(), shadow.end(), 1u), 0);
+    }
+}
+
+TEST(Accelerator, NativeWidth) {
+  const EmbreeAccelerator accel(cornell(), 1);
+  const uint32_t w = accel.native_width();
+  EXPECT_TRUE(w == 1 || w == 4 || w == 8 || w == 16) << w;
+}
+
+}  // namespace
+}  // namespace wavecomb

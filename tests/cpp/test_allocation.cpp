@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// A wave allocates nothing while it runs.
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+
+#include "wave_testing.h"
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#define WAVECOMB_COUNTS_ALLOCATIONS 1
+
+namespace {
+/// Allocations of this thread, by whatever way: operator new ends in malloc.
+thread_local uint64_t allocations = 0;
+}  // namespace
+
+// glibc's own functions under the names that ours take over for the whole program.
+extern "C" {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+void __libc_free(void*);
+
+void* malloc(size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(size_t count, size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* p, size_t size) {
+  ++allocations;
+  return __libc_realloc(p, size);
+}
+void* memalign(size_t alignment, size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+void* aligned_alloc(size_t alignment, size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** p, size_t alignment, size_t size) {
+  ++allocations;
+  *p = __libc_memalign(alignment, size);
+  return *p ? 0 : ENOMEM;
+}
+void free(void* p) {
+  __libc_free(p);
+}
+}
+#endif
+
+namespace wavecomb {
+namespace {
+
+using namespace scene_testing;
+using namespace wave_testing;
+
+#if defined(WAVECOMB_COUNTS_ALLOCATIONS)
+
+TEST(Allocation, IsCounted) {
+  const uint64_t before = allocations;
+  std::vector<int> v(100);
+  EXPECT_GE(allocations, before + 1);
+  void* volatile p = std::aligned_alloc(64, 640);
+  EXPECT_GE(allocations, before + 2);
+  std::free(p);
+  EXPECT_EQ(v.size(), 100u);
+}
+
+TEST(Allocation, NoneInAWave) {
+  for (const auto& scene : {cornell(), mixed(), emissive_meshes(), presence()}) {
+    for (const uint32_t lanes : lane_widths()) {
+      for (const std::string& policy : policy_names()) {
+        for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
+          WaveCase c;
+          c.settings.width = c.settings.height = 16;
+          c.settings.spp = 4;
+          c.settings.policy = policy;
+          c.settings.materialize = materialize;
+          if (materialize == Materialize::kOn)
+            c.settings.ray_order = c.settings.shadow_order = RayOrder::kAuto;
+          c.lanes = lanes;
+          WaveRun run(scene, c);
+          run.all(1024);  // warm
+          const uint64_t before = allocations;
+          run.all(1024);
+          EXPECT_EQ(allocations - before, 0u) << lanes << " lanes, policy " << policy;
+        }
+      }
+    }
+  }
+}
+
+#endif
+
+}  // namespace
+}  // namespace wavecomb

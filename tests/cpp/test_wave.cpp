@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+// The first promise: any schedule gives the same picture, bit for bit.
+#include "wave_testing.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace scene_testing;
+using namespace wave_testing;
+
+Picture reference(const ScenePtr& scene, const Settings& settings,
+                  const std::shared_ptr<const EmbreeAccelerator>& accel) {
+  WaveRun run(scene, {settings, kReferenceLanes, 1}, accel);
+  run.all(64);
+  return run.picture();
+}
+
+/// Expects that all schedules give the reference integrator's picture.
+void expect_one_picture(const ScenePtr& scene, Settings settings) {
+  const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
+  const Picture expected = reference(scene, settings, accel);
+  double light = 0;
+  for (const float x : expected.beauty) {
+    ASSERT_TRUE(std::isfinite(x));
+    light += x;
+  }
+  EXPECT_GT(light, 0) << "a black picture shows nothing";
+  for (const uint32_t lanes : lane_widths())
+    for (const uint32_t wave_size : {64u, 256u, 4096u, 65536u})
+      for (const char* policy : {"none", "program"})
+        for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
+          if (policy[0] == 'n' && materialize == Materialize::kOn) continue;  // nothing to move
+          settings.policy = policy;
+          settings.materialize = materialize;
+          const uint32_t traversal = lanes == 1 ? 1 : std::min(lanes, accel->native_width());
+          WaveRun run(scene, {settings, lanes, traversal}, accel);
+          run.all(wave_size, wave_size == 256 ? 3 : 16);
+          expect_same_picture(expected, run.picture(),
+                              std::to_string(lanes) + " lanes, waves of " +
+                                  std::to_string(wave_size) + ", policy " + policy +
+                                  (materialize == Materialize::kOn ? ", materialized" : ""));
+          if (testing::Test::HasFailure()) return;
+        }
+}
+
+Settings small_settings() {
+  Settings s;
+  s.width = size_for_build(37, 3);
+  s.height = size_for_build(29, 3);
+  s.spp = 5;
+  s.max_depth = 6;
+  return s;
+}
+
+TEST(Wave, DiffuseBoxIsOnePicture) {
+  expect_one_picture(cornell(), small_settings());
+}
+TEST(Wave, AllProgramsAreOnePicture) {
+  expect_one_picture(mixed(), small_settings());
+}
+TEST(Wave, EmissiveMeshesAreOnePicture) {
+  expect_one_picture(emissive_meshes(), small_settings());
+}
+TEST(Wave, PresenceIsOnePicture) {
+  expect_one_picture(presence(), small_settings());
+}
+
+TEST(Wave, EverySettingIsOnePicture) {
+  Settings s = small_settings();
+  s.width = s.height = 13;
+  s.cosine_sampling = true;
+  expect_one_picture(mixed(), s);
+  s = small_settings();
+  s.width = s.height = 13;
+  s.sampler = SamplerKind::kIndependent;
+  s.roulette = RouletteKind::kOff;
+  s.filter = FilterKind::kBox;
+  s.filter_width = 1;
+  s.schlick_fresnel = true;
+  s.clamp_indirect = 0.3f;
+  s.seed = 99;
+  expect_one_picture(mixed(), s);
+}
+
+TEST(Wave, EveryPolicyIsOnePicture) {
+  for (const ScenePtr& scene : {mixed(), presence()}) {
+    const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
+    Settings s = small_settings();
+    const Picture expected = reference(scene, s, accel);
+    for (const std::string& policy : policy_names())
+      for (const uint32_t wave_size : {64u, 1500u})
+        for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
+          s.policy = policy;
+          s.materialize = materialize;
+          WaveRun run(scene, {s, lane_widths().back(), accel->native_width()}, accel);
+          run.all(wave_size);
+          expect_same_picture(expected, run.picture(), "policy " + policy);
+        }
+  }
+}
+
+TEST(Wave, RayOrdersDoNotShow) {
+  for (const ScenePtr& scene : {mixed(), presence()}) {
+    const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
+    Settings s = small_settings();
+    const Picture expected = reference(scene, s, accel);
+    for (const uint32_t lanes : lane_widths())
+      for (const RayOrder bounce :
+           {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant, RayOrder::kAuto})
+        for (const RayOrder shadow : {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kAuto}) {
+          s.ray_order = bounce;
+          s.shadow_order = shadow;
+          WaveRun run(scene, {s, lanes, lanes == 1 ? 1 : accel->native_width()}, accel);
+          run.all(700);
+          expect_same_picture(expected, run.picture(),
+                              "ray orders " + std::to_string(static_cast<int>(bounce)) + ", " +
+                                  std::to_string(static_cast<int>(shadow)));
+        }
+  }
+}
+
+TEST(Wave, PacketsOfRaysDoNotShow) {
+  const ScenePtr scene = mixed();
+  const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
+  const Settings s = small_settings();
+  const Picture expected = reference(scene, s, accel);
+  for (const uint32_t traversal : {1u, 4u, 8u, 16u}) {
+    WaveRun run(scene, {s, lane_widths().back(), traversal}, accel);
+    run.all(1000);
+    expect_same_picture(expected, run.picture(), "packets of " + std::to_string(traversal));
+  }
+}
+
+TEST(Wave, LargeWaves) {
+  // More than 65,536 paths, so that the largest wave is full.
+  if (kSanitized) GTEST_SKIP() << "too slow under sanitizers";
+  const ScenePtr scene = cornell();
+  const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
+  Settings s;
+  s.width = 70;
+  s.height = 65;
+  s.spp = 16;
+  s.max_depth = 3;
+  const Picture expected = reference(scene, s, accel);
+  for (const char* policy : {"none", "program"}) {
+    s.policy = policy;
+    WaveRun run(scene, {s, lane_widths().back(), accel->native_width()}, accel);
+    run.all(65536);
+    expect_same_picture(expected, run.picture(), std::string("65536 paths, policy ") + policy);
+  }
+}
+
+TEST(Wave, ThreadsDoNotShow) {
+  for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes(), presence()}) {
+    const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
+    Settings s = small_settings();
+    const Picture expected = reference(scene, s, accel);
+    WavefrontRenderer renderer(scene);
+    for (const uint32_t threads : {1u, 2u, 3u}) {
+      for (const uint32_t wave_size : {0u, 64u, 4096u}) {
+        s.threads = threads;
+        s.wave_size = wave_size;
+        expect_same_picture(expected, renderer.render(s), std::to_string(threads) + " threads");
+      }
+      s.integrator = IntegratorKind::kReference;
+      expect_same_picture(expected, renderer.render(s), "reference, threads");
+      s.integrator = IntegratorKind::kWavefront;
+    }
+  }
+}
+
+TEST(Wave, EdgeCases) {
+  const ScenePtr scene = mixed();
+  SceneBuilder empty_builder, unlit_builder, missed_builder;
+  const ScenePtr empty = empty_builder.build();
+  unlit_builder.add_to_group(0, unlit_builder.add_mesh(make_mesh(sphere(6, true))));
+  unlit_builder.set_camera(make_camera({0, 0, 4}, {0, 0, 0}));
+  const ScenePtr unlit = unlit_builder.build();
+  missed_builder.add_to_group(0, missed_builder.add_mesh(make_mesh(sphere(6, true))));
+  missed_builder.add_light(make_light(LightKind::kDome, {1, 2, 3}));
+  missed_builder.set_camera(make_camera({0, 0, 4}, {0, 0, 9}));
+  const ScenePtr missed = missed_builder.build();
+  struct Case {
+    ScenePtr scene;
+    uint32_t width, height, spp, max_depth;
+  };
+  const std::vector<Case> cases = {
+      {scene, 1, 1, 1, 8},   {scene, 1, 1, 17, 8}, {scene, 1, 1, 130, 8}, {scene, 17, 3, 1, 8},
+      {scene, 5, 33, 17, 2}, {scene, 9, 9, 4, 0},  {scene, 9, 9, 4, 1},   {empty, 9, 7, 3, 8},
+      {unlit, 9, 7, 3, 8},   {missed, 9, 7, 3, 8}, {scene, 65, 2, 2, 3}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(testing::Message()
+                 << c.width << " x " << c.height << ", " << c.spp << " spp, depth " << c.max_depth);
+    const auto accel = std::make_shared<const EmbreeAccelerator>(c.scene, 1u);
+    Settings s;
+    s.width = c.width;
+    s.height = c.height;
+    s.spp = c.spp;
+    s.max_depth = c.max_depth;
+    const Picture expected = reference(c.scene, s, accel);
+    for (const uint32_t lanes : lane_widths())
+      for (const uint32_t wave_size : {64u, 1000u}) {
+        WaveRun run(c.scene, {s, lanes, lanes == 1 ? 1 : accel->native_width()}, accel);
+        run.all(wave_size);
+        expect_same_picture(expected, run.picture(), std::to_string(lanes) + " lanes");
+      }
+    EXPECT_EQ(expected.samples, std::vector<uint32_t>(size_t{c.width} * c.height, c.spp));
+    for (size_t i = 0; i < expected.beauty.size(); ++i) {
+      if (c.scene == empty || c.scene == unlit) {
+        EXPECT_EQ(expected.beauty[i], 0);
+      }
+      if (c.scene == missed) {
+        EXPECT_EQ(expected.beauty[i], static_cast<float>(1 + i % 3));
+      }
+    }
+    for (const float depth : expected.depth)
+      if (c.scene == empty || c.scene == missed) {
+        EXPECT_EQ(depth, kInf);
+      }
+  }
+}
+
+TEST(Wave, DepthZeroSeesEmittersOnly) {
+  Settings s = small_settings();
+  s.max_depth = 0;
+  const Picture picture = WavefrontRenderer(cornell()).render(s);
+  size_t lit = 0;
+  for (size_t i = 0; i < picture.depth.size(); ++i) {
+    // The light's red is 12; a pixel has five samples, some of which see it.
+    const double seen = picture.beauty[3 * i] / 12.0 * s.spp;
+    EXPECT_NEAR(seen, std::round(seen), 1e-4);
+    lit += seen > 0;
+  }
+  EXPECT_GT(lit, 0u);
+  EXPECT_LT(lit, picture.depth.size() / 4);
+  const Picture lamps = WavefrontRenderer(emissive_meshes()).render(s);
+  EXPECT_GT(*std::max_element(lamps.beauty.begin(), lamps.beauty.end()), 1);
+}
+
+TEST(Wave, AovsOfASimpleScene) {
+  SceneBuilder b;
+  const uint32_t red = b.add_material(make_material(ProgramId::kDiffuse, {0.8f, 0.2f, 0.1f}));
+  b.add_to_group(0, b.add_mesh(make_mesh(quad({-9, -9, -3}, {18, 0, 0}, {0, 18, 0}), red)));
+  b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
+  const Picture p = WavefrontRenderer(b.build()).render(small_settings());
+  for (size_t i = 0; i < p.depth.size(); ++i) {
+    EXPECT_NEAR(p.depth[i], 5, 1e-5);  // along the axis, at every pixel
+    EXPECT_FLOAT_EQ(p.albedo[3 * i], 0.8f);
+    EXPECT_FLOAT_EQ(p.albedo[3 * i + 1], 0.2f);
+    EXPECT_NEAR(p.normal[3 * i], 0, 1e-6);
+    EXPECT_NEAR(p.normal[3 * i + 2], 1, 1e-6);
+  }
+}
+
+TEST(Wave, CountsAgreeWithTheReference) {
+  const ScenePtr scene = mixed();
+  const Settings s = small_settings();
+  WaveRun oracle(scene, {s, kReferenceLanes, 1});
+  oracle.all(64);
+  WaveRun run(scene, {s, lane_widths().back(), 16});
+  run.all(512);
+  const Counts &a = oracle.reference_counts(), &b = run.wave().counts;
+  EXPECT_EQ(a.samples, uint64_t{s.width} * s.height * s.spp);
+  EXPECT_EQ(a.samples, b.samples);
+  EXPECT_EQ(a.rays, b.rays);
+  EXPECT_EQ(a.shadow_rays, b.shadow_rays);
+  EXPECT_EQ(a.records, b.records);
+  EXPECT_GE(b.packet_lanes, b.records);
+  EXPECT_EQ(b.packet_lanes, b.packets * lane_widths().back());
+  EXPECT_GT(run.wave().bytes(), 512u * 100);
+}
+
+}  // namespace
+}  // namespace wavecomb

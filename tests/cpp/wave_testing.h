@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Waves run by hand, without renderer and threads.
+#pragma once
+
+#include "scene_testing.h"
+#include "wavecomb/core/denormals.h"
+#include "wavecomb/integrate/reference.h"
+#include "wavecomb/integrate/wave.h"
+#include "wavecomb/render/pixel_order.h"
+
+namespace wavecomb::wave_testing {
+
+inline constexpr uint32_t kReferenceLanes = 0;
+
+/// What is to be run: settings, kernels (0: the reference integrator) and packets of rays.
+struct WaveCase {
+  Settings settings;
+  uint32_t lanes = kReferenceLanes;
+  uint32_t traversal = 1;
+};
+
+/// A scene, its accelerator and a film, ready to run waves on this thread.
+class WaveRun {
+ public:
+  WaveRun(std::shared_ptr<const Scene> scene, const WaveCase& wave_case,
+          std::shared_ptr<const EmbreeAccelerator> accel = nullptr)
+      : case_(wave_case),
+        scene_(std::move(scene)),
+        accel_(accel ? std::move(accel) : std::make_shared<const EmbreeAccelerator>(scene_, 1u)),
+        filter_(case_.settings.filter, case_.settings.filter_width),
+        camera_(scene_->camera(), case_.settings.width, case_.settings.height, filter_),
+        traits_(material_traits(*scene_)),
+        costs_(model_costs(*scene_)),
+        film_(case_.settings.width, case_.settings.height, true),
+        pixels_(morton_pixel_order(case_.settings.width, case_.settings.height)) {
+    // "adaptive" chooses among all others.
+    for (const std::string& name : policy_names())
+      if (name != "adaptive" &&
+          (case_.settings.policy == "adaptive" || case_.settings.policy == name))
+        policies_.push_back(make_policy(name));
+    for (const auto& policy : policies_) {
+      context_policies_.push_back(policy.get());
+      context_.wants_position |= (policy->columns() & kPositionColumn) != 0;
+    }
+    context_.scene = scene_->view();
+    context_.accel = accel_.get();
+    context_.settings = &case_.settings;
+    context_.camera = &camera_;
+    context_.policies = context_policies_;
+    context_.traits = traits_;
+    context_.costs = context_.roulette_costs = &costs_;
+    context_.film = &film_;
+    context_.traversal_width = case_.traversal;
+    [](auto& c) {
+      if constexpr (requires { c.measures_costs; }) c.measures_costs = true;
+    }(context_);
+    const Bounds& b = scene_->bounds();
+    if (b.empty()) return;
+    const float lo[3] = {b.lo.x, b.lo.y, b.lo.z}, hi[3] = {b.hi.x, b.hi.y, b.hi.z};
+    for (int i = 0; i < 3; ++i) {
+      context_.grid.lo[i] = lo[i];
+      context_.grid.scale[i] = hi[i] > lo[i] ? 1024.f / (hi[i] - lo[i]) : 0.f;
+    }
+  }
+  WaveRun(const WaveRun&) = delete;
+  WaveRun& operator=(const WaveRun&) = delete;
+
+  /// Runs all samples in waves of at most `wave_size` paths, in passes of at most `pass` samples.
+  void all(uint32_t wave_size, uint32_t pass = 16) {
+    const DenormalsOff denormals_off;
+    const Settings& s = case_.settings;
+    if (case_.lanes != kReferenceLanes && (!wave_ || wave_size > capacity_)) {
+      wave_ = std::make_unique<Wave>(wave_size, context_);
+      capacity_ = wave_size;
+    }
+    pass = std::min(pass, wave_size);
+    const uint32_t step = std::max(1u, wave_size / pass);
+    const auto count = static_cast<uint32_t>(pixels_.size());
+    for (uint32_t first = 0; first < s.spp; first += pass)
+      for (uint32_t p = 0; p < count; p += step)
+        run({pixels_.data() + p, std::min(step, count - p), first, std::min(pass, s.spp - first)});
+  }
+
+  Picture picture() const {
+    return {case_.settings.width, case_.settings.height, film_.beauty(), film_.albedo(),
+            film_.normal(),       film_.depth(),         film_.samples()};
+  }
+  const Wave& wave() const { return *wave_; }
+  const Counts& reference_counts() const { return counts_; }
+
+ private:
+  void run(const WaveTask& task) {
+    switch (case_.lanes) {
+      case kReferenceLanes:
+        return run_reference(context_, task, clock_, counts_);
+#ifdef WAVECOMB_HAS_LANES_1
+      case 1:
+        return run_wave<1>(*wave_, context_, task);
+#endif
+#ifdef WAVECOMB_HAS_LANES_4
+      case 4:
+        return run_wave<4>(*wave_, context_, task);
+#endif
+#ifdef WAVECOMB_HAS_LANES_8
+      case 8:
+        return run_wave<8>(*wave_, context_, task);
+#endif
+#ifdef WAVECOMB_HAS_LANES_16
+      case 16:
+        return run_wave<16>(*wave_, context_, task);
+#endif
+      default:
+        FAIL() << "no kernels for " << case_.lanes << " lanes";
+    }
+  }
+
+  WaveCase case_;
+  std::shared_ptr<const Scene> scene_;
+  std::shared_ptr<const EmbreeAccelerator> accel_;
+  FilterTable filter_;
+  CameraSetup camera_;
+  std::vector<MaterialTraits> traits_;
+  CostSnapshot costs_;
+  Film film_;
+  std::vector<uint32_t> pixels_;
+  std::unique_ptr<Wave> wave_;
+  uint32_t capacity_ = 0;
+  std::vector<std::unique_ptr<SchedulingPolicy>> policies_;
+  std::vector<const SchedulingPolicy*> context_policies_;
+  WaveContext context_{};
+  PhaseClock clock_;
+  Counts counts_;
+};
+
+}  // namespace wavecomb::wave_testing
