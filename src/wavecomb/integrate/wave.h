@@ -41,6 +41,7 @@ struct WaveContext {
   Film* film;                          ///< each wave writes its own pixels only
   uint32_t traversal_width;
   bool wants_position;  ///< some policy reads position keys
+  bool measures_costs;  ///< batches are timed
 
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;

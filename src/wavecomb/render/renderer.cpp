@@ -213,6 +213,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   const uint32_t pass_samples = std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});
   const uint32_t pixels_per_wave = std::max(1u, wave_size / pass_samples);
 
+  const bool measures = settings.costs != CostSource::kModel && !reference;
   CostSnapshot roulette_costs = costs;
   const WaveContext context{
       scene.view(),
@@ -226,7 +227,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
       order_grid(scene.bounds()),
       &film,
       settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, impl_->accel->native_width()),
-      wants_position};
+      wants_position,
+      measures};
 
   std::vector<Worker> workers(threads);
   std::atomic<uint64_t> done{0};
@@ -244,7 +246,6 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
     }
     done += task.path_count();
   };
-  const bool measures = settings.costs != CostSource::kModel && !reference;
   CostTracker measured(traits.size());  // of the pass
   std::vector<double> total_ns(traits.size());
   std::vector<uint64_t> total_timed(traits.size());

@@ -145,7 +145,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
     const size_t end = batch_end(queue, begin);
     const uint32_t at = queue.ordered ? queue.sorted_indices[begin] : static_cast<uint32_t>(begin);
     const auto program = static_cast<ProgramId>(queue.uints(ShadingQueue::kProgram)[at]);
-    const bool timed = wave.costs.wants(end - begin);
+    const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
     if (timed) start = PhaseClock::Clock::now();
     visit_program<F>(program, [&]<typename Bsdf>() {

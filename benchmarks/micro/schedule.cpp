@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// What giving a queue an order costs: sorting keys, and moving records against reading them by
+// index.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "wavecomb/core/lanes.h"
+#include "wavecomb/schedule/radix_sort.h"
+#include "wavecomb/schedule/shading_queue.h"
+
+namespace wavecomb {
+namespace {
+
+/// Keys as "material" makes them: a program in the top byte, a material below.
+std::vector<uint64_t> material_keys(size_t n, uint32_t materials) {
+  std::mt19937 random(1);
+  std::vector<uint64_t> keys(n);
+  for (uint64_t& key : keys) {
+    const uint64_t m = random() % materials;
+    key = ((m % 6) << 56) | (m << 24);
+  }
+  return keys;
+}
+
+void radix_sort(benchmark::State& state) {
+  const auto n = static_cast<size_t>(state.range(0));
+  const std::vector<uint64_t> keys = material_keys(n, 24);
+  RadixSorter sorter(n);
+  std::vector<uint32_t> order(n);
+  for (auto _ : state) {
+    std::copy(keys.begin(), keys.end(), sorter.keys());
+    benchmark::DoNotOptimize(sorter.sort(n, order.data()));
+  }
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(radix_sort)->RangeMultiplier(16)->Range(256, 1 << 20);
+
+void std_stable_sort(benchmark::State& state) {
+  const auto n = static_cast<size_t>(state.range(0));
+  const std::vector<uint64_t> keys = material_keys(n, 24);
+  std::vector<uint32_t> order(n);
+  for (auto _ : state) {
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
+    benchmark::DoNotOptimize(order.data());
+  }
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(std_stable_sort)->RangeMultiplier(16)->Range(256, 1 << 20);
+
+/// A queue of n records in the order of random materials.
+void fill(ShadingQueue& queue, size_t n) {
+  const std::vector<uint64_t> keys = material_keys(n, 24);
+  RadixSorter sorter(n);
+  std::copy(keys.begin(), keys.end(), sorter.keys());
+  queue.size = n;
+  queue.ordered = sorter.sort(n, queue.sorted_indices);
+}
+
+/// Reads every column of every record once, 16 at a time: what a very cheap shader would do.
+float read_all(const ShadingQueue& queue) {
+  constexpr size_t kLanes = WAVECOMB_MAX_LANES;
+  using F = Lanes<kLanes>;
+  using U = UInt<F>;
+  F sum(0.f);
+  for (size_t i = 0; i + kLanes <= queue.size; i += kLanes) {
+    const U at = queue.ordered ? load<U>(queue.sorted_indices + i)
+                               : lane_index<F>() + static_cast<uint32_t>(i);
+    for (uint32_t c = 0; c < ShadingQueue::kColumns; ++c) {
+      const float* column = queue.floats(static_cast<ShadingQueue::Column>(c));
+      sum = sum + (queue.ordered ? gather<F>(column, at, Mask<F>(true)) : load<F>(column + i));
+    }
+  }
+  return lane(sum, 0);
+}
+
+void gather_by_index(benchmark::State& state) {
+  const auto n = static_cast<size_t>(state.range(0));
+  ShadingQueue queue(n);
+  fill(queue, n);
+  for (auto _ : state) benchmark::DoNotOptimize(read_all(queue));
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(gather_by_index)->RangeMultiplier(16)->Range(256, 1 << 20);
+
+void materialize_then_read(benchmark::State& state) {
+  const auto n = static_cast<size_t>(state.range(0));
+  ShadingQueue queue(n);
+  fill(queue, n);
+  for (auto _ : state) {
+    queue.ordered = true;
+    queue.materialize();
+    benchmark::DoNotOptimize(read_all(queue));
+  }
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+BENCHMARK(materialize_then_read)->RangeMultiplier(16)->Range(256, 1 << 20);
+
+}  // namespace
+}  // namespace wavecomb
