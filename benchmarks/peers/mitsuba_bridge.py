@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded scene for Mitsuba 3: the same arrays, lights, camera and nearest materials.
 
-What corresponds exactly: geometry; rect, sphere and dome lights; emissive meshes that are closed
-(ours shine to both sides, Mitsuba's outwards); diffuse, smooth metal of a measured index, smooth
-dielectric; the camera, with a box filter. GGX agrees to within noise where little is scattered
-between facets (Mitsuba does not give that back). What is only the nearest: metal by colour (no
-Schlick there), plastic, principled. A distant light of some angle becomes a far sphere.
+What corresponds exactly: geometry; rect, disk, sphere and dome lights; emissive meshes that are
+closed (ours shine to both sides, Mitsuba's outwards); diffuse, smooth metal of a measured index,
+smooth dielectric; the camera, with a box filter. GGX agrees to within noise where little is
+scattered between facets (Mitsuba does not give that back). What is only the nearest: metal by
+colour (no Schlick there), plastic, principled. A distant light of some angle becomes a far sphere.
 """
 
 from __future__ import annotations
@@ -166,6 +166,11 @@ class MitsubaScene:
             return self._lamp(
                 {"type": "rectangle", "to_world": self._transform(to_world)}, radiance
             )
+        if kind == "disk":
+            to_world = _TURN @ np.diag([light["radius"], light["radius"], 1.0, 1.0]) @ rows
+            area = np.pi * np.linalg.norm(np.cross(to_world[0, :3], to_world[1, :3]))
+            radiance = colour / area if light.get("normalize") else colour
+            return self._lamp({"type": "disk", "to_world": self._transform(to_world)}, radiance)
         if kind == "sphere":
             radius = light["radius"] * abs(np.linalg.det(rows[:3, :3])) ** (1 / 3)
             if radius == 0.0:

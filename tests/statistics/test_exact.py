@@ -16,7 +16,7 @@ from wavecomb import _core
 
 LAYERS = ("beauty", "albedo", "normal", "depth", "samples")
 SCENES = ("cornell", "cornell-dragon", "mixed", "dragon")
-POLICIES = ("none", "program")
+POLICIES = tuple(_core.policies())
 
 WAYS = [
     {"threads": 1, "wave_size": 64, "policy": "none", "materialize": "off"},
@@ -78,6 +78,7 @@ def test_wave_is_the_reference(references: Any, name: str, lanes: int) -> None:
         {"roulette": "off", "max_depth": 3, "filter": "gaussian"},
         {"fresnel": "schlick", "clamp_indirect": 2.0},
         {"cosine_sampling": True},
+        {"roulette": "cost-aware", "costs": "model"},
         {"max_depth": 0},
         {"size": (33, 7), "spp": 5},
     ],
@@ -89,6 +90,22 @@ def test_with_other_settings(references: Any, name: str, settings: dict[str, Any
     for policy in POLICIES:
         found = differences(render(stage, policy=policy, wave_size=512, **settings), reference)
         assert not found, f"{name}, {settings}: {'; '.join(found)}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cornell-dragon", "mixed"])
+@pytest.mark.parametrize("policy", POLICIES)
+def test_every_policy(references: Any, name: str, policy: str) -> None:
+    """With measured costs, which change from pass to pass and run to run, and every ray order."""
+    stage, reference = references(name)
+    for way in (
+        {"wave_size": 512, "ray_order": "slot", "materialize": "on"},
+        {"wave_size": 3000, "ray_order": "morton", "materialize": "off"},
+        {"wave_size": 0, "ray_order": "morton-octant", "threads": 1},
+        {"wave_size": 0, "ray_order": "auto"},
+    ):
+        found = differences(render(stage, policy=policy, costs="measured", **way), reference)
+        assert not found, f"{name}, {policy}, {way}: {'; '.join(found)}"
 
 
 def test_again_is_the_same(references: Any) -> None:

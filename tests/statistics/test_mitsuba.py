@@ -9,6 +9,7 @@ test_closed_forms.py. Where the two models differ by design, the test says so.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -123,6 +124,29 @@ def test_dome_with_a_small_sun(check: Check, recorded: Any, tmp_path: Path) -> N
     check("sun", scene, tolerance=0.004)
 
 
+def test_disk_light(check: Check, recorded: Any) -> None:
+    place = look_at((-1.5, 2.5, 1.5), (0, 0.5, 0))
+    lamp = light("Disk", colour=(9, 6, 3), transform=place, radius=0.6, normalize=True)
+    scene = recorded(VIEW, lamp, GREY, BLUE, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)))
+    check("disk light", scene)
+
+
+def test_instances_of_both(mitsuba: ModuleType, generated: Any) -> None:
+    """Shape groups, which benchmarks use, and flattened copies: one picture in Mitsuba."""
+    from mitsuba_bridge import MitsubaScene, PeerSettings
+    from recording import record
+
+    scene = record(generated("cornell-dragon"))
+    pictures = [
+        batches(partial(MitsubaScene(mitsuba, scene, how).render, 64), 6, first)
+        for first, how in (
+            (0, PeerSettings(32, 32, 2)),
+            (50, PeerSettings(32, 32, 2, instancing=True)),
+        )
+    ]
+    assert_agree("mitsuba instances", *pictures)
+
+
 def test_sphere_light(check: Check, recorded: Any) -> None:
     lamp = light("Sphere", colour=(9, 6, 3), transform=moved(1.4, 2.2, 0.6), radius=0.35)
     scene = recorded(VIEW, lamp, GREY, BLUE, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)))
@@ -188,6 +212,22 @@ def test_gold(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> 
     gold = material("Gold", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=roughness)
     scene = recorded(VIEW, dome, GREY, gold, ground("Grey"), sphere("Ball", "Gold", (0, 1, 0)))
     check(f"gold {roughness}", scene)
+
+
+@pytest.mark.parametrize("program", ["metal", "dielectric"])
+def test_highlight(check: Check, recorded: Any, program: str) -> None:
+    """A small lamp in a rough surface: the width of the lobe (5 % of alpha would be found).
+
+    Glass is a pane on legs of nothing, with the lamp behind it.
+    """
+    if program == "metal":
+        body = material("M", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=0.2)
+        shape, where = ground("M"), moved(-1.6, 1.8, -2.6)
+    else:
+        body = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.3, ior=1.5)
+        shape, where = box("Pane", (-4, 0.3, -1), (4, 2.5, -0.8), "M"), moved(-1.5, 0.5, -4)
+    lamp = light("Sphere", colour=(60, 50, 40), transform=where, radius=0.3)
+    check(f"highlight {program}", recorded(VIEW, lamp, body, shape), max_depth=3)
 
 
 def test_rough_gold_gives_back_what_single_scattering_loses(

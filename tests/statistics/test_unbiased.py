@@ -29,6 +29,7 @@ def mixed(generated: Any) -> Any:
     ("name", "settings"),
     [
         ("roulette", {"roulette": "throughput", "roulette_depth": 1}),
+        ("cost-aware roulette", {"roulette": "cost-aware", "costs": "model"}),
         ("late roulette", {"roulette": "throughput", "roulette_depth": 4}),
         ("sobol", {"sampler": "sobol"}),
         ("cosine", {"cosine_sampling": True}),
@@ -76,7 +77,7 @@ def test_owen_sobol_converges_faster(cornell: Any, beauty: Any) -> None:
     Measured at 8 bounces: 1.6 and 2.4 (4.4 and 7.0 with direct light only). As many times more
     samples would bring independent noise to the same error.
     """
-    reference = beauty(cornell, 32, 16384, seed=900, sampler="sobol")
+    reference = beauty(cornell, 32, 8192, seed=900, sampler="sobol")
     gain = {}
     for spp, count in ((16, 16), (256, 4)):
         errors = {
