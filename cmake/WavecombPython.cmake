@@ -21,6 +21,15 @@ set(_rpath "$ORIGIN" "$ORIGIN/lib")
 if(WAVECOMB_TBB_IS_WHEEL)
   list(APPEND _rpath "$ORIGIN/../../..")
 endif()
+# An Embree that is neither staged nor the system's (embree_ROOT) is looked for where it was found.
+if(NOT WAVECOMB_EMBREE_IS_STAGED)
+  get_target_property(_embree_library embree LOCATION)
+  get_filename_component(_embree_folder "${_embree_library}" DIRECTORY)
+  get_filename_component(_embree_folder "${_embree_folder}" REALPATH)
+  if(_embree_library AND NOT _embree_folder IN_LIST CMAKE_CXX_IMPLICIT_LINK_DIRECTORIES)
+    list(APPEND _rpath "${_embree_folder}")
+  endif()
+endif()
 set_target_properties(wavecomb_python PROPERTIES
   OUTPUT_NAME _core
   INSTALL_RPATH "${_rpath}"
