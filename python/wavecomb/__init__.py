@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from wavecomb.api import Picture, load, render
     from wavecomb.compare import Comparison
     from wavecomb.errors import WavecombError
+    from wavecomb.scheduling import SchedulingPolicy
 
     __version__: str
 
@@ -28,6 +29,7 @@ __all__ = [
     "Picture",
     "Scene",
     "SceneBuilder",
+    "SchedulingPolicy",
     "Settings",
     "WavecombError",
     "__version__",
@@ -41,6 +43,7 @@ _HOMES = {
     "Picture": "wavecomb.api",
     "Scene": "wavecomb._core",
     "SceneBuilder": "wavecomb._core",
+    "SchedulingPolicy": "wavecomb.scheduling",
     "Settings": "wavecomb._core",
     "WavecombError": "wavecomb.errors",
     "load": "wavecomb.api",

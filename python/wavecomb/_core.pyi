@@ -211,8 +211,7 @@ class Result:
         """
     @property
     def stats(self) -> dict[str, Any]:
-        """settings, seconds {build, render}, phases_s, counts, samples_per_s, rays_per_s,
-        peak_rss_bytes (all plain ints, floats, strings and dicts)."""
+        """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
 
 def render(
     scene: Scene,
@@ -223,8 +222,16 @@ def render(
 ) -> Result:
     """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling
     thread (GIL held); returning False cancels, and the result holds what was done.
-    KeyboardInterrupt raised in the callback also stops the render. Raises Error."""
+    KeyboardInterrupt raised in the callback also stops the render. Raises Error.
+    policy: as wavecomb.SchedulingPolicy, in place of the settings' one; what its order() raises
+    comes out of here. costs: a profile to start from, as Result.costs."""
 
 def lane_widths() -> list[int]: ...
+def policies() -> list[str]:
+    """Names for Settings.policy."""
+
+def peak_rss_bytes() -> int:
+    """The most memory this process has held."""
+
 def build_info() -> dict[str, str]:
     """version, compiler, isa, embree, tbb, drjit."""

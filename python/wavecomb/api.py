@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
     from wavecomb.image import Transfer
+    from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
 
 Progress = Callable[[int, int], "bool | None"]
@@ -37,6 +38,8 @@ class Picture:
         samples: (height, width), samples that each pixel got.
         stats: What was done and how long it took; docs/statistics.md has the schema.
         cancelled: Progress asked to stop; the picture holds what was done.
+        costs: What shading took, by name of material and texture: a profile that another render
+            can start from.
     """
 
     beauty: NDArray[np.float32]
@@ -46,6 +49,7 @@ class Picture:
     samples: NDArray[np.uint32]
     stats: dict[str, Any] = field(default_factory=dict, repr=False)
     cancelled: bool = False
+    costs: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
 
     def layers(self) -> dict[str, NDArray[Any]]:
         """The layers by name, in the order of an EXR file."""
@@ -131,6 +135,8 @@ def render(
     progress: Progress | None = None,
     camera: str | None = None,
     frame: float | None = None,
+    policy: str | SchedulingPolicy | None = None,
+    costs: str | Mapping[str, Mapping[str, float]] | None = None,
     **settings: Any,
 ) -> Picture:
     """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
@@ -143,6 +149,10 @@ def render(
             False to stop and keep what is done.
         camera: As in ``load``; for a path only.
         frame: As in ``load``; for a path only.
+        policy: Order of shading: a name, or an object of a ``SchedulingPolicy`` of your own. No
+            policy changes the picture.
+        costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
+            from.
         **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed ...
 
     >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
@@ -156,14 +166,29 @@ def render(
     ...     wavecomb.render(stage, spp=4, seed=seed).save(f"mixed{seed}.exr")
 
     Raises:
-        WavecombError: The stage cannot be rendered.
+        WavecombError: The stage cannot be rendered; the policy or the costs are no good.
         wavecomb._core.Error: A setting is no good.
     """
     from wavecomb.stats import make_stats
 
+    own: Any = None
+    if isinstance(policy, str):
+        settings["policy"] = policy
+    elif policy is not None:
+        from wavecomb.scheduling import check_policy
+
+        check_policy(policy)
+        own = policy
+    profile: dict[str, dict[str, float]] | None = None
+    if isinstance(costs, str):
+        settings["costs"] = costs
+    elif costs is not None:
+        from wavecomb.costs import check_costs
+
+        profile = check_costs(costs)
     chosen = make_settings(size, spp, **settings)
     scene, loaded, stage = _resolve(source, camera, frame)
-    result = _render(scene, chosen, progress)
+    result = _render(scene, chosen, progress, own, profile)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats)
 
@@ -178,6 +203,7 @@ def picture_of(result: Result, stats: dict[str, Any]) -> Picture:
         samples=result.samples,
         stats=stats,
         cancelled=result.cancelled,
+        costs=result.costs,
     )
 
 
@@ -230,7 +256,13 @@ def _resolve(
     return scene, None, None
 
 
-def _render(scene: Scene, settings: Settings, progress: Progress | None) -> Result:
+def _render(
+    scene: Scene,
+    settings: Settings,
+    progress: Progress | None,
+    policy: SchedulingPolicy | None,
+    costs: dict[str, dict[str, float]] | None,
+) -> Result:
     from wavecomb import _core
 
-    return _core.render(scene, settings, progress)
+    return _core.render(scene, settings, progress, policy, costs)

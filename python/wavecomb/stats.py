@@ -29,8 +29,13 @@ PHASES = (
     "shade",
     "shadow",
     "resolve",
+    "metrics",
 )
+SORTING = ("keys", "sort", "materialize")
+"""Phases that are paid for an order of shading."""
 COUNTS = ("samples", "rays", "shadow_rays", "records")
+DEPTHS = ("rays", "shadow_rays", "records", "paths_ended")
+COHERENCE = ("run_length", "material_homogeneity", "texture_homogeneity")
 
 
 def make_stats(
@@ -44,6 +49,10 @@ def make_stats(
     core = dict(result.stats)
     seconds = dict(core.pop("seconds", {}))
     phases, counts = dict(core.pop("phases_s", {})), dict(core.pop("counts", {}))
+    phases, counts = (
+        {**dict.fromkeys(PHASES, 0.0), **phases},
+        {**dict.fromkeys(COUNTS, 0), **counts},
+    )
     report = loaded.report if loaded is not None else None
     return {
         "schema": SCHEMA,
@@ -58,8 +67,23 @@ def make_stats(
             "render": 0.0,
             **seconds,
         },
-        "phases_s": {**dict.fromkeys(PHASES, 0.0), **phases},
-        "counts": {**dict.fromkeys(COUNTS, 0), **counts},
+        "phases_s": phases,
+        "sort_overhead": sort_overhead(phases),
+        "counts": counts,
+        "mean_path_length": counts["rays"] / counts["samples"] if counts["samples"] else 0.0,
+        "depths": {**{name: [] for name in DEPTHS}, **core.pop("depths", {})},
+        "lane_utilisation": core.pop("lane_utilisation", 1.0),
+        "coherence": {**dict.fromkeys(COHERENCE, 0.0), **core.pop("coherence", {})},
+        "programs": core.pop("programs", {}),
+        "materials": core.pop("materials", []),
+        "cost_prediction": {
+            "r2": 0.0,
+            "mean_error": 0.0,
+            "materials": 0,
+            "calibration_s": 0.0,
+            **core.pop("cost_prediction", {}),
+        },
+        "policy_uses": core.pop("policy_uses", {}),
         "samples_per_s": core.pop("samples_per_s", 0.0),
         "rays_per_s": core.pop("rays_per_s", 0.0),
         "peak_rss_bytes": core.pop("peak_rss_bytes", 0),
@@ -71,6 +95,19 @@ def make_stats(
         ],
         **core,
     }
+
+
+def sort_overhead(phases: Mapping[str, float]) -> float:
+    """The share of ordered shading that went into the order.
+
+    (keys + sort + materialize) / (keys + sort + materialize + shade); 0 where nothing was shaded.
+
+    >>> sort_overhead({"keys": 1.0, "sort": 2.0, "materialize": 0.0, "shade": 27.0})
+    0.1
+    """
+    sorting = sum(phases.get(name, 0.0) for name in SORTING)
+    total = sorting + phases.get("shade", 0.0)
+    return sorting / total if total > 0.0 else 0.0
 
 
 def machine() -> dict[str, Any]:

@@ -50,6 +50,9 @@ class Fake:
         self.fail: Exception | None = None
         self.loaded: list[dict[str, Any]] = []
         self.rendered: list[dict[str, Any]] = []
+        self.policies: list[Any] = []
+        self.costs: list[Any] = []
+        self.stats: dict[str, Any] = {}
 
     def load_stage(self, path: Path, **options: Any) -> Any:
         if not Path(path).exists():
@@ -78,10 +81,19 @@ class Fake:
             scene=scene, report=report, camera_path="/Camera", seconds=0.25, stage_path=path
         )
 
-    def render(self, scene: Any, settings: Settings, progress: Any = None) -> Any:
+    def render(
+        self,
+        scene: Any,
+        settings: Settings,
+        progress: Any = None,
+        policy: Any = None,
+        costs: Any = None,
+    ) -> Any:
         if self.fail is not None:
             raise self.fail
         self.rendered.append(settings.to_dict())
+        self.policies.append(policy)
+        self.costs.append(costs)
         width, height, total = settings.width, settings.height, settings.spp
         total_samples, done, cancelled = width * height * total, 0, False
         for step in range(11):
@@ -101,6 +113,7 @@ class Fake:
             depth=np.where(x < 1, np.inf, x + 1).astype(np.float32),
             samples=np.full((height, width), total, np.uint32),
             cancelled=cancelled,
+            costs={"materials": {"Gold": 50.0, "Chalk": 25.5}, "textures": {"wood.png": 60.0}},
             stats={
                 "settings": settings.to_dict(),
                 "seconds": {"build": 0.1, "render": 0.5},
@@ -109,6 +122,7 @@ class Fake:
                 "samples_per_s": done / 0.5,
                 "rays_per_s": 4 * done / 0.5,
                 "peak_rss_bytes": 123_000_000,
+                **self.stats,
             },
         )
 

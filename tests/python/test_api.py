@@ -12,6 +12,7 @@ import pytest
 from fake_core import Fake, install
 
 import wavecomb
+from wavecomb.costs import load_costs, save_costs
 from wavecomb.errors import WavecombError
 from wavecomb.image import read_image, read_layers
 from wavecomb.stats import COUNTS, PHASES, write_stats
@@ -30,7 +31,15 @@ def stage(tmp_path: Path) -> Path:
 
 
 def test_names() -> None:
-    for name in ("load", "render", "compare", "SceneBuilder", "Settings", "Picture"):
+    for name in (
+        "load",
+        "render",
+        "compare",
+        "SceneBuilder",
+        "Settings",
+        "Picture",
+        "SchedulingPolicy",
+    ):
         assert name in wavecomb.__all__
         assert name in dir(wavecomb)
     with pytest.raises(AttributeError, match="nonsense"):
@@ -78,6 +87,46 @@ def test_render_a_loaded_stage_and_a_scene(fake: Fake, stage: Path) -> None:
         wavecomb.render(loaded, camera="/C")
 
 
+class Backwards(wavecomb.SchedulingPolicy):
+    name = "backwards"
+
+    def order(self, queue: Any, costs: Any, keys: Any) -> None:
+        keys[:] = np.arange(keys.size)[::-1]
+
+
+def test_policy_and_costs_are_passed_on(fake: Fake, stage: Path, tmp_path: Path) -> None:
+    policy = Backwards()
+    first = wavecomb.render(stage, size=(4, 4), spp=1, policy="material", costs="model")
+    assert (fake.rendered[0]["policy"], fake.rendered[0]["costs"]) == ("material", "model")
+    assert (fake.policies[0], fake.costs[0]) == (None, None)
+    wavecomb.render(stage, size=(4, 4), spp=1, policy=policy, costs=first.costs)
+    assert fake.policies[1] is policy
+    assert fake.costs[1] == first.costs
+    assert not {"policy", "costs"} & set(fake.rendered[1])
+    save_costs(tmp_path / "costs.json", first.costs)
+    assert load_costs(tmp_path / "costs.json") == first.costs
+    with pytest.raises(WavecombError, match="cost of Gold is -1"):
+        wavecomb.render(stage, costs={"materials": {"Gold": -1}, "textures": {}})
+
+
+@pytest.mark.parametrize(
+    ("attributes", "says"),
+    [
+        ({"name": 3}, "name must be a string"),
+        ({"columns": "throughput"}, "columns must be a tuple"),
+        ({"columns": None}, "columns must be a tuple"),
+        ({"columns": ("colour",)}, "column 'colour' is not known"),
+        ({"order": None}, "has no method order"),
+    ],
+)
+def test_bad_policies(fake: Fake, stage: Path, attributes: dict[str, Any], says: str) -> None:
+    with pytest.raises(WavecombError, match=says):
+        wavecomb.render(stage, policy=type("Odd", (Backwards,), attributes)())
+    with pytest.raises(WavecombError, match="is the class Backwards"):
+        wavecomb.render(stage, policy=Backwards)  # type: ignore[arg-type]
+    assert fake.loaded == []
+
+
 def test_cancel(fake: Fake, stage: Path) -> None:
     picture = wavecomb.render(stage, size=(10, 10), spp=10, progress=lambda done, _: done < 500)
     assert picture.cancelled
@@ -89,8 +138,9 @@ def test_schema(fake: Fake, stage: Path) -> None:
     stats = wavecomb.render(stage, size=(4, 4), spp=1).stats
     assert list(stats) == [
         *("schema", "version", "stage", "camera", "cancelled", "settings", "seconds"),
-        *("phases_s", "counts", "samples_per_s", "rays_per_s", "peak_rss_bytes", "machine"),
-        *("unsupported", "warnings"),
+        *("phases_s", "sort_overhead", "counts", "mean_path_length", "depths", "lane_utilisation"),
+        *("coherence", "programs", "materials", "cost_prediction", "policy_uses"),
+        *("samples_per_s", "rays_per_s", "peak_rss_bytes", "machine", "unsupported", "warnings"),
     ]
     assert set(stats["phases_s"]) == set(PHASES)
     assert set(stats["counts"]) == set(COUNTS)

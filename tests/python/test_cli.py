@@ -17,7 +17,9 @@ from click.testing import CliRunner, Result
 from fake_core import Error, Fake, install
 
 from wavecomb.cli import main
+from wavecomb.costs import SOURCES
 from wavecomb.image import read_layers, read_metadata, write_exr
+from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 
 @pytest.fixture
@@ -59,6 +61,8 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
         *("--filter", "box", "--filter-width", 1, "--roulette", "off", "--fresnel", "schlick"),
         *("--integrator", "reference", "--threads", 1, "--wave-size", 64, "--sampler", "sobol"),
         *("--clamp-indirect", 2.5, "--max-depth", 5),
+        *("--policy", "texture-locality", "--materialize", "on", "--ray-order", "morton"),
+        *("--shadow-order", "auto", "--costs", "model", "--cost-weight", 0.5),
     )
     assert result.exit_code == 0, result.output
     assert fake.loaded[0]["camera"] == "/Cam"
@@ -69,6 +73,8 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
         "width": 40, "height": 30, "spp": 4, "lanes": 8, "seed": 3, "filter": "box",
         "filter_width": 1.0, "roulette": "off", "fresnel": "schlick", "integrator": "reference",
         "threads": 1, "wave_size": 64, "sampler": "sobol", "clamp_indirect": 2.5, "max_depth": 5,
+        "policy": "texture-locality", "materialize": "on", "ray_order": "morton",
+        "shadow_order": "auto", "costs": "model", "cost_weight": 0.5,
     }  # fmt: skip
     layers = read_layers(out)
     assert list(layers) == ["beauty", "albedo", "normal", "depth", "samples"]
@@ -161,6 +167,12 @@ def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Pat
         (["--png", "/nowhere/a.png"], "/nowhere does not exist"),
         (["--stats", "/nowhere/a.json"], "/nowhere does not exist"),
         (["--nonsense"], "No such option"),
+        (["--policy", "best"], "'best' is not one of"),
+        (["--roulette", "russian"], "'russian' is not one of"),
+        (["--ray-order", "hilbert"], "'hilbert' is not one of"),
+        (["--costs", "mesured"], "one of auto, measured, model, or a file whose name ends in"),
+        (["--costs", "/nowhere/a.json"], "/nowhere does not exist"),
+        (["--cost-weight", -0.5], "at least 0"),
     ],
 )
 def test_bad_options(
@@ -214,6 +226,119 @@ def test_failed_render_keeps_the_old_file(fake: Fake, stage: str, tmp_path: Path
 def test_missing_stage(fake: Fake, tmp_path: Path) -> None:
     assert "no.usd: no such file" in error_line(run("render", "no.usd", "-o", tmp_path / "a.exr"))
     assert "no.usd: no such file" in error_line(run("info", "no.usd"))
+
+
+def test_cost_profile_is_written_and_read(fake: Fake, stage: str, tmp_path: Path) -> None:
+    file = tmp_path / "costs.json"
+    arguments = ("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8, "--costs", file)
+    result = run(*arguments)
+    assert result.exit_code == 0, result.output
+    assert fake.costs == [None]
+    assert str(file) in result.stdout
+    document = json.loads(file.read_text())
+    assert document == {
+        "schema": "wavecomb-costs/1",
+        "materials": {"Gold": 50.0, "Chalk": 25.5},
+        "textures": {"wood.png": 60.0},
+    }
+    del document["schema"]
+    assert run(*arguments, "--quiet").exit_code == 0
+    assert fake.costs[1] == document
+    assert "costs" not in fake.rendered[1]
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "is no cost profile"),
+        ("[" * 100_000, "is no cost profile"),
+        ("\x00\xff", "is no cost profile"),
+        ("[]", "no schema wavecomb-costs/1"),
+        ('{"materials": {}, "textures": {}}', "no schema wavecomb-costs/1"),
+        ('{"schema": "wavecomb-costs/1", "materials": {}}', "textures is no table"),
+        ('{"schema": "wavecomb-costs/1", "materials": [1], "textures": {}}', "materials is no"),
+        *(
+            (
+                '{"schema": "wavecomb-costs/1", "materials": {"Gold": '
+                + cost
+                + '}, "textures": {}}',
+                "cost of Gold is",
+            )
+            for cost in ("-1", "NaN", "Infinity", "1e13", '"3"', "null", "true", "[1]")
+        ),
+    ],
+)
+def test_broken_cost_profiles(fake: Fake, stage: str, tmp_path: Path, text: str, says: str) -> None:
+    file = tmp_path / "costs.json"
+    file.write_text(text, encoding="latin-1")
+    line = error_line(run("render", stage, "-o", tmp_path / "a.exr", "--costs", file))
+    assert says in line
+    assert "costs.json" in line
+    assert len(line) < 400
+    assert file.read_text(encoding="latin-1") == text
+    assert fake.loaded == []
+
+
+def test_cost_profile_must_be_another_file(fake: Fake, stage: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.json"
+    line = error_line(
+        run("render", stage, "-o", tmp_path / "a.exr", "--stats", file, "--costs", file)
+    )
+    assert "is the same file as --stats" in line
+
+
+def test_summary_of_scheduling(fake: Fake, stage: str, tmp_path: Path) -> None:
+    materials = [
+        {"name": f"M{i}", "program": "metal", "records": 1000 - i, "timed_records": 10,
+         "ns_per_record": 50.4, "calibrated_ns": 40.0, "predicted_ns": 49.6}
+        for i in range(9)
+    ]  # fmt: skip
+    fake.stats = {
+        "settings": {"policy": "adaptive"},
+        "phases_s": {"trace": 1.0, "keys": 0.1, "sort": 0.1, "shade": 1.8},
+        "counts": {
+            **{"samples": 100, "rays": 250, "shadow_rays": 100, "records": 9000},
+            **{"packets": 700, "packet_lanes": 11200},
+        },
+        "depths": {"rays": [100, 80, 40, 20, 5, 2, 1, 1, 1], "shadow_rays": [], "records": []},
+        "coherence": {"run_length": 12.34, "material_homogeneity": 0.9, "texture_homogeneity": 0.3},
+        "lane_utilisation": 0.8,
+        "programs": {"metal": {"records": 9000, "ns_per_record": 50.4}},
+        "materials": materials,
+        "cost_prediction": {"r2": 0.93, "mean_error": 0.05, "materials": 9, "calibration_s": 0.01},
+        "policy_uses": {"none": 25, "program": 75, "texture": 0},
+    }
+    result = run(
+        *("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8),
+        *("--stats", tmp_path / "a.json"),
+    )
+    for text in (
+        "policy adaptive: sorting 10 % of shading with it, lanes 80 % full",
+        "runs of a material 12.3 records",
+        "queues by policy: program 75 %, none 25 %",
+        "R2 0.93, mean error 5 %, over 9 materials",
+        "rays of a path 2.5; by depth: 1 0.8 0.4 0.2 0.05 0.02 0.01 0.01 ...",
+        "and 3 more materials",
+    ):
+        assert text in result.stdout
+    assert "M5" in result.stdout
+    assert "M6" not in result.stdout
+    stats = json.loads((tmp_path / "a.json").read_text())
+    assert len(stats["materials"]) == 9
+    assert stats["sort_overhead"] == pytest.approx(0.1)
+    assert stats["mean_path_length"] == 2.5
+
+
+def test_policy_names_are_the_cores() -> None:
+    core = pytest.importorskip("wavecomb._core")
+    assert list(POLICIES) == core.policies()
+    for name in POLICIES:
+        core.Settings(policy=name).check()
+    for order in RAY_ORDERS:
+        core.Settings(ray_order=order, shadow_order=order).check()
+    for source in SOURCES:
+        core.Settings(costs=source).check()
 
 
 # ---- info, scene, compare, help ------------------------------------------------------------------
@@ -368,10 +493,16 @@ def test_from_scene_to_comparison(tmp_path: Path) -> None:
         ("--threads", 1, "--wave-size", 64),
         ("--lanes", 1),
         ("--integrator", "reference"),
+        ("--policy", "adaptive", "--ray-order", "auto", "--shadow-order", "auto"),
+        ("--costs", tmp_path / "costs.json", "--policy", "cost-benefit"),
+        ("--costs", tmp_path / "costs.json", "--policy", "material", "--materialize", "on"),
     ):
         done = wavecomb("render", stage, "-o", b, *small, *options, "--quiet")
         assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
         assert wavecomb("compare", a, b).returncode == 0, options
+    assert len(json.loads((tmp_path / "costs.json").read_text())["materials"]) == 4
+    done = wavecomb("render", stage, "-o", b, *small, "--cost-weight", 2)
+    assert (done.returncode, "cost_weight is 2" in done.stderr) == (2, True)
     done = wavecomb("render", stage, "-o", b, *small, "--seed", 1, "--quiet")
     assert done.returncode == 0
     done = wavecomb("compare", a, b, "--heatmap", tmp_path / "h.png")

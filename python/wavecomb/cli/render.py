@@ -10,6 +10,9 @@ import click
 
 from wavecomb.cli.group import INTERRUPTED
 from wavecomb.cli.options import Real, StageOptions, examples, stage_options, stage_warnings, warn
+from wavecomb.cli.summary import print_summary
+from wavecomb.costs import SOURCES
+from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,6 +26,7 @@ _INTEGERS = click.IntRange(min=0)
         "wavecomb render shot.usd -o shot.exr",
         "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256",
         "wavecomb render shot.usd -o shot.exr --camera /World/Cam --frame 101 --stats shot.json",
+        "wavecomb render shot.usd -o shot.exr --policy adaptive --costs shot-costs.json",
     ),
 )
 @stage_options
@@ -78,7 +82,11 @@ _INTEGERS = click.IntRange(min=0)
     help="Pixel filter.  [default: blackman-harris]",
 )
 @click.option("--filter-width", type=Real(0, above=True), metavar="X", help="In pixels.")
-@click.option("--roulette", type=click.Choice(["off", "throughput"]), help="[default: throughput]")
+@click.option(
+    "--roulette",
+    type=click.Choice(["off", "throughput", "cost-aware"]),
+    help="How paths end early; each is unbiased.  [default: throughput]",
+)
 @click.option(
     "--clamp-indirect",
     type=Real(0),
@@ -86,6 +94,38 @@ _INTEGERS = click.IntRange(min=0)
     help="Limit of a sample's indirect light; biased; 0 is off.  [default: 0]",
 )
 @click.option("--fresnel", type=click.Choice(["exact", "schlick"]), help="[default: exact]")
+@click.option(
+    "--policy",
+    type=click.Choice(POLICIES),
+    help="Order of shading; changes no picture (docs/scheduling.md).  [default: program]",
+)
+@click.option(
+    "--materialize",
+    type=click.Choice(["auto", "on", "off"]),
+    help="Move records into that order, or read them through it.  [default: auto]",
+)
+@click.option(
+    "--ray-order",
+    type=click.Choice(RAY_ORDERS),
+    help="Order of bounce rays before traversal.  [default: slot]",
+)
+@click.option(
+    "--shadow-order",
+    type=click.Choice(RAY_ORDERS),
+    help="Order of shadow rays.  [default: slot]",
+)
+@click.option(
+    "--costs",
+    metavar="auto|measured|model|FILE.json",
+    help="Costs of materials. A file is read if it is there, and written at the end.  "
+    "[default: auto]",
+)
+@click.option(
+    "--cost-weight",
+    type=Real(0),
+    metavar="X",
+    help="Weight of a pass in the moving average of costs, 0 to 1.  [default: 0.3]",
+)
 @click.option("--half", is_flag=True, help="16 bit colours and normals in the EXR.")
 @click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="Of the PNG, in stops.")
 @click.option(
@@ -108,6 +148,7 @@ def render_command(
     quiet: bool,
     lanes: str | None,
     filter_: str | None,
+    costs: str | None,
     **options: Any,
 ) -> None:
     """Render STAGE to an OpenEXR file.
@@ -117,26 +158,35 @@ def render_command(
     """
     from wavecomb.api import make_settings
 
-    _check_outputs(stage, output, png, stats_file)
+    costs_file = costs if costs is not None and costs not in SOURCES else None
+    _check_outputs(stage, output, png, stats_file, costs_file)
     source = StageOptions.take(options)
     chosen = {name: value for name, value in options.items() if value is not None}
     if lanes is not None:
         chosen["lanes"] = 0 if lanes == "auto" else int(lanes)
     if filter_ is not None:
         chosen["filter"] = filter_
+    if costs is not None and costs_file is None:
+        chosen["costs"] = costs
+    profile = _read_costs(costs_file)
     settings = make_settings(size, spp, **chosen)
 
     console = _console()
     loaded = _load(source, stage, console, quiet)
     warn(stage_warnings(loaded))
-    picture, done = _render(loaded, stage, settings, console, quiet)
+    picture, done = _render(loaded, stage, settings, profile, console, quiet)
     if picture.cancelled and done <= 0.0:
         click.echo("stopped before the first sample; nothing was written", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
     warn(_picture_warnings(picture))
     _write(picture, output, png, stats_file, half, exposure, tone_map)
+    if costs_file is not None:
+        from wavecomb.costs import save_costs
+
+        save_costs(costs_file, picture.costs)
     if not quiet:
-        _summary(picture, loaded, [name for name in (output, png, stats_file) if name])
+        files = [name for name in (output, png, stats_file, costs_file) if name]
+        print_summary(picture.stats, loaded, files)
     if picture.cancelled:
         click.echo(f"stopped at {100.0 * done:.0f} %; {output} holds what was done", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
@@ -148,7 +198,9 @@ def _console() -> Console:
     return Console(stderr=True, emoji=False)
 
 
-def _check_outputs(stage: str, output: str, png: str | None, stats_file: str | None) -> None:
+def _check_outputs(
+    stage: str, output: str, png: str | None, stats_file: str | None, costs_file: str | None
+) -> None:
     """Everything that can be known to fail before the work begins."""
     from wavecomb.errors import WavecombError
     from wavecomb.files import check_writable
@@ -156,14 +208,33 @@ def _check_outputs(stage: str, output: str, png: str | None, stats_file: str | N
     for name, option, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):
         if name is not None and not name.lower().endswith(ending):
             raise WavecombError(f"{option} {name}: the name must end in {ending}")
+    if costs_file is not None and not costs_file.lower().endswith(".json"):
+        raise WavecombError(
+            f"--costs {costs_file}: must be one of {', '.join(SOURCES)}, "
+            "or a file whose name ends in .json"
+        )
     seen = {os.path.realpath(stage): "the stage"}
-    for name, option in ((output, "-o"), (png, "--png"), (stats_file, "--stats")):
+    for name, option in (
+        (output, "-o"),
+        (png, "--png"),
+        (stats_file, "--stats"),
+        (costs_file, "--costs"),
+    ):
         if name is None:
             continue
         other = seen.setdefault(os.path.realpath(name), option)
         if other != option:
             raise WavecombError(f"{option} {name}: is the same file as {other}")
         check_writable(name)
+
+
+def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
+    """The profile to start from, if there is one yet."""
+    if costs_file is None or not os.path.exists(costs_file):
+        return None
+    from wavecomb.costs import load_costs
+
+    return load_costs(costs_file)
 
 
 def _load(source: StageOptions, stage: str, console: Console, quiet: bool) -> Any:
@@ -176,7 +247,12 @@ def _load(source: StageOptions, stage: str, console: Console, quiet: bool) -> An
 
 
 def _render(
-    loaded: Any, stage: str, settings: Any, console: Console, quiet: bool
+    loaded: Any,
+    stage: str,
+    settings: Any,
+    profile: dict[str, dict[str, float]] | None,
+    console: Console,
+    quiet: bool,
 ) -> tuple[Any, float]:
     """The picture, and how much of it was done, from 0 to 1."""
     from wavecomb import _core
@@ -188,7 +264,7 @@ def _render(
         Interrupt() as interrupt,
         RenderProgress(console, interrupt, visible=not quiet) as progress,
     ):
-        result = _core.render(loaded.scene, settings, progress)
+        result = _core.render(loaded.scene, settings, progress, None, profile)
     stats = make_stats(result, stage=stage, loaded=loaded)
     total = int(settings.width) * int(settings.height) * int(settings.spp)
     return picture_of(result, stats), float(stats["counts"]["samples"]) / total
@@ -217,41 +293,3 @@ def _write(
         picture.save(png, exposure=exposure, tone_map=tone_map)
     if stats_file is not None:
         write_stats(stats_file, picture.stats)
-
-
-def _summary(picture: Any, loaded: Any, files: list[str]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    from wavecomb.progress import count_text, time_text
-
-    stats = picture.stats
-    console = Console(highlight=False, emoji=False, soft_wrap=True)
-    seconds, counts = stats["seconds"], stats["counts"]
-    rays = counts["rays"] + counts["shadow_rays"]
-    console.print(
-        ", ".join(f"{name} {time_text(seconds[name])}" for name in ("load", "build", "render"))
-    )
-    console.print(
-        f"{count_text(counts['samples'])} samples, {count_text(stats['samples_per_s'])}/s; "
-        f"{count_text(rays)} rays, {count_text(stats['rays_per_s'])}/s; "
-        f"peak memory {stats['peak_rss_bytes'] / 1e6:,.0f} MB"
-    )
-    phases = {name: value for name, value in stats["phases_s"].items() if value > 0.0}
-    if phases:
-        total = sum(phases.values())
-        table = Table(box=None, pad_edge=False)
-        table.add_column("phase")
-        table.add_column("thread s", justify="right")
-        table.add_column("%", justify="right")
-        for name, value in phases.items():
-            table.add_row(name, f"{value:.3f}", f"{100.0 * value / total:.1f}")
-        console.print(table)
-    if loaded.report.unsupported:
-        console.print("not supported, and left out:")
-        for finding in loaded.report.unsupported:
-            console.print(f"  {escape(finding.line())}")
-    for finding in loaded.report.notes:
-        console.print(f"note: {escape(finding.line())}")
-    console.print("wrote " + escape(", ".join(files)))

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What ``wavecomb render`` says at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+MOST_MATERIALS = 6
+"""Rows of the table of materials; the statistics file has all."""
+
+MOST_DEPTHS = 8
+
+
+def print_summary(stats: Mapping[str, Any], loaded: Any, files: Sequence[str]) -> None:
+    """Prints the figures of a render in a few lines and small tables."""
+    from rich.console import Console
+    from rich.markup import escape
+
+    from wavecomb.progress import count_text, time_text
+
+    console = Console(highlight=False, emoji=False, soft_wrap=True)
+    seconds, counts = stats["seconds"], stats["counts"]
+    rays = counts["rays"] + counts["shadow_rays"]
+    console.print(
+        ", ".join(f"{name} {time_text(seconds[name])}" for name in ("load", "build", "render"))
+    )
+    console.print(
+        f"{count_text(counts['samples'])} samples, {count_text(stats['samples_per_s'])}/s; "
+        f"{count_text(rays)} rays, {count_text(stats['rays_per_s'])}/s; "
+        f"peak memory {stats['peak_rss_bytes'] / 1e6:,.0f} MB"
+    )
+    for line in _scheduling_lines(stats):
+        console.print(escape(line))
+    _phases(console, stats)
+    _programs_and_materials(console, stats)
+    if loaded.report.unsupported:
+        console.print("not supported, and left out:")
+        for finding in loaded.report.unsupported:
+            console.print(f"  {escape(finding.line())}")
+    for finding in loaded.report.notes:
+        console.print(f"note: {escape(finding.line())}")
+    console.print("wrote " + escape(", ".join(files)))
+
+
+def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
+    lines: list[str] = []
+    counts, coherence, costs = stats["counts"], stats["coherence"], stats["cost_prediction"]
+    if counts.get("packet_lanes"):
+        policy = stats["settings"].get("policy", "")
+        lines.append(
+            f"policy {policy}: sorting {_percent(stats['sort_overhead'])} of shading with it, "
+            f"lanes {_percent(stats['lane_utilisation'])} full"
+        )
+        lines.append(
+            f"runs of a material {coherence['run_length']:.3g} records; neighbours of one material "
+            f"{_percent(coherence['material_homogeneity'])}, at one place of a texture "
+            f"{_percent(coherence['texture_homogeneity'])}"
+        )
+    uses = stats["policy_uses"]
+    if total := sum(uses.values()):
+        chosen = sorted((item for item in uses.items() if item[1]), key=lambda item: -item[1])
+        lines.append(
+            "queues by policy: "
+            + ", ".join(f"{name} {_percent(count / total)}" for name, count in chosen)
+        )
+    if costs["materials"]:
+        lines.append(
+            f"costs: predicted with R2 {costs['r2']:.2f}, mean error "
+            f"{_percent(costs['mean_error'])}, over {costs['materials']} materials"
+        )
+    if by_depth := stats["depths"].get("rays"):
+        shares = [f"{rays / max(1, by_depth[0]):.2g}" for rays in by_depth[:MOST_DEPTHS]]
+        more = " ..." if len(by_depth) > MOST_DEPTHS else ""
+        lines.append(
+            f"rays of a path {stats['mean_path_length']:.3g}; by depth: {' '.join(shares)}{more}"
+        )
+    return lines
+
+
+def _phases(console: Console, stats: Mapping[str, Any]) -> None:
+    phases = {name: value for name, value in stats["phases_s"].items() if value > 0.0}
+    total = sum(phases.values())
+    _table(
+        console,
+        ("phase", "thread s", "%"),
+        ((name, f"{value:.3f}", f"{100.0 * value / total:.1f}") for name, value in phases.items()),
+    )
+
+
+def _programs_and_materials(console: Console, stats: Mapping[str, Any]) -> None:
+    from wavecomb.progress import count_text
+
+    total = max(1, stats["counts"]["records"])
+    programs = sorted(stats["programs"].items(), key=lambda item: -item[1]["records"])
+    _table(
+        console,
+        ("program", "records", "%", "ns each"),
+        (
+            (
+                name,
+                count_text(entry["records"]),
+                f"{100.0 * entry['records'] / total:.1f}",
+                _ns(entry["ns_per_record"]),
+            )
+            for name, entry in programs
+        ),
+    )
+    seen = [entry for entry in stats["materials"] if entry["records"]]
+    seen.sort(key=lambda entry: -entry["records"])
+    _table(
+        console,
+        ("material", "records", "%", "ns each", "predicted"),
+        (
+            (
+                entry["name"] or "(no name)",
+                count_text(entry["records"]),
+                f"{100.0 * entry['records'] / total:.1f}",
+                _ns(entry["ns_per_record"]),
+                _ns(entry["predicted_ns"]),
+            )
+            for entry in seen[:MOST_MATERIALS]
+        ),
+    )
+    if len(seen) > MOST_MATERIALS:
+        console.print(f"and {len(seen) - MOST_MATERIALS} more materials (--stats has all)")
+
+
+def _table(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """A plain table, numbers to the right; nothing where there are no rows."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for i, title in enumerate(head):
+        table.add_column(title, justify="right" if i else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    if table.row_count:
+        console.print(table)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
+
+
+def _ns(value: float) -> str:
+    return f"{value:.0f}" if value else "-"
