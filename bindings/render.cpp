@@ -6,11 +6,13 @@
 #include <nanobind/stl/vector.h>
 #include <tbb/version.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/integrate/calibration.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/schedule/policy.h"
 
@@ -102,14 +104,18 @@ struct Result {
   nb::dict settings;
 };
 
-/// Python's side of a policy: order() gets NumPy arrays and fills `keys`. Arrays are valid during
-/// the call.
+/// Python's side of a policy. order() gets NumPy arrays of its own, so whatever it keeps or does to
+/// them harms nothing, and fills `keys`. Exceptions end the render and come out of it.
 class PythonPolicy final : public SchedulingPolicy {
  public:
-  explicit PythonPolicy(nb::object object) : object_(std::move(object)) {
+  PythonPolicy(nb::object object, const Scene& scene) : object_(std::move(object)) {
     name_ = nb::cast<std::string>(object_.attr("name"));
     for (nb::handle column : nb::cast<nb::tuple>(nb::tuple(object_.attr("columns"))))
       columns_ |= column_bit(nb::cast<std::string>(column));
+    for (const MaterialTraits& m : material_traits(scene)) {
+      texture_.push_back(m.texture);
+      texture_bytes_.push_back(m.texture_bytes);
+    }
   }
   ~PythonPolicy() override {
     const nb::gil_scoped_acquire gil;
@@ -124,22 +130,23 @@ class PythonPolicy final : public SchedulingPolicy {
              std::span<uint64_t> keys) const override {
     const nb::gil_scoped_acquire gil;
     nb::dict view;
-    view["program"] = array(queue.program);
-    view["material"] = array(queue.material);
+    view["program"] = copy(queue.program);
+    view["material"] = copy(queue.material);
     view["depth"] = queue.depth;
-    if (columns_ & kThroughputColumn) view["throughput"] = array(queue.throughput);
-    if (columns_ & kPositionColumn) view["position_key"] = array(queue.position_key);
-    if (columns_ & kTextureColumn) view["texture_key"] = array(queue.texture_key);
+    if (columns_ & kThroughputColumn) view["throughput"] = copy(queue.throughput);
+    if (columns_ & kPositionColumn) view["position_key"] = copy(queue.position_key);
+    if (columns_ & kTextureColumn) view["texture_key"] = copy(queue.texture_key);
+    view["material_texture"] = copy(std::span<const uint32_t>(texture_));
+    view["material_texture_bytes"] = copy(std::span<const uint64_t>(texture_bytes_));
     nb::dict cost;
-    cost["material_ns"] = array(std::span<const float>(costs.material_ns));
-    cost["texture_ns"] = array(std::span<const float>(costs.texture_ns));
+    cost["material_ns"] = copy(std::span<const float>(costs.material_ns));
+    cost["texture_ns"] = copy(std::span<const float>(costs.texture_ns));
     cost["mean_ns"] = costs.mean_ns;
-    const size_t shape[1] = {keys.size()};
-    const nb::object out =
-        nb::cast(nb::ndarray<nb::numpy, uint64_t>(keys.data(), 1, shape, nb::handle()),
-                 nb::rv_policy::reference);
+    auto* written = new uint64_t[keys.size()]();
+    const nb::object out = owned(written, keys.size());
     const nb::object keep = object_.attr("order")(view, cost, out);
-    return keep.is_none() || nb::cast<bool>(keep);
+    std::copy_n(written, keys.size(), keys.data());
+    return keep.is_none() || truth(keep);
   }
 
  private:
@@ -150,16 +157,35 @@ class PythonPolicy final : public SchedulingPolicy {
     throw Error("policy column '" + name +
                 "' is not known; there are throughput, position_key, texture_key");
   }
+  /// A NumPy array of `values`, which it deletes when it goes.
   template <typename T>
-  static nb::object array(std::span<const T> values) {
-    const size_t shape[1] = {values.size()};
-    return nb::cast(nb::ndarray<nb::numpy, const T>(values.data(), 1, shape, nb::handle()),
-                    nb::rv_policy::reference);
+  static nb::object owned(T* values, size_t n) {
+    const nb::capsule owner(const_cast<std::remove_const_t<T>*>(values), [](void* p) noexcept {
+      delete[] static_cast<std::remove_const_t<T>*>(p);
+    });
+    return nb::cast(nb::ndarray<nb::numpy, T>(values, {n}, owner));
+  }
+  /// A NumPy array that cannot be written.
+  template <typename T>
+  static nb::object copy(std::span<const T> values) {
+    auto* own = new T[values.size()];
+    std::copy(values.begin(), values.end(), own);
+    return owned<const T>(own, values.size());
+  }
+  /// What order() returned as a bool.
+  bool truth(const nb::object& result) const {
+    const auto type = nb::cast<std::string>(result.type().attr("__name__"));
+    if (type != "bool" && type != "bool_")
+      throw Error("policy " + name_ + ": order() returned a " + type +
+                  "; it must fill keys and return None, True or False");
+    return nb::bool_(result).operator bool();
   }
 
   nb::object object_;
   std::string name_;
   uint32_t columns_ = 0;
+  std::vector<uint32_t> texture_;
+  std::vector<uint64_t> texture_bytes_;
 };
 
 CostProfile to_profile(const nb::dict& d) {
@@ -307,7 +333,7 @@ Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_obj
   };
   std::unique_ptr<PythonPolicy> own_policy;
   if (!policy.is_none()) {
-    own_policy = std::make_unique<PythonPolicy>(policy);
+    own_policy = std::make_unique<PythonPolicy>(policy, *scene);
     result.settings["policy"] = std::string(own_policy->name());
   }
   CostProfile profile;
