@@ -308,6 +308,7 @@ def main() -> None:
         if not stage.exists():
             write_scene(scene, stage, aspect=1.0)
         result["scenes"][scene] = sit(scene, stage, args)
+    result["machine"]["load_after"] = list(os.getloadavg())
     output = args.output or ROOT / "benchmarks" / "results" / "first-figures.json"
     output.parent.mkdir(parents=True, exist_ok=True)
     part = output.with_suffix(".part")
