@@ -292,7 +292,7 @@ class MitsubaScene:
             normals, uvs = spread(normals), spread(uvs)
             indices = np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
         linear = transform[:3, :3]
-        positions = positions @ linear + transform[3, :3]
+        placed: NDArray[Any] = positions @ linear + transform[3, :3]
         if normals is not None:
             normals = normals @ np.linalg.inv(linear).T
             normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
@@ -307,14 +307,14 @@ class MitsubaScene:
             properties["mesh_emitter"] = mi.load_dict(radiance)
         made = mi.Mesh(
             name,
-            vertex_count=len(positions),
+            vertex_count=len(placed),
             face_count=len(indices),
             has_vertex_normals=normals is not None,
             has_vertex_texcoords=uvs is not None,
             props=properties,
         )
         params = mi.traverse(made)
-        params["vertex_positions"] = np.ascontiguousarray(positions, np.float32).ravel()
+        params["vertex_positions"] = np.ascontiguousarray(placed, np.float32).ravel()
         params["faces"] = np.ascontiguousarray(indices, np.uint32).ravel()
         if normals is not None:
             params["vertex_normals"] = np.ascontiguousarray(normals, np.float32).ravel()
