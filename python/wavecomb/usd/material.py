@@ -86,7 +86,7 @@ class MaterialTable:
         self._surface_ids: dict[int, tuple[Surface, int]] = {}
         self._plain: dict[tuple[float, ...], int] = {}
         self.glows = False
-        """Whether a material is in use that emits as a lamp does, brighter than ``LAMP``."""
+        """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
 
     def surface(self, material: UsdShade.Material) -> Surface:
         """The surface of a bound material."""
@@ -110,7 +110,7 @@ class MaterialTable:
         key = surface.key()
         number = self._ids.get(key)
         if number is None:
-            self.glows = self.glows or surface.brightest() > LAMP
+            self.glows = self.glows or surface.brightest() >= LAMP
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,

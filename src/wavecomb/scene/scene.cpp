@@ -203,6 +203,12 @@ uint32_t SceneBuilder::add_material(Material material) {
     if (!std::isfinite(x))
       throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
+  const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
+                     material.emission.z > 0 || material.has_texture(Slot::kEmission);
+  if (glows && !material.emits())
+    warnings_.push_back(name + " has emission, which its program '" +
+                        kProgramNames[static_cast<size_t>(material.program)] +
+                        "' does not read; use emissive or principled");
   materials_.push_back(std::move(material));
   return static_cast<uint32_t>(materials_.size() - 1);
 }
