@@ -81,13 +81,15 @@ TEST(CameraRay, ThinLensKeepsTheFocalPlaneSharp) {
   Camera camera;
   camera.lens_radius = 0.3f;
   camera.focus_distance = 7;
+  const FilterTable table(FilterKind::kBox, 1);
+  const CameraSetup setup(camera, 8, 8, table);
   std::mt19937 rng(1);
   std::uniform_real_distribution<float> uniform(0, 1);
   double widest = 0, mean[2] = {0, 0}, square = 0;
   constexpr int kRays = 20000;
   for (int i = 0; i < kRays; ++i) {
     const CameraRay<float> ray =
-        ray_at(camera, 8, 8, 2, 5, {0.25f, 0.75f, uniform(rng), uniform(rng)});
+        camera_ray<float>(setup, 2.f, 5.f, {0.25f, 0.75f, uniform(rng), uniform(rng)}, true);
     EXPECT_EQ(ray.o.z, 0);
     const double r = std::hypot(ray.o.x, ray.o.y);
     widest = std::max(widest, r);

@@ -51,9 +51,7 @@ class WaveRun {
     context_.costs = context_.roulette_costs = &costs_;
     context_.film = &film_;
     context_.traversal_width = case_.traversal;
-    [](auto& c) {
-      if constexpr (requires { c.measures_costs; }) c.measures_costs = true;
-    }(context_);
+    context_.measures_costs = true;
     const Bounds& b = scene_->bounds();
     if (b.empty()) return;
     const float lo[3] = {b.lo.x, b.lo.y, b.lo.z}, hi[3] = {b.hi.x, b.hi.y, b.hi.z};
