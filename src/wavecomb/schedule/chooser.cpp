@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/schedule/chooser.h"
 
+#include <algorithm>
 #include <limits>
 
 namespace wavecomb {
 
 size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
-  ++calls_;
+  const uint32_t calls = ++calls_[row(depth)];
   size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (size_t arm = 0; arm < arms_; ++arm) {
@@ -18,9 +19,12 @@ size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
       best = arm;
     }
   }
-  if (calls_ % kRetryPeriod != 0) return best;
-  // A turn for one of the others, if it is nearly as good.
-  const size_t other = (calls_ / kRetryPeriod) % arms_;
+  if (calls % kRetryPeriod != 0) return best;
+  // A turn for one of the others: if it is nearly as good, and now and then in any case, since what
+  // was measured may have been another program's doing.
+  const uint32_t turn = calls / kRetryPeriod;
+  const size_t other = turn % arms_;
+  if (turn / arms_ % kAnywayPeriod == kAnywayPeriod - 1) return other;
   const Stat& s = stat(depth, other);
   const double ns = work[other].packets * s.packet_ns + work[other].records * s.record_ns;
   return ns < least * kNearlyAsGood ? other : best;
@@ -31,11 +35,16 @@ void Chooser::learn(uint32_t depth, size_t arm, const Work& work, double run_ns,
   ++used_[arm];
   if (work.packets <= 0 || work.records <= 0) return;
   Stat& s = stat(depth, arm);
-  const double packet_ns = run_ns / work.packets, record_ns = prepare_ns / work.records;
-  // The first measurement meets cold caches; it is replaced by the second.
-  const double weight = s.tries < kFirstTries ? 1.0 : kWeight;
-  s.packet_ns += weight * (packet_ns - s.packet_ns);
-  s.record_ns += weight * (record_ns - s.record_ns);
+  const auto update = [&](double& mean, double ns) {
+    if (s.tries <= 1)
+      mean = ns;  // the first meets cold caches; it is replaced by the second
+    else if (s.tries < kFirstTries)
+      mean = std::min(mean, ns);
+    else
+      mean += kWeight * (std::min(ns, kOutlier * mean) - mean);
+  };
+  update(s.packet_ns, run_ns / work.packets);
+  update(s.record_ns, prepare_ns / work.records);
   ++s.tries;
 }
 

@@ -19,7 +19,8 @@ struct Work {
 ///   packets * (ns per packet) + records * (ns per record to prepare),
 /// both learned by exponential averages per depth and arm, and chooses the least. An arm that was
 /// not tried at a depth is tried first; later a way that is not far behind is tried again now and
-/// then, since scenes change from place to place.
+/// then, since scenes change from place to place, and any other rarely. A slow measurement counts
+/// as twice the average at most, since it may be the machine's doing.
 ///
 /// Contract: owned by one worker. What it chooses changes no picture, only time.
 class Chooser {
@@ -40,19 +41,20 @@ class Chooser {
     double packet_ns = 0, record_ns = 0;
     uint32_t tries = 0;
   };
-  Stat& stat(uint32_t depth, size_t arm) {
-    return stats_[(depth < kDepths ? depth : kDepths - 1) * arms_ + arm];
-  }
+  static uint32_t row(uint32_t depth) { return depth < kDepths ? depth : kDepths - 1; }
+  Stat& stat(uint32_t depth, size_t arm) { return stats_[row(depth) * arms_ + arm]; }
 
-  static constexpr uint32_t kFirstTries = 2;
+  static constexpr uint32_t kFirstTries = 4;
   static constexpr uint32_t kRetryPeriod = 64;
+  static constexpr uint32_t kAnywayPeriod = 8;
+  static constexpr double kOutlier = 2;
   static constexpr double kNearlyAsGood = 1.15;
   static constexpr double kWeight = 0.2;
 
   size_t arms_;
   std::vector<Stat> stats_;
   std::vector<uint64_t> used_ = std::vector<uint64_t>(arms_);
-  uint32_t calls_ = 0;
+  std::array<uint32_t, kDepths> calls_{};
 };
 
 }  // namespace wavecomb

@@ -26,12 +26,17 @@ CostPrediction merge_costs(const CostTracker& measured, std::span<const Material
                            float weight, CostSnapshot& costs) {
   CostPrediction prediction;
   double sum_w = 0, sum_measured = 0;
+  double compared_w = 0, compared = 0;  // of materials that a cost was known of
   for (size_t m = 0; m < materials.size(); ++m) {
-    sum_w += static_cast<double>(measured.timed()[m]);
+    const auto w = static_cast<double>(measured.timed()[m]);
+    sum_w += w;
     sum_measured += measured.ns()[m];
+    if (costs.material_ns[m] <= 0) continue;
+    compared_w += w;
+    compared += measured.ns()[m];
   }
   if (sum_w == 0) return prediction;
-  const double mean = sum_measured / sum_w;
+  const double mean = compared_w > 0 ? compared / compared_w : 0;
 
   double residual = 0, variance = 0, error = 0;
   std::vector<double> texture_ns(costs.texture_ns.size());
@@ -61,9 +66,9 @@ CostPrediction merge_costs(const CostTracker& measured, std::span<const Material
     float& cost = costs.texture_ns[t];
     cost = static_cast<float>(cost > 0 ? (1 - weight) * cost + weight * ns : ns);
   }
-  costs.mean_ns = static_cast<float>(mean);
+  costs.mean_ns = static_cast<float>(sum_measured / sum_w);
   prediction.r2 = variance > 0 ? 1 - residual / variance : (residual > 0 ? 0 : 1);
-  prediction.mean_error = error / sum_measured;
+  prediction.mean_error = compared > 0 ? error / compared : 0;
   return prediction;
 }
 

@@ -19,7 +19,7 @@ std::unique_ptr<SchedulingPolicy> make_random_runs_policy();
 
 /// Bits of a non-negative float: ascending as integers exactly as the floats ascend.
 inline uint64_t ascending_bits(float x) {
-  return std::bit_cast<uint32_t>(x < 0.f ? 0.f : x);
+  return std::bit_cast<uint32_t>(x > 0.f ? x : 0.f);
 }
 
 }  // namespace wavecomb
