@@ -68,7 +68,7 @@ _INTEGERS = click.IntRange(min=0)
 @click.option(
     "--traversal",
     type=click.Choice(["packets", "single"]),
-    help="single: exact also where surfaces lie in one another.  [default: packets]",
+    help="Rays in packets or one by one; the picture is the same.  [default: packets]",
 )
 @click.option(
     "--lanes", type=click.Choice(["auto", "1", "4", "8", "16"]), help="SIMD width.  [default: auto]"

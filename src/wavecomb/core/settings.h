@@ -47,8 +47,7 @@ struct Settings {
   uint32_t threads = 0;    ///< 0: all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0: default
   uint32_t lanes = 0;      ///< 1, 4, 8, 16; 0: widest built
-  /// Packets are faster. They can show in one place: where two surfaces lie exactly in one another
-  /// (z-fighting), which of them is seen depends on the packet's make-up; single rays always agree.
+  /// Packets are faster; both find the same hits, to the bit (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
   std::string policy = "program";
   Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster

@@ -16,8 +16,11 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   const RayQueue& q = wave.rays;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size};
   const HitBuffer& h = wave.hits;
+  // Coherent packets assume rays from one point: with a lens, hits on edges would depend on the
+  // packet.
+  const bool coherent = depth == 0 && context.camera->lens_radius == 0;
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
-                           depth == 0, presence_keys(wave.pool, depth, false));
+                           coherent, presence_keys(wave.pool, depth, false));
   wave.counts.add_rays(depth, q.size);
 }
 
