@@ -145,10 +145,11 @@ OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth
   return choice;
 }
 
-/// Adds every sixteenth queue to the measures of coherence, in the order in which it is shaded.
+/// Adds every seventeenth queue to the measures of coherence, in the order in which it is shaded.
+/// (A prime: waves of 8 or 16 depths would always show the same one.)
 template <typename F>
 void watch_coherence(Wave& wave, const WaveContext& context) {
-  if (wave.queues % 16 != 1) return;
+  if (wave.queues % 17 != 1) return;
   const ShadingQueue& queue = wave.shading;
   fill_columns<F>(wave, context, kTextureColumn);
   measure_coherence(
