@@ -160,7 +160,7 @@ def not_at_all(queue: Any, costs: Any, keys: Any) -> bool:
 def test_equals_the_same_policy_in_cpp(
     scene: Any, name: str, function: Order, columns: tuple[str, ...], materialize: str
 ) -> None:
-    # One thread: coherence is measured on every 16th queue of a worker, so on the same queues.
+    # One thread: coherence is measured on every 17th queue of a worker, so on the same queues.
     settings = {"threads": 1, "materialize": materialize}
     theirs = render(scene, name, **settings)
     ours = render(scene, Policy(function, columns=columns), **settings)

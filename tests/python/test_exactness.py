@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The first promise: one picture, bit for bit, whatever the schedule."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wavecomb
+
+_core = pytest.importorskip("wavecomb._core")
+
+OPTIONS: dict[str, list[Any]] = {
+    "policy": _core.policies(),
+    "materialize": ["on", "off"],
+    "wave_size": [256, 4096, 65536],
+    "threads": [1, 2],
+    "ray_order": ["slot", "morton", "morton-octant", "auto"],
+    "shadow_order": ["slot", "morton", "morton-octant", "auto"],
+    "lanes": _core.lane_widths(),
+    "costs": ["auto", "model"],
+}
+"""What must not show in the picture."""
+
+SCENES = ("mixed", "cornell", "textures")
+ROULETTES = ("off", "throughput", "cost-aware")
+LAYERS = ("beauty", "albedo", "normal", "depth", "samples")
+
+_loaded: dict[str, Any] = {}
+_plain: dict[Any, wavecomb.Picture] = {}
+
+
+def texture_scene() -> Any:
+    """24 textured tiles of four programs, each texture on two of them, before a mirror."""
+    rng = np.random.default_rng(7)
+    builder = wavecomb.SceneBuilder()
+    textures = [
+        builder.add_texture(
+            rng.integers(0, 256, (size, size, 3), np.uint8), srgb=True, name=f"noise{i}"
+        )
+        for i, size in enumerate((16, 512, 64, 128, 32, 256, 256, 8, 64, 512, 1024, 128))
+    ]
+    quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+
+    def tile(x: float, y: float, z: float, edge: float, tiling: float, material: int) -> None:
+        points = np.array([[0, 0, 0], [edge, 0, 0], [edge, edge, 0], [0, edge, 0]])
+        uvs = np.array([[0, 0], [tiling, 0], [tiling, tiling], [0, tiling]], np.float32)
+        mesh = builder.add_mesh(
+            (points + np.array([x, y, z])).astype(np.float32), quad, uvs=uvs, material=material
+        )
+        builder.add_to_group(0, mesh)
+
+    programs = ("diffuse", "plastic", "principled", "metal")
+    for i in range(24):
+        use = {"base_color": {"texture": textures[i % 12], "channel": "rgb"}}
+        material = builder.add_material(
+            programs[i % 4], name=f"Tile{i}", roughness=0.1 + 0.03 * i, textures=use
+        )
+        tile(2.0 * (i % 6) - 6.0, 2.0 * (i // 6) - 4.0, -4.0 - 0.01 * i, 1.98, 1.0 + i, material)
+    mirror = builder.add_material("metal", name="Mirror", roughness=0.0, base_color=(0.9, 0.9, 0.9))
+    tile(-10.0, -10.0, 2.5, 20.0, 1.0, mirror)
+    behind = np.eye(4)
+    behind[3, :3] = (1.0, 2.5, 2.0)  # of the camera; it shines at the tiles
+    builder.add_light("rect", behind, color=(9, 8, 7), width=2, height=2, name="Lamp")
+    builder.add_light("dome", np.eye(4), color=(0.3, 0.4, 0.5), name="Sky")
+    builder.set_camera(np.eye(4), window=(-1.5, 1.5, -1.0, 1.0))
+    return builder.build()
+
+
+@pytest.fixture(scope="session")
+def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Scenes by name, each made once."""
+
+    def scene(name: str) -> Any:
+        if name not in _loaded:
+            if name == "textures":
+                _loaded[name] = texture_scene()
+            else:
+                from wavecomb.scenes import write_scene
+
+                path: Path = tmp_path_factory.mktemp("stages") / f"{name}.usdc"
+                write_scene(name, path, triangles=20_000, teapot_level=8, texture_size=256)
+                _loaded[name] = wavecomb.load(path).scene
+        return _loaded[name]
+
+    return scene
+
+
+def render(scene: Any, size: tuple[int, int], spp: int, **settings: Any) -> wavecomb.Picture:
+    return wavecomb.render(scene, size=size, spp=spp, seed=3, **settings)
+
+
+def expect_equal(a: wavecomb.Picture, b: wavecomb.Picture, what: Any) -> None:
+    for layer in LAYERS:
+        x, y = getattr(a, layer), getattr(b, layer)
+        assert x.tobytes() == y.tobytes(), f"{layer} differs: {what}"
+    for count in ("samples", "rays", "shadow_rays", "records"):
+        assert a.stats["counts"][count] == b.stats["counts"][count], f"{count} differ: {what}"
+
+
+def plain(
+    scene_of: Any, scene: str, roulette: str, size: tuple[int, int], spp: int
+) -> wavecomb.Picture:
+    """Arrival order, one thread: what all others must equal."""
+    key = (scene, roulette, size, spp)
+    if key not in _plain:
+        _plain[key] = render(
+            scene_of(scene), size, spp, roulette=roulette, policy="none", threads=1, costs="model"
+        )
+    return _plain[key]
+
+
+def covering_rows(options: dict[str, list[Any]], seed: int = 1) -> list[dict[str, Any]]:
+    """Few choices of options in which every pair of values of two options occurs."""
+    rng = random.Random(seed)
+    names = list(options)
+    left = {
+        ((a, x), (b, y))
+        for a, b in itertools.combinations(names, 2)
+        for x in options[a]
+        for y in options[b]
+    }
+
+    def gain(row: dict[str, Any]) -> int:
+        return sum(((a, row[a]), (b, row[b])) in left for a, b in itertools.combinations(names, 2))
+
+    rows: list[dict[str, Any]] = []
+    while left:
+        (a, x), (b, y) = min(left, key=repr)
+        tries = [
+            {name: rng.choice(values) for name, values in options.items()} | {a: x, b: y}
+            for _ in range(60)
+        ]
+        best = max(tries, key=gain)
+        left -= {((a, best[a]), (b, best[b])) for a, b in itertools.combinations(names, 2)}
+        rows.append(best)
+    return rows
+
+
+COVERING = covering_rows({**OPTIONS, "scene": list(SCENES), "roulette": list(ROULETTES)})
+
+
+def test_covering_design_covers() -> None:
+    options = {**OPTIONS, "scene": list(SCENES), "roulette": list(ROULETTES)}
+    for a, b in itertools.combinations(options, 2):
+        assert {(repr(row[a]), repr(row[b])) for row in COVERING} == {
+            (repr(x), repr(y)) for x in options[a] for y in options[b]
+        }
+    assert len(COVERING) < 80
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
+    stats = plain(scene_of, scene, "off", (48, 32), 8).stats
+    counts = stats["counts"]
+    assert counts["records"] > 1.5 * counts["samples"]
+    assert counts["shadow_rays"] > 0.2 * counts["records"]
+    used = [material for material in stats["materials"] if material["records"]]
+    assert len(used) >= {"mixed": 8, "cornell": 3, "textures": 25}[scene]
+    if scene != "cornell":
+        assert len({material["program"] for material in used}) >= 4
+        assert stats["lane_utilisation"] < 0.7
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
+    """Waves of eight and of nine depths look alike, whichever queues are measured."""
+    settings: dict[str, Any] = {
+        "policy": "material",
+        "threads": 1,
+        "wave_size": 256,
+        "costs": "model",
+    }
+    lengths = [
+        render(scene_of(scene), (96, 64), 16, max_depth=depth, roulette="off", **settings).stats[
+            "coherence"
+        ]["run_length"]
+        for depth in (7, 8)
+    ]
+    assert lengths[0] == pytest.approx(lengths[1], rel=0.25)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
+    for row in COVERING:
+        if row["scene"] != scene:
+            continue
+        settings = {name: value for name, value in row.items() if name != "scene"}
+        expected = plain(scene_of, scene, row["roulette"], (48, 32), 8)
+        expect_equal(render(scene_of(scene), (48, 32), 8, **settings), expected, row)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("roulette", ROULETTES)
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_choice(scene: str, roulette: str, scene_of: Any) -> None:
+    """The whole product, small: a wave of 64 K holds all that a thread gets here."""
+    size, spp = (32, 24), 8
+    expected = plain(scene_of, scene, roulette, size, spp)
+    names = ("policy", "materialize", "wave_size", "threads", "ray_order")
+    for choice in itertools.product(*(OPTIONS[name] for name in names)):
+        settings = dict(zip(names, choice, strict=True))
+        settings |= {"roulette": roulette, "costs": "model", "shadow_order": settings["ray_order"]}
+        expect_equal(render(scene_of(scene), size, spp, **settings), expected, settings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", SCENES)
+def test_full_waves_of_64_k(scene: str, scene_of: Any) -> None:
+    size, spp = (128, 128), 16
+    expected = plain(scene_of, scene, "cost-aware", size, spp)
+    assert expected.stats["wave_size"] == 4096
+    for i, policy in enumerate(OPTIONS["policy"]):
+        order = OPTIONS["ray_order"][i % 4]
+        picture = render(
+            scene_of(scene), size, spp, policy=policy, threads=1, wave_size=65536,
+            ray_order=order, shadow_order=order, materialize="on" if i % 2 else "off",
+            roulette="cost-aware",
+        )  # fmt: skip
+        assert picture.stats["wave_size"] == 65536
+        expect_equal(picture, expected, (policy, order))
+
+
+class Shuffled(wavecomb.SchedulingPolicy):
+    """Keys that mean nothing."""
+
+    name = "shuffled"
+
+    def order(self, queue: Any, costs: Any, keys: Any) -> None:
+        keys[:] = np.random.default_rng(keys.size).integers(0, 1 << 63, keys.size)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_senseless_order_gives_the_same_picture(scene: str, scene_of: Any) -> None:
+    for roulette in ROULETTES:
+        picture = render(
+            scene_of(scene), (48, 32), 8, policy=Shuffled(), roulette=roulette, costs="model"
+        )
+        expect_equal(picture, plain(scene_of, scene, roulette, (48, 32), 8), roulette)
+
+
+def test_roulettes_are_different_estimates(scene_of: Any) -> None:
+    pictures = [plain(scene_of, "cornell", roulette, (48, 32), 8) for roulette in ROULETTES]
+    for a, b in itertools.combinations(pictures, 2):
+        assert not np.array_equal(a.beauty, b.beauty)
+
+
+def test_cost_aware_from_one_profile_is_reproducible(scene_of: Any) -> None:
+    """Measured costs vary; frozen in a profile they do not."""
+    scene = scene_of("mixed")
+    costs = render(scene, (48, 32), 8, policy="adaptive").costs
+    settings = {"roulette": "cost-aware", "costs": costs}
+    first = render(scene, (48, 32), 40, policy="adaptive", threads=2, **settings)
+    again = render(scene, (48, 32), 40, policy="none", threads=1, wave_size=256, **settings)
+    expect_equal(again, first, "profile")
+    other = render(scene, (48, 32), 40, roulette="cost-aware", costs="model")
+    assert not np.array_equal(other.beauty, first.beauty), "the profile decides"
