@@ -65,6 +65,7 @@ std::function<double()> noisy(uint32_t seed, double spikes = 0) {
 
 TEST(Chooser, TriesEachArmThenTakesTheLeast) {
   Game game(3, fixed({300, 100, 200}), {0, 0, 0});
+  for (size_t i = 0; i < 6; ++i) EXPECT_EQ(game.play(), i % 3) << "each in turn";
   for (int i = 0; i < 20; ++i) game.play();
   for (const uint64_t used : game.chooser.used())
     EXPECT_GE(used, 2u) << "each, and not by cold caches only";

@@ -8,11 +8,15 @@ namespace wavecomb {
 
 size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
   const uint32_t calls = ++calls_[row(depth)];
+  // First each in turn, so that short renders do not spend themselves on one.
+  size_t newest = 0;
+  for (size_t arm = 1; arm < arms_; ++arm)
+    if (stat(depth, arm).tries < stat(depth, newest).tries) newest = arm;
+  if (stat(depth, newest).tries < kFirstTries) return newest;
   size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (size_t arm = 0; arm < arms_; ++arm) {
     const Stat& s = stat(depth, arm);
-    if (s.tries < kFirstTries) return arm;
     const double ns = work[arm].packets * s.packet_ns + work[arm].records * s.record_ns;
     if (ns < least) {
       least = ns;
