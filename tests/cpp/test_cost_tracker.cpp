@@ -56,7 +56,7 @@ TEST(CostTracker, TimesFewBatches) {
     large += tracker.wants(256);
     small += tracker.wants(5);
   }
-  EXPECT_EQ(large, 800);
+  EXPECT_EQ(large, 400);
   EXPECT_EQ(small, 100);
 }
 

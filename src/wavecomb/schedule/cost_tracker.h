@@ -27,7 +27,7 @@ class CostTracker {
   /// Whether the next batch of `records` is to be timed: large ones now and then, small ones
   /// rarely, so that reading the clock stays below 1 % of shading.
   bool wants(size_t records) {
-    return records >= 32 ? (++large_ & 3u) == 0 : (++small_ & 31u) == 0;
+    return records >= 32 ? (++large_ & 7u) == 0 : (++small_ & 31u) == 0;
   }
 
   std::span<const double> ns() const { return ns_; }
