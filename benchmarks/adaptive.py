@@ -3,9 +3,9 @@
 
     .venv/bin/python benchmarks/adaptive.py out/mixed.usdc out/dragon.usdc out/cornell.usda
 
-Renders each stage with every policy in turn, rounds in shuffled order, in one process and one sitting.
-Prints medians of the render time, the ratio of adaptive to the best fixed policy, and the ratio of shading
-time with costs measured to shading time without.
+Renders each stage with every policy in turn, rounds in shuffled order, in one process and one
+sitting. Prints medians of the render time, the ratio of adaptive to the best fixed policy, and the
+ratio of shading time with costs measured to shading time without.
 """
 
 from __future__ import annotations
