@@ -282,6 +282,15 @@ void bind_scene(nb::module_& m) {
       .def_prop_ro("mesh_count", [](const Scene& s) { return s.meshes().size(); })
       .def_prop_ro("instance_count", [](const Scene& s) { return s.instances().size(); })
       .def_prop_ro("light_count", [](const Scene& s) { return s.lights().size(); })
+      .def_prop_ro("lights",
+                   [](const Scene& s) {
+                     constexpr const char* kKinds[kLightKindCount] = {
+                         "rect", "disk", "sphere", "distant", "dome", "triangle"};
+                     std::vector<std::pair<std::string, std::string>> out;
+                     for (const Light& light : s.lights())
+                       out.emplace_back(light.name, kKinds[static_cast<size_t>(light.kind)]);
+                     return out;
+                   })
       .def_prop_ro("materials",
                    [](const Scene& s) {
                      std::vector<std::pair<std::string, std::string>> out;

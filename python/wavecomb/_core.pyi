@@ -32,6 +32,9 @@ class Scene:
     @property
     def light_count(self) -> int: ...
     @property
+    def lights(self) -> list[tuple[str, str]]:
+        """(name, kind) of every light but emissive meshes."""
+    @property
     def materials(self) -> list[tuple[str, str]]:
         """(name, program) of every material."""
     @property

@@ -40,6 +40,8 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
             "files": [{"name": name, "bytes": size} for name, size in scene.textures],
         },
         "lights": scene.light_count,
+        "lights_by_kind": dict(sorted(Counter(kind for _, kind in scene.lights).items())),
+        "cameras": list(loaded.cameras),
         "prims": dict(sorted(report.counts.items())),
         "unsupported": [finding.as_dict() for finding in report.unsupported],
         "warnings": [finding.as_dict() for finding in report.warnings]
@@ -75,7 +77,11 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
         row("", f"{entry['bytes'] / 1e6:8.1f} MB  {entry['name']}")
     if textures["count"] > 8:
         row("", f"and {textures['count'] - 8} more (--json has all)")
-    row("lights", str(info["lights"]))
+    row("lights", f"{info['lights']}{_counts(info['lights_by_kind'])}")
+    others = [path for path in info["cameras"] if path != info["camera"]]
+    if others:
+        more = f" and {len(others) - 8} more" if len(others) > 8 else ""
+        row("other cameras", ", ".join(others[:8]) + more)
     row("prims", _counts(info["prims"]).removeprefix(": ") or "none")
     row("loaded in", f"{info['seconds']['load']:.2f} s")
     console.print(table)

@@ -66,6 +66,7 @@ class Fake:
             mesh_count=2,
             instance_count=90,
             light_count=3,
+            lights=[("Key", "rect"), ("Fill", "rect"), ("Sky", "dome")],
             materials=[("Gold", "metal"), ("Silver", "metal"), ("Chalk", "diffuse")],
             textures=[("wood.png", 4_000_000), ("stone.png", 1_000_000)],
             warnings=["mesh /Bad: 3 triangles left out"],
@@ -78,7 +79,12 @@ class Fake:
             counts={"Mesh": 2, "RectLight": 3, "Camera": 1},
         )
         return SimpleNamespace(
-            scene=scene, report=report, camera_path="/Camera", seconds=0.25, stage_path=path
+            scene=scene,
+            report=report,
+            camera_path="/Camera",
+            seconds=0.25,
+            stage_path=path,
+            cameras=("/Camera", "/Closeup"),
         )
 
     def render(

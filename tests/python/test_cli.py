@@ -349,6 +349,8 @@ def test_info(fake: Fake, stage: str) -> None:
     assert result.exit_code == 0
     for text in ("1,000 (90,000 with", "1 diffuse, 2 metal", "5.0 MB", "3 RectLight", "/Smoke"):
         assert text in result.stdout
+    assert "3: 1 dome, 2 rect" in result.stdout
+    assert "/Closeup" in result.stdout
     assert "missing texture" in result.stderr
 
 
@@ -357,6 +359,8 @@ def test_info_json(fake: Fake, stage: str) -> None:
     assert info["triangles"] == {"unique": 1000, "instanced": 90000}
     assert info["materials"] == {"count": 3, "by_program": {"diffuse": 1, "metal": 2}}
     assert info["textures"]["bytes"] == 5_000_000
+    assert info["lights_by_kind"] == {"dome": 1, "rect": 2}
+    assert info["cameras"] == ["/Camera", "/Closeup"]
     assert info["unsupported"] == [{"what": "volumes", "count": 1, "places": ["/Smoke"]}]
 
 

@@ -59,13 +59,18 @@ def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
 _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
+def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
+    """Every camera of the stage, those inside instances too, in the stage's order."""
+    return [p for p in Usd.PrimRange.Stage(stage, _PROXIES) if p.IsA(UsdGeom.Camera)]
+
+
 def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:
     """A camera by path, or by name where that is unique."""
     if Sdf.Path.IsValidPathString(wanted) and wanted.startswith("/"):
         prim = stage.GetPrimAtPath(wanted)
         if prim and prim.IsA(UsdGeom.Camera):
             return prim
-    cameras = [p for p in Usd.PrimRange.Stage(stage, _PROXIES) if p.IsA(UsdGeom.Camera)]
+    cameras = all_cameras(stage)
     by_name = [p for p in cameras if p.GetName() == wanted]
     if len(by_name) == 1:
         return by_name[0]

@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
+from wavecomb.usd.camera import all_cameras, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured, commentary
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
@@ -41,6 +41,7 @@ class LoadedStage:
         camera_path: Prim of the camera; None where the bounds were framed.
         seconds: Time taken.
         stage_path: The file.
+        cameras: Prims of all cameras that could be chosen.
     """
 
     scene: _core.Scene
@@ -48,6 +49,7 @@ class LoadedStage:
     camera_path: str | None
     seconds: float
     stage_path: Path
+    cameras: tuple[str, ...] = ()
 
 
 def load_stage(
@@ -89,7 +91,8 @@ def load_stage(
         builder = _native_builder() if builder_factory is None else builder_factory()
         camera_path = _read(stage, _time(stage, frame), camera, purposes, builder, report)
         scene = _build(builder, file)
-    return LoadedStage(scene, report, camera_path, clock.perf_counter() - started, file)
+        cameras = tuple(str(prim.GetPath()) for prim in all_cameras(stage))
+    return LoadedStage(scene, report, camera_path, clock.perf_counter() - started, file, cameras)
 
 
 def _native_builder() -> _core.SceneBuilder:

@@ -29,8 +29,8 @@ void ray_keys(const Queue& q, const OrderGrid& grid, bool by_octant, uint64_t* k
     U key = position_key<F>(grid, o);
     if (by_octant) {
       const auto sign = [&](const float* d) { return float_bits<F>(load<F>(d + i)) >> 31; };
-      // The octant takes the place of the two lowest bits and one spare: it is worth more than they
-      // are.
+      // The octant takes the two spare bits and the place of the lowest: it is worth more than that
+      // one
       key = (sign(q.dx) << 31) | (sign(q.dy) << 30) | (sign(q.dz) << 29) | (key >> 1);
     }
     store(lanes, key);
