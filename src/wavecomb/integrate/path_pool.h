@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/core/soa.h"
+#include "wavecomb/core/vec.h"
 
 namespace wavecomb {
 
@@ -40,5 +41,17 @@ class PathPool {
  public:
   bool has_aovs = false;
 };
+
+/// Adds c to the radiance of the active lanes' slots, which are distinct.
+template <typename F>
+inline void add_radiance(const PathPool& pool, const UInt<F>& slot, const Color<F>& c,
+                         const Mask<F>& active) {
+  const auto add = [&](float* to, const F& x) {
+    scatter<F>(to, gather<F>(to, slot, active) + x, slot, active);
+  };
+  add(pool.r, c.x);
+  add(pool.g, c.y);
+  add(pool.b, c.z);
+}
 
 }  // namespace wavecomb

@@ -11,17 +11,6 @@ namespace wavecomb {
 
 namespace detail {
 
-template <typename F>
-inline void add_radiance(PathPool& pool, const UInt<F>& slot, const Color<F>& c,
-                         const Mask<F>& active) {
-  const auto add = [&](float* to, const F& x) {
-    scatter<F>(to, gather<F>(to, slot, active) + x, slot, active);
-  };
-  add(pool.r, c.x);
-  add(pool.g, c.y);
-  add(pool.b, c.z);
-}
-
 /// Material of a hit: the face's, else the mesh's, else the instance's.
 template <typename F>
 inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inst, const UInt<F>& mesh,
@@ -92,13 +81,13 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
 
     if (any(missed)) {
       const Color<F> c = environment_emission<F>(scene, settings, depth, path, missed);
-      detail::add_radiance<F>(wave.pool, slot, c, missed & not_(is_black(c)));
+      add_radiance<F>(wave.pool, slot, c, missed & not_(is_black(c)));
     }
     if (any(shape)) {
       const Vec3<F> o{load<F>(rays.ox + i), load<F>(rays.oy + i), load<F>(rays.oz + i)};
       const Color<F> c =
           shape_emission<F>(scene, settings, depth, load<U>(hits.geom + i), o, t, path, shape);
-      detail::add_radiance<F>(wave.pool, slot, c, shape & not_(is_black(c)));
+      add_radiance<F>(wave.pool, slot, c, shape & not_(is_black(c)));
     }
     if (depth == 0 && wave.pool.has_aovs) {
       const Vec3<F> o{load<F>(rays.ox + i), load<F>(rays.oy + i), load<F>(rays.oz + i)};

@@ -47,14 +47,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                               id(Q::kMaterial), path, wants_aovs, active);
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
-    if (any(emits)) {
-      const auto add = [&](float* to, const F& x) {
-        scatter<F>(to, gather<F>(to, slot, emits) + x, slot, emits);
-      };
-      add(pool.r, v.emitted.x);
-      add(pool.g, v.emitted.y);
-      add(pool.b, v.emitted.z);
-    }
+    if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
     if (wants_aovs) {
       scatter<F>(pool.albedo_r, v.albedo.x, slot, active);
       scatter<F>(pool.albedo_g, v.albedo.y, slot, active);

@@ -35,16 +35,11 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   uint32_t* occluded = q.alive;  // compaction is done with it
   context.accel->occluded(rays, occluded, context.traversal_width,
                           presence_keys(wave.pool, depth, true));
-  PathPool& pool = wave.pool;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
-    const auto add = [&](float* to, const float* from) {
-      scatter<F>(to, gather<F>(to, slot, active) + load<F>(from + i), slot, active);
-    };
-    add(pool.r, q.r);
-    add(pool.g, q.g);
-    add(pool.b, q.b);
+    add_radiance<F>(wave.pool, slot, {load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)},
+                    active);
   }
   wave.counts.add_shadow_rays(depth, q.size);
 }
