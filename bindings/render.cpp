@@ -57,6 +57,7 @@ const std::vector<std::pair<const char*, RayOrder>> kOrders{
     {"slot", RayOrder::kSlot},
     {"morton", RayOrder::kMorton},
     {"morton-octant", RayOrder::kMortonOctant},
+    {"direction", RayOrder::kDirection},
     {"auto", RayOrder::kAuto}};
 const Names<RayOrder> kRayOrders{"ray_order", kOrders};
 const Names<RayOrder> kShadowOrders{"shadow_order", kOrders};

@@ -498,12 +498,13 @@ void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint
 }
 
 void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,
-                                 const PresenceKeys& keys) const {
+                                 bool coherent, const PresenceKeys& keys) const {
   QueryContext context;
   rtcInitRayQueryContext(&context.base);
   context.keys = &keys;
   RTCOccludedArguments args;
   rtcInitOccludedArguments(&args);
+  args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
   args.context = &context.base;
   switch (width) {
     case 16:

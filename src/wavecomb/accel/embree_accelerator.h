@@ -32,6 +32,7 @@ inline constexpr uint32_t kLightShape = 0xfffffffeu;
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
+  uint32_t stride = 1;  ///< words from one slot's to the next one's
   /// Different for every depth and for shadow rays, so that crossings are independent.
   uint32_t salt = 0;
 };
@@ -48,12 +49,13 @@ class EmbreeAccelerator {
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads);
   ~EmbreeAccelerator();
 
-  /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent` for camera rays.
-  /// Hits do not depend on width, order or coherence.
+  /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent`: the rays of a packet go
+  /// much the same way, and are traversed together. Hits do not depend on width, order or
+  /// coherence.
   void intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width, bool coherent,
                  const PresenceKeys& keys) const;
   /// occluded[i] = 1 where something lies before tfar, else 0.
-  void occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,
+  void occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width, bool coherent,
                 const PresenceKeys& keys) const;
 
   /// Memory that Embree holds for the hierarchy, bytes.

@@ -55,7 +55,8 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
   const float opacity = opacity_at(scene, m, material, hit_uv(record, prim, u, v));
   if (opacity >= 1.f) return true;
   if (!(opacity > 0.f)) return false;
-  const uint32_t path = hash_u32(keys.pixel_hash[slot], keys.sample[slot]);
+  const uint32_t path =
+      hash_u32(keys.pixel_hash[slot * keys.stride], keys.sample[slot * keys.stride]);
   const uint32_t where = hash_u32(instance * 0x9e3779b9u + mesh, prim);
   return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
 }

@@ -18,7 +18,7 @@ struct Frame {
 /// A frame around the unit vector `n`, without a branch (Duff et al., "Building an Orthonormal
 /// Basis, Revisited", JCGT 6(1) 2017).
 template <typename F>
-inline Frame<F> make_frame(const Vec3<F>& n) {
+WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
   const F sign = copysign(F(1.f), n.z);
   const F a = -1.f / (sign + n.z);
   const F b = n.x * n.y * a;

@@ -16,6 +16,11 @@
 #include <cstring>
 #include <type_traits>
 
+/// For kernels that are called once or twice a packet: what they return then stays in registers,
+/// and what the caller does not use is not worked out. Compilers alone stop at the size of the
+/// caller.
+#define WAVECOMB_INLINE inline __attribute__((always_inline))
+
 namespace wavecomb {
 
 /// A packet of `W` floats.
@@ -411,6 +416,51 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
       std::memcpy(out, lanes.value + std::countr_zero(rest), 4);
   }
   return static_cast<uint32_t>(std::popcount(bits));
+}
+
+/// table[index] of 16 words in each lane; index < 16.
+template <typename U>
+inline U lookup16(const uint32_t* table, const U& index) {
+  if constexpr (kIsScalar<U>) {
+    return table[index];
+#if defined(__AVX512F__)
+  } else if constexpr (kWidth<U> == 16) {
+    return U(_mm512_permutexvar_epi32(index.m, _mm512_loadu_si512(table)));
+#endif
+#if defined(__AVX2__)
+  } else if constexpr (kWidth<U> == 8) {
+    const auto half = [&](const uint32_t* p) {
+      return _mm256_permutevar8x32_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)),
+                                         index.m);
+    };
+    return select(index > 7u, U(half(table + 8)), U(half(table)));
+#endif
+  } else {
+    detail::InMemory<U> at(index);
+    for (uint32_t& value : at.value) value = table[value];
+    return load<U>(at.value);
+  }
+}
+
+/// Bits in reverse order, lane by lane.
+template <typename U>
+inline U reverse_bits(U x) {
+#if defined(__AVX512BW__) && defined(__GFNI__)
+  if constexpr (kWidth<U> == 16) {
+    // A byte's bits by a matrix product over GF(2), then the bytes.
+    const __m512i matrix = _mm512_set1_epi64(static_cast<long long>(0x8040201008040201ull));
+    const __m512i order =
+        _mm512_broadcast_i32x4(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
+    return U(_mm512_shuffle_epi8(_mm512_gf2p8affine_epi64_epi8(x.m, matrix, 0), order));
+  } else
+#endif
+  {
+    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
+    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+    x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
+    return (x >> 16) | (x << 16);
+  }
 }
 
 /// Value of lane `i`.

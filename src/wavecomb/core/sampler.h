@@ -43,19 +43,10 @@ inline constexpr uint32_t bsdf_set(uint32_t depth) {
 
 namespace detail {
 
-template <typename U>
-inline U reverse_bits(U x) {
-  x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
-  x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
-  x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
-  x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
-  return (x >> 16) | (x << 16);
-}
-
 /// Laine and Karras' permutation: bit k of the result depends on bits 0..k only, so that on
 /// reversed bits it is an Owen scramble (constants: Burley 2020, section 4).
 template <typename U>
-inline U laine_karras(U x, const U& seed) {
+WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   x += seed;
   x ^= x * 0x6c50b47cu;
   x ^= x * 0xb82f1e52u;
@@ -75,14 +66,37 @@ inline constexpr uint32_t kSobol3[kIndexBits] = {
     0x1,   0x3,   0x4,    0xa,    0x1f,   0x2e,   0x45,    0xc9,    0x11b,   0x2a4,
     0x79a, 0xb67, 0x101e, 0x302d, 0x4041, 0xa0c3, 0x1f104, 0x2e28a, 0x457df, 0xc9bae};
 
+/// A product with the matrix of such columns, four bits of the index at a time.
+class NibbleTables {
+ public:
+  static constexpr int kNibbles = kIndexBits / 4;
+
+  constexpr explicit NibbleTables(const uint32_t (&columns)[kIndexBits]) {
+    for (int n = 0; n < kNibbles; ++n)
+      for (uint32_t bits = 0; bits < 16; ++bits)
+        for (int k = 0; k < 4; ++k)
+          if (bits >> k & 1u) table_[n][bits] ^= columns[4 * n + k];
+  }
+  template <typename U>
+  U product(const U& index) const {
+    U result = lookup16<U>(table_[0], index & 15u);
+    for (int n = 1; n < kNibbles; ++n) result ^= lookup16<U>(table_[n], (index >> (4 * n)) & 15u);
+    return result;
+  }
+
+ private:
+  alignas(64) uint32_t table_[kNibbles][16] = {};
+};
+inline constexpr NibbleTables kSobolTables2(kSobol2), kSobolTables3(kSobol3);
+
 /// Owen-scrambled point from a bit-reversed Sobol value.
 template <typename F>
-inline F scrambled(const UInt<F>& reversed, const UInt<F>& seed) {
+WAVECOMB_INLINE F scrambled(const UInt<F>& reversed, const UInt<F>& seed) {
   return unit_float<F>(reverse_bits<UInt<F>>(laine_karras<UInt<F>>(reversed, seed)));
 }
 
 template <typename F>
-inline Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
+WAVECOMB_INLINE Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
   using U = UInt<F>;
   const U seed = hash_u32<U>(key.pixel_hash, U(set));
   // Shuffle the order of the points, so that sets are independent of one another.
@@ -95,14 +109,7 @@ inline Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
   d1 ^= (d1 & 0xf0f0f0f0u) >> 4;
   d1 ^= (d1 & 0xccccccccu) >> 2;
   d1 ^= (d1 & 0xaaaaaaaau) >> 1;
-  U d2(0u), d3(0u);
-  U bits = index;
-  for (int k = 0; k < kIndexBits; ++k) {
-    const U on = U(0u) - (bits & 1u);
-    d2 ^= on & kSobol2[k];
-    d3 ^= on & kSobol3[k];
-    bits = bits >> 1;
-  }
+  const U d2 = kSobolTables2.product<U>(index), d3 = kSobolTables3.product<U>(index);
   return {scrambled<F>(index, hash_u32<U>(seed ^ 0x1u)), scrambled<F>(d1, hash_u32<U>(seed ^ 0x2u)),
           scrambled<F>(d2, hash_u32<U>(seed ^ 0x3u)), scrambled<F>(d3, hash_u32<U>(seed ^ 0x4u))};
 }
@@ -119,7 +126,7 @@ inline Sample4<F> independent_4d(const SampleKey<F>& key, uint32_t set) {
 
 /// The values of one set of dimensions for each path.
 template <typename F>
-inline Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, uint32_t set) {
+WAVECOMB_INLINE Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, uint32_t set) {
   return kind == SamplerKind::kSobol ? detail::sobol_4d<F>(key, set)
                                      : detail::independent_4d<F>(key, set);
 }

@@ -12,7 +12,7 @@ enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
 /// Order of rays before traversal.
-enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kAuto };
+enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
 /// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model
 /// for roulette, so that pictures are reproducible.
 enum class CostSource : uint8_t { kAuto, kMeasured, kModel };
@@ -51,8 +51,8 @@ struct Settings {
   Traversal traversal = Traversal::kPackets;
   std::string policy = "program";
   Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster
-  RayOrder ray_order = RayOrder::kSlot;          ///< of bounce rays
-  RayOrder shadow_order = RayOrder::kSlot;       ///< of shadow rays
+  RayOrder ray_order = RayOrder::kAuto;          ///< of bounce rays
+  RayOrder shadow_order = RayOrder::kAuto;       ///< of shadow rays
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
   /// Throws Error naming the option and what it may be.

@@ -2,56 +2,99 @@
 /// The path slots of a wave.
 #pragma once
 
+#include "wavecomb/core/rows.h"
+#include "wavecomb/core/sampler.h"
 #include "wavecomb/core/soa.h"
 #include "wavecomb/core/vec.h"
 
 namespace wavecomb {
 
-/// A slot is one (pixel, sample) for life and owns its radiance. Everything that travels with the
-/// ray is in the queues; this is what stays.
+/// A slot is one (pixel, sample) for life. Its state is a row of one cache line, which shading
+/// reads, and writes anew for the next ray; its shadow ray is another row. Whatever order hits are
+/// shaded in, each touches its own lines and no other's (docs/decisions/path-rows.md).
 ///
 /// Contract: owned by one wave. AOV columns are there only where asked for.
 class PathPool {
  public:
+  /// Words of a row: 15 for a path, 10 for its shadow ray, 3 for its radiance.
+  static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
+
   PathPool() = default;
   PathPool(size_t capacity, bool with_aovs)
-      : block_(with_aovs ? 12 : 5, capacity), has_aovs(with_aovs) {
-    r = block_.floats(0);
-    g = block_.floats(1);
-    b = block_.floats(2);
-    pixel_hash = block_.uints(3);
-    sample = block_.uints(4);
+      : rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)),
+        aovs_(with_aovs ? 7 : 0, capacity),
+        has_aovs(with_aovs) {
+    paths = rows_.floats(0);
+    shadows = paths + capacity * kPathWords;
+    radiance = shadows + capacity * kShadowWords;
     if (!with_aovs) return;
-    size_t c = 5;
+    size_t c = 0;
     for (float** f : {&albedo_r, &albedo_g, &albedo_b, &normal_x, &normal_y, &normal_z, &depth})
-      *f = block_.floats(c++);
+      *f = aovs_.floats(c++);
   }
 
-  float *r = nullptr, *g = nullptr, *b = nullptr;  ///< radiance so far
-  uint32_t* pixel_hash = nullptr;                  ///< SampleKey of the path
-  uint32_t* sample = nullptr;
+  float* paths = nullptr;     ///< rows of load_path
+  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b
+  float* radiance = nullptr;  ///< r, g, b so far
   float *albedo_r = nullptr, *albedo_g = nullptr, *albedo_b = nullptr;
   float *normal_x = nullptr, *normal_y = nullptr, *normal_z = nullptr;
-  size_t bytes() const { return block_.bytes(); }
   float* depth = nullptr;  ///< along the camera's axis; infinite where nothing was hit
+  size_t bytes() const { return rows_.bytes() + aovs_.bytes(); }
 
  private:
-  SoaBlock block_;
+  SoaBlock rows_, aovs_;
 
  public:
   bool has_aovs = false;
 };
 
+/// A path between two vertices, as its row holds it.
+template <typename F>
+struct PathLanes {
+  Vec3<F> o, d;  ///< the ray to be traced
+  Color<F> throughput;
+  F pdf;                      ///< density of the bounce that made the ray; 0: delta or camera
+  F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
+  F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
+  SampleKey<F> key;
+};
+
+template <typename F>
+WAVECOMB_INLINE PathLanes<F> load_path(const PathPool& pool, const UInt<F>& slot,
+                                       const Mask<F>& active) {
+  const auto r =
+      load_rows<PathPool::kPathWords, F>(pool.paths, slot * PathPool::kPathWords, active);
+  return {{r[0], r[1], r[2]},
+          {r[3], r[4], r[5]},
+          {r[6], r[7], r[8]},
+          r[9],
+          r[10],
+          r[11],
+          r[12],
+          {float_bits<F>(r[13]), float_bits<F>(r[14])}};
+}
+
+template <typename F>
+WAVECOMB_INLINE void store_path(const PathPool& pool, const UInt<F>& slot, const PathLanes<F>& p,
+                                const Mask<F>& active) {
+  store_rows<PathPool::kPathWords, F>(
+      pool.paths, slot * PathPool::kPathWords,
+      {p.o.x, p.o.y, p.o.z, p.d.x, p.d.y, p.d.z, p.throughput.x, p.throughput.y, p.throughput.z,
+       p.pdf, p.eta_scale, p.cone_width, p.cone_spread, bits_float<F>(p.key.pixel_hash),
+       bits_float<F>(p.key.sample), F(0.f)},
+      active);
+}
+
 /// Adds c to the radiance of the active lanes' slots, which are distinct.
 template <typename F>
-inline void add_radiance(const PathPool& pool, const UInt<F>& slot, const Color<F>& c,
-                         const Mask<F>& active) {
-  const auto add = [&](float* to, const F& x) {
-    scatter<F>(to, gather<F>(to, slot, active) + x, slot, active);
-  };
-  add(pool.r, c.x);
-  add(pool.g, c.y);
-  add(pool.b, c.z);
+WAVECOMB_INLINE void add_radiance(const PathPool& pool, const UInt<F>& slot, const Color<F>& c,
+                                  const Mask<F>& active) {
+  const UInt<F> word = slot * PathPool::kRadianceWords;
+  auto r = load_rows<PathPool::kRadianceWords, F>(pool.radiance, word, active);
+  r[0] += c.x;
+  r[1] += c.y;
+  r[2] += c.z;
+  store_rows<PathPool::kRadianceWords, F>(pool.radiance, word, r, active);
 }
 
 }  // namespace wavecomb

@@ -26,7 +26,7 @@ class PathTracer {
   PathResult trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
-    keys_ = {&key.pixel_hash, &key.sample, 0};
+    keys_ = {&key.pixel_hash, &key.sample, 1, 0};
     const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
     const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
                                            static_cast<F>(pixel >> 16), r, true);
@@ -94,7 +94,7 @@ class PathTracer {
     const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1};
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
-    context_.accel->occluded(ray, &blocked, 1, keys_);
+    context_.accel->occluded(ray, &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);
     return blocked != 0;
   }

@@ -4,6 +4,7 @@
 
 #include "wavecomb/core/frame.h"
 #include "wavecomb/core/math.h"
+#include "wavecomb/core/rows.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -31,68 +32,68 @@ struct Surface {
 
 namespace detail {
 
-/// One array of a mesh: the same base in all lanes, or one address a lane.
+/// The meshes of the lanes, read row by row.
 template <typename F>
-struct MeshArray {
-  const void* shared = nullptr;
-  UInt64<F> address{0};
+class MeshReader {
+ public:
+  MeshReader(const SceneView& scene, const UInt<F>& mesh, const Mask<F>& active) {
+    const InMemory<UInt<F>> index(mesh);
+    const uint32_t bits = lane_bits<F>(active);
+    for (size_t i = 0; i < kWidth<F>; ++i)
+      records_[i] = scene.meshes + ((bits >> i & 1u) != 0 ? index.value[i] : 0u);
+    flags = gather<UInt<F>>(scene.meshes,
+                            mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
+                                static_cast<uint32_t>(offsetof(MeshRecord, flags) / 4),
+                            Mask<UInt<F>>(active));
+  }
 
-  template <typename T>
-  T at(const UInt<F>& index, const Mask<F>& active) const {
-    return shared ? gather<T>(shared, index, Mask<T>(active))
-                  : gather_at<T>(address, index, Mask<T>(active));
+  /// Row `index` of N words of one of a mesh's arrays.
+  template <size_t N>
+  std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
+                       const Mask<F>& active) const {
+    return load_rows_of<N, F>(
+        [&](size_t lane) { return reinterpret_cast<const void*>(records_[lane]->*array); },
+        index * static_cast<uint32_t>(N), active);
   }
-  Vec3<F> vec3(const UInt<F>& index, const Mask<F>& active) const {
-    const UInt<F> i = index * 3u;
-    return {at<F>(i, active), at<F>(i + 1u, active), at<F>(i + 2u, active)};
+  Vec3<F> vec3(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
+    const auto r = row<3>(array, index, active);
+    return {r[0], r[1], r[2]};
   }
-  Vec2<F> vec2(const UInt<F>& index, const Mask<F>& active) const {
-    const UInt<F> i = index * 2u;
-    return {at<F>(i, active), at<F>(i + 1u, active)};
+  Vec2<F> vec2(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
+    const auto r = row<2>(array, index, active);
+    return {r[0], r[1]};
   }
-};
+  /// Vertices of triangle `prim`.
+  std::array<UInt<F>, 3> corners(const UInt<F>& prim, const Mask<F>& active) const {
+    const auto r = row<3>(&MeshRecord::indices, prim, active);
+    return {float_bits<F>(r[0]), float_bits<F>(r[1]), float_bits<F>(r[2])};
+  }
 
-/// The meshes of the lanes.
-template <typename F>
-struct MeshArrays {
-  MeshArray<F> positions, indices, normals, uvs;
   UInt<F> flags;
-};
 
-template <typename F>
-inline MeshArrays<F> mesh_arrays(const SceneView& scene, const UInt<F>& mesh,
-                                 const Mask<F>& active) {
-  MeshArrays<F> a;
-  if (is_uniform<F>(mesh, active)) {
-    const MeshRecord& r = scene.meshes[any(active) ? first_active(mesh, Mask<UInt<F>>(active)) : 0];
-    a.positions.shared = reinterpret_cast<const void*>(r.positions);
-    a.indices.shared = reinterpret_cast<const void*>(r.indices);
-    a.normals.shared = reinterpret_cast<const void*>(r.normals);
-    a.uvs.shared = reinterpret_cast<const void*>(r.uvs);
-    a.flags = UInt<F>(r.flags);
-  } else {
-    const Mask<UInt<F>> on(active);
-    const UInt<F> word = mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4);
-    const auto address = [&](size_t offset) {
-      const UInt<F> at = word + static_cast<uint32_t>(offset / 4);
-      using U64 = UInt64<F>;
-      return U64(gather<UInt<F>>(scene.meshes, at, on)) |
-             (U64(gather<UInt<F>>(scene.meshes, at + 1u, on)) << 32);
-    };
-    a.positions.address = address(offsetof(MeshRecord, positions));
-    a.indices.address = address(offsetof(MeshRecord, indices));
-    a.normals.address = address(offsetof(MeshRecord, normals));
-    a.uvs.address = address(offsetof(MeshRecord, uvs));
-    a.flags = gather<UInt<F>>(scene.meshes,
-                              word + static_cast<uint32_t>(offsetof(MeshRecord, flags) / 4), on);
-  }
-  return a;
-}
+ private:
+  const MeshRecord* records_[kWidth<F>];
+};
 
 /// The transforms of the lanes' instances.
 template <typename F>
 struct InstanceMaps {
-  Vec3<F> row[3], t, normal[3];
+  Vec3<F> row[3], t;
+  F side;  ///< sign of the determinant
+
+  InstanceMaps(const SceneView& scene, const UInt<F>& inst, const Mask<F>& active) {
+    std::array<F, 16> r;
+    if (!kIsScalar<F> && any(active) && is_uniform<F>(inst, active)) {
+      const auto* shared = reinterpret_cast<const float*>(
+          scene.instances + first_active(inst, Mask<UInt<F>>(active)));
+      for (size_t k = 0; k < 16; ++k) r[k] = F(shared[k]);
+    } else {
+      r = load_rows<16, F>(scene.instances, inst * 16u, active);
+    }
+    for (uint32_t i = 0; i < 3; ++i) row[i] = {r[4 * i], r[4 * i + 1], r[4 * i + 2]};
+    t = {r[3], r[7], r[11]};
+    side = r[15];
+  }
 
   Vec3<F> point(const Vec3<F>& p) const {
     return {fma(row[0].z, p.z, fma(row[0].y, p.y, fma(row[0].x, p.x, t.x))),
@@ -102,32 +103,13 @@ struct InstanceMaps {
   Vec3<F> vector(const Vec3<F>& v) const {
     return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
   }
+  /// Normals go by the cofactors, whose rows are the cross products of the other two rows.
   Vec3<F> map_normal(const Vec3<F>& n) const {
-    return {dot(normal[0], n), dot(normal[1], n), dot(normal[2], n)};
+    return Vec3<F>(dot(cross(row[1], row[2]), n), dot(cross(row[2], row[0]), n),
+                   dot(cross(row[0], row[1]), n)) *
+           side;
   }
 };
-
-template <typename F>
-inline InstanceMaps<F> instance_maps(const SceneView& scene, const UInt<F>& inst,
-                                     const Mask<F>& active) {
-  InstanceMaps<F> m;
-  const auto fill = [&](auto&& real) {
-    for (uint32_t i = 0; i < 3; ++i) {
-      m.row[i] = {real(4 * i), real(4 * i + 1), real(4 * i + 2)};
-      m.normal[i] = {real(12 + 3 * i), real(13 + 3 * i), real(14 + 3 * i)};
-    }
-    m.t = {real(3), real(7), real(11)};
-  };
-  if (is_uniform<F>(inst, active)) {
-    const auto* shared = reinterpret_cast<const float*>(
-        scene.instances + (any(active) ? first_active(inst, Mask<UInt<F>>(active)) : 0));
-    fill([&](uint32_t word) { return F(shared[word]); });
-  } else {
-    const UInt<F> base = inst * static_cast<uint32_t>(sizeof(InstanceRecord) / 4);
-    fill([&](uint32_t word) { return gather<F>(scene.instances, base + word, active); });
-  }
-  return m;
-}
 
 template <typename F>
 inline Vec3<F> abs3(const Vec3<F>& v) {
@@ -144,18 +126,17 @@ inline Vec3<F> abs3(const Vec3<F>& v) {
 /// Rendering", section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator",
 /// Ray Tracing Gems II.
 template <typename F>
-inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir,
-                                bool with_uv, bool with_terminator, const Mask<F>& active) {
+WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
+                                         const Vec3<F>& dir, bool with_uv, bool with_terminator,
+                                         const Mask<F>& active) {
   using U = UInt<F>;
-  const auto mesh = detail::mesh_arrays<F>(scene, hit.mesh, active);
-  const auto maps = detail::instance_maps<F>(scene, hit.inst, active);
+  const detail::MeshReader<F> mesh(scene, hit.mesh, active);
+  const detail::InstanceMaps<F> maps(scene, hit.inst, active);
   const U corner = hit.prim * 3u;
-  const U i0 = mesh.indices.template at<U>(corner, active);
-  const U i1 = mesh.indices.template at<U>(corner + 1u, active);
-  const U i2 = mesh.indices.template at<U>(corner + 2u, active);
-  const Vec3<F> p0 = mesh.positions.vec3(i0, active);
-  const Vec3<F> p1 = mesh.positions.vec3(i1, active);
-  const Vec3<F> p2 = mesh.positions.vec3(i2, active);
+  const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
+  const Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
+  const Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
+  const Vec3<F> p2 = mesh.vec3(&MeshRecord::positions, i2, active);
   const F b1 = hit.u, b2 = hit.v, b0 = 1.f - b1 - b2;
   const Vec3<F> e1 = p1 - p0, e2 = p2 - p0;
   const Vec3<F> p = fma(e2, b2, fma(e1, b1, p0));
@@ -185,9 +166,9 @@ inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, c
   if (any(smooth)) {
     const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
     const Mask<U> pick(per_corner);
-    Vec3<F> n0 = mesh.normals.vec3(select(pick, corner, i0), smooth);
-    Vec3<F> n1 = mesh.normals.vec3(select(pick, corner + 1u, i1), smooth);
-    Vec3<F> n2 = mesh.normals.vec3(select(pick, corner + 2u, i2), smooth);
+    const Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, select(pick, U(corner), i0), smooth);
+    const Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, select(pick, U(corner + 1u), i1), smooth);
+    const Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, select(pick, U(corner + 2u), i2), smooth);
     const Vec3<F> n = maps.map_normal(fma(n2, b2, fma(n1, b1, Vec3<F>(n0 * b0))));
     const F len2 = length_squared(n);
     const Mask<F> good = smooth & (len2 > 0.f) & is_finite(len2);
@@ -229,7 +210,7 @@ inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, c
     if (any(has_uv)) {
       const Mask<U> pick(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
       const auto fetch = [&](const U& at, const U& index, Vec2<F>& out) {
-        const Vec2<F> value = mesh.uvs.vec2(select(pick, at, index), has_uv);
+        const Vec2<F> value = mesh.vec2(&MeshRecord::uvs, select(pick, at, index), has_uv);
         out = {select(has_uv, value.x, out.x), select(has_uv, value.y, out.y)};
       };
       fetch(corner, i0, t0);
@@ -249,7 +230,7 @@ inline Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, c
 
 /// The origin of a ray that leaves `s` along `dir`, clear of the surface on that side.
 template <typename F>
-inline Vec3<F> spawn_origin(const Surface<F>& s, const Vec3<F>& dir) {
+WAVECOMB_INLINE Vec3<F> spawn_origin(const Surface<F>& s, const Vec3<F>& dir) {
   const Mask<F> outside = dot(dir, s.ng) > 0.f;
   const F d = select(outside, s.offset, F(-s.offset));
   const Vec3<F> base = s.p + select<F>(outside, s.terminator, Vec3<F>(F(0.f)));

@@ -227,7 +227,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
       n = select<F>(mapped, bumped, n);
     }
   }
-  const Frame<F> frame = make_frame<F>(n, tangent);
+  const Frame<F> frame = textured ? make_frame<F>(n, tangent) : make_frame<F>(n);
   const Vec3<F> wo = frame.to_local(-path.dir);
 
   if (wants_aovs) {

@@ -75,19 +75,14 @@ struct Wave {
         costs(context.traits.size()),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
-        shadow_chooser(kRayOrders) {
-    if (context.settings->ray_order != RayOrder::kSlot) other_rays = RayQueue(capacity);
-    if (context.settings->shadow_order != RayOrder::kSlot) other_shadows = ShadowQueue(capacity);
-  }
-  static constexpr size_t kRayOrders = 3;  ///< slot, morton, morton-octant
+        shadow_chooser(kRayOrders) {}
+  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 
   PathPool pool;
   RayQueue rays;
   HitBuffer hits;
   ShadingQueue shading;
   ShadowQueue shadows;
-  RayQueue other_rays;  ///< where ordered rays are put, if they are ordered
-  ShadowQueue other_shadows;
   SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;
@@ -101,7 +96,7 @@ struct Wave {
 
   size_t bytes() const {
     return pool.bytes() + rays.bytes() + hits.bytes() + shading.bytes() + shadows.bytes() +
-           columns.bytes() + other_rays.bytes() + other_shadows.bytes();
+           columns.bytes();
   }
 };
 

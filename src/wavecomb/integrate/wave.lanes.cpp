@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compiled once per lane width, with WAVECOMB_LANES set to it.
+#include <bit>
+#include <cstring>
+
 #include "wavecomb/integrate/stages/collect.h"
 #include "wavecomb/integrate/stages/generate.h"
 #include "wavecomb/integrate/stages/order.h"
@@ -23,12 +26,16 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   for (uint32_t depth = 0; wave.rays.size > 0; ++depth) {
     // Camera rays are coherent as they come.
     RayOrderChoice ray_order;
-    if (depth > 0)
-      ray_order = order_rays<F>(wave, context, depth, s.ray_order, wave.ray_chooser, wave.rays,
-                                wave.other_rays);
+    ray_order.coherent = depth == 0;
     clock.enter(Phase::kTrace);
+    if (depth > 0) {
+      ray_order = order_rays<F>(wave, context, depth, s.ray_order, wave.ray_chooser,
+                                wave.pool.paths, wave.rays);
+      clock.enter(Phase::kTrace);
+      fetch_rays<F>(wave);
+    }
     Clock::time_point start = Clock::now();
-    trace(wave, context, depth, depth == 0 ? tfar : nullptr);
+    trace(wave, context, depth, depth == 0 ? tfar : nullptr, ray_order.coherent);
     learn_order(wave.ray_chooser, depth, ray_order, start);
 
     clock.enter(Phase::kShade);
@@ -46,12 +53,13 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
           choice.prepare_ns);
     compact<F>(wave);
 
-    const RayOrderChoice shadow_order =
-        order_rays<F>(wave, context, depth, s.shadow_order, wave.shadow_chooser, wave.shadows,
-                      wave.other_shadows);
+    if (wave.shadows.size == 0) continue;
+    const RayOrderChoice shadow_order = order_rays<F>(
+        wave, context, depth, s.shadow_order, wave.shadow_chooser, wave.pool.shadows, wave.shadows);
     clock.enter(Phase::kShadow);
+    fetch_shadows<F>(wave);
     start = Clock::now();
-    shadow<F>(wave, context, depth);
+    shadow<F>(wave, context, depth, shadow_order.coherent);
     learn_order(wave.shadow_chooser, depth, shadow_order, start);
   }
   clock.enter(Phase::kResolve);
@@ -74,33 +82,26 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     const float a = 0.61803399f * static_cast<float>(i), b = 0.75487767f * static_cast<float>(i);
     const float u = a - std::floor(a), v = b - std::floor(b);
     const Vec3<float> d = square_to_sphere(u, v);
-    const float values[13] = {d.x,
-                              d.y,
-                              d.z,
-                              0.5f,
-                              0.5f,
-                              0.5f,
-                              0.3f,
-                              1.f,
-                              0.01f * context.scene.scale,
-                              0.1f,
-                              0.1f * context.scene.scale,
-                              0.5f * u,
-                              0.5f * v};
-    for (uint32_t c = Q::kDx; c <= Q::kV; ++c)
-      queue.floats(static_cast<Q::Column>(c))[i] = values[c];
     const CalibrationHit& hit = hits.hits[i % hits.distinct];
-    queue.uints(Q::kSlot)[i] = i;
-    queue.uints(Q::kInst)[i] = hit.inst;
-    queue.uints(Q::kMesh)[i] = hit.mesh;
-    queue.uints(Q::kGeom)[i] = hit.geom;
-    queue.uints(Q::kPrim)[i] = hit.prim;
+    const auto id = [](uint32_t x) { return std::bit_cast<float>(x); };
+    const float row[Q::kRowWords] = {0.1f * context.scene.scale,
+                                     0.5f * u,
+                                     0.5f * v,
+                                     id(hit.prim),
+                                     id(hit.inst),
+                                     id(hit.mesh),
+                                     id(hit.geom),
+                                     id(i)};
+    std::memcpy(queue.rows() + i * Q::kRowWords, row, sizeof(row));
     queue.uints(Q::kMaterial)[i] = hits.material;
     queue.uints(Q::kProgram)[i] = context.traits[hits.material].program;
-    queue.uints(Q::kArrival)[i] = i;
-    wave.pool.pixel_hash[i] = i * 0x9e3779b9u;
-    wave.pool.sample[i] = i;
-    wave.pool.r[i] = wave.pool.g[i] = wave.pool.b[i] = 0.f;
+    queue.slot[i] = i;
+    const SampleKey<float> key{i * 0x9e3779b9u, i};
+    store_path<float>(
+        wave.pool, i,
+        {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f, 0.01f * context.scene.scale, 0.f, key},
+        true);
+    std::memset(wave.pool.radiance + i * PathPool::kRadianceWords, 0, 4 * PathPool::kRadianceWords);
   }
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0; begin < queue.size;) {

@@ -39,19 +39,25 @@ inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& te
   return light.radiance() * not_negative(Color<F>(texel.r, texel.g, texel.b));
 }
 
-/// The last i with cdf[i] <= x among `size` + 1 ascending values that start at `first`; x in [0,
-/// 1).
+/// The last i with cdf[i] <= x among the ascending values that start at `first`; x in [0, 1). The
+/// guide entries `row` of the distribution narrow the search.
 template <typename F>
-inline UInt<F> find_interval(const float* cdf, const UInt<F>& first, uint32_t size, const F& x,
-                             const Mask<F>& active) {
-  UInt<F> low(0u);
-  for (uint32_t step = std::bit_ceil(size); step > 0; step >>= 1) {
-    const UInt<F> next = low + step;
-    const Mask<F> inside = active & Mask<F>(next < UInt<F>(size));
-    const F value = gather<F>(cdf, first + next, inside);
-    low = select(inside & (value <= x), next, low);
+inline UInt<F> find_interval(const Distribution2D& d, const UInt<F>& row, const float* cdf,
+                             const UInt<F>& first, const F& x, const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t kGuide = Distribution2D::kGuide;
+  const U entry =
+      gather<U>(d.guide.data(), row * kGuide + U(to_int<F>(F(x * float{kGuide}))), Mask<U>(active));
+  U low = entry & 0xffffu, high = entry >> 16;
+  for (;;) {
+    const Mask<F> open = active & Mask<F>(low < high);
+    if (none(open)) return low;
+    const U middle = (low + high + 1u) >> 1;
+    const F value = gather<F>(cdf, first + middle, open);
+    const Mask<U> above(open & (value <= x));
+    high = select(Mask<U>(open) & not_(above), middle - 1u, high);
+    low = select(above, middle, low);
   }
-  return low;
 }
 
 /// Density over the unit square of cell (x, y) is stored; a direction's density over solid angle is
@@ -76,11 +82,12 @@ inline KindSample<F> sample_dome_image(const LightReader<F>& light, const Textur
     const F size = b - a;
     return min(max(F((x - a) / select(size > 0.f, size, F(1.f))), F(0.f)), F(kOneMinusEpsilon));
   };
-  const UInt<F> y = find_interval<F>(d.marginal.data(), UInt<F>(0u), d.height, v, active);
+  const UInt<F> y =
+      find_interval<F>(d, UInt<F>(d.height), d.marginal.data(), UInt<F>(0u), v, active);
   const F dy = inside(v, gather<F>(d.marginal.data(), y, active),
                       gather<F>(d.marginal.data(), y + 1u, active));
   const UInt<F> row = y * (d.width + 1);
-  const UInt<F> x = find_interval<F>(d.conditional.data(), row, d.width, u, active);
+  const UInt<F> x = find_interval<F>(d, y, d.conditional.data(), row, u, active);
   const F dx = inside(u, gather<F>(d.conditional.data(), row + x, active),
                       gather<F>(d.conditional.data(), row + x + 1u, active));
 

@@ -103,12 +103,14 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
                         Mask<F>(false)};
   if (view.count == 0 || none(active)) return result;
   const UInt<F> index = detail::pick_light<F>(view, u_pick, active);
-  const detail::LightReader<F> light(view.lights, index, active);
-  const F pick_pdf = light.pick_pdf();
+  const detail::LightReader<F> any_light(view.lights, index, active);
   detail::for_each_kind<F>(
-      light.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
+      any_light.bits(offsetof(LightRecord, kind)), active,
+      [&](LightKind kind, const Mask<F>& lanes) {
+        // Often there is one light of a kind, whose record is the same in all its lanes.
+        const detail::LightReader<F> light(view.lights, index, lanes);
         const detail::KindSample<F> s = detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
-        const F pdf = s.pdf * pick_pdf;
+        const F pdf = s.pdf * light.pick_pdf();
         const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
         const F inverse = 1.f / select(valid, pdf, F(1.f));
         result.wi = select<F>(valid, s.wi, result.wi);

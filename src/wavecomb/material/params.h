@@ -161,8 +161,9 @@ inline Mask<F> opacity_is_presence(const SlotReader<F>& slots, const F& threshol
 /// `opacity` is 1 where it is presence, which fetch_opacity gives. Inactive lanes hold anything
 /// finite.
 template <uint32_t kSlots, typename F>
-inline ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
-                                     const Vec2<F>& uv, const F& uv_width, const Mask<F>& active) {
+WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
+                                              const Vec2<F>& uv, const F& uv_width,
+                                              const Mask<F>& active) {
   using R = MaterialRecord;
   const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
   const auto& r = slots.record;

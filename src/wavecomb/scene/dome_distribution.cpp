@@ -104,6 +104,19 @@ double accumulate(std::vector<double>& weights, float* cdf) {
   return sum;
 }
 
+/// Guide entries of the cumulative values cdf[0 .. n].
+void add_guide(const float* cdf, uint32_t n, std::vector<uint32_t>& guide) {
+  constexpr uint32_t kEntries = Distribution2D::kGuide;
+  uint32_t first = 0, last = 0;
+  for (uint32_t k = 0; k < kEntries; ++k) {
+    const float from = static_cast<float>(k) / kEntries, to = static_cast<float>(k + 1) / kEntries;
+    while (first + 1 < n && cdf[first + 1] <= from) ++first;
+    last = std::max(last, first);
+    while (last + 1 < n && cdf[last + 1] < to) ++last;
+    guide.push_back(first | (last << 16));
+  }
+}
+
 }  // namespace
 
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color,
@@ -142,6 +155,11 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
   }
   if (mean_luminance) *mean_luminance = mean;
   if (!(accumulate(rows, d.marginal.data()) > 0)) return {};
+
+  static_assert(kMaxWidth < 1u << 16 && kMaxHeight < 1u << 16);
+  for (uint32_t y = 0; y < d.height; ++y)
+    add_guide(d.conditional.data() + size_t{y} * (d.width + 1), d.width, d.guide);
+  add_guide(d.marginal.data(), d.height, d.guide);
 
   // The density that the float tables really have.
   for (uint32_t y = 0; y < d.height; ++y) {

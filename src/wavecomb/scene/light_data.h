@@ -66,6 +66,10 @@ struct Distribution2D {
   std::vector<float> conditional;  ///< height rows of width + 1
   std::vector<float> marginal;     ///< height + 1
   std::vector<float> density;      ///< height x width, pdf over the unit square
+  /// Where inversion finds numbers in [k, k + 1) / kGuide: the first interval, and the last one in
+  /// the upper 16 bits. kGuide entries for each row of `conditional`, then those of `marginal`.
+  static constexpr uint32_t kGuide = 128;
+  std::vector<uint32_t> guide;
 };
 
 /// An entry of Vose's alias table.

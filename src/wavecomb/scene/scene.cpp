@@ -132,20 +132,8 @@ InstanceRecord make_instance_record(const Affine& m, uint32_t material) {
   r.to_world[3] = m.t.x;
   r.to_world[7] = m.t.y;
   r.to_world[11] = m.t.z;
-  // Cofactors: rows are cross products of the rows of A.
-  const auto cross3 = [](const Vec3<float>& a, const Vec3<float>& b) {
-    return Vec3<float>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  };
-  const float sign = m.determinant() < 0 ? -1.f : 1.f;
-  const Vec3<float> c[3] = {cross3(m.row[1], m.row[2]), cross3(m.row[2], m.row[0]),
-                            cross3(m.row[0], m.row[1])};
-  for (int i = 0; i < 3; ++i) {
-    r.normal[3 * i] = sign * c[i].x;
-    r.normal[3 * i + 1] = sign * c[i].y;
-    r.normal[3 * i + 2] = sign * c[i].z;
-  }
   r.material = material;
-  r.identity = m.is_identity();
+  r.side = m.determinant() < 0 ? -1.f : 1.f;
   return r;
 }
 

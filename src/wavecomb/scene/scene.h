@@ -18,17 +18,15 @@
 
 namespace wavecomb {
 
-/// An instance as lanes read it: 32 words. Instance 0 is the world itself (identity).
+/// An instance as lanes read it: one cache line. Instance 0 is the world itself (identity).
 struct alignas(64) InstanceRecord {
   float to_world[12];  ///< rows of A, each followed by its translation
-  float normal[9];     ///< rows of the cofactor matrix of A (times the sign of det A): maps normals
   uint32_t geometry;   ///< first of its group's entries in SceneView::geometry_mesh
   uint32_t material;   ///< for meshes whose material is kInheritMaterial
   uint32_t emissive;   ///< first of its entries in SceneView::emissive_lights
-  uint32_t identity;   ///< 1 when to_world is the identity
-  float pad[7];
+  float side;          ///< sign of det A: -1 where the transform mirrors
 };
-static_assert(sizeof(InstanceRecord) == 128);
+static_assert(sizeof(InstanceRecord) == 64);
 
 /// What kernels need of a scene: plain pointers, valid as long as the Scene.
 struct SceneView {

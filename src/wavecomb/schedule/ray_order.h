@@ -2,10 +2,10 @@
 /// Orders of rays before traversal. They are made from the rays alone.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "wavecomb/core/settings.h"
-#include "wavecomb/schedule/ray_queue.h"
 
 namespace wavecomb {
 
@@ -15,8 +15,11 @@ struct OrderGrid {
   float scale[3] = {1, 1, 1};  ///< 1024 / extent
 };
 
-/// Moves the columns of `from` into `to` by `order`; both have the same columns.
-void permute(const RayQueue& from, RayQueue& to, const uint32_t* order, size_t n);
-void permute(const ShadowQueue& from, ShadowQueue& to, const uint32_t* order, size_t n);
+/// Keys of directions lie below this.
+inline constexpr uint32_t kDirectionKeys = 64;
+
+/// Writes the n slots by ascending key, equal keys in the order in which they come: a counting
+/// sort.
+void sort_by_direction(const uint32_t* key, const uint32_t* slot, size_t n, uint32_t* sorted);
 
 }  // namespace wavecomb

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The rays of a wave that are to be traced next, with what their paths carry along.
+/// The rays of a wave that are to be traced next, and what traversal finds.
 #pragma once
 
 #include "wavecomb/core/soa.h"
 
 namespace wavecomb {
 
-/// Rays side by side, in traversal order. That order is made from the rays alone: slot order as
-/// generated, survivors keeping their places, so it is the same under every shading policy.
+/// Rays side by side, in traversal order, as traversal reads them; the rest of a path stays in its
+/// slot of the pool. The order is made from the rays alone: slot order as generated, survivors
+/// keeping their places, so it is the same under every shading policy.
 ///
 /// Contract: owned by one wave; `size` entries are valid; arrays have room for a packet past the
 /// end.
@@ -16,25 +17,18 @@ class RayQueue {
   RayQueue() = default;
   explicit RayQueue(size_t capacity) : block_(kColumns, capacity), capacity_(capacity) {
     size_t c = 0;
-    for (float** f : {&ox, &oy, &oz, &dx, &dy, &dz, &throughput_r, &throughput_g, &throughput_b,
-                      &pdf, &eta_scale, &cone_width, &cone_spread})
-      *f = block_.floats(c++);
-    slot = block_.uints(c++);
-    alive = block_.uints(c++);
+    for (float** f : {&ox, &oy, &oz, &dx, &dy, &dz}) *f = block_.floats(c++);
+    for (uint32_t** u : {&slot, &ordered_slot, &direction}) *u = block_.uints(c++);
   }
 
-  float *ox, *oy, *oz;  ///< origin, world space
-  float *dx, *dy, *dz;  ///< unit direction
-  float *throughput_r, *throughput_g, *throughput_b;
-  float* pdf;        ///< density of the bounce that made the ray; 0: delta or camera, no MIS
-  float* eta_scale;  ///< product of eta^2 of the interfaces crossed, for roulette
-  float *cone_width,
-      *cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
-  uint32_t* slot;    ///< path slot in the pool
-  uint32_t* alive;   ///< while shading writes: nonzero where the entry holds a new ray
+  float *ox, *oy, *oz;     ///< origin, world space
+  float *dx, *dy, *dz;     ///< unit direction
+  uint32_t* slot;          ///< path slot in the pool
+  uint32_t* ordered_slot;  ///< where slots go when they are put in another order
+  uint32_t* direction;     ///< direction_key of the rays, as shading listed them
   size_t size = 0;
 
-  static constexpr size_t kColumns = 15;
+  static constexpr size_t kColumns = 9;
   size_t capacity() const { return capacity_; }
   size_t bytes() const { return block_.bytes(); }
 
@@ -74,17 +68,16 @@ class ShadowQueue {
   explicit ShadowQueue(size_t capacity) : block_(kColumns, capacity) {
     size_t c = 0;
     for (float** f : {&ox, &oy, &oz, &dx, &dy, &dz, &tfar, &r, &g, &b}) *f = block_.floats(c++);
-    slot = block_.uints(c++);
-    alive = block_.uints(c++);
+    for (uint32_t** u : {&slot, &ordered_slot, &direction, &occluded}) *u = block_.uints(c++);
   }
 
   float *ox, *oy, *oz, *dx, *dy, *dz;
   float* tfar;
   float *r, *g, *b;  ///< what arrives in the slot's radiance when nothing is in the way
-  uint32_t* slot;
-  uint32_t* alive;
+  uint32_t *slot, *ordered_slot, *direction;  ///< as in RayQueue
+  uint32_t* occluded;                         ///< after traversal: 1 where something is in the way
   size_t size = 0;
-  static constexpr size_t kColumns = 12;
+  static constexpr size_t kColumns = 14;
   size_t bytes() const { return block_.bytes(); }
 
  private:

@@ -6,18 +6,23 @@ namespace wavecomb {
 void ShadingQueue::materialize() {
   if (!ordered) return;
   for (uint32_t c = 0; c < kColumns; ++c) {
-    const uint32_t* from = columns_[c];
+    const uint32_t* from = block_.uints(c);
     uint32_t* to = moved_.uints(c);
     for (size_t i = 0; i < size; ++i) to[i] = from[sorted_indices[i]];
-    columns_[c] = to;
   }
+  const float* from = rows_.floats(0);
+  float* to = moved_rows_.floats(0);
+  for (size_t i = 0; i < size; ++i)
+    std::memcpy(to + i * kRowWords, from + sorted_indices[i] * kRowWords, 4 * kRowWords);
   std::swap(block_, moved_);
+  std::swap(rows_, moved_rows_);
   ordered = false;
+  moved = true;
 }
 
 void ShadingQueue::clear() {
   size = 0;
-  ordered = false;
+  ordered = moved = false;
 }
 
 }  // namespace wavecomb

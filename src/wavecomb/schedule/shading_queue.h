@@ -11,64 +11,60 @@
 
 namespace wavecomb {
 
-/// Hits as records, column by column, in arrival order (which is the rays' order), with a logical
-/// order beside them. `sorted_indices` says in which order records are shaded; `materialize()`
-/// moves the columns into it.
+/// Hits in arrival order (which is the rays' order), with a logical order beside them: columns of
+/// ids, which policies look at, and a row a record for the rest, which shading loads whole
+/// (docs/decisions/path-rows.md). `sorted_indices` says in which order records are shaded;
+/// `materialize()` moves them into it.
 ///
 /// Contract: owned by one wave; `size` records are valid. The record's number in arrival order is
-/// where shading puts the path's next ray, so that no shading order shows in the ray order.
+/// where shading notes what became of the path, so that no shading order shows in the ray order.
 class ShadingQueue {
  public:
-  /// Columns of a record. Floats first.
   enum Column : uint32_t {
-    kDx,
-    kDy,
-    kDz,  ///< direction of the ray that hit
-    kThroughputR,
-    kThroughputG,
-    kThroughputB,
-    kPdf,
-    kEtaScale,
-    kConeWidth,
-    kConeSpread,  ///< cone at the hit
-    kT,
-    kU,
-    kV,
-    kSlot,
-    kInst,
-    kMesh,
-    kGeom,
-    kPrim,
     kMaterial,
     kProgram,
-    kArrival,      ///< the record's number in arrival order
     kPositionKey,  ///< Morton code of the hit; where a policy asks
     kColumns
   };
+  /// Words of a record's row, floats and ids.
+  enum Word : uint32_t { kT, kU, kV, kPrim, kInst, kMesh, kGeom, kSlot, kRowWords };
 
   ShadingQueue() = default;
   explicit ShadingQueue(size_t capacity)
-      : block_(kColumns, capacity), moved_(kColumns, capacity), order_(2, capacity) {
-    sorted_indices = order_.uints(0);
-    for (uint32_t c = 0; c < kColumns; ++c) columns_[c] = block_.uints(c);
+      : block_(kColumns, capacity),
+        moved_(kColumns, capacity),
+        rows_(1, capacity * kRowWords),
+        moved_rows_(1, capacity * kRowWords),
+        arrival_(3, capacity) {
+    sorted_indices = arrival_.uints(0);
+    slot = arrival_.uints(1);
+    outcome = arrival_.uints(2);
   }
 
   size_t size = 0;
-  uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 while `ordered`
-  bool ordered = false;  ///< false: shaded in arrival order, sorted_indices is not read
+  uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 while `ordered` or `moved`
+  bool ordered = false;                ///< false: shaded as records stand
+  bool moved = false;  ///< record i stands where it is shaded; it arrived as sorted_indices[i]
 
-  uint32_t* uints(Column c) const { return columns_[c]; }
-  float* floats(Column c) const { return reinterpret_cast<float*>(columns_[c]); }
+  /// By arrival, whatever the order: the path's slot, and what shading made of it (Outcome).
+  uint32_t *slot = nullptr, *outcome = nullptr;
+  enum Outcome : uint32_t { kAlive = 1, kShadowRay = 2 };
+  /// Above those, direction keys of the next ray and of the shadow ray.
+  static constexpr uint32_t kRayKeyShift = 8, kShadowKeyShift = 16;
+
+  uint32_t* uints(Column c) const { return block_.uints(c); }
+  float* rows() const { return rows_.floats(0); }
 
   /// Makes the physical order the logical one: afterwards records stand as they are shaded.
   void materialize();
-  size_t bytes() const { return block_.bytes() + moved_.bytes() + order_.bytes(); }
+  size_t bytes() const {
+    return block_.bytes() + moved_.bytes() + rows_.bytes() + moved_rows_.bytes() + arrival_.bytes();
+  }
   /// Empties the queue for the next depth.
   void clear();
 
  private:
-  SoaBlock block_, moved_, order_;
-  std::array<uint32_t*, kColumns> columns_{};
+  SoaBlock block_, moved_, rows_, moved_rows_, arrival_;
 };
 
 }  // namespace wavecomb

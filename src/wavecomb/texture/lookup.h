@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/core/math.h"
+#include "wavecomb/core/rows.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/texture/half.h"
 #include "wavecomb/texture/srgb.h"
@@ -159,18 +160,18 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
     t.b = decode_u8<F>(texture.srgb, (word >> 16) & 0xffu, active);
     t.a = texture.has_alpha ? decode_u8<F>(false, word >> 24, active) : one;
   } else if (texture.format == TexelFormat::kF16) {
-    const UInt<F> rg = fetch_word<F>(texture, i << 1, active);
-    const UInt<F> ba = fetch_word<F>(texture, (i << 1) + 1u, active);
+    const auto words = load_rows<2, F>(texture.texels, i << 1, active);
+    const UInt<F> rg = float_bits<F>(words[0]), ba = float_bits<F>(words[1]);
     t.r = half_to_float<F>(rg & 0xffffu);
     t.g = half_to_float<F>(rg >> 16);
     t.b = half_to_float<F>(ba & 0xffffu);
     t.a = texture.has_alpha ? half_to_float<F>(ba >> 16) : one;
   } else {
-    const UInt<F> word = i << 2;
-    t.r = gather<F>(texture.texels, word, active);
-    t.g = gather<F>(texture.texels, word + 1u, active);
-    t.b = gather<F>(texture.texels, word + 2u, active);
-    t.a = texture.has_alpha ? gather<F>(texture.texels, word + 3u, active) : one;
+    const auto words = load_rows<4, F>(texture.texels, i << 2, active);
+    t.r = words[0];
+    t.g = words[1];
+    t.b = words[2];
+    t.a = texture.has_alpha ? words[3] : one;
   }
   return t;
 }

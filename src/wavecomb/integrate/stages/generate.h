@@ -31,11 +31,9 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
     const CameraRay<F> ray =
         camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active);
-    store(pool.r + i, F(0.f));
-    store(pool.g + i, F(0.f));
-    store(pool.b + i, F(0.f));
-    store(pool.pixel_hash + i, key.pixel_hash);
-    store(pool.sample + i, sample);
+    store_path<F>(pool, slot,
+                  {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), F(0.f), ray.spread, key},
+                  active);
     if (pool.has_aovs) {
       for (float* column : {pool.albedo_r, pool.albedo_g, pool.albedo_b, pool.normal_x,
                             pool.normal_y, pool.normal_z})
@@ -48,14 +46,10 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     store(rays.dx + i, ray.d.x);
     store(rays.dy + i, ray.d.y);
     store(rays.dz + i, ray.d.z);
-    for (float* one : {rays.throughput_r, rays.throughput_g, rays.throughput_b, rays.eta_scale})
-      store(one + i, F(1.f));
-    store(rays.pdf + i, F(0.f));
-    store(rays.cone_width + i, F(0.f));
-    store(rays.cone_spread + i, ray.spread);
     store(rays.slot + i, slot);
     store(tfar + i, ray.tfar);
   }
+  std::memset(pool.radiance, 0, size_t{n} * PathPool::kRadianceWords * 4);
   rays.size = n;
   return camera.has_far ? tfar : nullptr;
 }

@@ -17,13 +17,13 @@ template <typename F>
 UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone_width,
                     const Mask<F>& active) {
   using U = UInt<F>;
-  const auto mesh = detail::mesh_arrays<F>(scene, hit.mesh, active);
+  const detail::MeshReader<F> mesh(scene, hit.mesh, active);
   const Mask<F> has_uv = active & Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u));
   const U corner = hit.prim * 3u;
   const Mask<U> per_corner(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
+  const std::array<U, 3> vertex = mesh.corners(hit.prim, has_uv);
   const auto uv_of = [&](uint32_t k) {
-    const U vertex = mesh.indices.template at<U>(corner + k, has_uv);
-    return mesh.uvs.vec2(select(per_corner, corner + k, vertex), has_uv);
+    return mesh.vec2(&MeshRecord::uvs, select(per_corner, U(corner + k), vertex[k]), has_uv);
   };
   const Vec2<F> t0 = uv_of(0), t1 = uv_of(1), t2 = uv_of(2);
   const F b0 = 1.f - hit.u - hit.v;
@@ -54,17 +54,17 @@ void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
   const ShadingQueue& queue = wave.shading;
   for (size_t i = 0; i < queue.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(queue.size - i);
-    const auto real = [&](Q::Column c) { return load<F>(queue.floats(c) + i); };
-    const auto id = [&](Q::Column c) { return load<U>(queue.uints(c) + i); };
-    if (wanted & kThroughputColumn)
-      store(
-          wave.columns.floats(0) + i,
-          luminance(Vec3<F>(real(Q::kThroughputR), real(Q::kThroughputG), real(Q::kThroughputB))));
-    if (wanted & kPositionColumn) store(wave.columns.uints(1) + i, id(Q::kPositionKey));
+    if (wanted & kPositionColumn)
+      store(wave.columns.uints(1) + i, load<U>(queue.uints(Q::kPositionKey) + i));
+    const U row = (lane_index<F>() + static_cast<uint32_t>(i)) * uint32_t{Q::kRowWords};
+    const auto r = load_rows<Q::kRowWords, F>(queue.rows(), row, active);
+    const auto id = [&](Q::Word w) { return float_bits<F>(r[w]); };
+    const PathLanes<F> path = load_path<F>(wave.pool, id(Q::kSlot), active);
+    if (wanted & kThroughputColumn) store(wave.columns.floats(0) + i, luminance(path.throughput));
     if (wanted & kTextureColumn) {
-      const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), real(Q::kU), real(Q::kV)};
-      store(wave.columns.uints(2) + i,
-            texture_key<F>(context.scene, hit, real(Q::kConeWidth), active));
+      const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), r[Q::kU], r[Q::kV]};
+      const F width = fma(path.cone_spread, r[Q::kT], path.cone_width);
+      store(wave.columns.uints(2) + i, texture_key<F>(context.scene, hit, width, active));
     }
   }
 }

@@ -19,38 +19,55 @@ inline UInt<F> position_key(const OrderGrid& grid, const Vec3<F>& p) {
   return morton_3<U>(axis(p.x, 0), axis(p.y, 1), axis(p.z, 2));
 }
 
-/// Keys of rays: the Morton code of the origin, under the octant of the direction where asked for.
-template <typename F, typename Queue>
-void ray_keys(const Queue& q, const OrderGrid& grid, bool by_octant, uint64_t* keys) {
+/// Axes longer than this count as long ones; about 1 / sqrt(3).
+inline constexpr float kLong = 0.6f;
+
+/// Six bits of a direction: its octant, and which of its axes are long.
+template <typename F>
+inline UInt<F> direction_key(const Vec3<F>& d) {
   using U = UInt<F>;
+  const auto sign = [](const F& x) { return float_bits<F>(x) >> 31; };
+  const auto is_long = [](const F& x) { return select(Mask<U>(abs(x) > kLong), U(1u), U(0u)); };
+  return (sign(d.x) << 5) | (sign(d.y) << 4) | (sign(d.z) << 3) | (is_long(d.x) << 2) |
+         (is_long(d.y) << 1) | is_long(d.z);
+}
+
+/// Keys of the rays in the pool rows of `slot`: the Morton code of the origin, under the octant of
+/// the direction where asked for. Paths and shadow rays both start with origin and direction.
+template <typename F>
+void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid& grid,
+              bool by_octant, uint64_t* keys) {
+  using U = UInt<F>;
+  static_assert(PathPool::kPathWords == PathPool::kShadowWords);
   alignas(64) uint32_t lanes[kWidth<F>];
-  for (size_t i = 0; i < q.size; i += kWidth<F>) {
-    const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
-    U key = position_key<F>(grid, o);
-    if (by_octant) {
-      const auto sign = [&](const float* d) { return float_bits<F>(load<F>(d + i)) >> 31; };
-      // The octant takes the two spare bits and the place of the lowest: it is worth more than that
-      // one
-      key = (sign(q.dx) << 31) | (sign(q.dy) << 30) | (sign(q.dz) << 29) | (key >> 1);
-    }
+  for (size_t i = 0; i < n; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(n - i);
+    const auto r = load_rows<8, F>(rows, load<U>(slot + i) * PathPool::kPathWords, active);
+    U key = position_key<F>(grid, Vec3<F>(r[0], r[1], r[2]));
+    // The octant takes the two spare bits and the place of the lowest: it is worth more than that
+    // one.
+    if (by_octant) key = ((direction_key<F>(Vec3<F>(r[3], r[4], r[5])) >> 3) << 29) | (key >> 1);
     store(lanes, key);
-    const size_t n = std::min(kWidth<F>, q.size - i);
-    for (size_t k = 0; k < n; ++k) keys[i + k] = lanes[k];
+    const size_t m = std::min(kWidth<F>, n - i);
+    for (size_t k = 0; k < m; ++k) keys[i + k] = lanes[k];
   }
 }
 
 /// What was done, for the chooser to learn from.
 struct RayOrderChoice {
   bool chosen = false;
+  bool coherent = false;  ///< packets are to be traversed together
   size_t arm = 0;
   Work work;
   double prepare_ns = 0;
 };
 
-/// Orders the queue as `order` says; kAuto asks the chooser. `other` is where ordered rays go.
+/// Orders the queue's slots as `order` says; kAuto asks the chooser. `rows` of the pool hold the
+/// rays.
 template <typename F, typename Queue>
 RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth, RayOrder order,
-                          Chooser& chooser, Queue& queue, Queue& other) {
+                          Chooser& chooser, const float* rows, Queue& queue) {
+  using U = UInt<F>;
   using Clock = PhaseClock::Clock;
   RayOrderChoice choice;
   if (order == RayOrder::kSlot || queue.size <= kWidth<F>) return choice;
@@ -59,15 +76,25 @@ RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth
   if (order == RayOrder::kAuto) {
     choice.chosen = true;
     choice.work = {static_cast<double>((queue.size + 15) / 16), static_cast<double>(queue.size)};
-    const std::array<Work, Wave::kRayOrders> work{choice.work, choice.work, choice.work};
+    std::array<Work, Wave::kRayOrders> work;
+    work.fill(choice.work);
     choice.arm = chooser.choose(depth, work);
     order = static_cast<RayOrder>(choice.arm);
   }
-  if (order != RayOrder::kSlot) {
-    ray_keys<F>(queue, context.grid, order == RayOrder::kMortonOctant, wave.ray_sorter.keys());
-    if (wave.ray_sorter.sort(queue.size, wave.ray_indices.data())) {
-      permute(queue, other, wave.ray_indices.data(), queue.size);
-      std::swap(queue, other);
+  if (order == RayOrder::kDirection) {
+    choice.coherent = true;
+    sort_by_direction(queue.direction, queue.slot, queue.size, queue.ordered_slot);
+    std::swap(queue.slot, queue.ordered_slot);
+  } else if (order != RayOrder::kSlot) {
+    ray_keys<F>(rows, queue.slot, queue.size, context.grid, order == RayOrder::kMortonOctant,
+                wave.ray_sorter.keys());
+    uint32_t* indices = wave.ray_indices.data();
+    if (wave.ray_sorter.sort(queue.size, indices)) {
+      for (size_t i = 0; i < queue.size; i += kWidth<F>) {
+        const Mask<U> active(first_lanes<F>(queue.size - i));
+        store(queue.ordered_slot + i, gather<U>(queue.slot, load<U>(indices + i), active));
+      }
+      std::swap(queue.slot, queue.ordered_slot);
     }
   }
   choice.prepare_ns = std::chrono::duration<double, std::nano>(Clock::now() - start).count();

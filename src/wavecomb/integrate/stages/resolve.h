@@ -17,9 +17,10 @@ inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask
     Film::Pixel sum = film.pixel(x, y);
     const size_t end = slot + task.samples;
     for (size_t s = slot; s < end; ++s) {
-      sum.r += pool.r[s];
-      sum.g += pool.g[s];
-      sum.b += pool.b[s];
+      const float* c = pool.radiance + s * PathPool::kRadianceWords;
+      sum.r += c[0];
+      sum.g += c[1];
+      sum.b += c[2];
     }
     sum.samples += task.samples;
     film.pixel(x, y) = sum;

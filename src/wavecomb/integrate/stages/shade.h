@@ -2,49 +2,45 @@
 /// Stage 3c: shading, batch by batch, in lanes.
 #pragma once
 
+#include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
 
-/// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. New rays
-/// and shadow rays go to the places of their records in arrival order; compact() closes the gaps.
+/// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. A path's
+/// next ray takes the place of its last in the pool; what became of it is noted by arrival.
 template <typename Bsdf, typename F>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {
   using U = UInt<F>;
   using Q = ShadingQueue;
   const ShadingQueue& queue = wave.shading;
-  PathPool& pool = wave.pool;
-  RayQueue& rays = wave.rays;
-  ShadowQueue& shadows = wave.shadows;
+  const PathPool& pool = wave.pool;
   const bool wants_aovs = depth == 0 && pool.has_aovs;
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
-    const U at = queue.ordered ? load<U>(queue.sorted_indices + i)
-                               : lane_index<F>() + static_cast<uint32_t>(i);
-    const auto real = [&](Q::Column c) {
-      return queue.ordered ? gather<F>(queue.floats(c), at, active) : load<F>(queue.floats(c) + i);
-    };
-    const auto id = [&](Q::Column c) {
-      return queue.ordered ? gather<U>(queue.uints(c), at, on) : load<U>(queue.uints(c) + i);
-    };
-    PathState<F> path;
-    path.dir = {real(Q::kDx), real(Q::kDy), real(Q::kDz)};
-    path.throughput = {real(Q::kThroughputR), real(Q::kThroughputG), real(Q::kThroughputB)};
-    path.pdf = real(Q::kPdf);
-    path.eta_scale = real(Q::kEtaScale);
-    path.cone_width = real(Q::kConeWidth);
-    path.cone_spread = real(Q::kConeSpread);
-    const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), real(Q::kU), real(Q::kV)};
+    const U here = lane_index<F>() + static_cast<uint32_t>(i);
+    const U sorted = queue.ordered || queue.moved ? load<U>(queue.sorted_indices + i) : here;
+    const U at = queue.ordered ? sorted : here;
+    const auto r = load_rows<Q::kRowWords, F>(queue.rows(), at * uint32_t{Q::kRowWords}, active);
+    const auto id = [&](Q::Word w) { return float_bits<F>(r[w]); };
     const U slot = id(Q::kSlot);
-    const U arrival = id(Q::kArrival);
-    const SampleKey<F> key{gather<U>(pool.pixel_hash, slot, on), gather<U>(pool.sample, slot, on)};
-
+    const U material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, on)
+                                     : load<U>(queue.uints(Q::kMaterial) + i);
+    const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), r[Q::kU], r[Q::kV]};
+    PathLanes<F> path = load_path<F>(pool, slot, active);
+    const F t = r[Q::kT];
+    const PathState<F> state{path.d,
+                             path.throughput,
+                             path.pdf,
+                             path.eta_scale,
+                             fma(path.cone_spread, t, path.cone_width),
+                             path.cone_spread};
     const VertexResult<F> v =
-        shade_vertex<Bsdf, F>(context.scene, settings, key, depth, hit, id(Q::kGeom), real(Q::kT),
-                              id(Q::kMaterial), path, wants_aovs, active);
+        shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, id(Q::kGeom), t,
+                              material, state, wants_aovs, active);
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
@@ -56,43 +52,24 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       scatter<F>(pool.normal_y, v.normal.y, slot, active);
       scatter<F>(pool.normal_z, v.normal.z, slot, active);
     }
-    // Flags are set for every record, so nothing need be cleared before.
-    scatter<U>(rays.alive, select(Mask<U>(v.alive), U(1u), U(0u)), arrival, on);
-    scatter<U>(shadows.alive, select(Mask<U>(v.has_shadow), U(1u), U(0u)), arrival, on);
-    const auto put = [&](float* to, const F& x, const Mask<F>& where) {
-      scatter<F>(to, x, arrival, where);
-    };
+    const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
+                      select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
+                      (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |
+                      (direction_key<F>(v.shadow_d) << Q::kShadowKeyShift);
+    scatter<U>(queue.outcome, outcome, sorted, on);
     if (any(v.has_shadow)) {
-      const Mask<F>& m = v.has_shadow;
-      put(shadows.ox, v.shadow_o.x, m);
-      put(shadows.oy, v.shadow_o.y, m);
-      put(shadows.oz, v.shadow_o.z, m);
-      put(shadows.dx, v.shadow_d.x, m);
-      put(shadows.dy, v.shadow_d.y, m);
-      put(shadows.dz, v.shadow_d.z, m);
-      put(shadows.tfar, v.shadow_tfar, m);
-      put(shadows.r, v.direct.x, m);
-      put(shadows.g, v.direct.y, m);
-      put(shadows.b, v.direct.z, m);
-      scatter<U>(shadows.slot, slot, arrival, Mask<U>(m));
+      const F none(0.f);
+      store_rows<PathPool::kShadowWords, F>(
+          pool.shadows, slot * PathPool::kShadowWords,
+          {v.shadow_o.x, v.shadow_o.y, v.shadow_o.z, v.shadow_d.x, v.shadow_d.y, v.shadow_d.z,
+           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, none, none, none, none, none, none},
+          v.has_shadow);
     }
-    if (any(v.alive)) {
-      const Mask<F>& m = v.alive;
-      put(rays.ox, v.o.x, m);
-      put(rays.oy, v.o.y, m);
-      put(rays.oz, v.o.z, m);
-      put(rays.dx, v.next.dir.x, m);
-      put(rays.dy, v.next.dir.y, m);
-      put(rays.dz, v.next.dir.z, m);
-      put(rays.throughput_r, v.next.throughput.x, m);
-      put(rays.throughput_g, v.next.throughput.y, m);
-      put(rays.throughput_b, v.next.throughput.z, m);
-      put(rays.pdf, v.next.pdf, m);
-      put(rays.eta_scale, v.next.eta_scale, m);
-      put(rays.cone_width, v.next.cone_width, m);
-      put(rays.cone_spread, v.next.cone_spread, m);
-      scatter<U>(rays.slot, slot, arrival, Mask<U>(m));
-    }
+    if (any(v.alive))
+      store_path<F>(pool, slot,
+                    {v.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
+                     v.next.cone_width, v.next.cone_spread, path.key},
+                    v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }
@@ -149,33 +126,25 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   }
 }
 
-/// Closes the gaps that shading left in the ray and shadow queues, keeping order.
+/// Lists the paths that go on and the shadow rays, both in arrival order.
 template <typename F>
 void compact(Wave& wave) {
   using U = UInt<F>;
-  const size_t n = wave.shading.size;
-  const auto squeeze = [n](const uint32_t* alive, auto&& columns) {
-    size_t out = 0;
-    for (size_t i = 0; i < n; i += kWidth<F>) {
-      const Mask<F> keep = first_lanes<F>(n - i) & Mask<F>(load<U>(alive + i) != U(0u));
-      columns(i, out, keep);
-      out += count<F>(keep);
-    }
-    return out;
-  };
-  RayQueue& r = wave.rays;
-  r.size = squeeze(r.alive, [&](size_t from, size_t to, const Mask<F>& keep) {
-    for (float* c : {r.ox, r.oy, r.oz, r.dx, r.dy, r.dz, r.throughput_r, r.throughput_g,
-                     r.throughput_b, r.pdf, r.eta_scale, r.cone_width, r.cone_spread})
-      compress_store<F>(c + to, load<F>(c + from), keep);
-    compress_store<U>(r.slot + to, load<U>(r.slot + from), Mask<U>(keep));
-  });
-  ShadowQueue& s = wave.shadows;
-  s.size = squeeze(s.alive, [&](size_t from, size_t to, const Mask<F>& keep) {
-    for (float* c : {s.ox, s.oy, s.oz, s.dx, s.dy, s.dz, s.tfar, s.r, s.g, s.b})
-      compress_store<F>(c + to, load<F>(c + from), keep);
-    compress_store<U>(s.slot + to, load<U>(s.slot + from), Mask<U>(keep));
-  });
+  const ShadingQueue& queue = wave.shading;
+  size_t rays = 0, shadows = 0;
+  for (size_t i = 0; i < queue.size; i += kWidth<F>) {
+    const Mask<U> active(first_lanes<F>(queue.size - i));
+    const U outcome = load<U>(queue.outcome + i), slot = load<U>(queue.slot + i);
+    const auto keep = [&](auto& list, size_t& n, ShadingQueue::Outcome what, uint32_t shift) {
+      const Mask<U> wanted = active & Mask<U>((outcome & uint32_t{what}) != U(0u));
+      compress_store<U>(list.direction + n, (outcome >> shift) & (kDirectionKeys - 1), wanted);
+      n += compress_store<U>(list.slot + n, slot, wanted);
+    };
+    keep(wave.rays, rays, ShadingQueue::kAlive, ShadingQueue::kRayKeyShift);
+    keep(wave.shadows, shadows, ShadingQueue::kShadowRay, ShadingQueue::kShadowKeyShift);
+  }
+  wave.rays.size = rays;
+  wave.shadows.size = shadows;
 }
 
 }  // namespace wavecomb

@@ -6,19 +6,46 @@
 
 namespace wavecomb {
 
+/// Brings the rays of the listed slots side by side.
+template <typename F>
+void fetch_rays(Wave& wave) {
+  using U = UInt<F>;
+  RayQueue& q = wave.rays;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i);
+    const U slot = load<U>(q.slot + i);
+    const auto r = load_rows<8, F>(wave.pool.paths, slot * PathPool::kPathWords, active);
+    float* const columns[] = {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz};
+    for (size_t c = 0; c < 6; ++c) store(columns[c] + i, r[c]);
+  }
+}
+
+/// Brings the shadow rays of the listed slots side by side.
+template <typename F>
+void fetch_shadows(Wave& wave) {
+  using U = UInt<F>;
+  ShadowQueue& q = wave.shadows;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i);
+    const U slot = load<U>(q.slot + i);
+    const auto r = load_rows<16, F>(wave.pool.shadows, slot * PathPool::kShadowWords, active);
+    float* const columns[] = {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b};
+    for (size_t c = 0; c < 10; ++c) store(columns[c] + i, r[c]);
+  }
+}
+
 /// Keys of presence for rays of `depth`; shadow rays draw other numbers than the rays themselves.
 inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow) {
-  return {pool.pixel_hash, pool.sample, 2 * depth + (shadow ? 1u : 0u)};
+  const auto* words = reinterpret_cast<const uint32_t*>(pool.paths);
+  return {words + 13, words + 14, PathPool::kPathWords, 2 * depth + (shadow ? 1u : 0u)};
 }
 
 /// Closest hits of the ray queue into the hit buffer.
-inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar) {
+inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar,
+                  bool coherent) {
   const RayQueue& q = wave.rays;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size};
   const HitBuffer& h = wave.hits;
-  // Coherent packets assume rays from one point: with a lens, hits on edges would depend on the
-  // packet.
-  const bool coherent = depth == 0 && context.camera->lens_radius == 0;
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
                            coherent, presence_keys(wave.pool, depth, false));
   wave.counts.add_rays(depth, q.size);
@@ -27,16 +54,14 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
 /// Adds what the unblocked shadow rays bring to their slots. A slot has at most one, so the order
 /// of the queue cannot matter.
 template <typename F>
-void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
+void shadow(Wave& wave, const WaveContext& context, uint32_t depth, bool coherent) {
   using U = UInt<F>;
   ShadowQueue& q = wave.shadows;
-  if (q.size == 0) return;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.slot, q.size};
-  uint32_t* occluded = q.alive;  // compaction is done with it
-  context.accel->occluded(rays, occluded, context.traversal_width,
+  context.accel->occluded(rays, q.occluded, context.traversal_width, coherent,
                           presence_keys(wave.pool, depth, true));
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
-    const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(occluded + i) == U(0u));
+    const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
     add_radiance<F>(wave.pool, slot, {load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)},
                     active);

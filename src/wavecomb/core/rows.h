@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rows in memory to and from lanes: each lane has a row of N consecutive words, and lane i of
+/// value k is word k of lane i's row.
+///
+/// A gather or scatter touches memory once a lane and a word. A row is loaded whole and the rows
+/// are transposed in registers: 16 rows of 16 words take a fifth of the time of 16 gathers
+/// (docs/decisions/path-rows.md).
+#pragma once
+
+#include <array>
+#include <bit>
+#include <utility>
+
+#include "wavecomb/core/lanes.h"
+
+namespace wavecomb {
+
+namespace detail {
+
+template <size_t W>
+struct VectorOf {
+  typedef float type __attribute__((vector_size(4 * W)));
+};
+/// A register of W words, whatever they mean.
+template <size_t W>
+using Vector = typename VectorOf<W>::type;
+
+/// Block S of `a` and `b` changes places with its neighbour: one step of a transposition.
+template <size_t W, size_t S, size_t... I>
+inline void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence<I...>) {
+  const Vector<W> low = __builtin_shufflevector(a, b, ((I & S) == 0 ? I : W + I - S)...);
+  const Vector<W> high = __builtin_shufflevector(a, b, ((I & S) == 0 ? I + S : W + I)...);
+  a = low;
+  b = high;
+}
+
+/// Transposes the N x N blocks that stand side by side in N registers of W words (Eklundh 1972);
+/// its own inverse.
+template <size_t N, size_t W, size_t S = N / 2>
+inline void transpose_blocks(std::array<Vector<W>, N>& r) {
+  for (size_t i = 0; i < N; ++i)
+    if ((i & S) == 0) swap_blocks<W, S>(r[i], r[i + S], std::make_index_sequence<W>());
+  if constexpr (S > 1) transpose_blocks<N, W, S / 2>(r);
+}
+
+/// Power of two that holds rows of N words.
+template <size_t N>
+inline constexpr size_t kRowBlock = std::bit_ceil(N);
+
+/// N <= B words at p in a register of B words, 0 beyond them. Reads nothing beyond.
+template <size_t N, size_t B>
+inline Vector<B> load_words(const float* p) {
+  if constexpr (N == B) {
+    Vector<B> v;
+    std::memcpy(&v, p, 4 * B);
+    return v;
+#if defined(__AVX512VL__)
+  } else if constexpr (B == 4) {
+    return std::bit_cast<Vector<4>>(_mm_maskz_loadu_ps((1 << N) - 1, p));
+#endif
+  } else {
+    Vector<B> v{};
+    for (size_t i = 0; i < N; ++i) v[i] = p[i];
+    return v;
+  }
+}
+
+template <size_t B, size_t... I>
+inline Vector<2 * B> join_two(const Vector<B>& a, const Vector<B>& b, std::index_sequence<I...>) {
+  return __builtin_shufflevector(a, b, I...);
+}
+/// Small vectors side by side in a wide one.
+template <size_t B, size_t W>
+inline Vector<W> join(const Vector<B>* parts) {
+  if constexpr (B == W)
+    return parts[0];
+  else
+    return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
+                           std::make_index_sequence<W>());
+}
+/// Words Start .. Start + sizeof...(I) - 1 of a vector.
+template <size_t Start, size_t W, size_t... I>
+inline Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
+  return __builtin_shufflevector(v, v, (Start + I)...);
+}
+/// Stores the N-word parts of `v` from part J on; part j goes to at[j * N].
+template <size_t N, size_t W, size_t J = 0>
+inline void store_parts(const Vector<W>& v, float* const* at) {
+  const Vector<N> one = part<J * N, W>(v, std::make_index_sequence<N>());
+  std::memcpy(at[J * N], &one, 4 * N);
+  if constexpr ((J + 1) * N < W) store_parts<N, W, J + 1>(v, at);
+}
+
+template <typename F>
+concept InOneRegister = !kIsScalar<F> && !requires(const F& f) { f.a1; };
+
+/// Rows at the lanes' own addresses.
+template <size_t N, typename F>
+WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
+  constexpr size_t W = kWidth<F>, B = kRowBlock<N>;
+  std::array<F, N> out;
+  if constexpr (kIsScalar<F>) {
+    std::memcpy(out.data(), at[0], 4 * N);
+  } else if constexpr (!InOneRegister<F>) {  // made of two halves
+    const auto low = rows_at<N, typename F::Array1>(at);
+    const auto high = rows_at<N, typename F::Array2>(at + F::Size1);
+    for (size_t k = 0; k < N; ++k) out[k] = F(low[k], high[k]);
+  } else if constexpr (B <= W) {
+    std::array<Vector<W>, B> r;
+    for (size_t k = 0; k < B; ++k) {
+      Vector<B> parts[W / B];
+      for (size_t j = 0; j < W / B; ++j) parts[j] = load_words<N, B>(at[k + j * B]);
+      r[k] = join<B, W>(parts);
+    }
+    transpose_blocks<B, W>(r);
+    for (size_t k = 0; k < N; ++k) out[k].m = std::bit_cast<decltype(F::m)>(r[k]);
+  } else {  // rows longer than a register: W columns at a time
+    static_assert(N % W == 0);
+    for (size_t c = 0; c < N; c += W) {
+      const float* part[W];
+      for (size_t i = 0; i < W; ++i) part[i] = at[i] + c;
+      const auto columns = rows_at<W, F>(part);
+      for (size_t k = 0; k < W; ++k) out[c + k] = columns[k];
+    }
+  }
+  return out;
+}
+
+template <size_t N, typename F>
+WAVECOMB_INLINE void rows_to(float* const* at, const std::array<F, N>& values) {
+  constexpr size_t W = kWidth<F>;
+  static_assert(std::has_single_bit(N));
+  if constexpr (kIsScalar<F>) {
+    std::memcpy(at[0], values.data(), 4 * N);
+  } else if constexpr (!InOneRegister<F>) {
+    std::array<typename F::Array1, N> low;
+    std::array<typename F::Array2, N> high;
+    for (size_t k = 0; k < N; ++k) {
+      low[k] = drjit::low(values[k]);
+      high[k] = drjit::high(values[k]);
+    }
+    rows_to<N, typename F::Array1>(at, low);
+    rows_to<N, typename F::Array2>(at + F::Size1, high);
+  } else if constexpr (N <= W) {
+    std::array<Vector<W>, N> r;
+    for (size_t k = 0; k < N; ++k) r[k] = std::bit_cast<Vector<W>>(values[k].m);
+    transpose_blocks<N, W>(r);
+    for (size_t k = 0; k < N; ++k) store_parts<N, W>(r[k], at + k);
+  } else {
+    for (size_t c = 0; c < N; c += W) {
+      float* part[W];
+      std::array<F, W> columns;
+      for (size_t i = 0; i < W; ++i) part[i] = at[i] + c;
+      for (size_t k = 0; k < W; ++k) columns[k] = values[c + k];
+      rows_to<W, F>(part, columns);
+    }
+  }
+}
+
+/// What inactive lanes read.
+alignas(64) inline constexpr float kNoRow[16] = {};
+
+}  // namespace detail
+
+/// Words [word, word + N) of the array at `base`, for each active lane; 0 in the others.
+/// N is 2 to 16; nothing else is read.
+template <size_t N, typename F>
+WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word,
+                                           const Mask<F>& active) {
+  constexpr size_t W = kWidth<F>;
+  const detail::InMemory<UInt<F>> index(word);
+  const auto* from = static_cast<const float*>(base);
+  const float* at[W];
+  const uint32_t bits = lane_bits<F>(active);
+  if (bits == (uint64_t{1} << W) - 1) {
+    for (size_t i = 0; i < W; ++i) at[i] = from + index.value[i];
+  } else {
+    for (size_t i = 0; i < W; ++i)
+      at[i] = (bits >> i & 1u) != 0 ? from + index.value[i] : detail::kNoRow;
+  }
+  return detail::rows_at<N, F>(at);
+}
+
+/// The same from an array of each lane's own: `array(i)` is lane i's, asked for active lanes only.
+template <size_t N, typename F, typename Array>
+WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>& word,
+                                              const Mask<F>& active) {
+  constexpr size_t W = kWidth<F>;
+  const detail::InMemory<UInt<F>> index(word);
+  const float* at[W];
+  const uint32_t bits = lane_bits<F>(active);
+  for (size_t i = 0; i < W; ++i)
+    at[i] = (bits >> i & 1u) != 0 ? static_cast<const float*>(array(i)) + index.value[i]
+                                  : detail::kNoRow;
+  return detail::rows_at<N, F>(at);
+}
+
+/// Writes the rows of the active lanes; rows of active lanes are distinct. N is a power of two.
+template <size_t N, typename F>
+WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::array<F, N>& values,
+                                const Mask<F>& active) {
+  constexpr size_t W = kWidth<F>;
+  const detail::InMemory<UInt<F>> index(word);
+  auto* to = static_cast<float*>(base);
+  alignas(64) float none[N];
+  float* at[W];
+  const uint32_t bits = lane_bits<F>(active);
+  for (size_t i = 0; i < W; ++i) at[i] = (bits >> i & 1u) != 0 ? to + index.value[i] : none;
+  detail::rows_to<N, F>(at, values);
+}
+
+/// Writes the rows of the active lanes one behind the other at `to`; returns how many.
+template <size_t N, typename F>
+WAVECOMB_INLINE uint32_t compress_rows(float* to, const std::array<F, N>& values,
+                                       const Mask<F>& active) {
+  constexpr size_t W = kWidth<F>;
+  alignas(64) float none[N];
+  float* at[W];
+  const uint32_t bits = lane_bits<F>(active);
+  uint32_t n = 0;
+  for (size_t i = 0; i < W; ++i) {
+    const uint32_t one = bits >> i & 1u;
+    at[i] = one != 0 ? to + N * n : none;
+    n += one;
+  }
+  detail::rows_to<N, F>(at, values);
+  return n;
+}
+
+}  // namespace wavecomb
