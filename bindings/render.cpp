@@ -275,6 +275,7 @@ nb::dict statistics_dict(const Result& r) {
   d["settings"] = r.settings;
   seconds["build"] = s.build_s;
   seconds["render"] = s.render_s;
+  seconds["first_samples"] = s.first_samples_s;
   d["seconds"] = seconds;
   for (const auto& [name, value] : s.phases_s) phases[name.c_str()] = value;
   d["phases_s"] = phases;
@@ -314,6 +315,10 @@ nb::dict statistics_dict(const Result& r) {
   d["lanes"] = s.lanes;
   memory["accelerator"] = s.accelerator_bytes;
   memory["waves"] = s.wave_bytes;
+  memory["film"] = s.film_bytes;
+  memory["meshes"] = s.scene_bytes.meshes;
+  memory["textures"] = s.scene_bytes.textures;
+  memory["records"] = s.scene_bytes.records;
   d["memory_bytes"] = memory;
   d["peak_rss_bytes"] = s.peak_rss_bytes;
   d["cancelled"] = s.cancelled;

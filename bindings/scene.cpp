@@ -135,6 +135,7 @@ uint32_t add_texture(SceneBuilder& builder,
   desc.srgb = srgb;
   desc.wrap_s = wrap(wrap_s);
   desc.wrap_t = wrap(wrap_t);
+  const nb::gil_scoped_release release;  // others may read images meanwhile
   return builder.add_texture(desc);
 }
 
@@ -314,7 +315,7 @@ void bind_scene(nb::module_& m) {
 
   const Color3 grey{0.18f, 0.18f, 0.18f}, black{0.f, 0.f, 0.f}, white{1.f, 1.f, 1.f};
   nb::class_<SceneBuilder>(m, "SceneBuilder")
-      .def(nb::init<>())
+      .def(nb::init<uint32_t>(), "threads"_a = 0)
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
@@ -336,5 +337,5 @@ void bind_scene(nb::module_& m) {
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
            "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,
            "far_clip"_a = 1e30f)
-      .def("build", &SceneBuilder::build);
+      .def("build", &SceneBuilder::build, nb::call_guard<nb::gil_scoped_release>());
 }

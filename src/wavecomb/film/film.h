@@ -32,6 +32,8 @@ class Film {
   uint32_t height() const { return height_; }
   bool has_aovs() const { return !aovs_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[size_t{y} * width_ + x]; }
+  /// Memory of the sums.
+  size_t bytes() const { return pixels_.size() * sizeof(Pixel) + aovs_.size() * sizeof(AovPixel); }
   AovPixel& aov(uint32_t x, uint32_t y) { return aovs_[size_t{y} * width_ + x]; }
 
   /// Means: rgb interleaved; black where a pixel has no samples.

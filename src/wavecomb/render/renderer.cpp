@@ -234,6 +234,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   std::atomic<uint64_t> done{0};
   std::atomic<bool> cancel{false};
   const Clock::time_point start = Clock::now();
+  double first_samples_s = 0;
 
   const auto run_task = [&](const WaveTask& task) {
     Worker& worker = workers[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
@@ -244,7 +245,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
       if (!worker.wave) worker.wave = std::make_unique<Wave>(wave_size, context);
       kernels.run(*worker.wave, context, task);
     }
-    done += task.path_count();
+    if (done.fetch_add(task.path_count()) == 0) first_samples_s = seconds_since(start);
   };
   CostTracker measured(traits.size());  // of the pass
   std::vector<double> total_ns(traits.size());
@@ -347,6 +348,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   s = {};
   s.build_s = impl_->build_s;
   s.render_s = seconds_since(start);
+  s.first_samples_s = first_samples_s;
   s.threads = threads;
   s.wave_size = wave_size;
   s.lanes = reference ? 1 : lanes;
@@ -405,7 +407,9 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   if (policies.size() > 1)
     for (size_t p = 0; p < policies.size(); ++p)
       s.policy_uses.emplace_back(std::string(policies[p]->name()), uses[p]);
+  s.scene_bytes = scene.bytes();
   s.accelerator_bytes = impl_->accel->bytes();
+  s.film_bytes = film.bytes();
   s.peak_rss_bytes = peak_rss_bytes();
 
   return {settings.width, settings.height, film.beauty(), film.albedo(),

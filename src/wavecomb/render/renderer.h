@@ -38,11 +38,13 @@ struct MaterialStatistics {
 /// What a render took. Phase times are sums over workers.
 struct RenderStatistics {
   double build_s = 0, render_s = 0;
+  double first_samples_s = 0;  ///< of render_s, until the first wave was done
   std::vector<std::pair<std::string, double>> phases_s;
   uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
   uint64_t packets = 0, packet_lanes = 0;
   uint32_t threads = 0, wave_size = 0, lanes = 0;
-  uint64_t accelerator_bytes = 0, wave_bytes = 0, peak_rss_bytes = 0;
+  SceneBytes scene_bytes;
+  uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
   bool cancelled = false;
   // Per depth; the last entry holds all deeper ones.
   std::vector<uint64_t> rays_at, shadow_rays_at, records_at;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "wavecomb/scene/light_builder.h"
+#include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {
 
@@ -11,6 +12,8 @@ namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
 constexpr uint32_t kMaxWidth = 1024, kMaxHeight = 512;
+/// Rows of texels that are read at once.
+constexpr uint32_t kRows = 256;
 /// Least share of a lit cell in its row, and of a lit row, relative to the mean: so that float
 /// cumulative values can tell it apart and no lit cell is missed.
 constexpr double kFloor = 1e-3;
@@ -39,22 +42,23 @@ uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
 class RowMeans {
  public:
   RowMeans(const TextureView& texture, const Vec3<float>& color, uint32_t cells)
-      : texture_(texture), color_(color), cells_(cells), line_(texture.levels[0].width) {}
+      : texture_(texture), color_(color), cells_(cells) {}
 
-  std::vector<double> operator()(uint32_t y) {
-    const auto n = static_cast<uint32_t>(line_.size());
+  std::vector<double> operator()(uint32_t y) const {
+    const uint32_t n = texture_.levels[0].width;
+    std::vector<double> line(n);
     for (uint32_t x = 0; x < n; ++x) {
       const auto t = texel_at(texture_, 0, x, y);
       const auto lit = [](float texel, float scale) {
         return std::max(0.0, double{texel}) * double{scale};
       };
-      line_[x] = 0.212656 * lit(t[0], color_.x) + 0.715158 * lit(t[1], color_.y) +
+      line[x] = 0.212656 * lit(t[0], color_.x) + 0.715158 * lit(t[1], color_.y) +
                  0.072186 * lit(t[2], color_.z);
     }
-    const auto at = [&](uint32_t i) { return i == n ? 0.0 : line_[i]; };
+    const auto at = [&](uint32_t i) { return i == n ? 0.0 : line[i]; };
     std::vector<double> smooth(n), cells(cells_, 0.0);
     for (uint32_t x = 0; x < n; ++x) {
-      smooth[x] = (at(neighbour(texture_.wrap_s, x, -1, n)) + 6 * line_[x] +
+      smooth[x] = (at(neighbour(texture_.wrap_s, x, -1, n)) + 6 * line[x] +
                    at(neighbour(texture_.wrap_s, x, 1, n))) /
                   8;
     }
@@ -68,7 +72,6 @@ class RowMeans {
   const TextureView& texture_;
   Vec3<float> color_;
   uint32_t cells_;
-  std::vector<double> line_;
 };
 
 /// Cumulative floats of the given weights, 0 first and 1 last; lit entries have some floor.
@@ -128,10 +131,17 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
 
   // Means over cells; the rows above and below bleed in as in RowMeans (the poles are clamped).
   std::vector<double> cells(size_t{d.width} * d.height, 0.0);
-  RowMeans means(texture, color, d.width);
-  std::vector<double> row = means(0), above = row, below;
+  const RowMeans means(texture, color, d.width);
+  std::vector<std::vector<double>> some(std::min(height, kRows));  // means of the next rows
+  const auto mean_of = [&](uint32_t y) {
+    if (y % kRows == 0)
+      parallel_for(std::min(kRows, height - y),
+                   [&](size_t i) { some[i] = means(y + static_cast<uint32_t>(i)); });
+    return std::move(some[y % kRows]);
+  };
+  std::vector<double> row = mean_of(0), above = row, below;
   for (uint32_t y = 0; y < height; ++y) {
-    below = y + 1 < height ? means(y + 1) : row;
+    below = y + 1 < height ? mean_of(y + 1) : row;
     for_each_overlap(y, height, d.height, [&](size_t c, double part) {
       double* to = cells.data() + c * d.width;
       for (uint32_t x = 0; x < d.width; ++x) to[x] += part * (above[x] + 6 * row[x] + below[x]) / 8;

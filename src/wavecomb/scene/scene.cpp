@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {
 namespace {
@@ -145,6 +146,22 @@ uint64_t Scene::unique_triangles() const {
   return n;
 }
 
+SceneBytes Scene::bytes() const {
+  SceneBytes b;
+  for (const Mesh& m : meshes_)
+    b.meshes += m.positions.size_bytes() + m.indices.size_bytes() + m.normals.size_bytes() +
+                m.uvs.size_bytes() + m.face_materials.size_bytes();
+  for (const auto& texture : textures_) b.textures += texture->bytes();
+  const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
+  b.records = of(meshes_) + of(instances_) + of(materials_) + of(mesh_records_) +
+              of(instance_records_) + of(geometry_mesh_) + of(emissive_lights_) +
+              of(material_program_) + of(material_records_) + of(use_records_) +
+              of(texture_views_) + of(light_set_.records) + of(light_set_.alias);
+  for (const Distribution2D& d : light_set_.distributions)
+    b.records += of(d.conditional) + of(d.marginal) + of(d.density);
+  return b;
+}
+
 uint64_t Scene::instanced_triangles() const {
   std::vector<uint64_t> of_group(groups_.size(), 0);
   for (size_t g = 0; g < groups_.size(); ++g)
@@ -154,12 +171,13 @@ uint64_t Scene::instanced_triangles() const {
   return n;
 }
 
-SceneBuilder::SceneBuilder() : groups_(1), children_(1) {
+SceneBuilder::SceneBuilder(uint32_t threads) : threads_(threads), groups_(1), children_(1) {
   groups_[0].name = "world";
 }
 
 uint32_t SceneBuilder::add_texture(const TextureDesc& desc) {
-  textures_.push_back(std::make_unique<Texture>(desc));
+  with_threads(threads_,
+               [&] { textures_.push_back(std::make_unique<Texture>(desc, parallel_for)); });
   return static_cast<uint32_t>(textures_.size() - 1);
 }
 
@@ -352,15 +370,20 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   scene->textures_ = std::move(textures_);
   scene->lights_ = std::move(lights_);
   scene->camera_ = camera_;
-  make_records(*scene);
-  make_lights(*scene);
+  with_threads(threads_, [&] {
+    make_records(*scene);
+    make_lights(*scene);
+  });
   scene->warnings_ = std::move(warnings_);
-  *this = SceneBuilder();
+  *this = SceneBuilder(threads_);
   return scene;
 }
 
 void SceneBuilder::make_records(Scene& scene) const {
-  for (const Mesh& mesh : scene.meshes_) scene.mesh_records_.push_back(make_mesh_record(mesh));
+  scene.mesh_records_.resize(scene.meshes_.size());
+  parallel_for(scene.meshes_.size(), [&](size_t m) {
+    scene.mesh_records_[m] = make_mesh_record(scene.meshes_[m]);
+  });
   for (const auto& texture : scene.textures_) scene.texture_views_.push_back(texture->view());
   for (const Material& m : scene.materials_) {
     scene.material_records_.push_back(make_material_record(m));
@@ -372,12 +395,15 @@ void SceneBuilder::make_records(Scene& scene) const {
   std::vector<Bounds> bounds(scene.groups_.size());
   for (size_t g = 0; g < scene.groups_.size(); ++g) {
     first[g] = static_cast<uint32_t>(scene.geometry_mesh_.size());
+    const auto& meshes = scene.groups_[g].meshes;
+    scene.geometry_mesh_.insert(scene.geometry_mesh_.end(), meshes.begin(), meshes.end());
+  }
+  parallel_for(scene.groups_.size(), [&](size_t g) {
     for (uint32_t mesh : scene.groups_[g].meshes) {
-      scene.geometry_mesh_.push_back(mesh);
       const auto& p = scene.meshes_[mesh].positions;
       for (size_t i = 0; i + 2 < p.size(); i += 3) bounds[g].add({p[i], p[i + 1], p[i + 2]});
     }
-  }
+  });
   const auto grey = static_cast<uint32_t>(scene.materials_.size() - 1);
   scene.instance_records_.push_back(make_instance_record(Affine{}, grey));
   scene.bounds_ = bounds[0];

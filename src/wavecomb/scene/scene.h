@@ -65,6 +65,13 @@ struct Instance {
   uint32_t material = kInheritMaterial;
 };
 
+/// Memory of a scene's arrays, bytes.
+struct SceneBytes {
+  uint64_t meshes = 0;    ///< points, indices, normals, texture coordinates, materials of faces
+  uint64_t textures = 0;  ///< all mip levels
+  uint64_t records = 0;   ///< instances, materials, lights
+};
+
 class SceneBuilder;
 
 /// Geometry, materials, textures, lights and camera, checked and complete. Immutable; any number of
@@ -89,6 +96,7 @@ class Scene {
   /// Triangles of all meshes, each counted once, and with every instance counted.
   uint64_t unique_triangles() const;
   uint64_t instanced_triangles() const;
+  SceneBytes bytes() const;
   /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
   const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -122,7 +130,8 @@ class Scene {
 /// Scene (Mesh::owner sees to it). Every function throws Error with one line that names the object.
 class SceneBuilder {
  public:
-  SceneBuilder();
+  /// `threads`: for textures and for build(); 0: all.
+  explicit SceneBuilder(uint32_t threads = 0);
   SceneBuilder(SceneBuilder&&) = default;
   SceneBuilder& operator=(SceneBuilder&&) = default;
 
@@ -160,6 +169,7 @@ class SceneBuilder {
   void make_records(Scene& scene) const;
   void make_lights(Scene& scene) const;
 
+  uint32_t threads_;
   std::vector<Mesh> meshes_;
   std::vector<Group> groups_;
   std::vector<std::vector<Node>> children_;

@@ -20,20 +20,20 @@ inline F half_to_float(const UInt<F>& half) {
   return bits_float<F>(bits | ((half & 0x8000u) << 16));
 }
 
-/// The nearest half, ties to even; overflow gives infinity, NaN stays NaN.
+/// The nearest half, ties to even; overflow gives infinity, NaN stays NaN. Without branches, so that
+/// loops over it become vector code.
 inline uint16_t float_to_half(float x) {
   const uint32_t bits = float_bits<float>(x);
   const uint32_t sign = (bits >> 16) & 0x8000u;
   const uint32_t magnitude = bits & 0x7fffffffu;
-  if (magnitude > 0x7f800000u) return static_cast<uint16_t>(sign | 0x7e00u);
-  if (magnitude >= 0x477ff000u) return static_cast<uint16_t>(sign | 0x7c00u);  // 65520 and above
-  if (magnitude < 0x38800000u) {  // below 2^-14: a multiple of 2^-24
-    const float scaled = bits_float<float>(magnitude) * 0x1p24f;  // exact
-    const float whole = (scaled + 0x1p23f) - 0x1p23f;             // rounds to even
-    return static_cast<uint16_t>(sign | static_cast<uint32_t>(whole));
-  }
-  const uint32_t rounded = magnitude + 0xfffu + ((magnitude >> 13) & 1u);
-  return static_cast<uint16_t>(sign | ((rounded - (112u << 23)) >> 13));
+  const uint32_t rounded = (magnitude + 0xfffu + ((magnitude >> 13) & 1u) - (112u << 23)) >> 13;
+  // Below 2^-14: the multiple of 2^-24 that 2^-1 has as its last bits in a sum.
+  const uint32_t small =
+      float_bits<float>(bits_float<float>(magnitude) + 0.5f) - float_bits<float>(0.5f);
+  uint32_t half = magnitude < 0x38800000u ? small : rounded;
+  half = magnitude >= 0x477ff000u ? 0x7c00u : half;  // 65520 and above
+  half = magnitude > 0x7f800000u ? 0x7e00u : half;
+  return static_cast<uint16_t>(sign | half);
 }
 
 }  // namespace wavecomb

@@ -2,8 +2,8 @@
 /// The sRGB transfer function (IEC 61966-2-1) for 8-bit values.
 #pragma once
 
-#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 
 namespace wavecomb {
@@ -35,14 +35,37 @@ constexpr std::array<float, 256> make_srgb_table(double offset) {
 /// Linear light of each 8-bit sRGB value.
 inline constexpr std::array<float, 256> kSrgbToLinear = detail::make_srgb_table(0);
 
+namespace detail {
+
+/// Entry i lies half a step above the 8-bit value i.
+inline constexpr std::array<float, 256> kSrgbSteps = make_srgb_table(0.5);
+
+/// Floats from 2^-13 to 1 in buckets by exponent and 8 bits of mantissa: none holds two steps.
+inline constexpr int kSrgbBucketShift = 23 - 8;
+inline constexpr uint32_t kSrgbFirstBits = (127u - 13u) << 23;
+inline constexpr uint32_t kSrgbBuckets = (13u << 8) + 1;
+
+/// Value at the lower end of each bucket.
+constexpr std::array<uint8_t, kSrgbBuckets> make_srgb_buckets() {
+  std::array<uint8_t, kSrgbBuckets> buckets{};
+  uint32_t value = 0;
+  for (uint32_t i = 0; i < kSrgbBuckets; ++i) {
+    const auto low = std::bit_cast<float>(kSrgbFirstBits + (i << kSrgbBucketShift));
+    while (value < 255 && kSrgbSteps[value] <= low) ++value;
+    buckets[i] = static_cast<uint8_t>(value);
+  }
+  return buckets;
+}
+inline constexpr std::array<uint8_t, kSrgbBuckets> kSrgbBucket = make_srgb_buckets();
+
+}  // namespace detail
+
 /// The 8-bit sRGB value nearest to a linear one (nearest as encoded); NaN gives 0.
 inline uint8_t linear_to_srgb(float linear) {
-  // Entry i lies half a step above value i.
-  static constexpr std::array<float, 256> kSteps = detail::make_srgb_table(0.5);
-  const auto* end = kSteps.begin() + 255;
-  return static_cast<uint8_t>(
-      std::partition_point(kSteps.begin(), end, [linear](float step) { return step <= linear; }) -
-      kSteps.begin());
+  const float x = linear > 0x1p-13f ? (linear < 1.f ? linear : 1.f) : 0x1p-13f;
+  const uint32_t bits = std::bit_cast<uint32_t>(x) - detail::kSrgbFirstBits;
+  const uint8_t value = detail::kSrgbBucket[bits >> detail::kSrgbBucketShift];
+  return static_cast<uint8_t>(value + (value < 255 && detail::kSrgbSteps[value] <= x));
 }
 
 }  // namespace wavecomb

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -60,6 +61,11 @@ struct TextureView {
 /// slow.
 std::array<float, 4> texel_at(const TextureView& view, uint32_t level, uint32_t x, uint32_t y);
 
+/// Runs body(0) to body(n - 1), in any order and perhaps at once.
+using ForEach = std::function<void(size_t n, const std::function<void(size_t)>& body)>;
+/// The one that runs them in order.
+void in_order(size_t n, const std::function<void(size_t)>& body);
+
 /// An immutable texture with its mip pyramid: each level is the box filter, in linear light, of the
 /// one before at half its size, rounded down (odd sizes: boxes of 2 1/2 texels and so on, by exact
 /// overlap).
@@ -72,7 +78,8 @@ class Texture {
 
   /// Builds the pyramid. Values that are not finite become 0 and are counted. Throws Error naming
   /// desc.name for sizes of 0 or above kMaxSize, bad channels, no data, or more than 8 GiB.
-  explicit Texture(const TextureDesc& desc);
+  /// `for_each` may share the rows among threads; it changes no bit.
+  explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order);
 
   const TextureView& view() const { return view_; }
   const std::string& name() const { return name_; }
