@@ -52,7 +52,7 @@ class SceneBuilder:
     float64 or float32, shape (4, 4).
     """
 
-    def __init__(self) -> None: ...
+    def __init__(self, threads: int = 0) -> None: ...
     def add_texture(
         self,
         pixels: NDArray[Any],

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb.machine import memory_bytes
+
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
     from wavecomb.image import Transfer
@@ -100,6 +102,7 @@ def load(
     frame: float | None = None,
     purposes: Sequence[str] | None = None,
     variants: Mapping[str, str] | None = None,
+    threads: int = 0,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -110,6 +113,7 @@ def load(
         frame: Time code; by default the stage's start.
         purposes: Of the geometry, as in USD; by default "default" and "render".
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
+        threads: For images and textures; 0: all.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -124,7 +128,9 @@ def load(
     from wavecomb.usd import load_stage
 
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
-    return load_stage(Path(path), camera=camera, frame=frame, variants=variants, **options)
+    return load_stage(
+        Path(path), camera=camera, frame=frame, variants=variants, threads=threads, **options
+    )
 
 
 def render(
@@ -187,7 +193,7 @@ def render(
 
         profile = check_costs(costs)
     chosen = make_settings(size, spp, **settings)
-    scene, loaded, stage = _resolve(source, camera, frame)
+    scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
     result = _render(scene, chosen, progress, own, profile)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats)
@@ -222,7 +228,7 @@ def make_settings(size: tuple[int, int], spp: int, **settings: Any) -> Settings:
         )
     if not 1 <= int(spp) <= MAX_SPP:
         raise WavecombError(f"{spp} samples per pixel: must be from 1 to {MAX_SPP}")
-    needed, there = width * height * _BYTES_PER_PIXEL, _memory_bytes()
+    needed, there = width * height * _BYTES_PER_PIXEL, memory_bytes()
     if there is not None and needed > 0.8 * there:
         raise WavecombError(
             f"size {width} x {height}: needs about {needed / 2**30:.0f} GiB of memory, "
@@ -233,18 +239,14 @@ def make_settings(size: tuple[int, int], spp: int, **settings: Any) -> Settings:
     return chosen
 
 
-def _memory_bytes() -> int | None:
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):
-        return None
-
-
 def _resolve(
-    source: str | os.PathLike[str] | LoadedStage | Scene, camera: str | None, frame: float | None
+    source: str | os.PathLike[str] | LoadedStage | Scene,
+    camera: str | None,
+    frame: float | None,
+    threads: int,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
-        loaded = load(source, camera=camera, frame=frame)
+        loaded = load(source, camera=camera, frame=frame, threads=threads)
         return loaded.scene, loaded, os.fspath(source)
     if camera is not None or frame is not None:
         raise TypeError("camera and frame are chosen when the stage is loaded: give them to load()")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.files import replacing
+from wavecomb.machine import memory_bytes, usable_cores
 from wavecomb.version import version
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ SORTING = ("keys", "sort", "materialize")
 """Phases that are paid for an order of shading."""
 COUNTS = ("samples", "rays", "shadow_rays", "records")
 DEPTHS = ("rays", "shadow_rays", "records", "paths_ended")
+MEMORY = ("accelerator", "meshes", "textures", "records", "waves", "film")
 COHERENCE = ("run_length", "material_homogeneity", "texture_homogeneity")
 
 
@@ -65,6 +67,7 @@ def make_stats(
             "load": float(loaded.seconds) if loaded is not None else 0.0,
             "build": 0.0,
             "render": 0.0,
+            "first_samples": 0.0,
             **seconds,
         },
         "phases_s": phases,
@@ -86,6 +89,7 @@ def make_stats(
         "policy_uses": core.pop("policy_uses", {}),
         "samples_per_s": core.pop("samples_per_s", 0.0),
         "rays_per_s": core.pop("rays_per_s", 0.0),
+        "memory_bytes": {**dict.fromkeys(MEMORY, 0), **core.pop("memory_bytes", {})},
         "peak_rss_bytes": core.pop("peak_rss_bytes", 0),
         "machine": machine(),
         "unsupported": [finding.line() for finding in report.unsupported] if report else [],
@@ -112,14 +116,10 @@ def sort_overhead(phases: Mapping[str, float]) -> float:
 
 def machine() -> dict[str, Any]:
     """What the figures were made on; nothing that names the machine or its user."""
-    try:
-        cores = len(os.sched_getaffinity(0))
-    except AttributeError:
-        cores = os.cpu_count() or 1
     return {
         "cpu": _cpu_name(),
-        "cores": cores,
-        "memory_bytes": _memory_bytes(),
+        "cores": usable_cores(),
+        "memory_bytes": memory_bytes(),
         "system": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),
         "build": _build_info(),
@@ -172,13 +172,6 @@ def _cpu_name() -> str:
     except OSError:
         pass
     return platform.processor() or platform.machine()
-
-
-def _memory_bytes() -> int | None:
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):
-        return None
 
 
 def _build_info() -> dict[str, str]:

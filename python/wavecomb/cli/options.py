@@ -94,8 +94,8 @@ class StageOptions:
         """Moves them out of a command's arguments."""
         return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
 
-    def load(self, stage: str) -> LoadedStage:
-        """Loads a stage as the options say."""
+    def load(self, stage: str, threads: int = 0) -> LoadedStage:
+        """Loads a stage as the options say, on ``threads`` threads (0: all)."""
         from wavecomb.api import load
         from wavecomb.errors import WavecombError
 
@@ -114,6 +114,7 @@ class StageOptions:
             frame=self.frame,
             purposes=purposes,
             variants=variants or None,
+            threads=threads,
         )
 
 

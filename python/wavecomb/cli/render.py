@@ -172,7 +172,7 @@ def render_command(
     settings = make_settings(size, spp, **chosen)
 
     console = _console()
-    loaded = _load(source, stage, console, quiet)
+    loaded = _load(source, stage, settings.threads, console, quiet)
     warn(stage_warnings(loaded))
     picture, done = _render(loaded, stage, settings, profile, console, quiet)
     if picture.cancelled and done <= 0.0:
@@ -237,13 +237,15 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     return load_costs(costs_file)
 
 
-def _load(source: StageOptions, stage: str, console: Console, quiet: bool) -> Any:
+def _load(
+    source: StageOptions, stage: str, threads: int, console: Console, quiet: bool
+) -> Any:
     if quiet or not console.is_terminal:
-        return source.load(stage)
+        return source.load(stage, threads)
     from rich.markup import escape
 
     with console.status(f"loading {escape(os.path.basename(stage))}"):
-        return source.load(stage)
+        return source.load(stage, threads)
 
 
 def _render(

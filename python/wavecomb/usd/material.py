@@ -88,6 +88,11 @@ class MaterialTable:
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
 
+    def expect(self, material: UsdShade.Material) -> None:
+        """Starts what takes long for a material that will be used: reading its images."""
+        if material.GetPath() not in self._surfaces:
+            self._textures.expect(material.GetPrim(), self._time)
+
     def surface(self, material: UsdShade.Material) -> Surface:
         """The surface of a bound material."""
         path = material.GetPath()

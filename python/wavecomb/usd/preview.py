@@ -166,7 +166,7 @@ class PreviewReader:
             channel = "r"
         space = self._colour_space(shader, file)
         bare = scale[:3] == (1.0, 1.0, 1.0) and bias[:3] == (0.0, 0.0, 0.0)
-        if slot == "normal" and bare and image.pixels.dtype.name in ("uint8", "float16"):
+        if slot == "normal" and bare and image.dtype.name in ("uint8", "float16"):
             scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
             what = "normal map without scale and bias: read as 2 x - 1, linear"
             self.report.note(what, shader.GetPath())

@@ -59,6 +59,7 @@ def load_stage(
     camera: str | None = None,
     purposes: Sequence[str] = ("default", "render"),
     variants: Mapping[str, str] | None = None,
+    threads: int = 0,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -71,6 +72,7 @@ def load_stage(
         purposes: Of the geometry to draw: default, render, proxy, guide.
         variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
             prim's.
+        threads: For images and textures; 0: all.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -88,17 +90,22 @@ def load_stage(
         stage = _open(file)
         if variants:
             _select(stage, variants)
-        builder = _native_builder() if builder_factory is None else builder_factory()
-        camera_path = _read(stage, _time(stage, frame), camera, purposes, builder, report)
+        builder = _native_builder(threads) if builder_factory is None else builder_factory()
+        textures = TextureTable(builder, report, threads)
+        try:
+            time = _time(stage, frame)
+            camera_path = _read(stage, time, camera, purposes, builder, textures, report)
+        finally:
+            textures.release()
         scene = _build(builder, file)
         cameras = tuple(str(prim.GetPath()) for prim in all_cameras(stage))
     return LoadedStage(scene, report, camera_path, clock.perf_counter() - started, file, cameras)
 
 
-def _native_builder() -> _core.SceneBuilder:
+def _native_builder(threads: int) -> _core.SceneBuilder:
     from wavecomb import _core
 
-    return _core.SceneBuilder()
+    return _core.SceneBuilder(threads)
 
 
 def _open(file: Path) -> Usd.Stage:
@@ -154,12 +161,12 @@ def _read(
     camera: str | None,
     purposes: Sequence[str],
     builder: _core.SceneBuilder,
+    textures: TextureTable,
     report: LoadReport,
 ) -> str | None:
     """Fills the builder; gives the camera's path."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = find_camera(stage, camera)
-    textures = TextureTable(builder, report)
     materials = MaterialTable(builder, textures, time, report)
     lights = LightReader(time, up_axis, textures, report)
     traversal = Traversal(time, purposes, lights, report)
@@ -207,7 +214,6 @@ def _add_lights(
         report.note("no light: added a soft dome")
         texture = textures.add_pixels("soft dome", soft_dome())
         builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
-    textures.release()
 
 
 def _build(builder: _core.SceneBuilder, file: Path) -> _core.Scene:

@@ -4,45 +4,20 @@
 from __future__ import annotations
 
 import os
-import tempfile
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
-from pxr import Ar, Sdf, Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
+from wavecomb.usd.pixels import Image, ReadAhead, TextureError, read_image
 from wavecomb.usd.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
 
-MAX_SIDE = 65536
-MAX_BYTES = 8 << 30
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black"}
-
-
-class TextureError(ValueError):
-    """An image that cannot be used; says why in a few words."""
-
-
-@dataclass(frozen=True)
-class Image:
-    """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top."""
-
-    pixels: NDArray[Any]
-
-    @property
-    def channels(self) -> int:
-        """Channels of each pixel."""
-        return int(self.pixels.shape[2])
-
-    @property
-    def automatic_srgb(self) -> bool:
-        """Whether ``sourceColorSpace = auto`` means sRGB: 8 bits, 3 or 4 channels."""
-        return self.pixels.dtype == np.uint8 and self.channels >= 3
 
 
 def asset_file(value: Any, attribute: Usd.Attribute | None, report: LoadReport) -> str:
@@ -61,70 +36,22 @@ def asset_file(value: Any, attribute: Usd.Attribute | None, report: LoadReport) 
     return str(tiles[0][0]) if tiles else path.replace("<UDIM>", "1001")
 
 
+def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
+    """Files that the shaders in a material name: a guess at what it will ask for."""
+    for prim in Usd.PrimRange(material, Usd.TraverseInstanceProxies()):
+        for attribute in prim.GetAuthoredAttributes():
+            if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
+                value = attribute.Get(time)
+                if value is not None and value.resolvedPath:
+                    yield value.resolvedPath
+
+
 def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
     """The sRGB transfer curve of IEC 61966-2-1, encoded to linear."""
     v = np.asarray(values, np.float32)
     low = v / np.float32(12.92)
     high = ((np.maximum(v, 0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
     return np.where(v <= 0.04045, low, high).astype(np.float32)
-
-
-def read_image(path: str) -> Image:
-    """Reads the first image of a file, or of a file in a package (``a.usdz[b.png]``).
-
-    Raises:
-        TextureError: It is missing, unreadable or too large.
-    """
-    if not path:
-        raise TextureError("no file name")
-    if not Ar.IsPackageRelativePath(path):
-        if not os.path.isfile(path):
-            raise TextureError("no such file")
-        return _read_file(path)
-    asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
-    if not asset:
-        raise TextureError("no such file in the package")
-    data = bytes(asset.GetBuffer())
-    suffix = Path(Ar.SplitPackageRelativePathInner(path)[1]).suffix
-    descriptor, name = tempfile.mkstemp(suffix=suffix, prefix="wavecomb-")
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-        return _read_file(name)
-    finally:
-        os.unlink(name)
-
-
-def _read_file(path: str) -> Image:
-    # Colours as stored: not multiplied by alpha.
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(path, config)
-    if source is None:
-        raise TextureError(" ".join(oiio.geterror().split()) or "not a known image file")
-    try:
-        spec = source.spec()
-        channels = min(spec.nchannels, 4)
-        base = spec.format.basetype
-        dtype = {oiio.UINT8: np.uint8, oiio.HALF: np.float16, oiio.UINT16: np.float16}.get(
-            base, np.float32
-        )
-        if spec.width < 1 or spec.height < 1 or channels < 1:
-            raise TextureError("it has no pixels")
-        size = spec.width * spec.height * channels * np.dtype(dtype).itemsize
-        if max(spec.width, spec.height) > MAX_SIDE or size > MAX_BYTES or spec.depth > 1:
-            raise TextureError(f"{spec.width} x {spec.height} is too large")
-        ask = oiio.TypeDesc(oiio.UINT8 if base == oiio.UINT8 else oiio.FLOAT)
-        pixels = source.read_image(0, 0, 0, channels, ask)
-        if pixels is None:
-            raise TextureError(" ".join(source.geterror().split()) or "it cannot be read")
-    finally:
-        source.close()
-    pixels = np.asarray(pixels).reshape(spec.height, spec.width, channels)
-    if pixels.dtype != np.uint8:
-        limit = 65504.0 if dtype == np.float16 else 3.4e38
-        pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=limit, neginf=-limit)
-    return Image(np.ascontiguousarray(pixels, dtype))
 
 
 def checker() -> NDArray[np.uint8]:
@@ -136,18 +63,23 @@ def checker() -> NDArray[np.uint8]:
 class TextureTable:
     """Adds textures to the scene, equal ones once."""
 
-    def __init__(self, builder: _core.SceneBuilder, report: LoadReport) -> None:
+    def __init__(self, builder: _core.SceneBuilder, report: LoadReport, threads: int = 0) -> None:
         self._builder = builder
         self._report = report
+        self._ahead = ReadAhead(threads)
         self._images: dict[str, Image | TextureError] = {}
         self._ids: dict[tuple[Any, ...], int] = {}
+
+    def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
+        """Starts to read the images of a material that will be used."""
+        self._ahead.want(image_files(material, time))
 
     def image(self, path: str, prim: object) -> Image | None:
         """The image of a file, read once; None and a warning where that fails."""
         found = self._images.get(path)
         if found is None:
             try:
-                found = read_image(path)
+                found = self._ahead.read(path)
             except (TextureError, MemoryError, OSError, ValueError) as error:
                 found = TextureError(str(error) or "out of memory")
             self._images[path] = found
@@ -171,12 +103,13 @@ class TextureTable:
         wraps = _WRAPS.get(wrap_s, "black"), _WRAPS.get(wrap_t, "black")
         key = (path, srgb, *wraps)
         if key not in self._ids:
-            pixels = image.pixels
+            # Gone from memory once it is in the scene; a second use in another way reads it again.
+            pixels = image.take() if image.is_here else read_image(path).take()
             if srgb and pixels.dtype != np.uint8:
                 colours = 3 if image.channels >= 3 else 1
                 linear = to_linear(pixels[..., :colours])
-                pixels = np.concatenate([linear, pixels[..., colours:]], axis=2)
-                pixels = np.ascontiguousarray(pixels, image.pixels.dtype)
+                linear = np.concatenate([linear, pixels[..., colours:]], axis=2)
+                pixels = np.ascontiguousarray(linear, image.dtype)
             self._ids[key] = self._builder.add_texture(
                 pixels, srgb=srgb, wrap_s=wraps[0], wrap_t=wraps[1], name=path
             )
@@ -201,3 +134,4 @@ class TextureTable:
     def release(self) -> None:
         """Forgets the pixels that were read."""
         self._images.clear()
+        self._ahead.close()

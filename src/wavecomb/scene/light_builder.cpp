@@ -6,6 +6,7 @@
 #include <string>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {
 
@@ -271,21 +272,22 @@ LightView LightSet::view(const MaterialView& materials) const {
   return v;
 }
 
-LightSet build_lights(std::span<const Light> lights, std::span<const EmissiveTriangle> triangles,
-                      const Vec3<float>& centre, float radius,
+LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
+                      const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const std::unique_ptr<Texture>> textures) {
   (void)centre;  // directions of infinite lights do not depend on it
-  if (lights.size() + triangles.size() > kMaxLights) {
-    throw Error("the scene has " + std::to_string(lights.size() + triangles.size()) +
+  if (lights.size() + triangle_count > kMaxLights) {
+    throw Error("the scene has " + std::to_string(lights.size() + triangle_count) +
                 " lights and emissive triangles; " + std::to_string(kMaxLights) + " is the most");
   }
   const double scene_radius = std::isfinite(radius) && radius > 0 ? double{radius} : 1.0;
   LightSet set;
   std::vector<double> powers;
-  const auto append = [&](Made made) {
+  set.records.reserve(lights.size() + triangle_count);
+  powers.reserve(lights.size() + triangle_count);
+  const auto power_of = [](const Made& made) {
     const bool sane = std::isfinite(made.power) && made.power > 0;
-    set.records.push_back(made.record);
-    powers.push_back(sane ? made.power : (made.power > 0 ? 1e300 : 0));
+    return sane ? made.power : (made.power > 0 ? 1e300 : 0);
   };
   set.of_input.resize(lights.size());
   for (const bool infinite : {true, false}) {
@@ -293,13 +295,24 @@ LightSet build_lights(std::span<const Light> lights, std::span<const EmissiveTri
       if (infinite) check(lights[i], textures.size());
       if (is_infinite(lights[i].kind) != infinite) continue;
       set.of_input[i] = static_cast<uint32_t>(set.records.size());
-      append(make_light(set, lights[i], scene_radius, textures));
+      const Made made = make_light(set, lights[i], scene_radius, textures);
+      set.records.push_back(made.record);
+      powers.push_back(power_of(made));
     }
     if (infinite) set.infinite_count = static_cast<uint32_t>(set.records.size());
   }
   set.first_triangle = static_cast<uint32_t>(set.records.size());
-  set.records.reserve(set.records.size() + triangles.size());
-  for (const EmissiveTriangle& t : triangles) append(make_triangle(t));
+  set.records.resize(set.first_triangle + triangle_count);
+  powers.resize(set.records.size());
+  constexpr size_t kChunk = 4096;
+  parallel_for((triangle_count + kChunk - 1) / kChunk, [&](size_t chunk) {
+    const size_t end = std::min(triangle_count, (chunk + 1) * kChunk);
+    for (size_t i = chunk * kChunk; i < end; ++i) {
+      const Made made = make_triangle(triangle(i));
+      set.records[set.first_triangle + i] = made.record;
+      powers[set.first_triangle + i] = power_of(made);
+    }
+  });
 
   for (const double power : powers) set.total_power += power;
   std::vector<float> probability;

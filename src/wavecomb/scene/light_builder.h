@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -44,7 +45,10 @@ struct LightSet {
 /// Most lights that the alias table can tell apart (its random number has 24 bits).
 inline constexpr uint32_t kMaxLights = (1u << 24) - 1;
 
-/// Builds the records.
+/// Emissive triangle i. Called from many threads at once.
+using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
+
+/// Builds the records, those of the `triangle_count` triangles in parallel.
 ///
 /// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the light's
 /// size:
@@ -59,8 +63,8 @@ inline constexpr uint32_t kMaxLights = (1u << 24) - 1;
 /// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
 /// the power that they send through it. Throws Error naming the light for values that are not
 /// finite, unknown textures and more than kMaxLights lights.
-LightSet build_lights(std::span<const Light> lights, std::span<const EmissiveTriangle> triangles,
-                      const Vec3<float>& centre, float radius,
+LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
+                      const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const std::unique_ptr<Texture>> textures);
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of

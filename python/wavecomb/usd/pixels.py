@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Image files to arrays, on threads of their own ahead of need."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import deque
+from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+from pxr import Ar
+
+from wavecomb.machine import usable_cores
+
+MAX_SIDE = 65536
+MAX_BYTES = 8 << 30
+
+
+class TextureError(ValueError):
+    """An image that cannot be used; says why in a few words."""
+
+
+class Image:
+    """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top.
+
+    Attributes:
+        channels: Channels of each pixel.
+        dtype: Of the pixels.
+    """
+
+    def __init__(self, pixels: NDArray[Any]) -> None:
+        self._pixels: NDArray[Any] | None = pixels
+        self.channels = int(pixels.shape[2])
+        self.dtype = pixels.dtype
+
+    @property
+    def is_here(self) -> bool:
+        """Whether the pixels were not taken yet."""
+        return self._pixels is not None
+
+    def take(self) -> NDArray[Any]:
+        """Hands the pixels over, once."""
+        pixels, self._pixels = self._pixels, None
+        if pixels is None:
+            raise ValueError("the pixels of this image were taken before")
+        return pixels
+
+    @property
+    def automatic_srgb(self) -> bool:
+        """Whether ``sourceColorSpace = auto`` means sRGB: 8 bits, 3 or 4 channels."""
+        return self.dtype == np.uint8 and self.channels >= 3
+
+
+def read_image(path: str) -> Image:
+    """Reads the first image of a file, or of a file in a package (``a.usdz[b.png]``).
+
+    Raises:
+        TextureError: It is missing, unreadable or too large.
+    """
+    if not path:
+        raise TextureError("no file name")
+    if not Ar.IsPackageRelativePath(path):
+        if not os.path.isfile(path):
+            raise TextureError("no such file")
+        return _read_file(path)
+    asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
+    if not asset:
+        raise TextureError("no such file in the package")
+    data = bytes(asset.GetBuffer())
+    suffix = Path(Ar.SplitPackageRelativePathInner(path)[1]).suffix
+    descriptor, name = tempfile.mkstemp(suffix=suffix, prefix="wavecomb-")
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+        return _read_file(name)
+    finally:
+        os.unlink(name)
+
+
+def _read_file(path: str) -> Image:
+    # Colours as stored: not multiplied by alpha.
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(path, config)
+    if source is None:
+        raise TextureError(" ".join(oiio.geterror().split()) or "not a known image file")
+    try:
+        spec = source.spec()
+        channels = min(spec.nchannels, 4)
+        base = spec.format.basetype
+        dtype = {oiio.UINT8: np.uint8, oiio.HALF: np.float16, oiio.UINT16: np.float16}.get(
+            base, np.float32
+        )
+        if spec.width < 1 or spec.height < 1 or channels < 1:
+            raise TextureError("it has no pixels")
+        size = spec.width * spec.height * channels * np.dtype(dtype).itemsize
+        if max(spec.width, spec.height) > MAX_SIDE or size > MAX_BYTES or spec.depth > 1:
+            raise TextureError(f"{spec.width} x {spec.height} is too large")
+        ask = oiio.TypeDesc(oiio.UINT8 if base == oiio.UINT8 else oiio.FLOAT)
+        pixels = source.read_image(0, 0, 0, channels, ask)
+        if pixels is None:
+            raise TextureError(" ".join(source.geterror().split()) or "it cannot be read")
+    finally:
+        source.close()
+    pixels = np.asarray(pixels).reshape(spec.height, spec.width, channels)
+    if pixels.dtype != np.uint8:
+        limit = 65504.0 if dtype == np.float16 else 3.4e38
+        pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=limit, neginf=-limit)
+    return Image(np.ascontiguousarray(pixels, dtype))
+
+
+class ReadAhead:
+    """Reads images before they are asked for.
+
+    Contract: used by one thread. At most one more than ``threads`` images lie ready, so that memory
+    is bounded; whatever is asked for and not under way is read at once.
+    """
+
+    def __init__(self, threads: int = 0) -> None:
+        """``threads`` read, 0: one for each core; with 1 nothing is read ahead."""
+        self._threads = threads or usable_cores()
+        self._pool: ThreadPoolExecutor | None = None
+        self._seen: set[str] = set()
+        self._waiting: deque[str] = deque()
+        self._ready: dict[str, Future[Image]] = {}
+
+    def want(self, paths: Iterable[str]) -> None:
+        """Says that images will be asked for, most likely in this order."""
+        if self._threads == 1:
+            return
+        for path in paths:
+            if path and path not in self._seen:
+                self._seen.add(path)
+                self._waiting.append(path)
+        self._start()
+
+    def read(self, path: str) -> Image:
+        """As ``read_image``, from what was read ahead where it was."""
+        self._seen.add(path)
+        future = self._ready.pop(path, None)
+        if future is None:
+            if path in self._waiting:
+                self._waiting.remove(path)
+            return read_image(path)
+        try:
+            return future.result()
+        finally:
+            self._start()
+
+    def close(self) -> None:
+        """Drops what was not asked for."""
+        self._waiting.clear()
+        self._ready.clear()
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+    def _start(self) -> None:
+        while self._waiting and len(self._ready) <= self._threads:
+            if self._pool is None:
+                self._pool = ThreadPoolExecutor(self._threads, "wavecomb-image")
+            path = self._waiting.popleft()
+            self._ready[path] = self._pool.submit(read_image, path)
