@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,15 +12,19 @@ SHARP = 1.0
 """Crease sharpness from which an edge is drawn as an edge."""
 
 
-def _scatter(index: NDArray[Any], values: NDArray[Any], count: int) -> NDArray[np.float32]:
-    """Sums of rows of values (k, 3) by index (k,), made unit length: (count, 3)."""
-    total: NDArray[np.float64] = np.stack(
-        [np.bincount(index, weights=values[:, axis], minlength=count) for axis in range(3)], axis=1
-    )
-    length = np.sqrt(np.einsum("ij,ij->i", total, total))
-    total /= np.where(length > 0, length, 1)[:, None]
-    total[length == 0] = (0, 0, 1)
-    return total.astype(np.float32)
+_CHUNK = 1 << 16
+"""Triangles whose normals are added at once: bounds the memory in use."""
+
+
+def _unit(total: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Rows of length 1; (0, 0, 1) for those of length 0."""
+    out = np.empty(total.shape, np.float32)
+    for first in range(0, len(total), _CHUNK):
+        part = total[first : first + _CHUNK]
+        length = np.sqrt(np.einsum("ij,ij->i", part, part))
+        out[first : first + _CHUNK] = part / np.where(length > 0, length, 1)[:, None]
+        out[first : first + _CHUNK][length == 0] = (0, 0, 1)
+    return out
 
 
 def smooth_normals(
@@ -37,15 +39,23 @@ def smooth_normals(
         topology: The triangles, turned the way that is outside.
         creases: (k, 2) points of the sharp edges.
     """
-    triangles = topology.triangles.astype(np.int64)
-    p = points[triangles].astype(np.float64)
-    face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    spread = np.repeat(face, 3, axis=0)
-    if creases is None or len(creases) == 0:
-        return _scatter(triangles.ravel(), spread, len(points))
-    labels = _smoothing_groups(triangles, creases, len(points))
-    groups, index = np.unique(labels, return_inverse=True)
-    return _scatter(index.ravel(), spread, len(groups))[index.ravel()].reshape(-1, 3, 3)
+    triangles = topology.triangles
+    sharp = creases is not None and len(creases) > 0
+    index, count = triangles.reshape(-1), len(points)
+    if sharp and creases is not None:
+        labels = _smoothing_groups(triangles.astype(np.int64), creases, len(points))
+        groups, index = np.unique(labels, return_inverse=True)
+        index, count = index.reshape(-1), len(groups)
+    total = np.zeros((3, count))
+    for first in range(0, len(triangles), _CHUNK):
+        p = points[triangles[first : first + _CHUNK]].astype(np.float64)
+        face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        where = index[3 * first : 3 * (first + _CHUNK)]
+        for axis in range(3):
+            # In order of triangles, however they are cut.
+            np.add.at(total[axis], where, np.repeat(face[:, axis], 3))
+    normals = _unit(np.ascontiguousarray(total.T))
+    return normals[index].reshape(-1, 3, 3) if sharp else normals
 
 
 def _smoothing_groups(

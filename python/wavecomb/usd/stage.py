@@ -13,6 +13,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.machine import give_back_memory
 from wavecomb.usd.camera import all_cameras, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured, commentary
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
@@ -87,19 +88,35 @@ def load_stage(
     report = LoadReport()
     file = Path(path)
     with captured(report):
-        stage = _open(file)
-        if variants:
-            _select(stage, variants)
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
         textures = TextureTable(builder, report, threads)
         try:
-            time = _time(stage, frame)
-            camera_path = _read(stage, time, camera, purposes, builder, textures, report)
+            camera_path, cameras = _fill(
+                builder, file, frame, camera, purposes, variants or {}, textures, report
+            )
         finally:
             textures.release()
         scene = _build(builder, file)
-        cameras = tuple(str(prim.GetPath()) for prim in all_cameras(stage))
+    give_back_memory()
     return LoadedStage(scene, report, camera_path, clock.perf_counter() - started, file, cameras)
+
+
+def _fill(
+    builder: _core.SceneBuilder,
+    file: Path,
+    frame: float | None,
+    camera: str | None,
+    purposes: Sequence[str],
+    variants: Mapping[str, str],
+    textures: TextureTable,
+    report: LoadReport,
+) -> tuple[str | None, tuple[str, ...]]:
+    """Fills the builder; gives the camera's path and those of all. The stage is closed then."""
+    stage = _open(file)
+    if variants:
+        _select(stage, variants)
+    chosen = _read(stage, _time(stage, frame), camera, purposes, builder, textures, report)
+    return chosen, tuple(str(prim.GetPath()) for prim in all_cameras(stage))
 
 
 def _native_builder(threads: int) -> _core.SceneBuilder:

@@ -98,10 +98,7 @@ def triangulate(
         turned = np.ascontiguousarray(triangles[:, ::-1]).view(np.uint32)
         return Topology(turned, corners, None, indices, len(points), len(counts))
     if low == 4 and high == 4 and not has_holes:
-        corners = _quads(points, indices)
-        if flip:
-            corners = corners[:, ::-1]
-        turned = indices.take(corners).view(np.uint32)
+        corners, turned = _quads(points, indices, flip)
         return Topology(turned, corners, None, indices, len(points), len(counts), 2)
     keep = counts >= 3
     if has_holes and holes is not None:
@@ -144,14 +141,20 @@ def _split(
     return all_corners, all_owners
 
 
-def _quads(points: NDArray[np.float32], indices: NDArray[np.int32]) -> NDArray[np.intp]:
-    """Corners (m, 3) of the triangles of a mesh of quads alone."""
-    ring = np.arange(len(indices)).reshape(-1, 4)
-    parts = [
-        _split_rings(points, indices, ring[first : first + _CHUNK]).reshape(-1, 3)
-        for first in range(0, len(ring), _CHUNK)
-    ]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+def _quads(
+    points: NDArray[np.float32], indices: NDArray[np.int32], flip: bool
+) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
+    """Corners and points (m, 3) of the triangles of a mesh of quads alone."""
+    count = len(indices) // 4
+    corners = np.empty((2 * count, 3), np.intp)
+    triangles = np.empty((2 * count, 3), np.uint32)
+    for first in range(0, count, _CHUNK):
+        last = min(count, first + _CHUNK)
+        ring = np.arange(4 * first, 4 * last).reshape(-1, 4)
+        part = _split_rings(points, indices, ring).reshape(-1, 3)
+        corners[2 * first : 2 * last] = part[:, ::-1] if flip else part
+        triangles[2 * first : 2 * last] = indices.take(corners[2 * first : 2 * last])
+    return corners, triangles
 
 
 def _split_rings(
