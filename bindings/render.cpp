@@ -316,6 +316,9 @@ nb::dict statistics_dict(const Result& r) {
   memory["accelerator"] = s.accelerator_bytes;
   memory["waves"] = s.wave_bytes;
   memory["film"] = s.film_bytes;
+  const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
+  memory["picture"] = bytes(r.picture.beauty, r.picture.albedo, r.picture.normal, r.picture.depth,
+                            r.picture.samples);
   memory["meshes"] = s.scene_bytes.meshes;
   memory["textures"] = s.scene_bytes.textures;
   memory["records"] = s.scene_bytes.records;

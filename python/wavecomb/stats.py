@@ -36,7 +36,7 @@ SORTING = ("keys", "sort", "materialize")
 """Phases that are paid for an order of shading."""
 COUNTS = ("samples", "rays", "shadow_rays", "records")
 DEPTHS = ("rays", "shadow_rays", "records", "paths_ended")
-MEMORY = ("accelerator", "meshes", "textures", "records", "waves", "film")
+MEMORY = ("accelerator", "meshes", "textures", "records", "waves", "film", "picture")
 COHERENCE = ("run_length", "material_homogeneity", "texture_homogeneity")
 
 

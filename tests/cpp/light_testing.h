@@ -41,7 +41,7 @@ struct Lights {
   void build(const std::vector<Light>& lights, const std::vector<EmissiveTriangle>& triangles = {},
              float scene_radius = 10.f) {
     set = build_lights(
-        lights, triangles.size(), [this](size_t i) { return triangles[i]; }, {0, 0, 0},
+        lights, triangles.size(), [&triangles](size_t i) { return triangles[i]; }, {0, 0, 0},
         scene_radius, textures);
   }
   LightView view() const { return set.view({nullptr, uses.data(), views.data(), false}); }

@@ -74,6 +74,21 @@ TEST(Srgb, TableAndItsInverse) {
   EXPECT_EQ(linear_to_srgb(9.f), 255);
 }
 
+TEST(Srgb, RoundsAtEveryStep) {
+  // Bisects for the float at which the value changes: half a step above, by the exact curve.
+  for (int i = 0; i < 255; ++i) {
+    float below = kSrgbToLinear[static_cast<size_t>(i)],
+          above = kSrgbToLinear[static_cast<size_t>(i + 1)];
+    while (std::nextafter(below, above) < above) {
+      const float middle = below + (above - below) / 2;
+      (linear_to_srgb(middle) <= i ? below : above) = middle;
+    }
+    EXPECT_EQ(linear_to_srgb(below), i);
+    EXPECT_EQ(linear_to_srgb(above), i + 1);
+    EXPECT_LE(ulps(above, srgb_decode((i + 0.5) / 255)), 1.01) << i;
+  }
+}
+
 /// An image in all the forms that Texture takes, with the linear values that it stands for.
 struct Image {
   TextureDesc desc;
@@ -446,6 +461,25 @@ TEST(Texture, KeepsItsFormatInMemory) {
   const Texture texture({"rgb", data.data(), 64, 64, 3, TexelFormat::kU8});
   EXPECT_LE(texture.bytes(), size_t{64 * 64 * 4} * 3 / 2);
   EXPECT_EQ(reinterpret_cast<uintptr_t>(texture.view().texels) % 64, 0u);
+}
+
+TEST(Texture, AnyOrderOfWorkGivesTheSameBits) {
+  // Backwards, and what it leaves in memory beyond the edges too.
+  const ForEach backwards = [](size_t n, const std::function<void(size_t)>& body) {
+    while (n > 0) body(--n);
+  };
+  for (const auto& [width, height] : {std::pair{64u, 192u}, {129u, 96u}, {100u, 65u}, {1u, 40u}}) {
+    for (const TexelFormat format : {TexelFormat::kU8, TexelFormat::kF16, TexelFormat::kF32}) {
+      for (const uint32_t channels : {1u, 3u}) {
+        Image image = make_image(width, height, channels, format, true);
+        image.desc.data = image.bytes.data();
+        const Texture a(image.desc), b(image.desc, backwards);
+        ASSERT_EQ(a.bytes(), b.bytes());
+        EXPECT_EQ(std::memcmp(a.view().texels, b.view().texels, a.bytes()), 0);
+        EXPECT_EQ(std::memcmp(a.mean(), b.mean(), 4 * sizeof(float)), 0);
+      }
+    }
+  }
 }
 
 }  // namespace

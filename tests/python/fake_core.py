@@ -23,7 +23,8 @@ class Error(ValueError):
 
 class Settings:
     def __init__(self, **settings: Any) -> None:
-        self.__dict__.update({"width": 600, "height": 600, "spp": 64, "seed": 0, **settings})
+        defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}
+        self.__dict__.update({**defaults, **settings})
 
     def check(self) -> None:
         if self.__dict__.get("lanes") == 4:

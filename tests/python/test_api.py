@@ -15,7 +15,7 @@ import wavecomb
 from wavecomb.costs import load_costs, save_costs
 from wavecomb.errors import WavecombError
 from wavecomb.image import read_image, read_layers
-from wavecomb.stats import COUNTS, PHASES, write_stats
+from wavecomb.stats import COUNTS, MEMORY, PHASES, write_stats
 
 
 @pytest.fixture
@@ -60,7 +60,8 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     picture = wavecomb.render(
         stage, size=(32, 16), spp=2, progress=progress, camera="/C", frame=3.0, max_depth=4
     )
-    assert fake.loaded[0] == {"path": stage, "camera": "/C", "frame": 3.0, "variants": None}
+    chosen = {"camera": "/C", "frame": 3.0, "variants": None, "threads": 0}
+    assert fake.loaded[0] == {"path": stage, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)
     assert picture.depth.shape == picture.samples.shape == (16, 32)
@@ -140,8 +141,10 @@ def test_schema(fake: Fake, stage: Path) -> None:
         *("schema", "version", "stage", "camera", "cancelled", "settings", "seconds"),
         *("phases_s", "sort_overhead", "counts", "mean_path_length", "depths", "lane_utilisation"),
         *("coherence", "programs", "materials", "cost_prediction", "policy_uses"),
-        *("samples_per_s", "rays_per_s", "peak_rss_bytes", "machine", "unsupported", "warnings"),
+        *("samples_per_s", "rays_per_s", "memory_bytes", "peak_rss_bytes", "machine"),
+        *("unsupported", "warnings"),
     ]
+    assert set(stats["memory_bytes"]) == set(MEMORY)
     assert set(stats["phases_s"]) == set(PHASES)
     assert set(stats["counts"]) == set(COUNTS)
     assert stats["machine"]["cores"] >= 1

@@ -86,7 +86,8 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
     assert png.stat().st_size > 0
     document = json.loads(stats.read_text())
     assert document["schema"] == "wavecomb-statistics/1"
-    assert document["seconds"] == {"load": 0.25, "build": 0.1, "render": 0.5}
+    seconds = {"load": 0.25, "build": 0.1, "render": 0.5, "first_samples": 0.0}
+    assert document["seconds"] == seconds
     assert document["counts"]["samples"] == 4800
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "a.exr", "a.json", "a.png", "stage.usda"
@@ -95,7 +96,8 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
 
 def test_defaults(fake: Fake, stage: str, tmp_path: Path) -> None:
     assert run("render", stage, "-o", tmp_path / "a.exr").exit_code == 0
-    assert fake.rendered == [{"width": 600, "height": 600, "spp": 64, "seed": 0}]
+    defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}
+    assert fake.rendered == [defaults]
     assert fake.loaded[0]["camera"] is None
     assert "purposes" not in fake.loaded[0]
 

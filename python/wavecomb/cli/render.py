@@ -237,9 +237,7 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     return load_costs(costs_file)
 
 
-def _load(
-    source: StageOptions, stage: str, threads: int, console: Console, quiet: bool
-) -> Any:
+def _load(source: StageOptions, stage: str, threads: int, console: Console, quiet: bool) -> Any:
     if quiet or not console.is_terminal:
         return source.load(stage, threads)
     from rich.markup import escape

@@ -31,7 +31,7 @@ def print_summary(stats: Mapping[str, Any], loaded: Any, files: Sequence[str]) -
     console.print(
         f"{count_text(counts['samples'])} samples, {count_text(stats['samples_per_s'])}/s; "
         f"{count_text(rays)} rays, {count_text(stats['rays_per_s'])}/s; "
-        f"peak memory {stats['peak_rss_bytes'] / 1e6:,.0f} MB"
+        f"peak memory {stats['peak_rss_bytes'] / 1e6:,.0f} MB{_memory(stats['memory_bytes'])}"
     )
     for line in _scheduling_lines(stats):
         console.print(escape(line))
@@ -44,6 +44,14 @@ def print_summary(stats: Mapping[str, Any], loaded: Any, files: Sequence[str]) -
     for finding in loaded.report.notes:
         console.print(f"note: {escape(finding.line())}")
     console.print("wrote " + escape(", ".join(files)))
+
+
+def _memory(parts: Mapping[str, int]) -> str:
+    """What the peak holds: arrays of the render, and Embree's hierarchy."""
+    arrays = sum(parts.values()) - parts["accelerator"]
+    if not arrays:
+        return ""
+    return f" (arrays {arrays / 1e6:,.0f}, BVH {parts['accelerator'] / 1e6:,.0f})"
 
 
 def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:

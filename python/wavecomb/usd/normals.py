@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +43,8 @@ def smooth_normals(
     """
     triangles = topology.triangles
     sharp = creases is not None and len(creases) > 0
-    index, count = triangles.reshape(-1), len(points)
+    index: NDArray[Any] = triangles.reshape(-1)
+    count = len(points)
     if sharp and creases is not None:
         labels = _smoothing_groups(triangles.astype(np.int64), creases, len(points))
         groups, index = np.unique(labels, return_inverse=True)

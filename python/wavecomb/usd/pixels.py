@@ -151,6 +151,8 @@ class ReadAhead:
         try:
             return future.result()
         finally:
+            # Its exception holds this frame: a circle that would keep the stage open.
+            del future
             self._start()
 
     def close(self) -> None:

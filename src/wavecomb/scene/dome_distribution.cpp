@@ -53,7 +53,7 @@ class RowMeans {
         return std::max(0.0, double{texel}) * double{scale};
       };
       line[x] = 0.212656 * lit(t[0], color_.x) + 0.715158 * lit(t[1], color_.y) +
-                 0.072186 * lit(t[2], color_.z);
+                0.072186 * lit(t[2], color_.z);
     }
     const auto at = [&](uint32_t i) { return i == n ? 0.0 : line[i]; };
     std::vector<double> smooth(n), cells(cells_, 0.0);

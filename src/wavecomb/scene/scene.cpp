@@ -381,9 +381,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
 
 void SceneBuilder::make_records(Scene& scene) const {
   scene.mesh_records_.resize(scene.meshes_.size());
-  parallel_for(scene.meshes_.size(), [&](size_t m) {
-    scene.mesh_records_[m] = make_mesh_record(scene.meshes_[m]);
-  });
+  parallel_for(scene.meshes_.size(),
+               [&](size_t m) { scene.mesh_records_[m] = make_mesh_record(scene.meshes_[m]); });
   for (const auto& texture : scene.textures_) scene.texture_views_.push_back(texture->view());
   for (const Material& m : scene.materials_) {
     scene.material_records_.push_back(make_material_record(m));

@@ -85,8 +85,8 @@ void SceneBuilder::make_lights(Scene& scene) const {
       }
       table.push_back(emissive ? static_cast<uint32_t>(triangle_count) : kNoLight);
       if (!emissive) continue;
-      sources.push_back({triangle_count, &mesh, &record,
-                         i == 0 ? &identity : &scene.instances_[i - 1].to_world});
+      sources.push_back(
+          {triangle_count, &mesh, &record, i == 0 ? &identity : &scene.instances_[i - 1].to_world});
       triangle_count += mesh.triangle_count();
     }
   }
@@ -105,7 +105,7 @@ void SceneBuilder::make_lights(Scene& scene) const {
     const Vec3<float> d = b.hi - center;
     radius = std::max(1e-20f, std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z));
   }
-  scene.light_set_ = 
+  scene.light_set_ =
       build_lights(scene.lights_, triangle_count, triangle, center, radius, scene.textures_);
   // Table entries now point at the first triangle; make them light ids.
   for (uint32_t& entry : table)

@@ -20,8 +20,8 @@ inline F half_to_float(const UInt<F>& half) {
   return bits_float<F>(bits | ((half & 0x8000u) << 16));
 }
 
-/// The nearest half, ties to even; overflow gives infinity, NaN stays NaN. Without branches, so that
-/// loops over it become vector code.
+/// The nearest half, ties to even; overflow gives infinity, NaN stays NaN. Without branches, so
+/// that loops over it become vector code.
 inline uint16_t float_to_half(float x) {
   const uint32_t bits = float_bits<float>(x);
   const uint32_t sign = (bits >> 16) & 0x8000u;

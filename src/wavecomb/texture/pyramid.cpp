@@ -249,7 +249,8 @@ class Pyramid {
         }
         return;
       case TexelFormat::kF16:
-        return store_tiles<uint16_t>(level, y, row, [](float v, size_t) { return float_to_half(v); });
+        return store_tiles<uint16_t>(level, y, row,
+                                     [](float v, size_t) { return float_to_half(v); });
       case TexelFormat::kF32:
         return store_tiles<float>(level, y, row, [](float v, size_t) { return v; });
     }

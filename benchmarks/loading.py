@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the start of a process to its first picture, and how much memory that takes.
+
+    .venv/bin/python benchmarks/loading.py
+    .venv/bin/python benchmarks/loading.py --rounds 9 --stages mixed --threads 2 --output my.json
+
+Each turn is a fresh process that reads a stage, renders it with 1 sample per pixel and writes an
+EXR file, as ``wavecomb render`` does. Stages take turns in shuffled rounds. Times count from just
+before the process is started; the files lie in the page cache (one turn of each goes first,
+uncounted). Writes JSON with every turn, and prints medians with the quickest and slowest turn.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from wavecomb.files import replacing
+from wavecomb.stats import machine
+
+RESULTS = Path(__file__).resolve().parent / "results" / "loading.json"
+STAGES = ("cornell", "mixed", "dragon")
+TIMES = ("python", "imports", "load", "build", "first_sample", "render", "first_picture", "process")
+MEMORY = ("imports_mb", "peak_mb", "parts_mb", "ratio")
+
+# What one turn runs. All times are of CLOCK_MONOTONIC, which processes share.
+CHILD = """
+import time
+start = time.monotonic()
+import json, sys
+def resident(key):
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) * 1024 for line in file if line.startswith(key))
+import wavecomb.usd
+import OpenImageIO
+from wavecomb import _core, api
+from wavecomb.stats import make_stats
+imports, imports_bytes = time.monotonic(), resident("VmRSS")
+stage, output, size, threads = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
+settings = api.make_settings((size, size), 1, threads=threads)
+loaded = api.load(stage, threads=threads)
+load = time.monotonic()
+result = _core.render(loaded.scene, settings, None, None, None)
+render = time.monotonic()
+picture = api.picture_of(result, make_stats(result, stage=stage, loaded=loaded))
+picture.save(output)
+end, stats = time.monotonic(), picture.stats
+begun = render - stats["seconds"]["render"]
+print(json.dumps({"start": start, "imports": imports, "load": load, "build": begun,
+                  "first_sample": begun + stats["seconds"]["first_samples"], "render": render,
+                  "first_picture": end, "imports_bytes": imports_bytes,
+                  "peak_bytes": resident("VmHWM"), "memory_bytes": stats["memory_bytes"]}))
+"""
+
+
+def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
+    """One process: seconds since its start, by event, and memory in MB."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", CHILD, str(stage), os.path.join(folder, "a.exr")]
+        begin = time.monotonic()
+        run = subprocess.run(
+            [*command, str(size), str(threads)], check=True, capture_output=True, text=True
+        )
+        end = time.monotonic()
+    got = json.loads(run.stdout)
+    parts = sum(got["memory_bytes"].values())
+    record: dict[str, Any] = {"python": got["start"] - begin}
+    record |= {name: got[name] - begin for name in TIMES[1:-1]}
+    record["process"] = end - begin
+    record["imports_mb"] = got["imports_bytes"] / 1e6
+    record["peak_mb"] = got["peak_bytes"] / 1e6
+    record["parts_mb"] = parts / 1e6
+    record["ratio"] = (got["peak_bytes"] - got["imports_bytes"]) / parts
+    record["memory_bytes"] = got["memory_bytes"]
+    return record
+
+
+def summary(turns: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """Median, least and most of each figure."""
+    out = {}
+    for name in (*TIMES, *MEMORY):
+        values = [entry[name] for entry in turns]
+        out[name] = {
+            "median": statistics.median(values),
+            "least": min(values),
+            "most": max(values),
+        }
+    return out
+
+
+def make_stage(name: str, folder: Path) -> Path:
+    """A stage of ``wavecomb scene``, or the file of that name."""
+    if name not in STAGES:
+        return Path(name)
+    path = folder / f"{name}.usdc"
+    if not path.exists():
+        command = [sys.executable, "-m", "wavecomb", "scene", name, "-o", str(path)]
+        subprocess.run(command, check=True)
+    return path
+
+
+def commit() -> str:
+    """The commit that is checked out, with "+" where files differ from it."""
+    git = ["git", "-C", str(RESULTS.parent)]
+    run = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+    changed = subprocess.run([*git, "diff", "--quiet", "HEAD"], check=False).returncode
+    return run.stdout.strip() + ("+" if changed else "")
+
+
+def main() -> None:
+    """Runs the sitting."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--stages", nargs="+", default=list(STAGES), help="names or files")
+    parser.add_argument("--folder", type=Path, default=Path("out"), help="where stages are made")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--size", type=int, default=600)
+    parser.add_argument("--threads", type=int, default=0, help="0: all")
+    parser.add_argument("--output", type=Path, default=RESULTS)
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    stages = {name: make_stage(name, options.folder) for name in options.stages}
+    for path in stages.values():
+        turn(path, options.size, options.threads)
+    turns: dict[str, list[dict[str, Any]]] = {name: [] for name in stages}
+    shuffle = random.Random(1)
+    for _ in range(options.rounds):
+        for name in shuffle.sample(list(stages), len(stages)):
+            turns[name].append(turn(stages[name], options.size, options.threads))
+    document = {
+        "command": " ".join(["benchmarks/loading.py", *sys.argv[1:]]),
+        "commit": commit(),
+        "machine": machine(),
+        "size": options.size,
+        "threads": options.threads,
+        "stages": {n: {"summary": summary(t), "turns": t} for n, t in turns.items()},
+    }
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(options.output) as part:
+        part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    print("| stage | " + " | ".join((*TIMES, *MEMORY)) + " |")
+    print("| --- |" + " --- |" * len((*TIMES, *MEMORY)))
+    for name, entry in document["stages"].items():
+        cells = []
+        for key in (*TIMES, *MEMORY):
+            f, form = entry["summary"][key], ".0f" if key.endswith("mb") else ".2f"
+            cells.append(f"{f['median']:{form}} ({f['least']:{form}} to {f['most']:{form}})")
+        print(f"| {name} | " + " | ".join(cells) + " |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Loading: images read ahead, threads, memory."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr")
+from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
+from usd_recorder import Recorder
+
+from wavecomb.image import write_png
+from wavecomb.usd import load_stage, pixels
+from wavecomb.usd.pixels import Image, ReadAhead, TextureError
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+def textured_stage(folder: Path) -> Path:
+    """Eight quads with an image each: one file is missing, one broken, one used in two ways."""
+    rng = np.random.default_rng(7)
+    for k in range(6):
+        write_png(folder / f"{k}.png", rng.random((16 + k, 20, 3)).astype(np.float32))
+    (folder / "6.png").write_bytes((folder / "5.png").read_bytes()[:100])
+    stage = Usd.Stage.CreateNew(str(folder / "stage.usda"))
+    uses = [(f"{k}.png", "sRGB") for k in range(8)] + [("0.png", "raw")]
+    for k, (name, space) in enumerate(uses):
+        mesh = UsdGeom.Mesh.Define(stage, f"/World/Quad{k}")
+        mesh.CreatePointsAttr([(0, 0, k), (1, 0, k), (1, 1, k), (0, 1, k)])
+        mesh.CreateFaceVertexCountsAttr([4])
+        mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 3])
+        material = UsdShade.Material.Define(stage, f"/World/Looks/M{k}")
+        image = UsdShade.Shader.Define(stage, f"/World/Looks/M{k}/Image")
+        image.CreateIdAttr("UsdUVTexture")
+        image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{name}")
+        image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
+        shader = UsdShade.Shader.Define(stage, f"/World/Looks/M{k}/Surface")
+        shader.CreateIdAttr("UsdPreviewSurface")
+        colour = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+        colour.ConnectToSource(image.ConnectableAPI(), "rgb")
+        material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    stage.Save()
+    return folder / "stage.usda"
+
+
+def test_reading_ahead_changes_nothing(tmp_path: Path) -> None:
+    path = textured_stage(tmp_path)
+    loads = []
+    for threads in (1, 3):
+        recorder = Recorder()
+        loads.append(
+            (recorder, load_stage(path, threads=threads, builder_factory=lambda r=recorder: r))
+        )
+    (one, a), (many, b) = loads
+    assert a.report.lines() == b.report.lines()
+    assert len(one.textures) == len(many.textures) == 9  # with the checker, and 0.png twice
+    for x, y in zip(one.textures, many.textures, strict=True):
+        assert x["srgb"] == y["srgb"] and np.array_equal(x["pixels"], y["pixels"])
+    warnings = [line for line in b.report.lines() if "cannot be read" in line]
+    assert len(warnings) == 2 and any("no such file" in line for line in warnings)
+    assert not Sdf.Layer.Find(str(path))  # closed, also where reading failed
+    assert not [t for t in threading.enumerate() if t.name.startswith("wavecomb-image")]
+
+
+def test_few_images_lie_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+
+    def fake(path: str) -> Image:
+        read.append(path)
+        if path == "bad":
+            raise TextureError("broken")
+        return Image(np.full((1, 1, 3), len(path), np.uint8))
+
+    monkeypatch.setattr(pixels, "read_image", fake)
+    ahead = ReadAhead(2)
+    ahead.want(["a", "bad", *(f"image{k}" for k in range(20))])
+    deadline = time.monotonic() + 10
+    while len(read) < 3 and time.monotonic() < deadline:
+        time.sleep(0.001)
+    time.sleep(0.02)
+    assert sorted(read) == ["a", "bad", "image0"]  # one more than there are threads
+    assert ahead.read("image19").channels == 3  # out of turn: read at once
+    with pytest.raises(TextureError, match="broken"):
+        ahead.read("bad")
+    for k in range(19):
+        assert ahead.read(f"image{k}").take()[0, 0, 0] == len(f"image{k}")
+    ahead.close()
+    assert len(read) == len(set(read)) == 22
+
+
+def test_help_imports_little() -> None:
+    code = (
+        "import sys\nfrom wavecomb.cli import main\n"
+        "try: main(['render', '--help'])\nexcept SystemExit: pass\n"
+        "heavy = {'numpy', 'pxr', 'OpenImageIO', 'rich', 'wavecomb._core'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def big_mesh(path: Path, side: int, smooth: bool) -> None:
+    """A wavy square of 2 side^2 triangles; ``smooth``: quads whose normals are to be made."""
+    u = np.linspace(-1, 1, side + 1, dtype=np.float32)
+    x, z = np.meshgrid(u, u)
+    points = np.stack([x, 0.1 * np.sin(9 * x) * np.cos(7 * z), z], -1).reshape(-1, 3)
+    a = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    b, c, d = a + side + 1, a + side + 2, a + 1
+    faces = np.stack([a, b, c, d] if smooth else [a, b, d, d, b, c], -1).ravel().astype(np.int32)
+    corners = 4 if smooth else 3
+    stage = Usd.Stage.CreateNew(str(path))
+    mesh = UsdGeom.Mesh.Define(stage, "/Terrain")
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.astype(np.float32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces))
+    counts = np.full(len(faces) // corners, corners, np.int32)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(counts))
+    mesh.CreateSubdivisionSchemeAttr("catmullClark" if smooth else "none")
+    stage.Save()
+
+
+MEASURE = """
+import json, os, sys
+import wavecomb.usd
+from wavecomb import _core, api
+
+def memory(key):
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(key))
+
+def cpu():
+    tasks = {}
+    for task in os.listdir("/proc/self/task"):
+        with open(f"/proc/self/task/{task}/schedstat") as file:
+            tasks[task] = int(file.read().split()[0])
+    return tasks
+
+imports = memory("VmRSS")
+loaded = wavecomb.load(sys.argv[1])
+after = memory("VmRSS")
+shares = {}
+for threads in (1, 2):
+    before = cpu()
+    settings = api.make_settings((64, 64), 1, threads=threads)
+    result = _core.render(loaded.scene, settings)
+    spent = [ns - before.get(task, 0) for task, ns in cpu().items()]
+    shares[threads] = max(spent) / sum(spent)
+stats = result.stats
+print(json.dumps({"imports": imports, "load": after, "peak": memory("VmHWM"),
+                  "parts": stats["memory_bytes"], "reported": stats["peak_rss_bytes"],
+                  "shares": shares}))
+"""
+
+
+@LINUX
+@pytest.mark.slow
+@pytest.mark.parametrize("smooth", [False, True])
+def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
+    """Peak memory stays within 1.5 x of arrays and BVH; nothing is copied; all threads build."""
+    pytest.importorskip("wavecomb._core")
+    stage = tmp_path / "big.usdc"
+    big_mesh(stage, 900, smooth)
+    run = subprocess.run(
+        [sys.executable, "-c", MEASURE, str(stage)], capture_output=True, text=True, check=True
+    )
+    got: dict[str, Any] = json.loads(run.stdout)
+    parts = got["parts"]
+    vertices, triangles = 901 * 901, 2 * 900 * 900
+    assert parts["meshes"] == 12 * vertices * (2 if smooth else 1) + 12 * triangles
+    assert parts["accelerator"] > 32 * triangles
+    assert got["reported"] == pytest.approx(got["peak"], rel=0.05)
+    # One set of arrays is in memory after loading, not two.
+    assert got["load"] - got["imports"] < 1.4 * parts["meshes"] + 10e6
+    assert got["peak"] - got["imports"] <= 1.5 * sum(parts.values())
+    assert got["shares"]["1"] > 0.95
+    assert got["shares"]["2"] < 0.75
