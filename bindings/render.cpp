@@ -436,6 +436,7 @@ void bind_render(nb::module_& m) {
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);
   m.def("peak_rss_bytes", &peak_rss_bytes);
+  m.def("give_back_memory", &give_back_memory);
   m.def("build_info", [] {
     nb::dict d;
     d["version"] = WAVECOMB_VERSION;

@@ -233,6 +233,9 @@ def lane_widths() -> list[int]: ...
 def policies() -> list[str]:
     """Names for Settings.policy."""
 
+def give_back_memory() -> None:
+    """Returns freed memory to the system where the C library keeps it."""
+
 def peak_rss_bytes() -> int:
     """The most memory this process has held."""
 

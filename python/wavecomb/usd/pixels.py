@@ -7,9 +7,8 @@ import os
 import tempfile
 from collections import deque
 from collections.abc import Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import OpenImageIO as oiio
@@ -17,6 +16,9 @@ from numpy.typing import NDArray
 from pxr import Ar
 
 from wavecomb.machine import usable_cores
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
@@ -166,6 +168,8 @@ class ReadAhead:
     def _start(self) -> None:
         while self._waiting and len(self._ready) <= self._threads:
             if self._pool is None:
+                from concurrent.futures import ThreadPoolExecutor
+
                 self._pool = ThreadPoolExecutor(self._threads, "wavecomb-image")
             path = self._waiting.popleft()
             self._ready[path] = self._pool.submit(read_image, path)

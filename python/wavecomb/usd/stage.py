@@ -13,7 +13,6 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
-from wavecomb.machine import give_back_memory
 from wavecomb.usd.camera import all_cameras, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured, commentary
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
@@ -97,7 +96,8 @@ def load_stage(
         finally:
             textures.release()
         scene = _build(builder, file)
-    give_back_memory()
+    if builder_factory is None:
+        _give_back_memory()
     return LoadedStage(scene, report, camera_path, clock.perf_counter() - started, file, cameras)
 
 
@@ -123,6 +123,12 @@ def _native_builder(threads: int) -> _core.SceneBuilder:
     from wavecomb import _core
 
     return _core.SceneBuilder(threads)
+
+
+def _give_back_memory() -> None:
+    from wavecomb import _core
+
+    _core.give_back_memory()
 
 
 def _open(file: Path) -> Usd.Stage:

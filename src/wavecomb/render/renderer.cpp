@@ -2,6 +2,9 @@
 #include "wavecomb/render/renderer.h"
 
 #include <sys/resource.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
@@ -421,6 +424,12 @@ std::vector<uint32_t> lane_widths() {
   for (uint32_t w : {1u, 4u, 8u, 16u})
     if (lane_kernels(w).run) widths.push_back(w);
   return widths;
+}
+
+void give_back_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 uint64_t peak_rss_bytes() {
