@@ -68,7 +68,11 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
         command = [sys.executable, "-c", CHILD, str(stage), os.path.join(folder, "a.exr")]
         begin = time.monotonic()
         run = subprocess.run(
-            [*command, str(size), str(threads)], check=True, capture_output=True, text=True
+            [*command, str(size), str(threads)],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as the command line has it
         )
         end = time.monotonic()
     got = json.loads(run.stdout)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
@@ -154,11 +154,9 @@ class GroupBuilder:
         for draw in found.draws:
             draw.subset_materials = [next(materials) for _ in draw.subsets]
             # A subset without a binding of its own computes the mesh's.
-        used: dict[Sdf.Path, UsdShade.Material] = {}
-        for draw in found.draws:
-            for material in (draw.material, *draw.subset_materials):
-                if material is not None:
-                    used.setdefault(material.GetPath(), material)
+        bound = [m for draw in found.draws for m in (draw.material, *draw.subset_materials)]
+        bound += [placed.material for placed in found.instances]
+        used = {material.GetPath(): material for material in bound if material is not None}
         for material in used.values():
             self.materials.expect(material)
 
