@@ -34,7 +34,7 @@ struct Settings {
   FilterKind filter = FilterKind::kBlackmanHarris;
   float filter_width = 3.f;  ///< full width in pixels (box: 1 is the pixel itself)
   RouletteKind roulette = RouletteKind::kThroughput;
-  uint32_t roulette_depth = 3;  ///< first vertex after which a path may end
+  uint32_t roulette_depth = 2;  ///< first vertex after which a path may end
   /// Costs decide over the picture through cost-aware roulette only, and then kMeasured makes it
   /// vary.
   CostSource costs = CostSource::kAuto;

@@ -115,6 +115,11 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
+/// Roulette ends paths whose throughput is below 1 / kRouletteGain. With a gain of 1 it saves rays and
+/// costs more noise than they are worth: on Cornell, 3 has the least product of relMSE and rays
+/// (docs/decisions/roulette.md).
+inline constexpr float kRouletteGain = 3.f;
+
 /// Cost-aware roulette: the probability of shading a vertex that a path has reached.
 ///
 /// The efficiency 1 / (variance x cost) is greatest when a path goes on with a probability
@@ -122,7 +127,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
 ///   sqrt(E[contribution^2] / cost)
 /// of what comes next (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The contribution is
 /// throughput times an unknown incident radiance, taken to be alike everywhere, so that
-///   q = T / sqrt(cost of this material / mean cost),
+///   q = kRouletteGain T / sqrt(cost of this material / mean cost),
 /// clamped to [0.05, 1]. Surfaces that shine are always shaded.
 template <typename F>
 inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
@@ -131,7 +136,7 @@ inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
   using U = UInt<F>;
   const F cost = gather<F>(costs.material_ns.data(), material, active);
   const F relative = max(F(cost * (1.f / costs.mean_ns)), F(1e-3f));
-  const F t = max_component(path.throughput) * path.eta_scale;
+  const F t = max_component(path.throughput) * path.eta_scale * kRouletteGain;
   const U flags = gather<U>(scene.materials.materials,
                             material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
                                 static_cast<uint32_t>(offsetof(MaterialRecord, flags) / 4),
@@ -291,7 +296,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.alive = active & (b.pdf > 0.f) & consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);
 
   if (settings.roulette && depth + 1 >= settings.roulette_depth) {
-    const F q = min(F(largest * out.next.eta_scale), F(0.95f));
+    const F q = min(F(largest * out.next.eta_scale * kRouletteGain), F(1.f));
     out.alive = out.alive & (rl.w < q);
     out.next.throughput *= F(1.f / max(q, F(1e-10f)));
   }
