@@ -19,7 +19,7 @@ nb::dict replay(RayRecording& recording, bool alone, uint32_t threads,
   ReplayTimes times;
   {
     const nb::gil_scoped_release release;
-    times = recording.replay({alone, threads, width, coherent});
+    times = recording.replay({alone, threads, width, coherent, {true, true, true}});
   }
   nb::dict d;
   d["wall_s"] = times.wall_s;

@@ -9,6 +9,7 @@ namespace {
 using namespace scene_testing;
 
 constexpr uint64_t kPlenty = 1u << 30;
+constexpr std::array<bool, kRayKinds> kAll{true, true, true};
 
 Settings small_settings() {
   Settings s;
@@ -44,7 +45,7 @@ TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
   renderer.render(small_settings(), {}, nullptr, nullptr, &recording);
   const RenderStatistics& s = renderer.statistics();
 
-  const ReplayTimes expected = recording.replay({false, 1, {1, 1, 1}, {false, false, false}});
+  const ReplayTimes expected = recording.replay({false, 1, {1, 1, 1}, {false, false, false}, kAll});
   EXPECT_EQ(expected.rays[0] + expected.rays[1], s.rays);
   EXPECT_EQ(expected.rays[2], s.shadow_rays);
   for (size_t k = 0; k < kRayKinds; ++k) {
@@ -57,13 +58,15 @@ TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
       for (const uint32_t w : {1u, 4u, 8u, 16u}) {
         if (w > native) continue;
         const ReplayTimes got =
-            recording.replay({alone, 2, {w, w, w}, {coherent, coherent, coherent}});
+            recording.replay({alone, 2, {w, w, w}, {coherent, coherent, coherent}, kAll});
         EXPECT_EQ(got.rays, expected.rays);
         EXPECT_EQ(got.hits, expected.hits)
             << w << (alone ? ", Embree alone" : ", as a render") << (coherent ? ", coherent" : "");
         for (size_t k = 0; k < kRayKinds; ++k) EXPECT_GT(got.thread_s[k], 0);
         EXPECT_GT(got.wall_s, 0);
       }
+  const ReplayTimes some = recording.replay({true, 2, {4, 4, 4}, {}, {false, true, false}});
+  EXPECT_EQ(some.rays, (std::array<uint64_t, kRayKinds>{0, expected.rays[1], 0}));
 }
 
 TEST(RayRecording, StopsAtItsLimit) {
@@ -81,7 +84,7 @@ TEST(RayRecording, StopsAtItsLimit) {
 TEST(RayRecording, RefusesWhatEmbreeAloneCannotSee) {
   EXPECT_THROW(RayRecording(presence(), kPlenty), Error);
   RayRecording recording(cornell(), kPlenty);
-  EXPECT_THROW(recording.replay({true, 1, {16, 3, 16}, {}}), Error);
+  EXPECT_THROW(recording.replay({true, 1, {16, 3, 16}, {}, kAll}), Error);
 }
 
 }  // namespace

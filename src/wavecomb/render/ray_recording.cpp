@@ -152,7 +152,8 @@ ReplayTimes RayRecording::replay(const Replay& how) {
           const DenormalsOff denormals_off;
           Buffers& own = buffers[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
           for (size_t w = range.begin(); w != range.end(); ++w)
-            for (const Stage& stage : *waves_[w]) trace(stage, how, own, own.times);
+            for (const Stage& stage : *waves_[w])
+              if (how.wanted[static_cast<size_t>(stage.kind)]) trace(stage, how, own, own.times);
         },
         tbb::simple_partitioner());
   });

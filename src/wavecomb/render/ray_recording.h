@@ -25,6 +25,7 @@ struct Replay {
   /// render never are).
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
   std::array<bool, kRayKinds> coherent{true, false, false};
+  std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace; others are left out
 };
 
 /// What that took. `hits`: rays that hit or are blocked.
