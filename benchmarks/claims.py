@@ -303,7 +303,9 @@ def measure(name: str, args: argparse.Namespace) -> Stage:
     stage = Stage(name, args)
     choices: list[Choice] = []
     for claim in args.only:
-        choices += [c for c in CLAIMS[claim][0](args) if c not in choices]
+        for choice in CLAIMS[claim][0](args):
+            if choice not in choices:
+                choices.append(choice)
     wavecomb.render(stage.loaded, size=(args.size, args.size), spp=1, threads=args.threads)
     shuffle = random.Random(args.seed)
     started = time.perf_counter()
