@@ -5,10 +5,11 @@
     .venv/bin/python benchmarks/limit.py --quick          # does it run?
 
 Each stage is rendered once with its rays recorded: all of them, wave by wave, stage by stage, in
-traversal order. Embree alone then traces them in the same order with as many threads: a plain loop
-around rtcIntersect and rtcOccluded that fills a packet, calls, and counts the hits; no filter,
-nothing stored. First each kind of ray (camera, bounce, shadow) is traced at each width, coherent
-and not, and the quickest is taken for it. A round then takes, in shuffled order,
+traversal order, as the render chose it where it sorts rays. Embree alone then traces them in the
+same order with as many threads: a plain loop around rtcIntersect and rtcOccluded that fills a
+packet, calls, and counts the hits; no filter, nothing stored. First each kind of ray (camera,
+bounce, shadow) is traced at each width, coherent, not, and as the render had it, and the quickest
+is taken for it. A round then takes, in shuffled order,
 
 - render: the render as it is, without a recorder;
 - alone: Embree alone, wall time, every kind at its best;
@@ -53,6 +54,8 @@ from wavecomb.api import make_settings
 
 KINDS = ("camera", "bounce", "shadow")
 WIDTHS = (1, 4, 8, 16)
+COHERENCE = (True, False, None)
+"""None: as the render told Embree, stage by stage."""
 Round = dict[str, float]
 
 
@@ -165,8 +168,8 @@ def _per_kind(recording: Any) -> tuple[int, int, int]:
 
 def tune(recording: Any, args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
     """Thread nanoseconds per ray of each kind, width and coherence: the least of some rounds."""
-    least: dict[tuple[str, int, bool], float] = {}
-    for _, width, coherent in itertools.product(range(args.tuning_rounds), WIDTHS, (True, False)):
+    least: dict[tuple[str, int, bool | None], float] = {}
+    for _, width, coherent in itertools.product(range(args.tuning_rounds), WIDTHS, COHERENCE):
         try:
             turn = recording.replay(
                 threads=args.threads, width=(width,) * 3, coherent=(coherent,) * 3
@@ -204,7 +207,8 @@ def report(stages: dict[str, Any]) -> Iterable[str]:
             rays = found["rays"][kind]
             yield row(
                 *(name, kind, f"{rays / 1e6:.2f}", str(best["width"])),
-                *("yes" if best["coherent"] else "no", f"{best['ns']:.0f}"),
+                {True: "yes", False: "no", None: "as rendered"}[best["coherent"]],
+                f"{best['ns']:.0f}",
             )
 
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/vector.h>
 
@@ -15,7 +16,7 @@ namespace {
 
 nb::dict replay(RayRecording& recording, bool alone, uint32_t threads,
                 const std::array<uint32_t, kRayKinds>& width,
-                const std::array<bool, kRayKinds>& coherent) {
+                const std::array<std::optional<bool>, kRayKinds>& coherent) {
   ReplayTimes times;
   {
     const nb::gil_scoped_release release;
@@ -41,5 +42,5 @@ void bind_recording(nb::module_& m) {
       .def_prop_ro("shadow_rays", &RayRecording::shadow_rays_at)
       .def("replay", &replay, nb::kw_only(), "alone"_a = true, "threads"_a = 0,
            "width"_a = std::array<uint32_t, kRayKinds>{16, 16, 16},
-           "coherent"_a = std::array<bool, kRayKinds>{true, false, false});
+           "coherent"_a = std::array<std::optional<bool>, kRayKinds>{});
 }

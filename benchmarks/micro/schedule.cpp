@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "wavecomb/core/rows.h"
 #include "wavecomb/schedule/radix_sort.h"
 #include "wavecomb/schedule/shading_queue.h"
 #include "widths.h"
@@ -77,18 +78,23 @@ void fill(ShadingQueue& queue, size_t n) {
   queue.ordered = sorter.sort(n, queue.sorted_indices);
 }
 
-/// Reads every column of every record once, 16 at a time: what a very cheap shader would do.
+/// Reads every record's row and ids once, in lanes: what a very cheap shader would do.
 float read_all(const ShadingQueue& queue) {
   constexpr size_t kLanes = WAVECOMB_MAX_LANES;
   using F = Lanes<kLanes>;
   using U = UInt<F>;
+  using Q = ShadingQueue;
+  const Mask<F> all(true);
   F sum(0.f);
   for (size_t i = 0; i + kLanes <= queue.size; i += kLanes) {
     const U at = queue.ordered ? load<U>(queue.sorted_indices + i)
                                : lane_index<F>() + static_cast<uint32_t>(i);
-    for (uint32_t c = 0; c < ShadingQueue::kColumns; ++c) {
-      const float* column = queue.floats(static_cast<ShadingQueue::Column>(c));
-      sum = sum + (queue.ordered ? gather<F>(column, at, Mask<F>(true)) : load<F>(column + i));
+    for (const F& word : load_rows<Q::kRowWords, F>(queue.rows(), at * uint32_t{Q::kRowWords}, all))
+      sum = sum + word;
+    for (uint32_t c = 0; c < Q::kColumns; ++c) {
+      const uint32_t* column = queue.uints(static_cast<Q::Column>(c));
+      const U id = queue.ordered ? gather<U>(column, at, Mask<U>(all)) : load<U>(column + i);
+      sum = sum + F(Int<F>(id));
     }
   }
   return lane(sum, 0);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What tracing a ray costs: the rays of a render, by Embree alone and as a render traces them.
+#include <map>
+
 #include "scene_testing.h"
 #include "wavecomb/render/ray_recording.h"
 #include "widths.h"
@@ -30,29 +32,32 @@ ScenePtr make_scene(bool large) {
   return b.build();
 }
 
-/// The rays of a picture of 128 x 128 with 16 samples, all diffuse bounces; made on first use.
-RayRecording& recording(bool large) {
-  static std::unique_ptr<RayRecording> made[2];
-  if (!made[large]) {
+/// The rays of a picture of 128 x 128 with 16 samples, all diffuse bounces, in slot order or put in
+/// order of direction; made on first use.
+RayRecording& recording(bool large, RayOrder order) {
+  static std::map<std::pair<bool, RayOrder>, std::unique_ptr<RayRecording>> made;
+  auto& rays = made[{large, order}];
+  if (!rays) {
     const ScenePtr scene = make_scene(large);
-    made[large] = std::make_unique<RayRecording>(scene, uint64_t{2} << 30);
+    rays = std::make_unique<RayRecording>(scene, uint64_t{2} << 30);
     Settings settings;
     settings.width = settings.height = 128;
     settings.spp = 16;
-    WavefrontRenderer(scene).render(settings, {}, nullptr, nullptr, made[large].get());
+    settings.ray_order = settings.shadow_order = order;
+    WavefrontRenderer(scene).render(settings, {}, nullptr, nullptr, rays.get());
   }
-  return *made[large];
+  return *rays;
 }
 
-void traversal(benchmark::State& state, bool large, bool alone, uint32_t width, RayKind kind,
-               bool coherent) {
+void traversal(benchmark::State& state, bool large, RayOrder order, bool alone, uint32_t width,
+               RayKind kind, bool coherent) {
   const auto k = static_cast<size_t>(kind);
   Replay how{alone, 1, {width, width, width}, {coherent, coherent, coherent}, {}};
   how.wanted[k] = true;
   ReplayTimes times;
   try {
     for (auto _ : state) {
-      times = recording(large).replay(how);
+      times = recording(large, order).replay(how);
       state.SetIterationTime(times.thread_s[k]);
     }
   } catch (const Error& error) {
@@ -66,21 +71,25 @@ void traversal(benchmark::State& state, bool large, bool alone, uint32_t width, 
 
 const bool registered = [] {
   constexpr const char* kKinds[kRayKinds] = {"camera", "bounce", "shadow"};
+  constexpr std::pair<RayOrder, const char*> kOrders[] = {{RayOrder::kSlot, "/slot_order"},
+                                                          {RayOrder::kDirection, "/by_direction"}};
   for (const bool large : {false, true})
     for (size_t k = 0; k < kRayKinds; ++k)
-      for (const bool alone : {true, false})
-        for (const uint32_t width : {1u, 4u, 8u, 16u})
-          for (const bool coherent : {true, false}) {
-            if (coherent && (width == 1 || (!alone && k == 2))) continue;  // the same as without
-            const std::string name =
-                std::string("traversal/") + (large ? "2M_triangles/" : "box/") + kKinds[k] +
-                (alone ? "/embree_alone" : "/as_a_render") + "/packet:" + std::to_string(width) +
-                (coherent ? "/coherent" : "");
-            benchmark::RegisterBenchmark(name.c_str(), traversal, large, alone, width,
-                                         static_cast<RayKind>(k), coherent)
-                ->UseManualTime()
-                ->Unit(benchmark::kMillisecond);
-          }
+      for (const auto& [order, order_name] : kOrders)
+        for (const bool alone : {true, false})
+          for (const uint32_t width : {1u, 4u, 8u, 16u})
+            for (const bool coherent : {true, false}) {
+              if (coherent && width == 1) continue;              // the same as without
+              if (k == 0 && order != RayOrder::kSlot) continue;  // camera rays are left as they are
+              const std::string name =
+                  std::string("traversal/") + (large ? "2M_triangles/" : "box/") + kKinds[k] +
+                  order_name + (alone ? "/embree_alone" : "/as_a_render") +
+                  "/packet:" + std::to_string(width) + (coherent ? "/coherent" : "");
+              benchmark::RegisterBenchmark(name.c_str(), traversal, large, order, alone, width,
+                                           static_cast<RayKind>(k), coherent)
+                  ->UseManualTime()
+                  ->Unit(benchmark::kMillisecond);
+            }
   return true;
 }();
 

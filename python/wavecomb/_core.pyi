@@ -252,11 +252,11 @@ class RayRecording:
         alone: bool = True,
         threads: int = 0,
         width: tuple[int, int, int] = (16, 16, 16),
-        coherent: tuple[bool, bool, bool] = (True, False, False),
+        coherent: tuple[bool | None, bool | None, bool | None] = (None, None, None),
     ) -> dict[str, Any]:
         """Traces all rays again, in their order: by Embree alone, or as a render does.
 
-        width, coherent: of camera, bounce and shadow rays. Returns wall_s, and by kind of ray
+        width, coherent: of camera, bounce and shadow rays; None: as the render had it. Returns wall_s, and by kind of ray
         thread_s, rays and hits. Raises Error for a width that Embree does not have here."""
 
 def lane_widths() -> list[int]: ...

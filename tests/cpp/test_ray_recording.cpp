@@ -45,7 +45,7 @@ TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
   renderer.render(small_settings(), {}, nullptr, nullptr, &recording);
   const RenderStatistics& s = renderer.statistics();
 
-  const ReplayTimes expected = recording.replay({false, 1, {1, 1, 1}, {false, false, false}, kAll});
+  const ReplayTimes expected = recording.replay({false, 1, {1, 1, 1}, {}, kAll});
   EXPECT_EQ(expected.rays[0] + expected.rays[1], s.rays);
   EXPECT_EQ(expected.rays[2], s.shadow_rays);
   for (size_t k = 0; k < kRayKinds; ++k) {

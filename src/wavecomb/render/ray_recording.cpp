@@ -69,18 +69,19 @@ RaySpan RayRecording::Stage::rays() const {
           size};
 }
 
-void RayRecording::closest(const void* wave, const RaySpan& rays, uint32_t depth) {
-  keep(wave, rays, depth == 0 ? RayKind::kCamera : RayKind::kBounce, depth);
+void RayRecording::closest(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) {
+  keep(wave, rays, depth == 0 ? RayKind::kCamera : RayKind::kBounce, depth, coherent);
 }
 
-void RayRecording::occluded(const void* wave, const RaySpan& rays, uint32_t depth) {
-  keep(wave, rays, RayKind::kShadow, depth);
+void RayRecording::occluded(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) {
+  keep(wave, rays, RayKind::kShadow, depth, coherent);
 }
 
-void RayRecording::keep(const void* wave, const RaySpan& rays, RayKind kind, uint32_t depth) {
+void RayRecording::keep(const void* wave, const RaySpan& rays, RayKind kind, uint32_t depth,
+                        bool coherent) {
   const bool has_tfar = rays.tfar != nullptr;
   const size_t columns = has_tfar ? 7 : 6;
-  Stage stage{kind, has_tfar, rays.size, SoaBlock(columns, rays.size)};
+  Stage stage{kind, has_tfar, coherent, rays.size, SoaBlock(columns, rays.size)};
   const float* const from[7] = {rays.ox, rays.oy, rays.oz, rays.dx, rays.dy, rays.dz, rays.tfar};
   for (size_t c = 0; c < columns; ++c) std::memcpy(stage.columns.floats(c), from[c], 4 * rays.size);
 
@@ -101,16 +102,16 @@ void RayRecording::trace(const Stage& stage, const Replay& how, Buffers& buffers
   const RaySpan rays = stage.rays();
   const HitBuffer& h = buffers.hits;
   const bool shadow = stage.kind == RayKind::kShadow;
+  const bool coherent = how.coherent[k].value_or(stage.coherent);
   uint64_t hits = 0;
   const Clock::time_point start = Clock::now();
   if (how.alone)
-    hits = shadow ? bare_->occluded(rays, how.width[k], how.coherent[k])
-                  : bare_->intersect(rays, how.width[k], how.coherent[k]);
+    hits = shadow ? bare_->occluded(rays, how.width[k], coherent)
+                  : bare_->intersect(rays, how.width[k], coherent);
   else if (shadow)
-    accel_->occluded(rays, buffers.occluded.data(), how.width[k], {});
+    accel_->occluded(rays, buffers.occluded.data(), how.width[k], coherent, {});
   else
-    accel_->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, how.width[k], how.coherent[k],
-                      {});
+    accel_->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, how.width[k], coherent, {});
   times.thread_s[k] += seconds_since(start);
   if (!how.alone) {
     const uint32_t* found = shadow ? buffers.occluded.data() : h.inst;

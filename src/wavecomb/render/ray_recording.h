@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "wavecomb/accel/bare_traversal.h"
@@ -21,10 +22,10 @@ inline constexpr size_t kRayKinds = 3;
 struct Replay {
   bool alone = true;     ///< by Embree alone; false: by EmbreeAccelerator, as a render does
   uint32_t threads = 0;  ///< 0: all
-  /// By kind: rays per packet, and whether Embree is told that they are coherent (shadow rays of a
-  /// render never are).
+  /// By kind: rays per packet, and whether Embree is told that they are coherent; nothing: as the
+  /// render told it, stage by stage.
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
-  std::array<bool, kRayKinds> coherent{true, false, false};
+  std::array<std::optional<bool>, kRayKinds> coherent{};
   std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace; others are left out
 };
 
@@ -45,8 +46,8 @@ class RayRecording final : public RayRecorder {
   RayRecording(std::shared_ptr<const Scene> scene, uint64_t byte_limit);
   ~RayRecording() override;
 
-  void closest(const void* wave, const RaySpan& rays, uint32_t depth) override;
-  void occluded(const void* wave, const RaySpan& rays, uint32_t depth) override;
+  void closest(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) override;
+  void occluded(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) override;
 
   uint64_t bytes() const { return bytes_; }
   size_t waves() const { return waves_.size(); }
@@ -62,7 +63,7 @@ class RayRecording final : public RayRecorder {
   /// The rays of one stage of a wave.
   struct Stage {
     RayKind kind;
-    bool has_tfar;
+    bool has_tfar, coherent;
     size_t size;
     SoaBlock columns;
     RaySpan rays() const;
@@ -70,7 +71,7 @@ class RayRecording final : public RayRecorder {
   using RecordedWave = std::vector<Stage>;
   struct Buffers;
 
-  void keep(const void* wave, const RaySpan& rays, RayKind kind, uint32_t depth);
+  void keep(const void* wave, const RaySpan& rays, RayKind kind, uint32_t depth, bool coherent);
   void trace(const Stage& stage, const Replay& how, Buffers& buffers, ReplayTimes& times) const;
 
   std::shared_ptr<const Scene> scene_;
