@@ -256,8 +256,9 @@ class RayRecording:
     ) -> dict[str, Any]:
         """Traces all rays again, in their order: by Embree alone, or as a render does.
 
-        width, coherent: of camera, bounce and shadow rays; None: as the render had it. Returns wall_s, and by kind of ray
-        thread_s, rays and hits. Raises Error for a width that Embree does not have here."""
+        width, coherent: of camera, bounce and shadow rays; None: as the render had it. Returns
+        wall_s, and by kind of ray thread_s, rays and hits. Raises Error for a width that Embree
+        does not have here."""
 
 def lane_widths() -> list[int]: ...
 def policies() -> list[str]:
