@@ -88,9 +88,10 @@ test-py: build build/.setup-test ## Python and statistical tests
 test-py-fast: build build/.setup-test
 	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
 
-bench: build ## Micro-benchmarks
+bench: build ## Micro-benchmarks; JSON goes to out/micro
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_benchmarks -j $(JOBS) -- --quiet
-	@for program in $(BUILD)/benchmarks/micro/micro_*; do [ -x $$program ] || continue; echo "== $$program"; $$program; done
+	@mkdir -p out/micro; for program in $(BUILD)/benchmarks/micro/micro_*; do [ -f $$program ] || continue; \
+	  echo "== $$program"; $$program --benchmark_out=out/micro/$${program##*/micro_}.json || exit 1; done
 
 # ---- style ---------------------------------------------------------------------------------------------
 

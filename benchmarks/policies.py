@@ -24,25 +24,19 @@ from __future__ import annotations
 import argparse
 import hashlib
 import itertools
-import json
-import os
 import random
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sitting import RESULTS, ROOT, bootstrap, head, load_stage, log, phase_times, row, write_result
 
 import wavecomb
 from wavecomb import _core
-from wavecomb.files import replacing
-from wavecomb.scenes import write_scene
-from wavecomb.stats import SORTING, machine
 
-ROOT = Path(__file__).resolve().parents[1]
 ROULETTES = ("throughput", "cost-aware")
 RAY_ORDERS = (
     ("slot", "slot"),
@@ -88,9 +82,7 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--stages", type=Path, default=ROOT / "out" / "stages")
     parser.add_argument("--triangles", type=int, default=250_000, help="of a dragon")
-    parser.add_argument(
-        "--output", type=Path, default=ROOT / "benchmarks" / "results" / "policies.json"
-    )
+    parser.add_argument("--output", type=Path, default=RESULTS / "policies.json")
     parser.add_argument("--quick", action="store_true", help="small; for trying the program")
     args = parser.parse_args()
     if args.quick:
@@ -130,19 +122,14 @@ class Sitting:
                 for choice in choices:
                     self.runs.append(self._run(name, scene, choice, repetition))
                 done = time.perf_counter() - started
-                _log(f"{name}: repetition {repetition + 1}, {self.spp[name]} spp, {done:.0f} s")
+                log(f"{name}: repetition {repetition + 1}, {self.spp[name]} spp, {done:.0f} s")
                 self.write()
             self._expect_equal(name)
             if self.args.reference_spp:
                 self.errors[name] = self._errors(scene, self.spp[name])
 
     def _scene(self, name: str) -> Any:
-        path = self.args.stages / f"{name}-{self.args.triangles}.usdc"
-        if not path.exists():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            options = {} if name == "cornell" else {"triangles": self.args.triangles}
-            write_scene(name, path, **options)
-        return wavecomb.load(path).scene
+        return load_stage(name, self.args.stages, self.args.triangles).scene
 
     def _choices(self) -> list[Choice]:
         choices: list[Choice] = []
@@ -182,18 +169,18 @@ class Sitting:
     def _run(self, name: str, scene: Any, choice: Choice, repetition: int) -> Run:
         picture = wavecomb.render(scene, spp=self.spp[name], **self.settings, **choice)
         stats = picture.stats
-        phases = stats["phases_s"]
+        phases, times = stats["phases_s"], phase_times(stats)
         return {
             "scene": name,
             "repetition": repetition,
             **choice,
-            "shade_s": phases["shade"],
-            "order_s": sum(phases[phase] for phase in SORTING),
-            "ordered_shade_s": phases["shade"] + sum(phases[phase] for phase in SORTING),
+            "shade_s": times["shade_s"],
+            "order_s": times["order_s"],
+            "ordered_shade_s": times["shade_s"] + times["order_s"],
             "order_rays_s": phases["order_rays"],
             "trace_s": phases["trace"],
             "shadow_s": phases["shadow"],
-            "total_s": stats["seconds"]["render"],
+            "total_s": times["render_s"],
             "phases_s": phases,
             **stats["coherence"],
             "lane_utilisation": stats["lane_utilisation"],
@@ -227,24 +214,17 @@ class Sitting:
 
     def write(self) -> None:
         """All of it as JSON."""
-        commit = subprocess.run(
-            ["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False
-        ).stdout.strip()
-        document = {
-            "schema": "wavecomb-benchmark-policies/1",
-            "commit": commit,
-            "command": " ".join(["benchmarks/policies.py", *sys.argv[1:]]),
-            "machine": machine(),
-            "load": os.getloadavg(),
-            "settings": self.settings,
-            "spp": self.spp,
-            "repetitions": self.args.repetitions,
-            "errors": self.errors,
-            "runs": self.runs,
-        }
-        self.args.output.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(self.args.output) as part:
-            part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        write_result(
+            self.args.output,
+            "wavecomb-benchmark-policies/1",
+            {
+                "settings": self.settings,
+                "spp": self.spp,
+                "repetitions": self.args.repetitions,
+                "errors": self.errors,
+                "runs": self.runs,
+            },
+        )
 
     # ---- tables ----------------------------------------------------------------------------------
 
@@ -274,7 +254,7 @@ class Sitting:
                 yield ""
 
     def _policy_table(self, scene: str, roulette: str, lanes: int) -> Iterable[str]:
-        yield from _head(
+        yield from head(
             *("policy", "shade s", "to none", "order s", "shade + order to none", "total to none"),
             *("run length", "material", "texture", "lanes full", "M rays"),
         )
@@ -282,7 +262,7 @@ class Sitting:
         for policy in self.args.policies:
             runs = self._pick(policy=policy, **fixed)
             base = self._pick(policy="none", **fixed)
-            yield _row(
+            yield row(
                 policy,
                 f"{_median(runs, 'shade_s'):.3f}",
                 _ratio(runs, base, "shade_s"),
@@ -297,7 +277,7 @@ class Sitting:
             )
 
     def _roulette_table(self, scene: str) -> Iterable[str]:
-        yield from _head(
+        yield from head(
             *("policy", "lanes", "roulette", "rays", "records", "shade", "total"),
             *("relMSE", "efficiency"),
         )
@@ -316,7 +296,7 @@ class Sitting:
                 error = f"{errors[roulette]:.3g}"
                 factor = first / errors[roulette]
                 efficiency = _ratio(base, runs, "total_s", scale=factor)
-            yield _row(
+            yield row(
                 policy,
                 str(lanes),
                 roulette,
@@ -326,7 +306,7 @@ class Sitting:
             )
 
     def _ray_table(self, scene: str) -> Iterable[str]:
-        yield from _head(
+        yield from head(
             "bounce", "shadow", "order_rays s", "trace", "shadow time", "all three", "total"
         )
         fixed = {
@@ -345,7 +325,7 @@ class Sitting:
         base = of("slot", "slot")
         for ray, shadow in RAY_ORDERS:
             runs = of(ray, shadow)
-            yield _row(
+            yield row(
                 ray,
                 shadow,
                 f"{_median(runs, 'order_rays_s'):.3f}",
@@ -377,27 +357,8 @@ def _ratio(runs: Sequence[Run], base: Sequence[Run], key: str, scale: float = 1.
     text = f"{np.median(ratios):.3f}"
     if np.ptp(ratios) == 0.0:
         return text
-    low, high = _bootstrap(ratios, np.median)
+    low, high = bootstrap(ratios)
     return f"{text} ({low:.3f} to {high:.3f})"
-
-
-def _bootstrap(values: Any, statistic: Callable[[Any], Any]) -> tuple[float, float]:
-    rng = np.random.default_rng(0)
-    draws = [statistic(rng.choice(values, values.size)) for _ in range(1000)]
-    low, high = np.quantile(draws, (0.025, 0.975))
-    return float(low), float(high)
-
-
-def _head(*names: str) -> list[str]:
-    return [_row(*names), "|" + " --- |" * len(names)]
-
-
-def _row(*cells: str) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def _log(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -4,4 +4,5 @@
 #include <nanobind/nanobind.h>
 
 void bind_scene(nanobind::module_& m);
+void bind_recording(nanobind::module_& m);
 void bind_render(nanobind::module_& m);

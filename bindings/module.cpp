@@ -11,5 +11,6 @@ NB_MODULE(_core, m) {
   m.doc() = "The native core of Wavecomb.";
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_scene(m);
+  bind_recording(m);
   bind_render(m);
 }

@@ -13,6 +13,7 @@
 #include "bind.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/integrate/calibration.h"
+#include "wavecomb/render/ray_recording.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/schedule/policy.h"
 
@@ -329,7 +330,8 @@ nb::dict statistics_dict(const Result& r) {
 }
 
 Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_object,
-              const nb::object& progress, const nb::object& policy, const nb::object& costs) {
+              const nb::object& progress, const nb::object& policy, const nb::object& costs,
+              RayRecording* recorder) {
   const Settings settings = nb::cast<Settings>(settings_object);
   Result result;
   result.settings = to_dict(settings_object);
@@ -351,8 +353,8 @@ Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_obj
     const nb::gil_scoped_release release;
     settings.check();
     WavefrontRenderer renderer(scene, settings.threads);
-    result.picture =
-        renderer.render(settings, callback, own_policy.get(), costs.is_none() ? nullptr : &profile);
+    result.picture = renderer.render(settings, callback, own_policy.get(),
+                                     costs.is_none() ? nullptr : &profile, recorder);
     result.statistics = renderer.statistics();
     result.profile = renderer.cost_profile();
   }
@@ -432,7 +434,7 @@ void bind_render(nb::module_& m) {
       .def_prop_ro("stats", &statistics_dict);
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
-        "policy"_a = nb::none(), "costs"_a = nb::none());
+        "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none());
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);
   m.def("peak_rss_bytes", &peak_rss_bytes);

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // What giving a queue an order costs: sorting keys, and moving records against reading them by
-// index.
-#include <benchmark/benchmark.h>
+// index. Times are per record.
 
 #include <algorithm>
 #include <numeric>
 #include <random>
 #include <vector>
 
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/rows.h"
 #include "wavecomb/schedule/radix_sort.h"
 #include "wavecomb/schedule/shading_queue.h"
+#include "widths.h"
 
-namespace wavecomb {
+namespace wavecomb::micro {
 namespace {
 
 /// Keys as "material" makes them: a program in the top byte, a material below.
@@ -26,18 +26,34 @@ std::vector<uint64_t> material_keys(size_t n, uint32_t materials) {
   return keys;
 }
 
-void radix_sort(benchmark::State& state) {
-  const auto n = static_cast<size_t>(state.range(0));
-  const std::vector<uint64_t> keys = material_keys(n, 24);
+/// Keys as no policy makes them: 64 bits that differ. The most passes a sort can take.
+std::vector<uint64_t> random_keys(size_t n) {
+  std::mt19937_64 random(1);
+  std::vector<uint64_t> keys(n);
+  for (uint64_t& key : keys) key = random();
+  return keys;
+}
+
+void sort_keys(benchmark::State& state, const std::vector<uint64_t>& keys) {
+  const size_t n = keys.size();
   RadixSorter sorter(n);
   std::vector<uint32_t> order(n);
   for (auto _ : state) {
     std::copy(keys.begin(), keys.end(), sorter.keys());
     benchmark::DoNotOptimize(sorter.sort(n, order.data()));
   }
-  state.SetItemsProcessed(state.iterations() * state.range(0));
+  count_items(state, "record", n);
 }
-BENCHMARK(radix_sort)->RangeMultiplier(16)->Range(256, 1 << 20);
+
+void radix_sort_material(benchmark::State& state) {
+  sort_keys(state, material_keys(static_cast<size_t>(state.range(0)), 24));
+}
+BENCHMARK(radix_sort_material)->RangeMultiplier(16)->Range(256, 1 << 20);
+
+void radix_sort_random(benchmark::State& state) {
+  sort_keys(state, random_keys(static_cast<size_t>(state.range(0))));
+}
+BENCHMARK(radix_sort_random)->RangeMultiplier(16)->Range(256, 1 << 20);
 
 void std_stable_sort(benchmark::State& state) {
   const auto n = static_cast<size_t>(state.range(0));
@@ -49,7 +65,7 @@ void std_stable_sort(benchmark::State& state) {
                      [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
     benchmark::DoNotOptimize(order.data());
   }
-  state.SetItemsProcessed(state.iterations() * state.range(0));
+  count_items(state, "record", n);
 }
 BENCHMARK(std_stable_sort)->RangeMultiplier(16)->Range(256, 1 << 20);
 
@@ -62,29 +78,43 @@ void fill(ShadingQueue& queue, size_t n) {
   queue.ordered = sorter.sort(n, queue.sorted_indices);
 }
 
-/// Reads every column of every record once, 16 at a time: what a very cheap shader would do.
+/// Reads every record's row and ids once, in lanes: what a very cheap shader would do.
 float read_all(const ShadingQueue& queue) {
   constexpr size_t kLanes = WAVECOMB_MAX_LANES;
   using F = Lanes<kLanes>;
   using U = UInt<F>;
+  using Q = ShadingQueue;
+  const Mask<F> all(true);
   F sum(0.f);
   for (size_t i = 0; i + kLanes <= queue.size; i += kLanes) {
     const U at = queue.ordered ? load<U>(queue.sorted_indices + i)
                                : lane_index<F>() + static_cast<uint32_t>(i);
-    for (uint32_t c = 0; c < ShadingQueue::kColumns; ++c) {
-      const float* column = queue.floats(static_cast<ShadingQueue::Column>(c));
-      sum = sum + (queue.ordered ? gather<F>(column, at, Mask<F>(true)) : load<F>(column + i));
+    for (const F& word : load_rows<Q::kRowWords, F>(queue.rows(), at * uint32_t{Q::kRowWords}, all))
+      sum = sum + word;
+    for (uint32_t c = 0; c < Q::kColumns; ++c) {
+      const uint32_t* column = queue.uints(static_cast<Q::Column>(c));
+      const U id = queue.ordered ? gather<U>(column, at, Mask<U>(all)) : load<U>(column + i);
+      sum = sum + F(Int<F>(id));
     }
   }
   return lane(sum, 0);
 }
+
+void read_in_arrival_order(benchmark::State& state) {
+  const auto n = static_cast<size_t>(state.range(0));
+  ShadingQueue queue(n);
+  queue.size = n;
+  for (auto _ : state) benchmark::DoNotOptimize(read_all(queue));
+  count_items(state, "record", n);
+}
+BENCHMARK(read_in_arrival_order)->RangeMultiplier(16)->Range(256, 1 << 20);
 
 void gather_by_index(benchmark::State& state) {
   const auto n = static_cast<size_t>(state.range(0));
   ShadingQueue queue(n);
   fill(queue, n);
   for (auto _ : state) benchmark::DoNotOptimize(read_all(queue));
-  state.SetItemsProcessed(state.iterations() * state.range(0));
+  count_items(state, "record", n);
 }
 BENCHMARK(gather_by_index)->RangeMultiplier(16)->Range(256, 1 << 20);
 
@@ -97,9 +127,9 @@ void materialize_then_read(benchmark::State& state) {
     queue.materialize();
     benchmark::DoNotOptimize(read_all(queue));
   }
-  state.SetItemsProcessed(state.iterations() * state.range(0));
+  count_items(state, "record", n);
 }
 BENCHMARK(materialize_then_read)->RangeMultiplier(16)->Range(256, 1 << 20);
 
 }  // namespace
-}  // namespace wavecomb
+}  // namespace wavecomb::micro

@@ -222,12 +222,43 @@ def render(
     progress: Callable[[int, int], bool | None] | None = None,
     policy: Any = None,
     costs: dict[str, dict[str, float]] | None = None,
+    recorder: RayRecording | None = None,
 ) -> Result:
     """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling
     thread (GIL held); returning False cancels, and the result holds what was done.
     KeyboardInterrupt raised in the callback also stops the render. Raises Error.
     policy: as wavecomb.SchedulingPolicy, in place of the settings' one; what its order() raises
-    comes out of here. costs: a profile to start from, as Result.costs."""
+    comes out of here. costs: a profile to start from, as Result.costs. recorder: keeps the rays of
+    the wavefront integrator."""
+
+class RayRecording:
+    """The rays of one render, kept and traced again; for benchmarks/limit.py."""
+
+    def __init__(self, scene: Scene, byte_limit: int = ...) -> None:
+        """Raises Error for a scene with partly present surfaces. A render that would keep more
+        than `byte_limit` bytes ends with an Error."""
+    @property
+    def bytes(self) -> int: ...
+    @property
+    def waves(self) -> int: ...
+    @property
+    def rays(self) -> list[int]:
+        """Camera and bounce rays of each depth."""
+    @property
+    def shadow_rays(self) -> list[int]: ...
+    def replay(
+        self,
+        *,
+        alone: bool = True,
+        threads: int = 0,
+        width: tuple[int, int, int] = (16, 16, 16),
+        coherent: tuple[bool | None, bool | None, bool | None] = (None, None, None),
+    ) -> dict[str, Any]:
+        """Traces all rays again, in their order: by Embree alone, or as a render does.
+
+        width, coherent: of camera, bounce and shadow rays; None: as the render had it. Returns
+        wall_s, and by kind of ray thread_s, rays and hits. Raises Error for a width that Embree
+        does not have here."""
 
 def lane_widths() -> list[int]: ...
 def policies() -> list[str]:

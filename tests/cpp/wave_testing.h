@@ -79,6 +79,17 @@ class WaveRun {
         run({pixels_.data() + p, std::min(step, count - p), first, std::min(pass, s.spp - first)});
   }
 
+  /// Nanoseconds that shading synthetic hits of one material takes, by kernels of W lanes.
+  template <size_t W>
+  double time_material(const CalibrationHits& hits) {
+    const DenormalsOff denormals_off;
+    if (!wave_ || hits.count > capacity_) {
+      wave_ = std::make_unique<Wave>(hits.count, context_);
+      capacity_ = hits.count;
+    }
+    return wavecomb::time_material<W>(*wave_, context_, hits);
+  }
+
   Picture picture() const {
     return {case_.settings.width, case_.settings.height, film_.beauty(), film_.albedo(),
             film_.normal(),       film_.depth(),         film_.samples()};

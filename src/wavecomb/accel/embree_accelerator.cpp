@@ -142,6 +142,22 @@ void intersect_round_lights(const RTCIntersectFunctionNArguments* args) {
   }
 }
 
+/// The same where any closest hit will do.
+void intersect_round_lights_bare(const RTCIntersectFunctionNArguments* args) {
+  const unsigned n = args->N;
+  RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
+  RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] == 0) continue;
+    const float t = meet_round_light(args->geometryUserPtr, ray, n, i);
+    if (t == 0.f) continue;
+    RTCRayN_tfar(ray, n, i) = t;
+    RTCHitN_primID(hit, n, i) = 0;
+    RTCHitN_geomID(hit, n, i) = args->geomID;
+    RTCHitN_instID(hit, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
 void occlude_round_lights(const RTCOccludedFunctionNArguments* args) {
   for (unsigned i = 0; i < args->N; ++i)
     if (args->valid[i] != 0 && meet_round_light(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
@@ -188,6 +204,7 @@ bool mesh_has_presence(const Scene& scene, const Mesh& mesh) {
 
 struct EmbreeAccelerator::Impl {
   std::shared_ptr<const Scene> scene;
+  HitRule rule = HitRule::kCanonical;
   SceneView view;
   RTCDevice device = nullptr;
   RTCScene top = nullptr;
@@ -220,8 +237,10 @@ struct EmbreeAccelerator::Impl {
 
   RTCScene new_scene() const {
     RTCScene s = rtcNewScene(device);
-    rtcSetSceneFlags(s, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST |
-                                                   RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS));
+    const RTCSceneFlags filter = rule == HitRule::kCanonical
+                                     ? RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
+                                     : RTC_SCENE_FLAG_NONE;
+    rtcSetSceneFlags(s, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | filter));
     rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
     return s;
   }
@@ -241,9 +260,10 @@ struct EmbreeAccelerator::Impl {
                                mesh.vertex_count());
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(),
                                0, 12, mesh.triangle_count());
-    if (mesh_has_presence(*scene, mesh) ||
-        (can_inherit_presence && mesh.material == kInheritMaterial &&
-         mesh.face_materials.empty())) {
+    if (rule == HitRule::kCanonical &&
+        (mesh_has_presence(*scene, mesh) ||
+         (can_inherit_presence && mesh.material == kInheritMaterial &&
+          mesh.face_materials.empty()))) {
       users.push_back(std::make_unique<GeometryUser>(GeometryUser{&view, mesh_id}));
       rtcSetGeometryUserData(g, users.back().get());
       rtcSetGeometryIntersectFilterFunction(g, presence_filter);
@@ -277,7 +297,8 @@ struct EmbreeAccelerator::Impl {
       rtcSetGeometryUserPrimitiveCount(g, 1);
       rtcSetGeometryUserData(g, const_cast<LightRecord*>(&light));  // only read
       rtcSetGeometryBoundsFunction(g, round_light_box, nullptr);
-      rtcSetGeometryIntersectFunction(g, intersect_round_lights);
+      rtcSetGeometryIntersectFunction(
+          g, rule == HitRule::kCanonical ? intersect_round_lights : intersect_round_lights_bare);
       rtcSetGeometryOccludedFunction(g, occlude_round_lights);
       rtcCommitGeometry(g);
       rtcAttachGeometryByID(top, g, id);
@@ -463,9 +484,11 @@ struct EmbreeAccelerator::Impl {
   }
 };
 
-EmbreeAccelerator::EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads)
+EmbreeAccelerator::EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
+                                     HitRule rule)
     : impl_(std::make_unique<Impl>()) {
   impl_->scene = std::move(scene);
+  impl_->rule = rule;
   impl_->view = impl_->scene->view();
   impl_->device = rtcNewDevice(nullptr);
   if (!impl_->device) throw Error("the ray tracer could not start; is this CPU older than SSE2?");
@@ -533,6 +556,10 @@ uint32_t EmbreeAccelerator::native_width() const {
   if (rtcGetDeviceProperty(impl_->device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
   if (rtcGetDeviceProperty(impl_->device, RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED)) return 4;
   return 1;
+}
+
+RTCSceneTy* EmbreeAccelerator::embree_scene() const {
+  return impl_->top;
 }
 
 }  // namespace wavecomb

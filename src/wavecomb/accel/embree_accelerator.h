@@ -7,6 +7,8 @@
 
 #include "wavecomb/scene/scene.h"
 
+struct RTCSceneTy;  // Embree's
+
 namespace wavecomb {
 
 /// Rays to trace, column by column. Directions are unit, tnear is 0.
@@ -37,6 +39,12 @@ struct PresenceKeys {
   uint32_t salt = 0;
 };
 
+/// Which of equally close hits a hierarchy is built to give.
+enum class HitRule : uint8_t {
+  kCanonical,  ///< the same one for any packet (docs/decisions/canonical-hits.md)
+  kEmbree,     ///< whichever Embree keeps; no filter anywhere. For BareTraversal only
+};
+
 /// A two-level bounding volume hierarchy: each group of meshes committed once, instanced any number
 /// of times; the world's own meshes in the top level.
 ///
@@ -46,7 +54,8 @@ class EmbreeAccelerator {
  public:
   /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory
   /// ...).
-  EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads);
+  EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
+                    HitRule rule = HitRule::kCanonical);
   ~EmbreeAccelerator();
 
   /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent`: the rays of a packet go
@@ -62,6 +71,8 @@ class EmbreeAccelerator {
   size_t bytes() const;
   /// Widest packets that Embree traces natively here.
   uint32_t native_width() const;
+  /// The top level, as an RTCScene.
+  RTCSceneTy* embree_scene() const;
 
  private:
   struct Impl;

@@ -20,6 +20,7 @@ struct CalibrationHits {
   uint32_t material = 0;
   uint32_t count = 0;
   uint32_t distinct = 0;
+  float fill = 1;  ///< share of the lanes that packets fill, on average; at least one lane
   CalibrationHit hits[kMost];
 };
 

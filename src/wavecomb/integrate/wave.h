@@ -14,6 +14,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/phase_clock.h"
+#include "wavecomb/integrate/ray_recorder.h"
 #include "wavecomb/integrate/statistics.h"
 #include "wavecomb/schedule/chooser.h"
 #include "wavecomb/schedule/coherence.h"
@@ -40,8 +41,9 @@ struct WaveContext {
   OrderGrid grid;                      ///< for ray orders and hit positions
   Film* film;                          ///< each wave writes its own pixels only
   uint32_t traversal_width;
-  bool wants_position;  ///< some policy reads position keys
-  bool measures_costs;  ///< batches are timed
+  bool wants_position;    ///< some policy reads position keys
+  bool measures_costs;    ///< batches are timed
+  RayRecorder* recorder;  ///< gets the rays; null in any render that is not measured
 
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;

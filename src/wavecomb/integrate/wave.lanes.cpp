@@ -104,8 +104,13 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     std::memset(wave.pool.radiance + i * PathPool::kRadianceWords, 0, 4 * PathPool::kRadianceWords);
   }
   const auto start = PhaseClock::Clock::now();
-  for (size_t begin = 0; begin < queue.size;) {
-    const size_t end = batch_end(queue, begin);
+  for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {
+    // Packets that are to be filled in part only are batches of their own.
+    const size_t end =
+        hits.fill < 1.f
+            ? std::min(queue.size,
+                       static_cast<size_t>(hits.fill * static_cast<float>(W * batch) + 0.5f))
+            : batch_end(queue, begin);
     visit_program<F>(
         static_cast<ProgramId>(context.traits[hits.material].program),
         [&]<typename Bsdf>() { shade_batch<Bsdf, F>(wave, context, settings, 1, begin, end); });

@@ -178,7 +178,8 @@ CostProfile WavefrontRenderer::cost_profile() const {
 }
 
 Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallback& progress,
-                                  const SchedulingPolicy* own_policy, const CostProfile* profile) {
+                                  const SchedulingPolicy* own_policy, const CostProfile* profile,
+                                  RayRecorder* recorder) {
   settings.check();
   const Scene& scene = *impl_->scene;
   const uint32_t lanes = choose_lanes(settings.lanes);
@@ -231,7 +232,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
       &film,
       settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, impl_->accel->native_width()),
       wants_position,
-      measures};
+      measures,
+      recorder};
 
   std::vector<Worker> workers(threads);
   std::atomic<uint64_t> done{0};

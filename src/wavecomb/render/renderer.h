@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "wavecomb/core/settings.h"
+#include "wavecomb/integrate/ray_recorder.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
 
@@ -79,8 +80,10 @@ class WavefrontRenderer {
   /// on threads, wave size, lanes or policy. Throws Error for settings that cannot be. `policy`
   /// replaces the one that the settings name. `profile` gives the costs to start from, for the
   /// order and for roulette; without one they are measured on synthetic hits or modelled.
+  /// `recorder` gets the rays of the wavefront integrator; what it throws ends the render.
   Picture render(const Settings& settings, const ProgressCallback& progress = {},
-                 const SchedulingPolicy* policy = nullptr, const CostProfile* profile = nullptr);
+                 const SchedulingPolicy* policy = nullptr, const CostProfile* profile = nullptr,
+                 RayRecorder* recorder = nullptr);
   /// Costs after the last render().
   CostProfile cost_profile() const;
   /// Of the last render().

@@ -45,6 +45,7 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
                   bool coherent) {
   const RayQueue& q = wave.rays;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size};
+  if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
   const HitBuffer& h = wave.hits;
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
                            coherent, presence_keys(wave.pool, depth, false));
@@ -58,6 +59,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth, bool coheren
   using U = UInt<F>;
   ShadowQueue& q = wave.shadows;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.slot, q.size};
+  if (context.recorder) context.recorder->occluded(&wave, rays, depth, coherent);
   context.accel->occluded(rays, q.occluded, context.traversal_width, coherent,
                           presence_keys(wave.pool, depth, true));
   for (size_t i = 0; i < q.size; i += kWidth<F>) {

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a render is from its limit: the same rays traced by Embree alone.
+
+    .venv/bin/python benchmarks/limit.py --spp 16 --threads 2 --rounds 5
+    .venv/bin/python benchmarks/limit.py --quick          # does it run?
+
+Each stage is rendered once with its rays recorded: all of them, wave by wave, stage by stage, in
+traversal order, as the render chose it where it sorts rays. Embree alone then traces them in the
+same order with as many threads: a plain loop around rtcIntersect and rtcOccluded that fills a
+packet, calls, and counts the hits; no filter, nothing stored. First each kind of ray (camera,
+bounce, shadow) is traced at each width, coherent, not, and as the render had it, and the quickest
+is taken for it. A round then takes, in shuffled order,
+
+- render: the render as it is, without a recorder;
+- alone: Embree alone, wall time, every kind at its best;
+- calls: the same rays through the accelerator's own functions, as the render calls them: they fill
+  packets, keep hits canonical by a filter, and store hits.
+
+Ratios are taken within a round:
+
+- limit: render / alone, wall time both;
+- traversal: the trace and shadow phases (per thread) / alone;
+- calls: calls / alone: filter, set-up and storing of hits, alone on the machine;
+- filter share: (calls - alone) / the trace and shadow phases: how much of them that is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import random
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from sitting import (
+    RESULTS,
+    ROOT,
+    STAGES,
+    head,
+    load_stage,
+    log,
+    phase_times,
+    ratio,
+    row,
+    show,
+    summary,
+    write_result,
+)
+
+from wavecomb import _core
+from wavecomb.api import make_settings
+
+KINDS = ("camera", "bounce", "shadow")
+WIDTHS = (1, 4, 8, 16)
+COHERENCE = (True, False, None)
+"""None: as the render told Embree, stage by stage."""
+Round = dict[str, float]
+
+
+def main() -> None:
+    """Runs the sitting, prints the tables, writes the JSON."""
+    args = _arguments()
+    stages: dict[str, Any] = {}
+    for name in args.stages:
+        stages[name] = measure(name, args)
+        write_result(
+            args.output,
+            "wavecomb-limit/1",
+            {
+                "size": args.size,
+                "spp": args.spp,
+                "threads": args.threads,
+                "rounds": args.rounds,
+                "stages": stages,
+            },
+        )
+    for line in report(stages):
+        print(line)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--stages", nargs="+", default=list(STAGES), metavar="NAME")
+    parser.add_argument("--spp", type=int, default=16)
+    parser.add_argument("--size", type=int, default=600, help="edge of the picture, pixels")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--tuning-rounds", type=int, default=2, help="for the choice of widths")
+    parser.add_argument("--policy", default="program")
+    parser.add_argument("--memory-gb", type=float, default=4.0, help="most that rays may take")
+    parser.add_argument("--triangles", type=int, default=250_000, help="of a dragon")
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "stages", help="of stages")
+    parser.add_argument("--seed", type=int, default=1, help="of the order of turns")
+    parser.add_argument("--output", type=Path, default=RESULTS / "limit.json")
+    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    args = parser.parse_args()
+    if args.quick:
+        args.size, args.spp, args.rounds, args.triangles = 96, 4, 2, 20_000
+        args.folder = ROOT / "out" / "quick"
+        args.output = args.folder / "limit.json"
+    return args
+
+
+def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
+    """All rounds of one stage."""
+    scene = load_stage(name, args.folder, args.triangles).scene
+    settings = make_settings(
+        (args.size, args.size), args.spp, threads=args.threads, policy=args.policy
+    )
+    recording = _core.RayRecording(scene, int(args.memory_gb * 2**30))
+    counts = _core.render(scene, settings, recorder=recording).stats["counts"]
+    if (sum(recording.rays), sum(recording.shadow_rays)) != (counts["rays"], counts["shadow_rays"]):
+        sys.exit(f"{name}: the recording does not hold all rays of the render")
+    log(f"{name}: {counts['rays']} + {counts['shadow_rays']} rays, {recording.bytes >> 20} MiB")
+
+    tuning = tune(recording, args)
+    best = {kind: min(tuning[kind], key=lambda turn: turn["ns"]) for kind in KINDS}
+    alone = {
+        "width": tuple(best[kind]["width"] for kind in KINDS),
+        "coherent": tuple(best[kind]["coherent"] for kind in KINDS),
+    }
+    widest = max(turn["width"] for turn in tuning["camera"])
+
+    def render() -> Round:
+        times = phase_times(_core.render(scene, settings).stats)
+        return {"render": times["render_s"], "phases": times["traversal_s"] / args.threads}
+
+    def by_embree() -> Round:
+        turn = recording.replay(threads=args.threads, **alone)
+        per_kind = zip(KINDS, turn["thread_s"], strict=True)
+        return {"alone": turn["wall_s"]} | {f"alone_{kind}": t for kind, t in per_kind}
+
+    def by_calls() -> Round:
+        turn = recording.replay(alone=False, threads=args.threads, width=(widest,) * 3)
+        return {"calls": turn["wall_s"]}
+
+    shuffle = random.Random(args.seed)
+    rounds: list[Round] = []
+    for number in range(args.rounds):
+        done: Round = {}
+        for turn in shuffle.sample((render, by_embree, by_calls), 3):
+            done |= turn()
+        rounds.append(done)
+        log(f"{name}: round {number + 1}: limit ratio {done['render'] / done['alone']:.2f}")
+
+    def of(key: str) -> list[float]:
+        return [done[key] for done in rounds]
+
+    return {
+        "rays": dict(zip(KINDS, _per_kind(recording), strict=True)),
+        "recorded_bytes": recording.bytes,
+        "tuning_ns_per_ray": tuning,
+        "best": best,
+        "seconds": {key: summary(of(key)) for key in rounds[0]},
+        "limit": ratio(of("render"), of("alone")),
+        "traversal": ratio(of("phases"), of("alone")),
+        "calls": ratio(of("calls"), of("alone")),
+        "filter_share": summary([(d["calls"] - d["alone"]) / d["phases"] for d in rounds]),
+        "rounds": rounds,
+    }
+
+
+def _per_kind(recording: Any) -> tuple[int, int, int]:
+    return recording.rays[0], sum(recording.rays[1:]), sum(recording.shadow_rays)
+
+
+def tune(recording: Any, args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
+    """Thread nanoseconds per ray of each kind, width and coherence: the least of some rounds."""
+    least: dict[tuple[str, int, bool | None], float] = {}
+    for _, width, coherent in itertools.product(range(args.tuning_rounds), WIDTHS, COHERENCE):
+        try:
+            turn = recording.replay(
+                threads=args.threads, width=(width,) * 3, coherent=(coherent,) * 3
+            )
+        except _core.Error:
+            continue  # wider than Embree has here
+        for kind, seconds, rays in zip(KINDS, turn["thread_s"], turn["rays"], strict=True):
+            key = (kind, width, coherent)
+            least[key] = min(least.get(key, float("inf")), 1e9 * seconds / max(1, rays))
+    table: dict[str, list[dict[str, Any]]] = {kind: [] for kind in KINDS}
+    for (kind, width, coherent), ns in least.items():
+        table[kind].append({"width": width, "coherent": coherent, "ns": ns})
+    return table
+
+
+def report(stages: dict[str, Any]) -> Iterable[str]:
+    """The tables, as Markdown."""
+    yield from head(
+        *("stage", "M rays", "Embree alone s", "trace + shadow s", "render s"),
+        *("limit: render / alone", "traversal / alone", "calls / alone", "filter share"),
+    )
+    for name, found in stages.items():
+        seconds = found["seconds"]
+        yield row(
+            name,
+            f"{sum(found['rays'].values()) / 1e6:.2f}",
+            *(f"{seconds[key]['median']:.3f}" for key in ("alone", "phases", "render")),
+            *(show(found[key], 2) for key in ("limit", "traversal", "calls", "filter_share")),
+        )
+    yield ""
+    yield from head("stage", "rays", "M rays", "width", "coherent", "ns per ray and thread")
+    for name, found in stages.items():
+        for kind in KINDS:
+            best = found["best"][kind]
+            rays = found["rays"][kind]
+            yield row(
+                *(name, kind, f"{rays / 1e6:.2f}", str(best["width"])),
+                {True: "yes", False: "no", None: "as rendered"}[best["coherent"]],
+                f"{best['ns']:.0f}",
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// What tracing a ray costs: the rays of a render, by Embree alone and as a render traces them.
+#include <map>
+
+#include "scene_testing.h"
+#include "wavecomb/render/ray_recording.h"
+#include "widths.h"
+
+namespace wavecomb::micro {
+namespace {
+
+using namespace scene_testing;
+
+/// A box with spheres in it: 20 triangles, or some millions.
+ScenePtr make_scene(bool large) {
+  if (!large) return cornell();
+  SceneBuilder b;
+  const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.7f, 0.7f, 0.7f}));
+  MeshData room = box({-1, -1, -1}, {1, 1, 1});
+  room.indices.resize(30);  // open towards +z
+  b.add_to_group(0, b.add_mesh(make_mesh(room, white)));
+  for (int i = 0; i < 8; ++i) {
+    const float x = i & 1 ? 0.45f : -0.45f, y = i & 2 ? 0.45f : -0.45f, z = i & 4 ? 0.4f : -0.5f;
+    MeshData ball = sphere(256, true);
+    ball.transform(translate(x, y, z) * scale(0.35f, 0.35f, 0.35f));
+    b.add_to_group(0, b.add_mesh(make_mesh(ball, white)));
+  }
+  Light light = make_light(LightKind::kRect, {12, 11, 9}, translate(0, 0.99f, 0) * rotate(0, -90));
+  light.width = light.height = 0.5f;
+  b.add_light(light);
+  b.set_camera(make_camera({0, 0, 3.6}, {0, 0, 0}, 0.9f));
+  return b.build();
+}
+
+/// The rays of a picture of 128 x 128 with 16 samples, all diffuse bounces, in slot order or put in
+/// order of direction; made on first use.
+RayRecording& recording(bool large, RayOrder order) {
+  static std::map<std::pair<bool, RayOrder>, std::unique_ptr<RayRecording>> made;
+  auto& rays = made[{large, order}];
+  if (!rays) {
+    const ScenePtr scene = make_scene(large);
+    rays = std::make_unique<RayRecording>(scene, uint64_t{2} << 30);
+    Settings settings;
+    settings.width = settings.height = 128;
+    settings.spp = 16;
+    settings.ray_order = settings.shadow_order = order;
+    WavefrontRenderer(scene).render(settings, {}, nullptr, nullptr, rays.get());
+  }
+  return *rays;
+}
+
+void traversal(benchmark::State& state, bool large, RayOrder order, bool alone, uint32_t width,
+               RayKind kind, bool coherent) {
+  const auto k = static_cast<size_t>(kind);
+  Replay how{alone, 1, {width, width, width}, {coherent, coherent, coherent}, {}};
+  how.wanted[k] = true;
+  ReplayTimes times;
+  try {
+    for (auto _ : state) {
+      times = recording(large, order).replay(how);
+      state.SetIterationTime(times.thread_s[k]);
+    }
+  } catch (const Error& error) {
+    state.SkipWithError(error.what());  // wider than Embree has here
+    return;
+  }
+  count_items(state, "ray", times.rays[k]);
+  state.counters["hit_share"] =
+      static_cast<double>(times.hits[k]) / static_cast<double>(times.rays[k]);
+}
+
+const bool registered = [] {
+  constexpr const char* kKinds[kRayKinds] = {"camera", "bounce", "shadow"};
+  constexpr std::pair<RayOrder, const char*> kOrders[] = {{RayOrder::kSlot, "/slot_order"},
+                                                          {RayOrder::kDirection, "/by_direction"}};
+  for (const bool large : {false, true})
+    for (size_t k = 0; k < kRayKinds; ++k)
+      for (const auto& [order, order_name] : kOrders)
+        for (const bool alone : {true, false})
+          for (const uint32_t width : {1u, 4u, 8u, 16u})
+            for (const bool coherent : {true, false}) {
+              if (coherent && width == 1) continue;              // the same as without
+              if (k == 0 && order != RayOrder::kSlot) continue;  // camera rays are left as they are
+              const std::string name =
+                  std::string("traversal/") + (large ? "2M_triangles/" : "box/") + kKinds[k] +
+                  order_name + (alone ? "/embree_alone" : "/as_a_render") +
+                  "/packet:" + std::to_string(width) + (coherent ? "/coherent" : "");
+              benchmark::RegisterBenchmark(name.c_str(), traversal, large, order, alone, width,
+                                           static_cast<RayKind>(k), coherent)
+                  ->UseManualTime()
+                  ->Unit(benchmark::kMillisecond);
+            }
+  return true;
+}();
+
+}  // namespace
+}  // namespace wavecomb::micro

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What benchmarks of lane kernels share: every width, and time per item.
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <string>
+
+#include "wavecomb/core/lanes.h"
+
+namespace wavecomb::micro {
+
+/// Calls f.operator()<W>() for each lane width that is built.
+template <typename Function>
+void for_each_width(const Function& f) {
+#ifdef WAVECOMB_HAS_LANES_1
+  f.template operator()<1>();
+#endif
+#ifdef WAVECOMB_HAS_LANES_4
+  f.template operator()<4>();
+#endif
+#ifdef WAVECOMB_HAS_LANES_8
+  f.template operator()<8>();
+#endif
+#ifdef WAVECOMB_HAS_LANES_16
+  f.template operator()<16>();
+#endif
+}
+
+inline std::string lanes_label(size_t width) {
+  return "/lanes:" + std::to_string(width);
+}
+
+/// Adds the counter `seconds_per_<item>`, for `n` items an iteration.
+inline void count_items(benchmark::State& state, const char* item, size_t n) {
+  using benchmark::Counter;
+  state.counters[std::string("seconds_per_") + item] =
+      Counter(static_cast<double>(n), Counter::kIsIterationInvariantRate | Counter::kInvert);
+}
+
+/// Keeps a packet's value from being optimised away.
+template <typename F>
+void keep(const F& value) {
+  if constexpr (kIsScalar<F>) {
+    benchmark::DoNotOptimize(value);
+  } else {
+    const float first = lane(value, 0);
+    benchmark::DoNotOptimize(first);
+  }
+}
+
+}  // namespace wavecomb::micro
