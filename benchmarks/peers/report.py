@@ -63,10 +63,14 @@ def _ratios(ours: dict[str, Any], theirs: dict[str, Any]) -> dict[str, Any]:
             if key == "marginal_rate":
                 rate = (value, draws)
     if "noise" in ours and "noise" in theirs:
-        a, b = (np.array(r["noise"]["relmse_of_seeds"]) * r["noise"]["spp"] for r in (ours, theirs))
-        draws = [x[rng.integers(0, len(x), (_DRAWS, len(x)))].mean(axis=1) for x in (a, b)]
-        lower = (float(b.mean() / a.mean()), draws[1] / draws[0])
-        put("relmse_of_theirs_to_ours", *lower)
+        for key in ("relmse", "trimmed"):
+            both = (r["noise"] for r in (ours, theirs))
+            a, b = (np.array(n[f"{key}_of_seeds"]) * n["spp"] for n in both)
+            means = [x[rng.integers(0, len(x), (_DRAWS, len(x)))].mean(axis=1) for x in (a, b)]
+            value, draws = float(b.mean() / a.mean()), means[1] / means[0]
+            put(f"{key}_of_theirs_to_ours", value, draws)
+            if key == "relmse":
+                lower = (value, draws)
     if rate and lower:
         put("efficiency", rate[0] * lower[0], rate[1] * lower[1])
     return out
@@ -74,7 +78,7 @@ def _ratios(ours: dict[str, Any], theirs: dict[str, Any]) -> dict[str, Any]:
 
 def tables(scenes: dict[str, Any]) -> str:
     """Markdown: figures, then ratios."""
-    head = ["stage", "renderer", "M samples/s", "marginal", "M rays/s", "spp", "relMSE"]
+    head = ["stage", "renderer", "M samples/s", "marginal", "M rays/s", "spp", "relMSE", "trimmed"]
     head += ["efficiency", "peak MB", "start to first picture, s"]
     lines = _row(head) + _row(["---"] * len(head))
     for scene, found in scenes.items():
@@ -87,13 +91,15 @@ def tables(scenes: dict[str, Any]) -> str:
                 _number(r.get("marginal_rate"), 1e-6),
             ]
             cells += [_number(r.get("rays_per_s"), 1e-6), str(noise.get("spp", ""))]
-            cells += [f"{noise['relmse']:.5f}" if noise else "", _number(r.get("efficiency"))]
+            cells += [_number(noise.get(key), digits=5) for key in ("relmse", "trimmed")]
+            cells.append(_number(r.get("efficiency")))
             cells += [_number(r.get("peak_mb"), 1.0, 0), _number(r.get("start_to_first_picture_s"))]
             lines += _row(cells)
     keys = {
         "rate": "samples/s",
         "marginal_rate": "marginal",
         "relmse_of_theirs_to_ours": "their relMSE to ours",
+        "trimmed_of_theirs_to_ours": "trimmed",
         "efficiency": "efficiency",
         "peak_mb": "peak memory",
         "start_to_first_picture_s": "start to first picture",
