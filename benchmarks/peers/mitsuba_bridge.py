@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from recording import INHERIT, Mesh, Placed, RecordingBuilder
+from recorded import INHERIT, Mesh, Placed, Recorded
 
 Matrix = NDArray[np.float64]
 _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -78,6 +78,7 @@ class PeerSettings:
         max_depth: Scattering vertices, as Wavecomb counts them.
         rr_depth: Vertices before roulette; by default none.
         instancing: Shape groups, as far as Mitsuba allows them; else all is copied.
+        sampler: Mitsuba's name of one.
     """
 
     width: int
@@ -85,12 +86,13 @@ class PeerSettings:
     max_depth: int = 8
     rr_depth: int = 1_000_000
     instancing: bool = False
+    sampler: str = "independent"
 
 
 class MitsubaScene:
     """A recorded scene in Mitsuba's hands."""
 
-    def __init__(self, mi: ModuleType, recorded: RecordingBuilder, settings: PeerSettings) -> None:
+    def __init__(self, mi: ModuleType, recorded: Recorded, settings: PeerSettings) -> None:
         self.mi = mi
         self.recorded = recorded
         self.settings = settings
@@ -139,7 +141,7 @@ class MitsubaScene:
                 "pixel_format": "rgb",
                 "component_format": "float32",
             },
-            "sampler": {"type": "independent"},
+            "sampler": {"type": self.settings.sampler},
         }
         if camera.get("lens_radius", 0.0) > 0.0:
             sensor["type"] = "thinlens"
@@ -210,8 +212,7 @@ class MitsubaScene:
         return self._lamp(sphere, radiance)
 
     def _extent(self) -> float:
-        assert self.recorded.scene is not None
-        return float(np.abs(np.array(self.recorded.scene.bounds)).max())
+        return float(np.abs(self.recorded.bounds).max())
 
     def _dome(
         self, light: dict[str, Any], rows: Matrix, colour: NDArray[np.float64]

@@ -6,63 +6,24 @@ Other renderers are fed from the record, so that they get the very arrays that W
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from recorded import INHERIT, Group, Mesh, Recorded
 
 from wavecomb import _core
 from wavecomb.usd import load_stage
 
-INHERIT = 0xFFFFFFFF
-Matrix = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Mesh:
-    """Arguments of ``SceneBuilder.add_mesh``."""
-
-    positions: NDArray[np.float32]
-    indices: NDArray[np.uint32]
-    normals: NDArray[np.float32] | None
-    uvs: NDArray[np.float32] | None
-    face_materials: NDArray[np.uint32] | None
-    material: int
-    name: str
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A mesh as it is seen once: its number, its transform (row vectors), what it inherits."""
-
-    mesh: int
-    transform: Matrix
-    material: int
-
-
-@dataclass
-class Group:
-    """Meshes and groups that are placed together."""
-
-    meshes: list[int] = field(default_factory=list)
-    children: list[tuple[int, Matrix, NDArray[np.uint32] | None]] = field(default_factory=list)
-
-
-class RecordingBuilder:
+class RecordingBuilder(Recorded):
     """Stands in for ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._native = _core.SceneBuilder()
         self.scene: _core.Scene | None = None
-        self.textures: list[dict[str, Any]] = []
-        self.materials: list[dict[str, Any]] = []
-        self.meshes: list[Mesh] = []
-        self.groups = [Group()]
-        self.lights: list[dict[str, Any]] = []
-        self.camera: dict[str, Any] = {}
 
     def add_texture(self, pixels: NDArray[Any], **options: Any) -> int:
         """Keeps a texture."""
@@ -134,22 +95,8 @@ class RecordingBuilder:
     def build(self) -> RecordingBuilder:
         """Makes the native scene, and stands in for it."""
         self.scene = self._native.build()
+        self.bounds = np.array(self.scene.bounds, np.float64).reshape(2, 3)
         return self
-
-    def placed(self) -> list[Placed]:
-        """All meshes as seen, instances one by one."""
-
-        def expand(group: int, matrix: Matrix, inherited: int) -> Iterator[Placed]:
-            for number in self.groups[group].meshes:
-                own = self.meshes[number].material
-                yield Placed(number, matrix, inherited if own == INHERIT else own)
-            for child, transforms, materials in self.groups[group].children:
-                for k, transform in enumerate(transforms):
-                    chosen = INHERIT if materials is None else int(materials[k])
-                    passed = inherited if chosen == INHERIT else chosen
-                    yield from expand(child, np.asarray(transform, np.float64) @ matrix, passed)
-
-        return list(expand(0, np.eye(4), INHERIT))
 
 
 def record(stage: Path) -> RecordingBuilder:

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded materials and textures as shader nodes of Cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+from recorded import Recorded
+
+_SMOOTH = 0.0317
+"""Below this roughness Wavecomb takes a surface for smooth."""
+
+
+class Nodes:
+    """A material under construction: nodes and their links."""
+
+    def __init__(self, tree: Any, images: Images) -> None:
+        self.tree = tree
+        self.images = images
+        tree.nodes.clear()
+
+    def add(self, kind: str, **inputs: Any) -> Any:
+        """A node; inputs by the names on it, underscores for blanks: values or sockets."""
+        node = self.tree.nodes.new(kind)
+        for name, value in inputs.items():
+            socket = node.inputs[name.replace("_", " ")]
+            if isinstance(value, bpy.types.NodeSocket):
+                self.tree.links.new(value, socket)
+            elif socket.type == "RGBA":
+                socket.default_value = (*(float(v) for v in value), 1.0)
+            else:
+                socket.default_value = value
+        return node
+
+    def out(self, kind: str, socket: Any) -> None:
+        """The output node of a material or world."""
+        self.tree.links.new(socket, self.add(kind).inputs["Surface"])
+
+    def vector(self, operation: str, *operands: Any) -> Any:
+        """Component-wise arithmetic."""
+        node = self.tree.nodes.new("ShaderNodeVectorMath")
+        node.operation = operation
+        for socket, value in zip(node.inputs, operands, strict=False):
+            if isinstance(value, bpy.types.NodeSocket):
+                self.tree.links.new(value, socket)
+            else:
+                socket.default_value = value
+        return node.outputs["Vector"]
+
+    def texture(self, use: dict[str, Any], signed: bool = False) -> Any:
+        """Texel * scale + bias; signed: as it is stored, for a node that takes [0, 1] itself."""
+        node = self.tree.nodes.new("ShaderNodeTexImage")
+        node.image, node.extension = self.images.get(use["texture"])
+        a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
+        if b or d:
+            raise NotImplementedError("a texture that is turned")
+        if (a, c, e, f) != (1.0, 0.0, 1.0, 0.0):
+            uv = self.add("ShaderNodeUVMap").outputs["UV"]
+            moved = self.vector("MULTIPLY_ADD", uv, (a, e, 1.0), (c, f, 0.0))
+            self.tree.links.new(moved, node.inputs["Vector"])
+        value, channel = node.outputs["Color"], use.get("channel", "rgb")
+        scale, bias = (
+            np.broadcast_to(np.asarray(use.get(k, d), float), 4)
+            for k, d in (("scale", 1), ("bias", 0))
+        )
+        if signed:
+            if tuple(scale[:3]) != (2.0,) * 3 or tuple(bias[:3]) != (-1.0,) * 3:
+                raise NotImplementedError("a normal map that is not stored as (n + 1) / 2")
+            return value
+        if channel == "a":
+            value, scale, bias = node.outputs["Alpha"], scale[[3] * 4], bias[[3] * 4]
+        if any(scale[:3] != 1.0) or any(bias[:3] != 0.0):
+            value = self.vector("MULTIPLY_ADD", value, tuple(scale[:3]), tuple(bias[:3]))
+        if channel in ("r", "g", "b"):
+            split = self.add("ShaderNodeSeparateXYZ", Vector=value)
+            value = split.outputs["rgb".index(channel)]
+        return value
+
+    def slot(self, m: dict[str, Any], name: str, default: Any) -> Any:
+        """A parameter: texture or value."""
+        use = m.get("textures", {}).get(name)
+        return self.texture(use) if use is not None else m.get(name, default)
+
+
+class Images:
+    """Textures as images, each made once. 8 bit stays 8 bit."""
+
+    def __init__(self, recorded: Recorded) -> None:
+        self.recorded = recorded
+        self._made: dict[int, Any] = {}
+
+    def get(self, number: int) -> tuple[Any, str]:
+        """An image and how it goes on beyond its edges."""
+        texture = self.recorded.textures[number]
+        if number not in self._made:
+            pixels = texture["pixels"]
+            small = pixels.dtype == np.uint8
+            space = "sRGB" if small and texture["srgb"] else "Non-Color"
+            values = pixels.astype(np.float32) / (255.0 if small else 1.0)
+            self._made[number] = image(values, space, small)
+        wraps = {"repeat": "REPEAT", "mirror": "MIRROR", "clamp": "EXTEND", "black": "CLIP"}
+        return self._made[number], wraps[texture.get("wrap_s", "repeat")]
+
+
+def image(values: NDArray[np.float32], space: str, small: bool) -> Any:
+    """An image of (height, width, 1 to 4) values, top row first."""
+    height, width, channels = values.shape
+    four = np.ones((height, width, 4), np.float32)
+    four[:, :, :channels] = values
+    if channels <= 2:
+        four[:, :, :3] = values[:, :, :1]
+        four[:, :, 3] = values[:, :, 1] if channels == 2 else 1.0
+    made = bpy.data.images.new("texture", width, height, alpha=True, float_buffer=not small)
+    made.colorspace_settings.name = space
+    made.alpha_mode = "CHANNEL_PACKED"
+    made.pixels.foreach_set(np.ascontiguousarray(four[::-1]).ravel())
+    made.update()
+    return made
+
+
+def make_material(recorded: Recorded, number: int, images: Images) -> Any:
+    """A material of Blender for a recorded one; the nearest nodes."""
+    m = recorded.materials[number]
+    made = bpy.data.materials.new(m.get("name") or f"material{number}")
+    made.use_nodes = True
+    nodes = Nodes(made.node_tree, images)
+    makers = {
+        "diffuse": _diffuse,
+        "metal": _metal,
+        "dielectric": _dielectric,
+        "plastic": _principled,
+        "principled": _principled,
+    }
+    surface = makers[m["program"]](nodes, m) if m["program"] in makers else None
+    emission = m.get("emission", (0.0, 0.0, 0.0))
+    if any(emission):
+        shines = nodes.add("ShaderNodeEmission", Color=emission, Strength=1.0).outputs[0]
+        if surface is None:
+            surface = shines
+        else:
+            both = nodes.add("ShaderNodeAddShader")
+            for socket, part in zip(both.inputs, (surface, shines), strict=True):
+                nodes.tree.links.new(part, socket)
+            surface = both.outputs[0]
+    nodes.out("ShaderNodeOutputMaterial", surface)
+    return made
+
+
+def _normal(nodes: Nodes, m: dict[str, Any]) -> dict[str, Any]:
+    use = m.get("textures", {}).get("normal")
+    if use is None:
+        return {}
+    return {
+        "Normal": nodes.add("ShaderNodeNormalMap", Color=nodes.texture(use, signed=True)).outputs[0]
+    }
+
+
+def _roughness(nodes: Nodes, m: dict[str, Any]) -> Any:
+    value = nodes.slot(m, "roughness", 0.5)
+    return 0.0 if isinstance(value, float) and value < _SMOOTH else value
+
+
+def _diffuse(nodes: Nodes, m: dict[str, Any]) -> Any:
+    colour = nodes.slot(m, "base_color", (0.18,) * 3)
+    node = nodes.add("ShaderNodeBsdfDiffuse", Color=colour, Roughness=0.0, **_normal(nodes, m))
+    return node.outputs[0]
+
+
+def _metal(nodes: Nodes, m: dict[str, Any]) -> Any:
+    inputs = {"Roughness": _roughness(nodes, m), **_normal(nodes, m)}
+    measured = any(m.get("conductor_eta", (0, 0, 0)))
+    if measured:
+        inputs |= {"IOR": m["conductor_eta"], "Extinction": m["conductor_k"]}
+    else:
+        tint = m.get("specular_color", (0, 0, 0))
+        inputs["Base_Color"] = nodes.slot(m, "base_color", (0.18,) * 3)
+        inputs["Edge_Tint"] = tint if any(tint) else (1.0,) * 3
+    node = nodes.add("ShaderNodeBsdfMetallic", **inputs)
+    node.fresnel_type = "PHYSICAL_CONDUCTOR" if measured else "F82"
+    node.distribution = "MULTI_GGX"
+    return node.outputs[0]
+
+
+def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
+    """Glass whose colour tints what goes through only: Principled takes the root of it."""
+    tint = np.asarray(m.get("base_color", (1.0,) * 3))
+    node = nodes.add(
+        "ShaderNodeBsdfPrincipled",
+        Base_Color=tint**2,
+        Roughness=_roughness(nodes, m),
+        IOR=float(m.get("ior", 1.5)),
+        Transmission_Weight=1.0,
+        **_normal(nodes, m),
+    )
+    node.distribution = "GGX"
+    return node.outputs[0]
+
+
+def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
+    """Plastic, too: a diffuse base under an interface."""
+    node = nodes.add(
+        "ShaderNodeBsdfPrincipled",
+        Base_Color=nodes.slot(m, "base_color", (0.18,) * 3),
+        Roughness=_roughness(nodes, m),
+        Metallic=nodes.slot(m, "metallic", 0.0),
+        IOR=float(m.get("ior", 1.5)),
+        Coat_Weight=nodes.slot(m, "clearcoat", 0.0),
+        Coat_Roughness=nodes.slot(m, "clearcoat_roughness", 0.01),
+        **_normal(nodes, m),
+    )
+    node.distribution = "MULTI_GGX"
+    return node.outputs[0]

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noise at equal samples: relMSE of each renderer against its own converged picture."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from renderers import RENDERERS, Job, Process
+
+Picture = NDArray[np.float64]
+_BATCH = 256
+"""Samples per pixel of a batch of a converged picture: a square, for multijitter."""
+_REFERENCE = {"mitsuba": "mitsuba-llvm-multijitter", "cycles": "cycles-no-tree"}
+"""Who makes the converged picture of a family; else the renderer itself."""
+
+
+_OUTLIERS = 1e-3
+"""Share of pixels, the worst ones, that the trimmed error leaves out."""
+
+
+def rel_errors(picture: Picture, reference: Picture) -> Picture:
+    """(x - r)^2 / (r^2 + 0.01) of each pixel, the worst last. Their mean is the relMSE."""
+    errors = (picture - reference) ** 2 / (reference**2 + 0.01)
+    return np.sort(errors.mean(axis=2).ravel())
+
+
+class Noise:
+    """Pictures and their error for one stage; all is kept in a folder and found again."""
+
+    def __init__(
+        self, job: Job, cache: Path, spp: int, seeds: int, reference_spp: int, ours: dict[str, Any]
+    ) -> None:
+        self.job = job
+        self.cache = cache
+        self.spp = spp
+        self.seeds = seeds
+        self.reference_spp = reference_spp
+        self.ours = ours
+
+    def measure(self, name: str) -> dict[str, Any]:
+        """Error of each seed, less the converged picture's own; the mean it converges to.
+
+        relMSE is a matter of chance where a few pixels catch a bright caustic path, so there is a
+        trimmed one as well: without the worst 0.1 % of pixels, over 1 + N / N_ref.
+        """
+        options = self.ours if name == "wavecomb" else {}
+        family = RENDERERS[name].family
+        with _Lazy(name, self.job, self.cache, options) as process:
+            key = process.key()
+            file = self.cache / f"{key}-noise{self.spp}.npz"
+            if not file.exists() or len(np.load(file)["pictures"]) < self.seeds:
+                pictures, spp = [], 0
+                for k in range(self.seeds):
+                    picture, spp = process.picture(self.spp, k + 1)
+                    pictures.append(picture.astype(np.float32))
+                np.savez(file, pictures=np.array(pictures), spp=spp)
+        found = np.load(file)
+        reference, own = self._converged(_REFERENCE.get(family, name))
+        pixels = [rel_errors(p, reference) for p in found["pictures"][: self.seeds]]
+        errors = [float(e.mean()) - own for e in pixels]
+        kept = round(reference.shape[0] * reference.shape[1] * (1.0 - _OUTLIERS))
+        doubt = 1.0 + int(found["spp"]) / self.reference_spp
+        trimmed = [float(e[:kept].sum() / len(e) / doubt) for e in pixels]
+        return {
+            "spp": int(found["spp"]),
+            "relmse": float(np.mean(errors)),
+            "relmse_of_seeds": errors,
+            "relmse_of_reference": own,
+            "trimmed": float(np.mean(trimmed)),
+            "trimmed_of_seeds": trimmed,
+            "mean": [float(v) for v in reference.mean(axis=(0, 1))],
+        }
+
+    def converged(self, name: str) -> Picture:
+        """The converged picture of a renderer."""
+        return self._converged(_REFERENCE.get(RENDERERS[name].family, name))[0]
+
+    def noisy(self, name: str) -> Picture:
+        """The picture of the first seed."""
+        options = self.ours if name == "wavecomb" else {}
+        with _Lazy(name, self.job, self.cache, options) as process:
+            found = np.load(self.cache / f"{process.key()}-noise{self.spp}.npz")["pictures"][0]
+        return np.asarray(found, np.float64)
+
+    def _converged(self, name: str) -> tuple[Picture, float]:
+        """Mean of batches of other seeds, and its relMSE as their spread tells it.
+
+        E (x - r)^2 = var x + var r, so that the second is taken off; where errors fall as 1 / N it
+        is the same as dividing by 1 + N / N_ref.
+        """
+        options = self.ours if name == "wavecomb" else {}
+        batches = max(2, self.reference_spp // _BATCH)
+        with _Lazy(name, self.job, self.cache, options) as process:
+            file = self.cache / f"{process.key()}-converged{batches * _BATCH}.npz"
+            if not file.exists():
+                total, squares = np.zeros(()), np.zeros(())
+                for k in range(batches):
+                    picture, _ = process.picture(_BATCH, 1000 + k)
+                    total, squares = total + picture, squares + picture**2
+                mean = total / batches
+                spread = np.maximum(squares / batches - mean**2, 0.0) / (batches - 1)
+                np.savez(file, mean=mean, own=np.mean(spread / (mean**2 + 0.01)))
+        found = np.load(file)
+        return found["mean"], float(found["own"])
+
+
+class _Lazy:
+    """A process that is started when a picture is asked for, or to learn its version once."""
+
+    _versions: ClassVar[dict[str, str]] = {}
+
+    def __init__(self, name: str, job: Job, cache: Path, options: dict[str, Any]) -> None:
+        self.name, self.job, self.cache, self.options = name, job, cache, options
+        self._process: Process | None = None
+
+    def __enter__(self) -> _Lazy:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process:
+            self._process.close()
+
+    def _started(self) -> Process:
+        if self._process is None:
+            log = self.cache / f"{self.name}.log"
+            self._process = Process(self.name, self.job, log, self.options)
+            self._versions[RENDERERS[self.name].kind] = self._process.facts["version"]
+        return self._process
+
+    def key(self) -> str:
+        """A name for the pictures: renderer, its version, stage and settings."""
+        kind = RENDERERS[self.name].kind
+        if kind not in self._versions:
+            self._started()
+        told = [self._versions[kind], self.options, RENDERERS[self.name].options]
+        told += [self.job.size, self.job.max_depth]
+        told.append(self.job.digest)
+        number = hashlib.sha1(json.dumps(told, sort_keys=True).encode()).hexdigest()[:10]
+        return f"{self.job.stage.stem}-{self.name}-{number}"
+
+    def picture(self, spp: int, seed: int) -> tuple[Picture, int]:
+        """A picture, and the samples per pixel it got."""
+        file = self.cache / "picture.npy"
+        answer = self._started().render(spp, seed, file)
+        print(f"{self.name}: {spp} spp, {answer['seconds']:.1f} s", file=sys.stderr)
+        return np.load(file).astype(np.float64), answer["spp"]

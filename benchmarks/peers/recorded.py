@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a scene is made of, as plain arrays: from one renderer's process to another's.
+
+Needs NumPy only, so that it loads in an environment of its own (Blender's).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+INHERIT = 0xFFFFFFFF
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Arguments of ``SceneBuilder.add_mesh``."""
+
+    positions: NDArray[np.float32]
+    indices: NDArray[np.uint32]
+    normals: NDArray[np.float32] | None
+    uvs: NDArray[np.float32] | None
+    face_materials: NDArray[np.uint32] | None
+    material: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A mesh as it is seen once: its number, its transform (row vectors), what it inherits."""
+
+    mesh: int
+    transform: Matrix
+    material: int
+
+
+@dataclass
+class Group:
+    """Meshes and groups that are placed together."""
+
+    meshes: list[int] = field(default_factory=list)
+    children: list[tuple[int, Matrix, NDArray[np.uint32] | None]] = field(default_factory=list)
+
+
+@dataclass
+class Recorded:
+    """Arguments of all calls to a ``SceneBuilder``; bounds: (2, 3) of the scene in world space."""
+
+    textures: list[dict[str, Any]] = field(default_factory=list)
+    materials: list[dict[str, Any]] = field(default_factory=list)
+    meshes: list[Mesh] = field(default_factory=list)
+    groups: list[Group] = field(default_factory=lambda: [Group()])
+    lights: list[dict[str, Any]] = field(default_factory=list)
+    camera: dict[str, Any] = field(default_factory=dict)
+    bounds: Matrix = field(default_factory=lambda: np.zeros((2, 3)))
+
+    def placed(self) -> list[Placed]:
+        """All meshes as seen, instances one by one."""
+
+        def expand(group: int, matrix: Matrix, inherited: int) -> Iterator[Placed]:
+            for number in self.groups[group].meshes:
+                own = self.meshes[number].material
+                yield Placed(number, matrix, inherited if own == INHERIT else own)
+            for child, transforms, materials in self.groups[group].children:
+                for k, transform in enumerate(transforms):
+                    chosen = INHERIT if materials is None else int(materials[k])
+                    passed = inherited if chosen == INHERIT else chosen
+                    yield from expand(child, np.asarray(transform, np.float64) @ matrix, passed)
+
+        return list(expand(0, np.eye(4), INHERIT))
+
+    def save(self, folder: Path) -> None:
+        """Writes scene.json and one .npy for each array. A folder that is there is taken over."""
+        folder.mkdir(parents=True, exist_ok=True)
+        count = 0
+
+        def plain(value: Any) -> Any:
+            nonlocal count
+            if isinstance(value, np.ndarray):
+                name = f"{count:05d}.npy"
+                np.save(folder / name, value)
+                count += 1
+                return {"array": name}
+            if isinstance(value, np.generic):
+                return value.item()
+            if isinstance(value, dict):
+                return {k: plain(v) for k, v in value.items()}
+            if isinstance(value, (list, tuple)):
+                return [plain(v) for v in value]
+            return value
+
+        names = ("textures", "materials", "lights", "camera", "bounds")
+        scene = {name: plain(getattr(self, name)) for name in names}
+        scene["meshes"] = [plain(vars(mesh)) for mesh in self.meshes]
+        scene["groups"] = [plain(asdict(group)) for group in self.groups]
+        # Last: a folder with a scene.json is whole.
+        (folder / "scene.json").write_text(json.dumps(scene))
+
+
+def load(folder: Path) -> Recorded:
+    """Reads what ``Recorded.save`` wrote."""
+
+    def rich(value: Any) -> Any:
+        if isinstance(value, dict):
+            if set(value) == {"array"}:
+                return np.load(folder / value["array"])
+            return {k: rich(v) for k, v in value.items()}
+        return [rich(v) for v in value] if isinstance(value, list) else value
+
+    scene = rich(json.loads((folder / "scene.json").read_text()))
+    meshes = [Mesh(**mesh) for mesh in scene.pop("meshes")]
+    groups = [
+        Group(g["meshes"], [(c, t, m) for c, t, m in g["children"]]) for g in scene.pop("groups")
+    ]
+    return Recorded(meshes=meshes, groups=groups, **scene)
