@@ -77,7 +77,7 @@ _KEYS = (
     ),
     *_of(
         "text",
-        ("policy", "", "Order of shading: docs/scheduling.md, or oracle-best, oracle-worst."),
+        ("policy", "", "Order of shading: docs/scheduling.md, or oracle: docs/bench.md."),
         ("roulette", "", "off, throughput, cost-aware."),
         ("ray_order", "", "Order of bounce rays."),
         ("shadow_order", "", "Order of shadow rays."),
@@ -86,7 +86,10 @@ _KEYS = (
     *_of(
         "text",
         ("factor", "", "Scaling: which factor the experiment varies; else empty."),
-        ("factor_value", "", "Scaling: its value in this run, as written in the suite."),
+    ),
+    *_of("number", ("factor_value", "", "Scaling: its value; of texture_mb in 1e6 bytes.")),
+    *_of(
+        "text",
         ("status", "", "ok, or failed."),
         ("error", "", "Why it failed, in one line."),
     ),
@@ -141,13 +144,13 @@ _METRICS = (
         ("lane_utilisation", "", "records / lanes of all packets."),
         ("samples_per_s", "1/s", "Camera paths per second of render_s."),
         ("rays_per_s", "1/s", "rays + shadow_rays per second of render_s."),
-        ("rel_mse", "", "Mean of (x - r)^2 / (r^2 + 0.01) against the golden picture r."),
+        ("rel_mse", "", "Mean of (x - r)^2 / (r^2 + 0.01), golden r; its noise is taken off."),
         ("efficiency", "1/s", "1 / (rel_mse x render_s)."),
         (
             "variance",
             "",
-            "Of a pixel's channel over repetitions of other seeds, mean over the picture; "
-            "empty unless the suite asks for it.",
+            "Mean squared error of a pixel's channel against the golden picture: the variance, "
+            "and the squared bias of settings that have one.",
         ),
         ("peak_rss_mb", "MB", "Largest resident memory of the process, 1e6 bytes."),
     ),
@@ -155,7 +158,7 @@ _METRICS = (
 
 _COUNTERS = _of(
     "number",
-    ("cycles", "1/record", "CPU cycles per record, start of the process and loading included."),
+    ("cycles", "1/record", "CPU cycles per record, of the timed render."),
     ("instructions", "1/record", "Likewise."),
     ("l1d_misses", "1/record", "Loads that missed the first level."),
     ("l2_misses", "1/record", "Requests that missed the second level."),
@@ -167,10 +170,12 @@ _STATE = (
     *_of(
         "number",
         ("load_average", "", "Of one minute, when the run began."),
+        ("others_share", "", "Share of all cores' time that other processes took."),
         ("spin_s", "s", "Mean time of the calibration spin before and after the run."),
     ),
     *_of(
-        "flag", ("noisy", "", "1: others used the machine, or the spin was off by more than 10 %.")
+        "flag",
+        ("noisy", "", "1: others took over 5 % of the machine, or the spin over 10 % longer."),
     ),
     *_of(
         "number",
@@ -214,10 +219,12 @@ def parse_row(cells: Mapping[str, str]) -> dict[str, Any]:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """All rows of a file, typed. A torn last line is left out."""
+    """All rows of a file, typed. A torn last line is left out, and of rows with one
+    ``run_id``, which a run that failed and was tried again has, all but the last."""
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
-    return [parse_row(cells) for cells in csv.DictReader(StringIO(whole))]
+    rows = (parse_row(cells) for cells in csv.DictReader(StringIO(whole)))
+    return list({row["run_id"]: row for row in rows}.values())
 
 
 def _line(cells: Any) -> str:
