@@ -83,10 +83,7 @@ _KEYS = (
         ("shadow_order", "", "Order of shadow rays."),
     ),
     *_of("integer", ("max_depth", "", "Scattering vertices of a path.")),
-    *_of(
-        "text",
-        ("factor", "", "Scaling: which factor the experiment varies; else empty."),
-    ),
+    *_of("text", ("factor", "", "Scaling: which factor the experiment varies; else empty.")),
     *_of("number", ("factor_value", "", "Scaling: its value; of texture_mb in 1e6 bytes.")),
     *_of(
         "text",
@@ -219,8 +216,11 @@ def parse_row(cells: Mapping[str, str]) -> dict[str, Any]:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """All rows of a file, typed. A torn last line is left out, and of rows with one
-    ``run_id``, which a run that failed and was tried again has, all but the last."""
+    """All rows of a file, typed.
+
+    A torn last line is left out, and of rows with one ``run_id``, which a run that failed and was
+    tried again has, all but the last.
+    """
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     rows = (parse_row(cells) for cells in csv.DictReader(StringIO(whole)))

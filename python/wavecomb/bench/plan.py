@@ -75,7 +75,8 @@ class Config:
         """Equal for configurations that converge to the same picture; fit for file names."""
         width, height = self.settings["size"]
         of = {key: self.settings[key] for key in _FOR_PICTURE if key in self.settings}
-        return f"{self.stage}-{width}x{height}-{digest(of)}"
+        stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{self.renderer}"
+        return f"{stage}-{width}x{height}-{digest(of)}"
 
     def recording_key(self) -> str:
         """Equal for configurations whose shading costs are alike: all but policy and roulette."""
