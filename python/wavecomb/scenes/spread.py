@@ -33,6 +33,8 @@ _STONES = 144
 _PITCH = 2.3
 _BYTES_PER_TEXEL = 4.0 * 4.0 / 3.0
 """Of 8 bit colour as the core holds it, mip levels included."""
+_TILE = 8
+"""Texels are stored in tiles of 8 x 8, so small textures take somewhat more than asked for."""
 _CHART_TEXELS = 4
 _PATTERNS = (marble, wood, weave)
 
@@ -64,7 +66,7 @@ def texture_edge(options: SceneOptions) -> int:
     if options.texture_mb <= 0.0:
         return 0
     texels = options.texture_mb * 1e6 / options.materials / _BYTES_PER_TEXEL
-    return max(_CHART_TEXELS, round(math.sqrt(texels) / _CHART_TEXELS) * _CHART_TEXELS)
+    return max(_TILE, round(math.sqrt(texels) / _TILE) * _TILE)
 
 
 def evaluations(options: SceneOptions, index: int) -> int:

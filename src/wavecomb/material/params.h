@@ -191,8 +191,9 @@ inline ShadingParams<F> evaluate_params(const MaterialView& view, const UInt<F>&
 /// Evaluates the parameters of dear materials as often as they say: a packet as often as its
 /// dearest lane. The values are those of one evaluation; the compiler is kept from seeing that.
 template <uint32_t kSlots, typename F>
-inline void evaluate_again(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                           const F& uv_width, const Mask<F>& active, const UInt<F>& more) {
+[[gnu::noinline]] void evaluate_again(const MaterialView& view, const UInt<F>& material,
+                                      const Vec2<F>& uv, const F& uv_width, const Mask<F>& active,
+                                      const UInt<F>& more) {
   const Mask<UInt<F>> on(active);
   Vec2<F> at = uv;
   for (uint32_t done = 0; any(Mask<F>(on & (more > UInt<F>(done)))); ++done) {
@@ -213,8 +214,15 @@ inline ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& ma
                                      const Vec2<F>& uv, const F& uv_width, const Mask<F>& active) {
   const auto p = detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
   const UInt<F> more = p.flags >> kEvaluationsShift;
-  if (any(active & Mask<F>(more != UInt<F>(0u)))) [[unlikely]]
-    detail::evaluate_again<kSlots, F>(view, material, uv, uv_width, active, more);
+  if (any(active & Mask<F>(more != UInt<F>(0u)))) [[unlikely]] {
+    // Copies, so that what all other materials use may stay in registers.
+    const MaterialView v = view;
+    const UInt<F> m = material, n = more;
+    const Vec2<F> at = uv;
+    const F width = uv_width;
+    const Mask<F> on = active;
+    detail::evaluate_again<kSlots, F>(v, m, at, width, on, n);
+  }
   return p;
 }
 
