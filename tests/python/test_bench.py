@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import signal
 import subprocess
@@ -296,7 +295,8 @@ def test_dry_run_does_nothing_and_estimates(results: Path, tmp_path: Path) -> No
     assert "matches none" in bench("run", suite, "-o", other, "--only", "x", "--dry-run").stderr
 
 
-def test_killed_and_resumed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     suite, out = written(tmp_path, text), tmp_path / "out"
     command = [sys.executable, "-m", "wavecomb", "bench", "run", str(suite), "-o", str(out)]
@@ -307,8 +307,8 @@ def test_killed_and_resumed(tmp_path: Path) -> None:
         if csv.exists() and csv.read_text().count("\n") >= 2:
             break
         time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+    process.send_signal(how)
+    assert process.wait() == (130 if how == signal.SIGINT else -9)
     done = csv.read_text().splitlines()
     assert 2 <= len(done) < 5
     with jsonl.open("a") as file:

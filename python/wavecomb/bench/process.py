@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -89,7 +90,8 @@ def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -
     try:
         out, err = process.communicate(text)
     except BaseException:
-        process.kill()
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # what it started, too
         process.wait()
         raise
     wall = time.perf_counter() - clock

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from wavecomb.bench.table import Table
 from wavecomb.errors import WavecombError
 from wavecomb.files import reason
 
@@ -171,7 +172,7 @@ def load_suite(path: Path) -> Suite:
         raise WavecombError(f"{path}: cannot be read: {reason(error)}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise WavecombError(f"{path}: is no TOML: {error}") from error
-    top = _Table(path, "", document)
+    top = Table(path, "", document)
     stages = {
         name: _stage(top.below(f"stage.{name}", entry)) for name, entry in top.tables("stage")
     }
@@ -206,7 +207,7 @@ def load_suite(path: Path) -> Suite:
     return suite
 
 
-def _stage(table: _Table) -> StageSource:
+def _stage(table: Table) -> StageSource:
     scene, file = table.take("scene", str, ""), table.take("file", str, "")
     if bool(scene) == bool(file):
         raise table.error("scene", "give either scene = NAME or file = PATH")
@@ -225,7 +226,7 @@ def _stage(table: _Table) -> StageSource:
     return StageSource(scene=scene, options=options, camera=camera)
 
 
-def _check_stage_option(table: _Table, key: str) -> None:
+def _check_stage_option(table: Table, key: str) -> None:
     import dataclasses
 
     from wavecomb.scenes import SceneOptions
@@ -237,7 +238,7 @@ def _check_stage_option(table: _Table, key: str) -> None:
         )
 
 
-def _experiment(table: _Table, stages: Mapping[str, StageSource]) -> Experiment:
+def _experiment(table: Table, stages: Mapping[str, StageSource]) -> Experiment:
     name = table.take("name", str, "")
     if not name or not all(c.isalnum() or c in "-_" for c in name):
         raise table.error("name", "give a name of letters, digits, - and _")
@@ -285,13 +286,13 @@ def _experiment(table: _Table, stages: Mapping[str, StageSource]) -> Experiment:
     return experiment
 
 
-def _settings(table: _Table, where: str, values: Mapping[str, Any]) -> dict[str, Any]:
+def _settings(table: Table, where: str, values: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in values.items():
         _check_setting(table, f"{where}.{key}", key, value)
     return dict(values)
 
 
-def _check_setting(table: _Table, where: str, key: str, value: Any) -> None:
+def _check_setting(table: Table, where: str, key: str, value: Any) -> None:
     kind = SETTINGS.get(key)
     whole = isinstance(value, int) and not isinstance(value, bool)
     if kind is None:
@@ -307,62 +308,3 @@ def _check_setting(table: _Table, where: str, key: str, value: Any) -> None:
     if not good:
         what = {"pair": "[width, height]", "count": 'an integer, "all" or "widest"'}.get(kind, kind)
         raise table.error(where, f"must be {what}, not {value!r}")
-
-
-class _Table:
-    """A table of the file; takes keys one by one, so that what is left over is unknown."""
-
-    def __init__(self, path: Path, where: str, values: Mapping[str, Any]) -> None:
-        self.path = path
-        self.where = where
-        self._values = dict(values)
-        self._known: list[str] = []
-
-    def error(self, key: str, what: str) -> WavecombError:
-        place = f"{self.where}: {key}" if self.where else key
-        return WavecombError(f"{self.path}: {place}: {what}")
-
-    def below(self, where: str, values: Any) -> _Table:
-        if not isinstance(values, Mapping):
-            raise self.error(where, "must be a table")
-        return _Table(self.path, where, values)
-
-    def take(self, key: str, kind: type, default: Any) -> Any:
-        self._known.append(key)
-        value = self._values.pop(key, default)
-        if value is not default and (
-            not isinstance(value, kind) or (kind is int and isinstance(value, bool))
-        ):
-            names = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}
-            raise self.error(key, f"must be {names.get(kind, 'a table')}, not {value!r}")
-        return value
-
-    def count(self, key: str, default: int, least: int) -> int:
-        value = int(self.take(key, int, default))
-        if value < least:
-            raise self.error(key, f"must be at least {least}, not {value}")
-        return value
-
-    def choice(self, key: str, default: str, allowed: tuple[str, ...]) -> str:
-        value = str(self.take(key, str, default))
-        if value not in allowed:
-            raise self.error(key, f"must be one of {', '.join(allowed)}, not {value!r}")
-        return value
-
-    def tables(self, key: str) -> list[tuple[str, Any]]:
-        return list(self.take(key, dict, {}).items())
-
-    def list_of_tables(self, key: str) -> list[Any]:
-        entries = list(self.take(key, list, []))
-        for entry in entries:
-            if not isinstance(entry, Mapping):
-                raise self.error(key, f"write [[{key}]] tables")
-        return entries
-
-    def rest(self) -> dict[str, Any]:
-        values, self._values = self._values, {}
-        return values
-
-    def end(self) -> None:
-        for key in self._values:
-            raise self.error(key, f"no such key; there are {', '.join(self._known)}")
