@@ -86,6 +86,7 @@ class SceneBuilder:
         conductor_k: tuple[float, float, float] = (0, 0, 0),
         specular_workflow: bool = False,
         presence: bool = False,
+        evaluations: int = 1,
         textures: dict[str, dict[str, Any]] = {},
     ) -> int:
         """Programs: diffuse, metal, dielectric, plastic, emissive, principled.
@@ -96,7 +97,8 @@ class SceneBuilder:
         specular_color, emission, roughness, metallic, clearcoat, clearcoat_roughness, opacity,
         normal (tangent space, value already in [-1, 1] after scale and bias).
         For a metal: base_color is the reflectance at normal incidence, specular_color the tint at
-        82 degrees (black: none given, untinted).
+        82 degrees (black: none given, untinted). evaluations: how often a hit evaluates the
+        parameters; costs time and changes no picture.
         """
     def add_mesh(
         self,

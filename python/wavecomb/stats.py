@@ -128,7 +128,7 @@ def machine() -> dict[str, Any]:
 
 def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
     """Writes statistics as JSON, whole or not at all; NaN and infinities become null."""
-    text = json.dumps(_plain(stats), indent=2, allow_nan=False) + "\n"
+    text = json.dumps(plain(stats), indent=2, allow_nan=False) + "\n"
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
 
@@ -143,24 +143,24 @@ def picture_metadata(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
     if stats.get("camera"):
         metadata["wavecomb:camera"] = str(stats["camera"])
     if stats.get("settings"):
-        metadata["wavecomb:settings"] = json.dumps(_plain(stats["settings"]), sort_keys=True)
+        metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:
         metadata["wavecomb:render_seconds"] = float(stats["seconds"].get("render", 0.0))
     return metadata
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Only what JSON has."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
+        return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, (bool, int, str)) or value is None:
         return value
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if hasattr(value, "item"):
-        return _plain(value.item())
+        return plain(value.item())
     return str(value)
 
 

@@ -8,12 +8,14 @@ import re
 import struct
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
+import wavecomb
 from wavecomb.scenes import SCENES, SceneError, write_scene
 from wavecomb.scenes.dragon import MIN_TRIANGLES, dragon
 from wavecomb.scenes.materials import PROGRAMS
@@ -23,10 +25,11 @@ from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.sweep import Tube, tube_mesh
 from wavecomb.scenes.teapot import teapot, teapot_patches
 from wavecomb.scenes.textures import TEXTURES, sky
+from wavecomb.usd import LoadedStage
 
 ASSETS = Path(__file__).resolve().parents[3] / "shared" / "assets"
 TEAPOT = ASSETS / "meshes" / "teapot"
-SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64}
+SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
 needs_teapot = pytest.mark.skipif(
     not TEAPOT.is_dir(), reason=f"the published teapot is not at {TEAPOT}"
 )
@@ -253,6 +256,89 @@ def test_bad_requests_say_why(
         write_scene(name, tmp_path / file, **{"texture_size": 64, **options})
     assert "\n" not in str(caught.value)
     assert not (tmp_path / file).exists()
+
+
+# Spread
+
+
+def spread_stage(folder: Path, **options: Any) -> tuple[Usd.Stage, LoadedStage]:
+    path = folder / "spread.usdc"
+    write_scene("spread", path, texture_size=64, **options)
+    return Usd.Stage.Open(str(path)), wavecomb.load(path)
+
+
+def test_spread_has_what_was_asked_for(tmp_path: Path) -> None:
+    stage, loaded = spread_stage(
+        tmp_path, materials=200, texture_mb=6.0, triangles=40_000, shader_cost=50.0, programs=3
+    )
+    scene = loaded.scene
+    stones = [name for name, _ in scene.materials if "Stone_" in name]
+    assert len(stones) == 200
+    assert {kind for name, kind in scene.materials if "Stone_" in name} == {
+        "principled",
+        "diffuse",
+        "plastic",
+    }
+    assert scene.triangles == pytest.approx(40_000, rel=0.1)
+    assert scene.instanced_triangles == scene.triangles  # no instance: triangles are memory
+    own = [size for name, size in scene.textures if "stone_" in name]
+    assert len(own) == 200 and sum(own) == pytest.approx(6e6, rel=0.2)
+    dear = {
+        prim.GetName(): prim.GetAttribute("wavecomb:evaluations").Get() or 1
+        for prim in stage.GetPrimAtPath("/World/Looks").GetChildren()
+        if prim.GetName().startswith("Stone_")
+    }
+    assert dear["Stone_0000"] == 1 and dear["Stone_0199"] == 50
+    assert list(dear.values()) == sorted(dear.values())
+    assert not loaded.report.warnings
+
+
+def test_stones_are_closed_and_their_charts_lie_apart(tmp_path: Path) -> None:
+    stage, _ = spread_stage(tmp_path, materials=2, texture_mb=8.0, triangles=20_000)
+    prim = UsdGeom.Mesh(stage.GetPrimAtPath("/World/Objects/Stone_0007"))
+    points = np.array(prim.GetPointsAttr().Get())
+    faces = np.array(prim.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+    normals = np.array(prim.GetNormalsAttr().Get())
+    assert_sound(Mesh(points, faces, normals, np.zeros((len(points), 2), np.float32)))
+    st = UsdGeom.PrimvarsAPI(prim).GetPrimvar("st")
+    assert st.GetInterpolation() == UsdGeom.Tokens.faceVarying
+    uv = np.array(st.Get()).reshape(-1, 3, 2)
+    size = uv.max(axis=1) - uv.min(axis=1)
+    assert len(uv) == len(faces) and size.max() < 4.0 / 800.0  # 4 texels of some 860
+    steps = np.abs(np.diff(uv.mean(axis=1), axis=0)).mean()
+    assert 0.25 < steps < 0.42  # of independent places on a unit square: 1 / 3
+
+
+def test_shader_cost_changes_time_and_no_picture(tmp_path: Path) -> None:
+    pictures = []
+    for cost in (1.0, 200.0):
+        (tmp_path / str(cost)).mkdir()
+        _, loaded = spread_stage(
+            tmp_path / str(cost), materials=1, texture_mb=0.5, triangles=5_000, shader_cost=cost
+        )
+        pictures.append(wavecomb.render(loaded, size=(48, 48), spp=8, threads=1))
+    assert np.array_equal(pictures[0].beauty, pictures[1].beauty)
+
+    def stone_ns(picture: wavecomb.Picture) -> float:
+        return next(m["ns_per_record"] for m in picture.stats["materials"] if "Stone_" in m["name"])
+
+    assert stone_ns(pictures[1]) > 5.0 * stone_ns(pictures[0]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"materials": 0}, "materials must be from 1"),
+        ({"programs": 6}, "programs must be from 1 to 5"),
+        ({"texture_mb": -1.0}, "texture_mb must be from 0"),
+        ({"shader_cost": 0.5}, "shader_cost must be from 1"),
+        ({"triangles": 100}, "triangles must be from 4608"),
+    ],
+)
+def test_bad_spreads_say_why(tmp_path: Path, options: dict[str, Any], says: str) -> None:
+    with pytest.raises(SceneError, match=says):
+        write_scene("spread", tmp_path / "spread.usdc", **options)
+    assert not (tmp_path / "spread.usdc").exists()
 
 
 # Textures

@@ -7,6 +7,7 @@ import os
 
 import click
 
+from wavecomb.cli.bench import bench_command
 from wavecomb.cli.compare import compare_command
 from wavecomb.cli.group import Commands, print_version
 from wavecomb.cli.info import info_command
@@ -49,3 +50,4 @@ main.add_command(render_command)
 main.add_command(info_command)
 main.add_command(scene_command)
 main.add_command(compare_command)
+main.add_command(bench_command)

@@ -17,17 +17,31 @@ from wavecomb.cli.options import Real, examples
         "wavecomb scene --list",
         "wavecomb scene mixed -o mixed.usdc",
         "wavecomb scene cornell-dragon -o box.usda --dragon dragon.obj",
+        "wavecomb scene spread -o spread.usdc --materials 256 --texture-mb 64 --shader-cost 10",
     ),
 )
 @click.argument("name", required=False)
 @click.option("-o", "--output", type=click.Path(), metavar="FILE", help=".usda, .usdc or .usd.")
 @click.option("--list", "list_", is_flag=True, help="List the scenes.")
 @click.option("--dragon", type=click.Path(), metavar="FILE", help="OBJ, PLY or USD mesh to use.")
-@click.option("--triangles", type=click.IntRange(min=1), metavar="N", help="Of our own dragon.")
+@click.option(
+    "--triangles", type=click.IntRange(min=1), metavar="N", help="Of our own dragon, or of spread."
+)
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of layout and patterns.")
 @click.option("--texture-size", type=click.IntRange(min=16), metavar="N", help="Largest, texels.")
 @click.option("--aspect", type=Real(0, above=True), metavar="X", help="Width / height.")
 @click.option("--material", metavar="NAME", help="cornell-dragon: gold, copper, glass, jade.")
+@click.option("--materials", type=click.IntRange(min=1), metavar="N", help="spread: how many.")
+@click.option(
+    "--programs", type=click.IntRange(1, 5), metavar="N", help="spread: kinds of materials, 1 to 5."
+)
+@click.option("--texture-mb", type=Real(0), metavar="X", help="spread: memory of its textures.")
+@click.option(
+    "--shader-cost",
+    type=Real(1),
+    metavar="X",
+    help="spread: evaluations of the dearest material per hit; costs time only.",
+)
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
     """Write one of our own test stages, and its textures beside it."""
     from wavecomb.errors import WavecombError

@@ -16,6 +16,7 @@ from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.stage import StageWriter
 
 __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
@@ -41,6 +42,7 @@ SCENES: dict[str, SceneInfo] = {
     "cornell-dragon": SceneInfo("the Cornell box with a dragon", 0.001, build_cornell_dragon),
     "mixed": SceneInfo("45 teapots, 45 dragons and a mirror", 0.1, build_mixed),
     "dragon": SceneInfo("90 dragons and a mirror", 0.1, build_dragon),
+    "spread": SceneInfo("a field of stones, for scaling: see --materials", 0.1, build_spread),
 }
 """Every scene by name."""
 

@@ -17,12 +17,17 @@ class SceneOptions:
 
     Attributes:
         dragon: OBJ, PLY or USD file to stand in for our dragon, or None.
-        triangles: Triangles of our dragon.
+        triangles: Triangles of our dragon; of all stones of ``spread`` together.
         teapot_level: Cells along each edge of the teapot's 32 patches.
         seed: Of the layout and of the texture patterns.
         texture_size: Edge of the largest textures, texels; the others shrink in proportion.
         aspect: Width / height of the picture that the camera frames.
         material: Of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
+        materials: How many ``spread`` has.
+        programs: How many kinds of material ``spread`` uses, 1 to 5.
+        texture_mb: Memory of all textures of ``spread``, 1e6 bytes; 0 is none.
+        shader_cost: How often the dearest material of ``spread`` evaluates its parameters for a
+            hit; the others from once up, geometrically.
     """
 
     dragon: Path | str | None = None
@@ -32,6 +37,10 @@ class SceneOptions:
     texture_size: int = 2048
     aspect: float | None = None
     material: str = "gold"
+    materials: int = 16
+    programs: int = 5
+    texture_mb: float = 16.0
+    shader_cost: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuses what no scene can use."""

@@ -15,7 +15,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.materials import MaterialInfo
 from wavecomb.scenes.mesh import FloatArray, Mesh
-from wavecomb.scenes.textures import TEXTURES, sky, write_image
+from wavecomb.scenes.textures import TEXTURES, TextureInfo, sky, write_image
 
 SUFFIXES = (".usda", ".usdc", ".usd")
 _INPUT_TYPES = {
@@ -58,6 +58,7 @@ class StageWriter:
         self._seed = seed
         self._materials: dict[str, UsdShade.Material] = {}
         self._written: set[str] = set()
+        self._own: dict[str, TextureInfo] = {}
         self.stage = Usd.Stage.CreateInMemory()
         UsdGeom.SetStageUpAxis(self.stage, UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(self.stage, metres_per_unit)
@@ -163,6 +164,10 @@ class StageWriter:
         material.GetPrim().CreateAttribute(
             "wavecomb:program", Sdf.ValueTypeNames.String, custom=True
         ).Set(info.program)
+        if info.evaluations != 1:
+            material.GetPrim().CreateAttribute(
+                "wavecomb:evaluations", Sdf.ValueTypeNames.Int, custom=True
+            ).Set(info.evaluations)
         surface = UsdShade.Shader.Define(self.stage, f"/World/Looks/{name}/Surface")
         surface.CreateIdAttr("UsdPreviewSurface")
         for key, value in info.inputs.items():
@@ -173,6 +178,10 @@ class StageWriter:
             self._textures(f"/World/Looks/{name}", surface, info)
         self._materials[name] = material
         return name
+
+    def define_texture(self, name: str, info: TextureInfo) -> None:
+        """Lets materials name a texture of the scene's own; ``info.size`` is its edge as it is."""
+        self._own[name] = info
 
     def _textures(self, path: str, surface: UsdShade.Shader, info: MaterialInfo) -> None:
         reader = UsdShade.Shader.Define(self.stage, f"{path}/St")
@@ -186,7 +195,7 @@ class StageWriter:
             transform.CreateInput("scale", Sdf.ValueTypeNames.Float2).Set(Gf.Vec2f(info.repeat))
             result = transform.CreateOutput("result", Sdf.ValueTypeNames.Float2)
         for key, name in info.textures.items():
-            texture_info = TEXTURES[name]
+            texture_info = self._own.get(name) or TEXTURES[name]
             texture = UsdShade.Shader.Define(self.stage, f"{path}/{key[0].upper()}{key[1:]}Map")
             texture.CreateIdAttr("UsdUVTexture")
             texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._texture_file(name))
@@ -213,9 +222,13 @@ class StageWriter:
     def _texture_file(self, name: str) -> Sdf.AssetPath:
         file, asset = self._texture_path(f"{name}.png")
         if name not in self._written:
-            info = TEXTURES[name]
-            size = max(16, info.size * self._texture_size // 2048)
-            rng = np.random.default_rng([self._seed, list(TEXTURES).index(name)])
+            if name in self._own:
+                info, size = self._own[name], self._own[name].size
+                number = len(TEXTURES) + list(self._own).index(name)
+            else:
+                info, number = TEXTURES[name], list(TEXTURES).index(name)
+                size = max(16, info.size * self._texture_size // 2048)
+            rng = np.random.default_rng([self._seed, number])
             write_image(file, info.make(size, rng), "uint8")
             self._written.add(name)
         return asset

@@ -47,6 +47,8 @@ _USES: dict[str, tuple[str, ...]] = {
 PROGRAMS = (*_USES, "principled")
 """What ``wavecomb:program`` may say."""
 
+MAX_EVALUATIONS = 1 << 16
+
 _IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -61,6 +63,21 @@ def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> st
         report.warn(f"wavecomb:program {name!r} is none of {known}: principled", material.GetPath())
         return "principled"
     return str(name)
+
+
+def evaluations_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> int:
+    """How often ``wavecomb:evaluations`` of a material makes a hit evaluate it, else 1."""
+    attribute = material.GetAttribute("wavecomb:evaluations")
+    value = attribute.Get(time) if attribute else None
+    if value is None:
+        return 1
+    if not isinstance(value, int) or not 1 <= value <= MAX_EVALUATIONS:
+        report.warn(
+            f"wavecomb:evaluations {value!r} is no whole number from 1 to {MAX_EVALUATIONS}: 1",
+            material.GetPath(),
+        )
+        return 1
+    return value
 
 
 class PreviewReader:
@@ -105,6 +122,9 @@ class PreviewReader:
             attribute = self.material.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
                 parameters[slot] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
+        evaluations = evaluations_of(self.material, self.time, self.report)
+        if evaluations != 1:
+            parameters["evaluations"] = evaluations
         return Surface(
             str(self.material.GetPath()),
             program,

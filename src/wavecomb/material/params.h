@@ -154,6 +154,55 @@ inline Mask<F> opacity_is_presence(const SlotReader<F>& slots, const F& threshol
   return Mask<F>((flags & UInt<F>(uint32_t{kPresence})) != UInt<F>(0u)) | (threshold > 0.f);
 }
 
+template <uint32_t kSlots, typename F>
+WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const UInt<F>& material,
+                                                 const Vec2<F>& uv, const F& uv_width,
+                                                 const Mask<F>& active) {
+  using R = MaterialRecord;
+  const SlotReader<F> slots(view, material, uv, uv_width, active);
+  const auto& r = slots.record;
+  const auto color = [&](Slot s, size_t offset) {
+    const Vec3<F> constant = r.vec3(offset);
+    return (kSlots & slot_bit(s)) ? slots.value(s, constant) : constant;
+  };
+  const auto real = [&](Slot s, size_t offset) {
+    const F constant = r.real(offset);
+    return saturate((kSlots & slot_bit(s)) ? slots.value(s, constant) : constant);
+  };
+  ShadingParams<F> p;
+  p.base_color = saturate(color(Slot::kBaseColor, offsetof(R, base_color)));
+  p.specular_color = saturate(color(Slot::kSpecularColor, offsetof(R, specular_color)));
+  p.emission = sane_emission(color(Slot::kEmission, offsetof(R, emission)));
+  p.roughness = real(Slot::kRoughness, offsetof(R, roughness));
+  p.metallic = real(Slot::kMetallic, offsetof(R, metallic));
+  p.clearcoat = real(Slot::kClearcoat, offsetof(R, clearcoat));
+  p.clearcoat_roughness = real(Slot::kClearcoatRoughness, offsetof(R, clearcoat_roughness));
+  p.opacity = real(Slot::kOpacity, offsetof(R, opacity));
+  const F threshold = r.real(offsetof(R, opacity_threshold));
+  p.opacity = select(opacity_is_presence(slots, threshold), F(1.f), p.opacity);
+  p.normal = sane_normal(color(Slot::kNormal, offsetof(R, normal)));
+  p.ior = clamp(r.real(offsetof(R, ior)), F(1.f / kMaxIor), F(kMaxIor));
+  p.conductor_eta = max(r.vec3(offsetof(R, conductor_eta)), Color<F>(F(0.f)));
+  p.conductor_k = max(r.vec3(offsetof(R, conductor_k)), Color<F>(F(0.f)));
+  p.flags = r.bits(offsetof(R, flags));
+  return p;
+}
+
+/// Evaluates the parameters of dear materials as often as they say: a packet as often as its
+/// dearest lane. The values are those of one evaluation; the compiler is kept from seeing that.
+template <uint32_t kSlots, typename F>
+[[gnu::noinline]] void evaluate_again(const MaterialView& view, const UInt<F>& material,
+                                      const Vec2<F>& uv, const F& uv_width, const Mask<F>& active,
+                                      const UInt<F>& more) {
+  const Mask<UInt<F>> on(active);
+  Vec2<F> at = uv;
+  for (uint32_t done = 0; any(Mask<F>(on & (more > UInt<F>(done)))); ++done) {
+    asm volatile("" : : "r"(&at) : "memory");
+    const ShadingParams<F> p = evaluate_params<kSlots, F>(view, material, at, uv_width, active);
+    asm volatile("" : : "r"(&p) : "memory");
+  }
+}
+
 }  // namespace detail
 
 /// The parameters of material `material` at `uv`, in sane ranges. Only slots in `kSlots` read
@@ -164,33 +213,17 @@ template <uint32_t kSlots, typename F>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const F& uv_width,
                                               const Mask<F>& active) {
-  using R = MaterialRecord;
-  const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
-  const auto& r = slots.record;
-  const auto color = [&](Slot s, size_t offset) {
-    const Vec3<F> constant = r.vec3(offset);
-    return (kSlots & slot_bit(s)) ? slots.value(s, constant) : constant;
-  };
-  const auto real = [&](Slot s, size_t offset) {
-    const F constant = r.real(offset);
-    return detail::saturate((kSlots & slot_bit(s)) ? slots.value(s, constant) : constant);
-  };
-  ShadingParams<F> p;
-  p.base_color = detail::saturate(color(Slot::kBaseColor, offsetof(R, base_color)));
-  p.specular_color = detail::saturate(color(Slot::kSpecularColor, offsetof(R, specular_color)));
-  p.emission = detail::sane_emission(color(Slot::kEmission, offsetof(R, emission)));
-  p.roughness = real(Slot::kRoughness, offsetof(R, roughness));
-  p.metallic = real(Slot::kMetallic, offsetof(R, metallic));
-  p.clearcoat = real(Slot::kClearcoat, offsetof(R, clearcoat));
-  p.clearcoat_roughness = real(Slot::kClearcoatRoughness, offsetof(R, clearcoat_roughness));
-  p.opacity = real(Slot::kOpacity, offsetof(R, opacity));
-  const F threshold = r.real(offsetof(R, opacity_threshold));
-  p.opacity = select(detail::opacity_is_presence(slots, threshold), F(1.f), p.opacity);
-  p.normal = detail::sane_normal(color(Slot::kNormal, offsetof(R, normal)));
-  p.ior = clamp(r.real(offsetof(R, ior)), F(1.f / kMaxIor), F(kMaxIor));
-  p.conductor_eta = max(r.vec3(offsetof(R, conductor_eta)), Color<F>(F(0.f)));
-  p.conductor_k = max(r.vec3(offsetof(R, conductor_k)), Color<F>(F(0.f)));
-  p.flags = r.bits(offsetof(R, flags));
+  const auto p = detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
+  const UInt<F> more = p.flags >> kEvaluationsShift;
+  if (any(active & Mask<F>(more != UInt<F>(0u)))) [[unlikely]] {
+    // Copies, so that what all other materials use may stay in registers.
+    const MaterialView v = view;
+    const UInt<F> m = material, n = more;
+    const Vec2<F> at = uv;
+    const F width = uv_width;
+    const Mask<F> on = active;
+    detail::evaluate_again<kSlots, F>(v, m, at, width, on, n);
+  }
   return p;
 }
 

@@ -66,6 +66,9 @@ struct Material {
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
   bool specular_workflow = false;  ///< principled: F0 from specular_color rather than metallic
   bool presence = false;  ///< principled: opacity is presence (cut-out) rather than transparency
+  /// How often a hit evaluates the parameters and their textures, 1 to kMaxEvaluations. Costs time
+  /// and changes nothing else: it stands for dearer shading networks where cost is measured.
+  uint32_t evaluations = 1;
   std::array<TextureUse, kSlotCount> textures;
 
   bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
@@ -89,11 +92,14 @@ struct alignas(64) MaterialRecord {
   float ior, opacity_threshold;
   float conductor_eta[3], conductor_k[3];
   uint32_t texture_slots;  ///< bit s: slot s reads a texture
-  uint32_t flags;          ///< MaterialFlags
+  uint32_t flags;          ///< MaterialFlags; upper half: evaluations - 1
   uint32_t program;
   float pad[4];
 };
 static_assert(sizeof(MaterialRecord) == 128);
+/// The upper half of MaterialRecord::flags: evaluations beyond the first.
+inline constexpr uint32_t kEvaluationsShift = 16;
+inline constexpr uint32_t kMaxEvaluations = 1u << 16;
 enum MaterialFlags : uint32_t {
   kSpecularWorkflow = 1,
   kPresence = 2,

@@ -109,6 +109,7 @@ MaterialRecord make_material_record(const Material& m) {
   if (m.needs_presence()) r.flags |= kPresence;
   if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
   if (m.emits()) r.flags |= kEmits;
+  r.flags |= (m.evaluations - 1) << kEvaluationsShift;
   r.program = static_cast<uint32_t>(m.program);
   return r;
 }
@@ -209,6 +210,9 @@ uint32_t SceneBuilder::add_material(Material material) {
     if (!std::isfinite(x))
       throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
+  if (material.evaluations < 1 || material.evaluations > kMaxEvaluations)
+    throw Error(name + " has " + std::to_string(material.evaluations) + " evaluations; from 1 to " +
+                std::to_string(kMaxEvaluations) + " are possible");
   const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
                      material.emission.z > 0 || material.has_texture(Slot::kEmission);
   if (glows && !material.emits())

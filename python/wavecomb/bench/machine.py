@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The machine that a sitting runs on: what it is, and how busy it is."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import platform
+import re
+import subprocess
+import threading
+import time
+from datetime import datetime, timezone
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from wavecomb.bench.plan import Limits
+
+SPIN_BYTES = 8 << 20
+_PACKAGES = ("numpy", "usd-core", "openimageio", "tbb", "click", "rich", "mitsuba", "bpy")
+_SYS_CPU = Path("/sys/devices/system/cpu")
+
+
+def now() -> str:
+    """UTC, ISO 8601, to the second."""
+    return datetime.now(timezone.utc).replace(microsecond=0).isoformat()
+
+
+def cores() -> list[int]:
+    """The cores that this process may use."""
+    try:
+        return sorted(os.sched_getaffinity(0))
+    except AttributeError:
+        return list(range(os.cpu_count() or 1))
+
+
+def limits() -> Limits:
+    """What values of a suite are measured by."""
+    from wavecomb import _core
+
+    return Limits(len(cores()), max(_core.lane_widths()), cache_bytes())
+
+
+def cache_bytes() -> dict[str, int]:
+    """Sizes of the data caches: L1D and L2 of one core, L3 of all; empty where unknown."""
+    sizes: dict[str, int] = {}
+    for index in sorted(_SYS_CPU.glob("cpu0/cache/index*")):
+        kind, level = _read(index / "type"), _read(index / "level")
+        size = re.fullmatch(r"(\d+)([KM]?)", _read(index / "size"))
+        if kind in ("Data", "Unified") and size:
+            name = "L1D" if level == "1" else f"L{level}"
+            sizes[name] = int(size[1]) * {"": 1, "K": 1 << 10, "M": 1 << 20}[size[2]]
+    return sizes
+
+
+def machine_state() -> dict[str, Any]:
+    """What the figures were made on and with; nothing that names the machine or its user."""
+    from wavecomb import stats
+
+    return {
+        **stats.machine(),
+        "kernel": platform.release(),
+        "isa": stats.machine()["build"].get("isa", ""),
+        "caches_bytes": cache_bytes(),
+        "frequency_mhz": frequency_mhz(),
+        "governor": _read(_SYS_CPU / "cpu0/cpufreq/scaling_governor") or None,
+        "memory_free_bytes": _memory_free(),
+        "load_before": list(load_average()),
+        "versions": _versions(),
+        **source_state(),
+        "native_sha256": native_digest(),
+        "time": now(),
+    }
+
+
+def source_state() -> dict[str, Any]:
+    """Commit of the checkout, and whether files in it were changed; None outside one."""
+    here = Path(__file__).resolve().parent
+
+    def git(*arguments: str) -> str | None:
+        try:
+            done = subprocess.run(
+                ["git", *arguments], cwd=here, capture_output=True, text=True, check=False
+            )
+        except OSError:
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    status = git("status", "--porcelain", "--untracked-files=no")
+    return {"commit": git("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+
+
+def native_digest() -> str:
+    """SHA-256 of the native module: results of two builds are never mixed."""
+    from wavecomb import _core
+
+    return hashlib.sha256(Path(str(_core.__file__)).read_bytes()).hexdigest()
+
+
+def frequency_mhz() -> float | None:
+    """Mean frequency of the cores, as the kernel says it at this moment."""
+    values = [
+        float(line.partition(":")[2])
+        for line in _read(Path("/proc/cpuinfo")).splitlines()
+        if line.startswith("cpu MHz")
+    ]
+    return round(sum(values) / len(values), 1) if values else None
+
+
+def load_average() -> tuple[float, float, float]:
+    """Of 1, 5 and 15 minutes."""
+    try:
+        return os.getloadavg()
+    except OSError:
+        return (0.0, 0.0, 0.0)
+
+
+def busy_seconds() -> float | None:
+    """CPU seconds that all processes have used since the machine began; None where unknown."""
+    fields = _read(Path("/proc/stat")).partition("\n")[0].split()
+    if len(fields) < 9 or fields[0] != "cpu":
+        return None
+    user, nice, system, _, _, irq, softirq, steal = (int(value) for value in fields[1:9])
+    return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+
+
+def spin(threads: int) -> float:
+    """Seconds of a fixed piece of work on each of so many threads at once, the lesser of two."""
+    block = bytes(SPIN_BYTES)
+
+    def work() -> None:
+        hashlib.sha256(block).digest()  # lets other threads of Python run
+
+    def once() -> float:
+        crowd = [threading.Thread(target=work) for _ in range(threads)]
+        started = time.perf_counter()
+        for thread in crowd:
+            thread.start()
+        for thread in crowd:
+            thread.join()
+        return time.perf_counter() - started
+
+    return min(once(), once())
+
+
+def _versions() -> dict[str, str]:
+    from wavecomb.version import version
+
+    found = {"wavecomb": version(), "python": platform.python_version()}
+    for name in _PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
+
+
+def _memory_free() -> int | None:
+    match = re.search(r"MemAvailable:\s+(\d+) kB", _read(Path("/proc/meminfo")))
+    return int(match[1]) * 1024 if match else None
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except OSError:
+        return ""

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a suite to the list of runs: configurations, their short names, and the order in time."""
+
+from __future__ import annotations
+
+import fnmatch
+import hashlib
+import itertools
+import json
+import random
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from wavecomb.bench.suite import WAVECOMB, Experiment, StageSource, Suite
+from wavecomb.errors import WavecombError
+
+STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
+"""Of settings that a row names, what is meant where a suite says nothing."""
+
+_FOR_PICTURE = (
+    *("size", "max_depth", "sampler", "filter", "filter_width"),
+    *("clamp_indirect", "fresnel", "cosine_sampling"),
+)
+"""Settings that a converged picture depends on."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a machine has, for values of a suite that depend on it.
+
+    Attributes:
+        threads: Usable cores.
+        lanes: Widest SIMD built.
+        cache_bytes: {"L2": ..., "L3": ...}; L3 of all cores together.
+    """
+
+    threads: int
+    lanes: int
+    cache_bytes: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Config:
+    """One configuration: everything but repetition and seed.
+
+    Attributes:
+        name: Short, unique in the suite, fit for file names.
+        experiment: Its name.
+        renderer: "wavecomb" or a peer.
+        stage: Name of the stage, with the options that are varied.
+        source: Where the stage comes from.
+        settings: Settings of the render; policy may be "oracle".
+        factor: Name of the factor of a scaling curve, or "".
+        factor_value: Its value, or None.
+        images: As in ``Experiment``.
+        golden: Whether the picture is compared with a converged one.
+    """
+
+    name: str
+    experiment: str
+    renderer: str
+    stage: str
+    source: StageSource
+    settings: dict[str, Any]
+    factor: str
+    factor_value: float | None
+    images: str
+    golden: bool
+
+    def golden_key(self) -> str:
+        """Equal for configurations that converge to the same picture; fit for file names."""
+        width, height = self.settings["size"]
+        of = {key: self.settings[key] for key in _FOR_PICTURE if key in self.settings}
+        stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{self.renderer}"
+        return f"{stage}-{width}x{height}-{digest(of)}"
+
+    def recording_key(self) -> str:
+        """Equal for configurations whose shading costs are alike: all but policy and roulette."""
+        left_out = ("policy", "roulette")
+        of = {key: value for key, value in self.settings.items() if key not in left_out}
+        return f"{self.stage}-{digest(of)}"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the plan."""
+
+    config: Config
+    repetition: int
+
+    @property
+    def run_id(self) -> str:
+        """Unique in the suite."""
+        return f"{self.config.name}-{self.repetition}"
+
+
+def digest(value: Any) -> str:
+    """Eight hexadecimal digits of a JSON value."""
+    text = json.dumps(value, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def configurations(suite: Suite, limits: Limits, threads: int | None = None) -> list[Config]:
+    """All configurations, in the order of the file; values that this machine has not are left out.
+
+    Args:
+        suite: The suite.
+        limits: What the machine has.
+        threads: For all runs in which threads are not what is varied.
+    """
+    found: list[Config] = []
+    for experiment in suite.experiments:
+        found += _of_experiment(suite, experiment, limits, threads)
+    names = [config.name for config in found]
+    if len(set(names)) < len(names):
+        double = next(name for name in names if names.count(name) > 1)
+        raise WavecombError(f"{suite.path}: two configurations are named {double}: rename a case")
+    return found
+
+
+def chosen(configs: Sequence[Config], pattern: str | None) -> list[Config]:
+    """Those whose name matches a pattern of the shell."""
+    if pattern is None:
+        return list(configs)
+    kept = [config for config in configs if fnmatch.fnmatch(config.name, pattern)]
+    if not kept:
+        some = ", ".join(config.name for config in configs[:3])
+        raise WavecombError(f"--only {pattern}: matches none of the names; they are like {some}")
+    return kept
+
+
+def schedule(configs: Sequence[Config], repetitions: int, seed: int) -> list[Run]:
+    """The runs in the order of time: rounds of one repetition of all, each in random order."""
+    rng = random.Random(seed)
+    runs: list[Run] = []
+    for repetition in range(repetitions):
+        round_ = [Run(config, repetition) for config in configs]
+        rng.shuffle(round_)
+        runs += round_
+    return runs
+
+
+def with_folder(suite: Suite, folder: Path) -> Suite:
+    """The suite with the stages of a folder added to each experiment that varies none."""
+    files = sorted(p for p in folder.glob("*") if p.suffix.lower() in STAGE_SUFFIXES)
+    if not folder.is_dir() or not files:
+        raise WavecombError(f"--stages {folder}: no {', '.join(STAGE_SUFFIXES)} in this folder")
+    more = {path.stem: StageSource(file=path.resolve()) for path in files}
+    twice = set(more) & set(suite.stages)
+    if twice or len(more) < len(files):
+        name = min(twice) if twice else "two of its files"
+        raise WavecombError(f"--stages {folder}: {name} has the name of another stage; rename it")
+    experiments = tuple(
+        experiment
+        if experiment.stage_vary
+        else replace(experiment, stages=(*experiment.stages, *more))
+        for experiment in suite.experiments
+    )
+    return replace(suite, stages={**suite.stages, **more}, experiments=experiments)
+
+
+def _of_experiment(
+    suite: Suite, experiment: Experiment, limits: Limits, threads: int | None
+) -> list[Config]:
+    found = []
+    keys = [*experiment.vary, *(f"stage.{key}" for key in experiment.stage_vary)]
+    values = [
+        _resolved(suite.path, key, listed, limits)
+        for key, listed in [*experiment.vary.items(), *experiment.stage_vary.items()]
+    ]
+    for renderer, stage, (number, case), picked in itertools.product(
+        experiment.renderers,
+        experiment.stages,
+        enumerate(experiment.cases),
+        itertools.product(*values),
+    ):
+        varied = dict(zip(keys, picked, strict=True))
+        settings = {"size": [600, 600], "spp": 64, **FRAMED, **experiment.settings, **case}
+        settings |= {key: value for key, value in varied.items() if "." not in key}
+        if any(all(settings.get(k) == v for k, v in skip.items()) for skip in experiment.skip):
+            continue
+        if threads is not None and "threads" not in experiment.vary:
+            settings["threads"] = threads
+        for key in ("threads", "lanes"):
+            settings[key] = _resolve(suite.path, key, settings.get(key, 0), limits)
+        source, name = _varied_stage(suite.stages[stage], stage, varied)
+        parts = [experiment.name, name]
+        parts += [] if renderer == WAVECOMB else [renderer]
+        parts += [_case_name(case, number)] if len(experiment.cases) > 1 else []
+        parts += [f"{key}-{value}" for key, value in varied.items() if "." not in key]
+        factor = experiment.factor
+        value = varied.get(factor, varied.get(f"stage.{factor}"))
+        found.append(
+            Config(
+                name=".".join(_safe(part) for part in parts),
+                experiment=experiment.name,
+                renderer=renderer,
+                stage=name,
+                source=source,
+                settings=settings,
+                factor=factor,
+                factor_value=float(value) if isinstance(value, (int, float)) else None,
+                images=experiment.images,
+                golden=experiment.golden,
+            )
+        )
+    return found
+
+
+def _case_name(case: Mapping[str, Any], number: int) -> str:
+    if "size" in case and "spp" in case:
+        width, height = case["size"]
+        rest = [f"{value}" for key, value in case.items() if key not in ("size", "spp")]
+        return "-".join([f"{width}x{height}", f"{case['spp']}spp", *rest])
+    return "-".join(str(value) for value in case.values()) or f"case{number}"
+
+
+def _varied_stage(
+    source: StageSource, name: str, varied: Mapping[str, Any]
+) -> tuple[StageSource, str]:
+    options = {k.partition(".")[2]: v for k, v in varied.items() if k.startswith("stage.")}
+    if not options:
+        return source, name
+    label = "-".join([name, *(f"{key}-{value}" for key, value in options.items())])
+    return replace(source, options={**source.options, **options}), _safe(label)
+
+
+def _safe(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text)
+
+
+def _resolved(path: Path, key: str, values: Sequence[Any], limits: Limits) -> list[Any]:
+    """Values of this machine: each once, and of threads none above what there is."""
+    found: list[Any] = []
+    for value in values:
+        number = _resolve(path, key, value, limits)
+        above = key == "threads" and number > limits.threads
+        if number not in found and not above:
+            found.append(number)
+    return found
+
+
+def _resolve(path: Path, key: str, value: Any, limits: Limits) -> Any:
+    if value == "all":
+        return limits.threads
+    if value == "widest":
+        return limits.lanes
+    if key == "lanes" and value == 0:
+        return limits.lanes
+    if key == "threads" and value == 0:
+        return limits.threads
+    if key == "texture_mb" and isinstance(value, str):
+        return _cache_mb(path, value, limits)
+    return value
+
+
+def _cache_mb(path: Path, text: str, limits: Limits) -> float:
+    """Megabytes of 1e6 bytes from "L2" or "0.5*L3"."""
+    match = re.fullmatch(r"(?:([0-9.]+) ?\* ?)?(L2|L3)", text)
+    if match is None:
+        raise WavecombError(
+            f"{path}: vary.stage.texture_mb: {text!r} must be a number, or like 'L2' or '4*L3'"
+        )
+    size = limits.cache_bytes.get(match[2], 0)
+    if size <= 0:
+        raise WavecombError(f"{path}: this machine does not say how large its {match[2]} is")
+    return round(float(match[1] or 1.0) * size / 1e6, 3)

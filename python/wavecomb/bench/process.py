@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Jobs in processes of their own, and what the machine did meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wavecomb.bench import machine
+from wavecomb.bench.counters import Session
+
+
+@dataclass
+class Outcome:
+    """What a process answered.
+
+    Attributes:
+        answer: Its JSON object; {"status": "failed", "error": line} where there is none.
+        wall_s: From its start to its end.
+        others_share: Share of all cores' time that other processes took; None where unknown.
+        load_average: Of one minute, at its start.
+        started: Time of day.
+        code: What the process ended with.
+    """
+
+    answer: dict[str, Any]
+    wall_s: float
+    others_share: float | None
+    load_average: float
+    started: str
+    code: int
+
+
+def run_worker(job: dict[str, Any], events: dict[str, str], scratch: Path) -> Outcome:
+    """Runs ``wavecomb.bench.worker``, under perf where there are events to count."""
+    command = [sys.executable, "-m", "wavecomb.bench.worker"]
+    if not events:
+        return run_process(command, job)
+    session = Session(events, scratch / f".perf-{os.getpid()}.csv")
+    outcome = run_process(
+        [*session.command, *command], {**job, "perf": session.job}, fds=session.fds
+    )
+    outcome.answer["counters"] = session.close()
+    return outcome
+
+
+def run_process(
+    command: Sequence[str], job: dict[str, Any], *, fds: tuple[int, ...] = ()
+) -> Outcome:
+    """Runs a command that reads a JSON job and answers with one JSON line, its last on stdout."""
+    done = run_lines(command, json.dumps(job), fds=fds)
+    outcome = done.outcome
+    answer = done.lines[-1] if done.lines else None
+    if isinstance(answer, dict) and answer.get("status") in ("ok", "failed"):
+        outcome.answer = answer
+    return outcome
+
+
+@dataclass
+class Lines:
+    """The JSON objects that a process wrote, and its outcome, failed as if none would do."""
+
+    lines: list[Any]
+    outcome: Outcome
+
+
+def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -> Lines:
+    """Runs a command on a text; reads the JSON lines of its stdout."""
+    load, started = machine.load_average()[0], machine.now()
+    busy, own, clock = machine.busy_seconds(), _own_seconds(), time.perf_counter()
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        pass_fds=fds,
+        start_new_session=True,  # Ctrl-C is the runner's
+    )
+    try:
+        out, err = process.communicate(text)
+    except BaseException:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # what it started, too
+        process.wait()
+        raise
+    wall = time.perf_counter() - clock
+    own, after = _own_seconds() - own, machine.busy_seconds()
+    others = None
+    if busy is not None and after is not None and wall > 0.0:
+        total = wall * (os.cpu_count() or 1)
+        others = max(0.0, (after - busy - own) / total)
+    failed = _failure(err, process.returncode)
+    return Lines(_objects(out), Outcome(failed, wall, others, load, started, process.returncode))
+
+
+def _objects(out: str) -> list[Any]:
+    objects = []
+    for line in out.splitlines():
+        with contextlib.suppress(ValueError):
+            objects.append(json.loads(line))
+    return objects
+
+
+def _failure(err: str, code: int) -> dict[str, Any]:
+    said = [line.strip() for line in err.splitlines() if line.strip()]
+    how = f"killed by signal {-code}" if code < 0 else f"ended with code {code}"
+    return {"status": "failed", "error": f"{how}: {said[-1] if said else 'no answer'}"[:500]}
+
+
+def _own_seconds() -> float:
+    """CPU seconds of this process and of its children that have ended."""
+    usage = [resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in usage)

@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Suites: what is to be run, as a TOML file says it. docs/bench.md has the keys."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wavecomb.bench.table import Table
+from wavecomb.errors import WavecombError
+from wavecomb.files import reason
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+SUITES = Path(__file__).parent / "suites"
+DEFAULT_REPETITIONS = 16
+IMAGES = ("none", "first", "all")
+WAVECOMB = "wavecomb"
+PEERS = ("mitsuba-scalar", "mitsuba-llvm", "cycles")
+RENDERERS = (WAVECOMB, *PEERS)
+ORACLE = "oracle"
+"""Policy of suites only: cost-benefit with the true costs of an earlier recording, frozen."""
+
+SETTINGS = {
+    "size": "pair",
+    "spp": "integer",
+    "max_depth": "integer",
+    "sampler": "text",
+    "filter": "text",
+    "filter_width": "number",
+    "roulette": "text",
+    "roulette_depth": "integer",
+    "clamp_indirect": "number",
+    "fresnel": "text",
+    "cosine_sampling": "flag",
+    "integrator": "text",
+    "threads": "count",
+    "wave_size": "integer",
+    "lanes": "count",
+    "traversal": "text",
+    "policy": "text",
+    "materialize": "text",
+    "ray_order": "text",
+    "shadow_order": "text",
+    "costs": "text",
+    "cost_weight": "number",
+}
+"""Settings that a suite may choose, and their kinds; a count is an integer, "all" or "widest"."""
+
+
+@dataclass(frozen=True)
+class StageSource:
+    """Where a stage comes from: a generated scene with options, or a file.
+
+    Attributes:
+        scene: Name of a generated scene, or "".
+        options: Its ``SceneOptions``.
+        file: Path of a stage, or None.
+        camera: Camera prim of a file, or None.
+    """
+
+    scene: str = ""
+    options: dict[str, Any] = field(default_factory=dict)
+    file: Path | None = None
+    camera: str | None = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Runs that are compared with one another.
+
+    Attributes:
+        name: Unique in the suite.
+        stages: Names of stages.
+        renderers: Of ``RENDERERS``.
+        settings: The same in all runs.
+        vary: Setting -> values; all combinations are run.
+        stage_vary: Option of the stage -> values, likewise.
+        cases: Settings that change together; each is combined with all of ``vary``.
+        skip: Combinations to leave out: those that agree with all keys of one entry.
+        factor: The key of ``vary`` or ``stage_vary`` that a scaling curve is drawn over, or "".
+        images: Which repetitions keep their picture: "none", "first" or "all".
+        golden: Pictures are compared with a converged one.
+    """
+
+    name: str
+    stages: tuple[str, ...]
+    renderers: tuple[str, ...] = (WAVECOMB,)
+    settings: dict[str, Any] = field(default_factory=dict)
+    vary: dict[str, list[Any]] = field(default_factory=dict)
+    stage_vary: dict[str, list[Any]] = field(default_factory=dict)
+    cases: tuple[dict[str, Any], ...] = ({},)
+    skip: tuple[dict[str, Any], ...] = ()
+    factor: str = ""
+    images: str = "none"
+    golden: bool = False
+
+
+@dataclass(frozen=True)
+class Golden:
+    """How converged pictures are made: samples per pixel, integrator, seed."""
+
+    spp: int = 1024
+    integrator: str = "reference"
+    seed: int = 90001
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A suite as its file says it.
+
+    Attributes:
+        name: Short.
+        title: One line.
+        path: The file.
+        text: What it holds.
+        repetitions: Of each configuration.
+        warm_up: Discarded runs of each stage before the first round.
+        seed: Of the order of runs.
+        golden: See ``Golden``.
+        stages: By name.
+        experiments: In order.
+    """
+
+    name: str
+    title: str
+    path: Path
+    text: str
+    repetitions: int
+    warm_up: int
+    seed: int
+    golden: Golden
+    stages: dict[str, StageSource]
+    experiments: tuple[Experiment, ...]
+
+
+def suite_names() -> list[str]:
+    """The suites that come with Wavecomb."""
+    return sorted(path.stem for path in SUITES.glob("*.toml"))
+
+
+def find_suite(name: str) -> Path:
+    """The file of a suite: one of ours by its name, or a path that ends in .toml."""
+    if name.endswith(".toml"):
+        return Path(name)
+    path = SUITES / f"{name}.toml"
+    if not path.is_file():
+        raise WavecombError(
+            f"no suite {name!r}: there are {', '.join(suite_names())}, "
+            "or give a file whose name ends in .toml"
+        )
+    return path
+
+
+def load_suite(path: Path) -> Suite:
+    """Reads a suite.
+
+    Raises:
+        WavecombError: It is no good; one line that names the file and the key.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        document = tomllib.loads(text)
+    except OSError as error:
+        raise WavecombError(f"{path}: cannot be read: {reason(error)}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise WavecombError(f"{path}: is no TOML: {error}") from error
+    top = Table(path, "", document)
+    stages = {
+        name: _stage(top.below(f"stage.{name}", entry)) for name, entry in top.tables("stage")
+    }
+    golden = top.below("golden", top.take("golden", dict, {}))
+    suite = Suite(
+        name=top.take("name", str, path.stem),
+        title=top.take("title", str, ""),
+        path=path,
+        text=text,
+        repetitions=top.count("repetitions", DEFAULT_REPETITIONS, 1),
+        warm_up=top.count("warm_up", 1, 0),
+        seed=top.count("seed", 1, 0),
+        golden=Golden(
+            golden.count("spp", Golden.spp, 1),
+            golden.choice("integrator", Golden.integrator, ("reference", "wavefront")),
+            golden.count("seed", Golden.seed, 0),
+        ),
+        stages=stages,
+        experiments=tuple(
+            _experiment(top.below(f"experiment {number}", entry), stages)
+            for number, entry in enumerate(top.list_of_tables("experiment"), 1)
+        ),
+    )
+    golden.end()
+    top.end()
+    if not suite.experiments:
+        raise top.error("experiment", "there is none: write at least one [[experiment]]")
+    names = [experiment.name for experiment in suite.experiments]
+    for name in names:
+        if names.count(name) > 1:
+            raise top.error("experiment", f"two are named {name!r}; give each its own name")
+    return suite
+
+
+def _stage(table: Table) -> StageSource:
+    scene, file = table.take("scene", str, ""), table.take("file", str, "")
+    if bool(scene) == bool(file):
+        raise table.error("scene", "give either scene = NAME or file = PATH")
+    camera = table.take("camera", str, None)
+    if file:
+        table.end()
+        path = table.path.parent / os.path.expanduser(file)
+        return StageSource(file=path, camera=camera)
+    from wavecomb.scenes import SCENES
+
+    if scene not in SCENES:
+        raise table.error("scene", f"no scene {scene!r}; there are {', '.join(SCENES)}")
+    options = table.rest()
+    for key in options:
+        _check_stage_option(table, key)
+    return StageSource(scene=scene, options=options, camera=camera)
+
+
+def _check_stage_option(table: Table, key: str) -> None:
+    import dataclasses
+
+    from wavecomb.scenes import SceneOptions
+
+    known = [entry.name for entry in dataclasses.fields(SceneOptions)]
+    if key not in known:
+        raise table.error(
+            key, f"a generated stage has no such option; there are {', '.join(known)}"
+        )
+
+
+def _experiment(table: Table, stages: Mapping[str, StageSource]) -> Experiment:
+    name = table.take("name", str, "")
+    if not name or not all(c.isalnum() or c in "-_" for c in name):
+        raise table.error("name", "give a name of letters, digits, - and _")
+    table.where = f"experiment {name}"
+    chosen = tuple(table.take("stages", list, list(stages)))
+    for stage in chosen:
+        if stage not in stages:
+            there = ", ".join(stages) or "none"
+            raise table.error("stages", f"no stage {stage!r}; the file defines {there}")
+    renderers = tuple(table.take("renderers", list, [WAVECOMB]))
+    for renderer in renderers:
+        if renderer not in RENDERERS:
+            raise table.error("renderers", f"no {renderer!r}; there are {', '.join(RENDERERS)}")
+    vary = dict(table.take("vary", dict, {}))
+    stage_vary = vary.pop("stage", {})
+    for key, values in [*vary.items(), *stage_vary.items()]:
+        if not isinstance(values, list) or not values:
+            raise table.error(f"vary.{key}", "give a list of values")
+    for key, values in vary.items():
+        for value in values:
+            _check_setting(table, f"vary.{key}", key, value)
+    for key in stage_vary:
+        _check_stage_option(table, key)
+        for stage in chosen:
+            if not stages[stage].scene:
+                raise table.error(f"vary.stage.{key}", f"stage {stage} is a file: has no options")
+    factor = table.take("factor", str, "")
+    if factor and factor not in vary and factor not in stage_vary:
+        raise table.error("factor", f"{factor!r} is not varied; name a key of vary")
+    experiment = Experiment(
+        name=name,
+        stages=chosen,
+        renderers=renderers,
+        settings=_settings(table, "settings", table.take("settings", dict, {})),
+        vary=vary,
+        stage_vary=stage_vary,
+        cases=tuple(_settings(table, "case", entry) for entry in table.list_of_tables("case"))
+        or ({},),
+        skip=tuple(_settings(table, "skip", entry) for entry in table.list_of_tables("skip")),
+        factor=factor,
+        images=table.choice("images", "none", IMAGES),
+        golden=table.take("golden", bool, False),
+    )
+    table.end()
+    return experiment
+
+
+def _settings(table: Table, where: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    for key, value in values.items():
+        _check_setting(table, f"{where}.{key}", key, value)
+    return dict(values)
+
+
+def _check_setting(table: Table, where: str, key: str, value: Any) -> None:
+    kind = SETTINGS.get(key)
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    if kind is None:
+        raise table.error(where, f"no setting {key!r}; there are {', '.join(SETTINGS)}")
+    good = {
+        "pair": isinstance(value, list) and len(value) == 2 and all(type(v) is int for v in value),
+        "integer": whole,
+        "number": whole or isinstance(value, float),
+        "text": isinstance(value, str),
+        "flag": isinstance(value, bool),
+        "count": whole or value in ("all", "widest"),
+    }[kind]
+    if not good:
+        what = {"pair": "[width, height]", "count": 'an integer, "all" or "widest"'}.get(kind, kind)
+        raise table.error(where, f"must be {what}, not {value!r}")

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb bench``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import click
+
+from wavecomb.cli.options import Real, examples
+
+
+@click.group(
+    "bench",
+    epilog=examples(
+        "wavecomb bench list",
+        "wavecomb bench run quick -o results --dry-run",
+        "wavecomb bench run quick -o results",
+        "wavecomb bench run quick -o results --resume",
+        "wavecomb bench run my.toml -o results --only 'orders.*'",
+        "wavecomb bench report results",
+    ),
+)
+def bench_command() -> None:
+    """Measure: suites of runs, interleaved, with the state of the machine (docs/bench.md)."""
+
+
+@bench_command.command("list")
+def list_command() -> None:
+    """List the suites that come with Wavecomb."""
+    from wavecomb.bench.machine import limits
+    from wavecomb.bench.plan import configurations
+    from wavecomb.bench.suite import find_suite, load_suite, suite_names
+
+    here = limits()
+    for name in suite_names():
+        suite = load_suite(find_suite(name))
+        runs = len(configurations(suite, here)) * suite.repetitions
+        click.echo(f"{name:17} {runs:6} runs  {suite.title}")
+
+
+@bench_command.command("run")
+@click.argument("suite")
+@click.option(
+    "-o", "--output", required=True, type=click.Path(), metavar="DIR", help="Folder for results."
+)
+@click.option("--dry-run", is_flag=True, help="Say what would be run, and for how long.")
+@click.option("--resume", is_flag=True, help="Go on with the results in DIR.")
+@click.option(
+    "--repetitions", type=click.IntRange(min=1), metavar="N", help="In place of the suite's."
+)
+@click.option("--only", metavar="GLOB", help="Only configurations whose name matches.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="In place of the suite's.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of the order of the runs.")
+@click.option(
+    "--time-limit", type=Real(0, above=True), metavar="MINUTES", help="Begin no run past it."
+)
+@click.option("--stages", type=click.Path(), metavar="FOLDER", help="More stages, of a folder.")
+@click.option("--quiet", is_flag=True, help="Only warnings and errors.")
+def run_command(
+    suite: str,
+    output: str,
+    dry_run: bool,
+    resume: bool,
+    repetitions: int | None,
+    only: str | None,
+    threads: int | None,
+    seed: int | None,
+    time_limit: float | None,
+    stages: str | None,
+    quiet: bool,
+) -> None:
+    """Run SUITE, a name of `wavecomb bench list` or a TOML file.
+
+    Each run is a process of its own, on cores of its own. Results are in DIR as soon as a run is
+    done; after Ctrl-C or a kill, --resume goes on.
+    """
+    from wavecomb.bench.plan import with_folder
+    from wavecomb.bench.results import ResultFolder
+    from wavecomb.bench.runner import Options, Sitting
+    from wavecomb.bench.suite import find_suite, load_suite
+
+    chosen = load_suite(find_suite(suite))
+    if stages is not None:
+        chosen = with_folder(chosen, Path(stages))
+    limit = time_limit * 60.0 if time_limit is not None else None
+    options = Options(repetitions, only, threads, seed, limit, resume)
+
+    def say(line: str) -> None:
+        if not quiet or line.startswith("warning"):
+            click.echo(line, err=True)
+
+    sitting = Sitting(chosen, ResultFolder(Path(output)), options, say)
+    if dry_run:
+        _dry_run(sitting)
+        return
+    sitting.run()
+    if not quiet:
+        click.echo(f"results are in {output}; `wavecomb bench report {output}` shows them")
+
+
+def _dry_run(sitting: object) -> None:
+    from wavecomb.bench.results import read_objects
+    from wavecomb.bench.runner import Sitting
+    from wavecomb.progress import time_text
+
+    assert isinstance(sitting, Sitting)
+    sitting.folder.objects = read_objects(sitting.folder.runs_jsonl)
+    estimator = sitting.estimator()
+    left = sitting.left() if sitting.options.resume else sitting.plan
+    for config in sitting.configs:
+        runs = sum(run.config is config for run in left)
+        click.echo(f"{config.name}: {runs} x {time_text(estimator.seconds(config))}")
+    basis = "results in the folder" if estimator.measured else "a short calibration; rough"
+    click.echo(
+        f"{len(left)} runs of {len(sitting.configs)} configurations, "
+        f"about {time_text(estimator.total(left))} (from {basis}), "
+        "and what stages and golden pictures take to make"
+    )
+
+
+@bench_command.command("report")
+@click.argument("folder", type=click.Path(), metavar="DIR")
+def report_command(folder: str) -> None:
+    """Write DIR/report.html and DIR/figures from the results in DIR."""
+    from wavecomb.errors import WavecombError
+
+    if not (Path(folder) / "runs.csv").is_file():
+        raise WavecombError(f"{folder}: holds no runs.csv; `wavecomb bench run` makes it")
+    try:
+        build = import_module("wavecomb.bench.report").build
+    except ImportError as error:
+        raise WavecombError(
+            f"bench report: {error.name} is missing; run `pip install 'wavecomb[bench]'`"
+        ) from error
+    click.echo(f"wrote {build(Path(folder))}")
