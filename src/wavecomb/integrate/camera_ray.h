@@ -11,6 +11,10 @@
 
 namespace wavecomb {
 
+/// Width of a camera ray's cone in pixels. A pixel is the mean of many samples, each of which need
+/// not blur as much as the pixel does; Igehy's full pixel shows, beside renderers without cones.
+inline constexpr float kConeShare = 0.25f;
+
 /// A camera with its window fitted to a picture of width x height pixels.
 struct CameraSetup {
   Affine to_world;
@@ -68,7 +72,7 @@ inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y
   CameraRay<F> ray;
   ray.o = {rotate(m.row[0], o) + m.t.x, rotate(m.row[1], o) + m.t.y, rotate(m.row[2], o) + m.t.z};
   ray.d = world * F(1.f / len);
-  ray.spread = F(camera.step_y);
+  ray.spread = F(kConeShare * camera.step_y);
   ray.tfar = len * (camera.far_clip - camera.near_clip);
   return ray;
 }

@@ -115,8 +115,8 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
-/// Roulette ends paths whose throughput is below 1 / kRouletteGain. With a gain of 1 it saves rays and
-/// costs more noise than they are worth: on Cornell, 3 has the least product of relMSE and rays
+/// Roulette ends paths whose throughput is below 1 / kRouletteGain. With a gain of 1 it saves rays
+/// and costs more noise than they are worth: on Cornell, 3 has the least product of relMSE and rays
 /// (docs/decisions/roulette.md).
 inline constexpr float kRouletteGain = 3.f;
 
