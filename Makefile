@@ -96,7 +96,7 @@ test-py: build build/.setup-test ## Python and statistical tests
 
 test-wheel: wheel ## Install that wheel into a fresh environment and render with each of its libraries
 	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv
-	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pytest scipy dist/wavecomb-*.whl
+	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pytest dist/wavecomb-*.whl
 	$(WHEEL)/venv/bin/python -m pytest -q tests/python/test_isa.py tests/python/test_cli.py
 
 test-py-fast: build build/.setup-test
