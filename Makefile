@@ -8,6 +8,7 @@ SHELL := /bin/bash
 
 BUILD := build/editable
 ASAN := build/asan
+WHEEL := build/wheel
 VENV := .venv/bin
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
 # One build at a time per directory, whoever starts it.
@@ -22,7 +23,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build render test test-fast test-cpp test-py test-py-fast test-asan bench lint format clean
+.PHONY: help setup setup-test build wheel render test test-fast test-cpp test-py test-py-fast test-asan test-wheel bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -52,6 +53,14 @@ build/.built: build/.configured $(NATIVE_INPUTS)
 setup: build/.setup ## Install what building needs (system packages, .venv, Embree 4)
 setup-test: build/.setup-test
 build: build/.built ## Build the core and the Python module into .venv (editable)
+
+# Dependencies are what their wheels bring; Embree travels in this one where it is staged.
+wheel: build/.setup ## A wheel for other machines in dist/: a native library for each instruction set
+	@echo "wheel: a library for each instruction set"
+	@rm -f dist/wavecomb-*.whl
+	@$(LOCK) $(VENV)/python -m pip wheel -q --no-build-isolation --no-deps -w dist . --config-settings=build-dir=$(WHEEL) \
+	  --config-settings=cmake.define.WAVECOMB_ISAS=portable
+	@ls dist/wavecomb-*.whl
 
 # ---- use -----------------------------------------------------------------------------------------------
 
@@ -84,6 +93,11 @@ test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBe
 
 test-py: build build/.setup-test ## Python and statistical tests
 	$(VENV)/python -m pytest -q -n $(JOBS)
+
+test-wheel: wheel ## Install that wheel into a fresh environment and render with each of its libraries
+	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv
+	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pytest dist/wavecomb-*.whl
+	$(WHEEL)/venv/bin/python -m pytest -q tests/python/test_isa.py tests/python/test_cli.py
 
 test-py-fast: build build/.setup-test
 	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"

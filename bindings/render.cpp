@@ -443,6 +443,7 @@ void bind_render(nb::module_& m) {
     nb::dict d;
     d["version"] = WAVECOMB_VERSION;
     d["compiler"] = __VERSION__;
+    d["library"] = library_name();
 #if defined(__AVX512F__)
     d["isa"] = "avx512";
 #elif defined(__AVX2__)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # The Python module wavecomb._core, and the libraries that travel with it.
 # Everything here is in the install component `python`, relative to site-packages.
+#
+# Without WAVECOMB_ISAS there is one module, wavecomb/_core. With it, each instruction set has its own in
+# wavecomb/lib/<isa>/_core, and wavecomb/_cpu says which of them this CPU runs; python/wavecomb/isa.py chooses.
 
 execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
   OUTPUT_VARIABLE nanobind_ROOT OUTPUT_STRIP_TRAILING_WHITESPACE)
@@ -10,41 +13,62 @@ file(GLOB binding_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/*.cp
 if(NOT binding_sources)
   message(FATAL_ERROR "bindings/ holds no *.cpp: there is no Python module to build.")
 endif()
-nanobind_add_module(wavecomb_python NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sources})
-target_compile_definitions(wavecomb_python PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
-target_link_libraries(wavecomb_python PRIVATE wavecomb_core wavecomb_private TBB::tbb)
 
-# In site-packages/wavecomb: `lib` holds what we bring; ../../.. is <venv>/lib, where the tbb wheel puts
-# libtbb.so.12 (not looked for when oneTBB is the distribution's). In the build tree the linked
-# directories are enough.
-set(_rpath "$ORIGIN" "$ORIGIN/lib")
-if(WAVECOMB_TBB_IS_WHEEL)
-  list(APPEND _rpath "$ORIGIN/../../..")
-endif()
 # An Embree that is neither staged nor the system's (embree_ROOT) is looked for where it was found.
+set(_embree_rpath "")
 if(NOT WAVECOMB_EMBREE_IS_STAGED)
   get_target_property(_embree_library embree LOCATION)
   get_filename_component(_embree_folder "${_embree_library}" DIRECTORY)
   get_filename_component(_embree_folder "${_embree_folder}" REALPATH)
   if(_embree_library AND NOT _embree_folder IN_LIST CMAKE_CXX_IMPLICIT_LINK_DIRECTORIES)
-    list(APPEND _rpath "${_embree_folder}")
+    set(_embree_rpath "${_embree_folder}")
   endif()
 endif()
-set_target_properties(wavecomb_python PROPERTIES
-  OUTPUT_NAME _core
-  INSTALL_RPATH "${_rpath}"
-  INSTALL_RPATH_USE_LINK_PATH OFF)
-install(TARGETS wavecomb_python LIBRARY DESTINATION wavecomb COMPONENT python)
 
-# What the bindings really offer, to compare python/wavecomb/_core.pyi with: target wavecomb_stub.
-nanobind_add_stub(wavecomb_stub EXCLUDE_FROM_ALL MODULE _core OUTPUT "${PROJECT_BINARY_DIR}/_core.pyi"
-  PYTHON_PATH $<TARGET_FILE_DIR:wavecomb_python> DEPENDS wavecomb_python)
+# wavecomb_add_module(NAME CORE FLAGS FOLDER): wavecomb/FOLDER/_core on top of the core library CORE.
+function(wavecomb_add_module name core flags folder)
+  nanobind_add_module(${name} NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sources})
+  target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
+  target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb)
+  # Nothing but its entry leaves the module: no other library is to be bound to code of its instruction set.
+  if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+    target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
+    set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
+  endif()
+  # In site-packages/wavecomb: `lib` holds what we bring; ../../.. is <venv>/lib, where the tbb wheel puts
+  # libtbb.so.12 (not looked for when oneTBB is the distribution's). In the build tree the linked
+  # directories are enough.
+  string(REGEX REPLACE "[^/]+" ".." up "${folder}")
+  if(up)
+    string(APPEND up "/")
+  endif()
+  set(rpath "$ORIGIN" "$ORIGIN/${up}lib")
+  if(WAVECOMB_TBB_IS_WHEEL)
+    list(APPEND rpath "$ORIGIN/${up}../../..")
+  endif()
+  list(APPEND rpath ${_embree_rpath})
+  set_target_properties(${name} PROPERTIES
+    OUTPUT_NAME _core
+    LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${folder}"
+    INSTALL_RPATH "${rpath}"
+    INSTALL_RPATH_USE_LINK_PATH OFF)
+  install(TARGETS ${name} LIBRARY DESTINATION "wavecomb/${folder}" COMPONENT python)
+endfunction()
+
+if(WAVECOMB_ISAS)
+  include(cmake/WavecombIsas.cmake)
+else()
+  wavecomb_add_module(wavecomb_python wavecomb_core wavecomb_private "")
+  # What the bindings really offer, to compare python/wavecomb/_core.pyi with: target wavecomb_stub.
+  nanobind_add_stub(wavecomb_stub EXCLUDE_FROM_ALL MODULE _core OUTPUT "${PROJECT_BINARY_DIR}/_core.pyi"
+    PYTHON_PATH $<TARGET_FILE_DIR:wavecomb_python> DEPENDS wavecomb_python)
+  if(BUILD_SHARED_LIBS)
+    install(TARGETS wavecomb_core LIBRARY DESTINATION wavecomb/lib NAMELINK_SKIP COMPONENT python)
+  endif()
+endif()
 
 if(WAVECOMB_EMBREE_IS_STAGED)
   install(FILES "${WAVECOMB_STAGED_EMBREE}/lib/libembree4.so.4" DESTINATION wavecomb/lib
     PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE
     COMPONENT python)
-endif()
-if(BUILD_SHARED_LIBS)
-  install(TARGETS wavecomb_core LIBRARY DESTINATION wavecomb/lib NAMELINK_SKIP COMPONENT python)
 endif()

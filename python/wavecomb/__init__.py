@@ -12,8 +12,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from wavecomb import isa
+
 # Eager, for it has the name of its module: a late import of the module would hide the function.
 from wavecomb.compare import compare
+
+isa.install()
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene, SceneBuilder, Settings

@@ -273,4 +273,4 @@ def peak_rss_bytes() -> int:
     """The most memory this process has held."""
 
 def build_info() -> dict[str, str]:
-    """version, compiler, isa, embree, tbb, drjit."""
+    """version, compiler, library (its -march), isa (what its kernels use), tbb."""

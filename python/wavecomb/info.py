@@ -19,6 +19,8 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
         loaded: What ``wavecomb.load`` gave.
         stage: Name of the file.
     """
+    from wavecomb.isa import library_info
+
     scene, report = loaded.scene, loaded.report
     low, high = scene.bounds
     programs = Counter(program for _, program in scene.materials)
@@ -47,6 +49,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
         "warnings": [finding.as_dict() for finding in report.warnings]
         + [{"what": line, "count": 1, "places": []} for line in scene.warnings],
         "notes": [finding.as_dict() for finding in report.notes],
+        "native": library_info(),
     }
 
 
@@ -54,6 +57,8 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
     """The same for people."""
     from rich.markup import escape
     from rich.table import Table
+
+    from wavecomb.isa import library_text
 
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
@@ -83,6 +88,7 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
         more = f" and {len(others) - 8} more" if len(others) > 8 else ""
         row("other cameras", ", ".join(others[:8]) + more)
     row("prims", _counts(info["prims"]).removeprefix(": ") or "none")
+    row("native", library_text())
     row("loaded in", f"{info['seconds']['load']:.2f} s")
     console.print(table)
     for title, findings in (

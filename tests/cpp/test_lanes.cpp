@@ -5,6 +5,8 @@
 #include <cstring>
 #include <numeric>
 
+#include "wavecomb/core/denormals.h"
+
 namespace wavecomb {
 namespace {
 
@@ -341,6 +343,17 @@ TEST(Lanes, IsUniformLooksAtActiveLanesOnly) {
     }
   });
   EXPECT_TRUE(is_uniform<float>(3u, true));
+}
+
+TEST(Lanes, DenormalsAreZeroWhileTheyAreOff) {
+  volatile float denormal = 1e-40f, small = 2e-38f, half = 0.5f;
+  {
+    const DenormalsOff off;
+    EXPECT_EQ(0.f, denormal * 1e20f) << "as an operand";
+    EXPECT_EQ(0.f, small * half) << "as a result";
+  }
+  EXPECT_GT(denormal * 1e20f, 0.f);
+  EXPECT_GT(small * half, 0.f);
 }
 
 }  // namespace

@@ -143,7 +143,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
         "Error": Error,
         "Settings": Settings,
         "render": fake.render,
-        "build_info": lambda: {"version": "0", "isa": "none"},
+        "build_info": lambda: {"version": "0", "library": "fake", "isa": "none"},
         "lane_widths": lambda: [1, 8],
     }.items():
         setattr(core, name, value)

@@ -76,9 +76,14 @@ def describe(error: Exception) -> str:
 def print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     """Prints the version and exits."""
     if value and not ctx.resilient_parsing:
+        from wavecomb.isa import library_text
         from wavecomb.version import version
 
-        click.echo(f"wavecomb {version()}")
+        try:
+            text = library_text()
+        except ImportError as error:
+            text = describe(error)
+        click.echo(f"wavecomb {version()} ({text})")
         ctx.exit()
 
 

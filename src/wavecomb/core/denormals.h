@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #if defined(__SSE__)
 #include <xmmintrin.h>
 #endif
@@ -11,20 +13,30 @@ namespace wavecomb {
 /// nothing here, and every worker must treat them alike for pictures to be equal.
 class DenormalsOff {
  public:
-#if defined(__SSE__)
-  DenormalsOff() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }
-  ~DenormalsOff() { _mm_setcsr(saved_); }
-#else
-  DenormalsOff() = default;
-  ~DenormalsOff() = default;
-#endif
+  DenormalsOff() : saved_(control()) { set_control(saved_ | kFlush); }
+  ~DenormalsOff() { set_control(saved_); }
   DenormalsOff(const DenormalsOff&) = delete;
   DenormalsOff& operator=(const DenormalsOff&) = delete;
 
-#if defined(__SSE__)
  private:
-  unsigned saved_;
+  // The control word of the thread's floating point, and the bits that flush results and operands.
+#if defined(__SSE__)
+  static constexpr uint64_t kFlush = 0x8040;
+  static uint64_t control() { return _mm_getcsr(); }
+  static void set_control(uint64_t word) { _mm_setcsr(static_cast<unsigned>(word)); }
+#elif defined(__aarch64__)
+  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ: both
+  static uint64_t control() {
+    uint64_t word;
+    asm volatile("mrs %0, fpcr" : "=r"(word));
+    return word;
+  }
+  static void set_control(uint64_t word) { asm volatile("msr fpcr, %0" : : "r"(word) : "memory"); }
+#else
+#error "DenormalsOff: how this CPU flushes denormals is not known here."
 #endif
+
+  uint64_t saved_;
 };
 
 }  // namespace wavecomb

@@ -255,7 +255,14 @@ inline uint32_t mask_bits(const M& m) {
   } else if constexpr (requires { m.a1; }) {  // made of two halves
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
+#if defined(__aarch64__)
+    // Dr.Jit has no bitmask_() here. A lane of a mask is all ones or all zeros.
+    static_assert(M::Size == 4 && sizeof(m.m) == 16);
+    constexpr uint32_t kBits[4] = {1, 2, 4, 8};
+    return vaddvq_u32(vandq_u32(std::bit_cast<uint32x4_t>(m.m), vld1q_u32(kBits)));
+#else
     return m.bitmask_();
+#endif
   }
 }
 }  // namespace detail

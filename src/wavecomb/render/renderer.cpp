@@ -78,8 +78,8 @@ uint32_t choose_lanes(uint32_t wanted) {
   if (std::find(built.begin(), built.end(), wanted) != built.end()) return wanted;
   std::string list;
   for (uint32_t w : built) list += (list.empty() ? "" : ", ") + std::to_string(w);
-  throw Error("lanes is " + std::to_string(wanted) +
-              ", which this build has no kernels for; it has " + list);
+  throw Error("lanes is " + std::to_string(wanted) + ", which the " + library_name() +
+              " library has no kernels for; it has " + list);
 }
 
 /// The policies that `name` stands for: one, or those that "adaptive" chooses among, "none" first.
@@ -441,6 +441,10 @@ void give_back_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
 #endif
+}
+
+const char* library_name() {
+  return WAVECOMB_LIBRARY;
 }
 
 uint64_t peak_rss_bytes() {

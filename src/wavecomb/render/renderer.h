@@ -96,6 +96,8 @@ class WavefrontRenderer {
 
 /// Lane widths that this build has kernels for, ascending.
 std::vector<uint32_t> lane_widths();
+/// The -march that this library is compiled with: "native", "x86-64-v3" ...; "default" without one.
+const char* library_name();
 /// The most memory this process has held, bytes.
 uint64_t peak_rss_bytes();
 /// Returns freed memory to the system where the C library keeps it (glibc): call after loading.

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+# One Python module for each instruction set in WAVECOMB_ISAS, and the probe wavecomb._cpu that says which of
+# them a CPU runs. docs/decisions/isa.md has the reasons.
+
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  set(_known x86-64-v2 x86-64-v3 x86-64-v4)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+  set(_known armv8-a)
+else()
+  message(FATAL_ERROR "WAVECOMB_ISAS: no list of instruction sets for ${CMAKE_SYSTEM_PROCESSOR}; leave it empty "
+    "and give WAVECOMB_ARCH.")
+endif()
+set(_isas ${WAVECOMB_ISAS})
+if(_isas STREQUAL "portable")
+  set(_isas ${_known})
+endif()
+foreach(_isa IN LISTS _isas)
+  if(NOT _isa IN_LIST _known)
+    message(FATAL_ERROR "WAVECOMB_ISAS: ${_isa} is not one of portable, ${_known}.")
+  endif()
+endforeach()
+
+check_cxx_source_compiles("int main() {
+#if defined(__x86_64__)
+  return __builtin_cpu_supports(\"x86-64-v4\") && __builtin_cpu_supports(\"x86-64-v2\");
+#endif
+}" WAVECOMB_HAS_CPU_LEVELS)
+if(NOT WAVECOMB_HAS_CPU_LEVELS)
+  message(FATAL_ERROR "WAVECOMB_ISAS: ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION} cannot ask a CPU for "
+    "x86-64-v2 to x86-64-v4 (__builtin_cpu_supports); take GCC 12 or newer.")
+endif()
+
+# The probe runs on every CPU: the compiler's baseline, the C interface of Python, no library but libc.
+Python_add_library(wavecomb_cpu MODULE WITH_SOABI "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
+target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)
+set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden)
+install(TARGETS wavecomb_cpu LIBRARY DESTINATION wavecomb COMPONENT python)
+
+add_custom_target(wavecomb_python DEPENDS wavecomb_cpu)
+foreach(_isa IN LISTS _isas)
+  string(MAKE_C_IDENTIFIER "${_isa}" _id)
+  wavecomb_add_flags(wavecomb_private_${_id} ${_isa})
+  wavecomb_add_core(wavecomb_core_${_id} wavecomb_private_${_id} STATIC)
+  wavecomb_add_module(wavecomb_python_${_id} wavecomb_core_${_id} wavecomb_private_${_id} lib/${_isa})
+  add_dependencies(wavecomb_python wavecomb_python_${_id})
+endforeach()
