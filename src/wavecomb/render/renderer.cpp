@@ -40,7 +40,7 @@ constexpr uint32_t kPassSamples = 16;
 /// cache beside it; otherwise they share the cache.
 uint32_t default_wave_size(uint64_t scene_bytes) {
   constexpr uint64_t kSmallScene = 1 << 20;
-  return scene_bytes < kSmallScene ? 16384 : 4096;
+  return scene_bytes < kSmallScene ? 8192 : 4096;
 }
 
 /// The kernels of one width.
