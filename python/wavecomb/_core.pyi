@@ -181,7 +181,7 @@ class Settings:
     traversal: str  # "packets" | "single"
     policy: str  # "program"
     materialize: str  # "auto" | "on" | "off"
-    ray_order: str  # of bounce rays: "slot" | "morton" | "morton-octant" | "auto"
+    ray_order: str  # of bounce rays: "slot" | "morton" | "morton-octant" | "direction" | "auto"
     shadow_order: str  # of shadow rays, likewise
     costs: str  # "auto" | "measured" | "model"
     cost_weight: float  # of a pass in the moving average

@@ -24,7 +24,7 @@ POLICIES = (
 )
 """Names of the built-in policies; docs/scheduling.md says what each does."""
 
-RAY_ORDERS = ("slot", "morton", "morton-octant", "auto")
+RAY_ORDERS = ("slot", "morton", "morton-octant", "direction", "auto")
 """Names of the orders of rays before traversal."""
 
 COLUMNS = ("throughput", "position_key", "texture_key")

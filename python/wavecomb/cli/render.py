@@ -107,12 +107,12 @@ _INTEGERS = click.IntRange(min=0)
 @click.option(
     "--ray-order",
     type=click.Choice(RAY_ORDERS),
-    help="Order of bounce rays before traversal.  [default: slot]",
+    help="Order of bounce rays before traversal.  [default: auto]",
 )
 @click.option(
     "--shadow-order",
     type=click.Choice(RAY_ORDERS),
-    help="Order of shadow rays.  [default: slot]",
+    help="Order of shadow rays.  [default: auto]",
 )
 @click.option(
     "--costs",
