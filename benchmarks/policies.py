@@ -42,9 +42,11 @@ RAY_ORDERS = (
     ("slot", "slot"),
     ("morton", "slot"),
     ("morton-octant", "slot"),
+    ("direction", "slot"),
     ("auto", "slot"),
     ("slot", "morton"),
     ("slot", "morton-octant"),
+    ("slot", "direction"),
     ("slot", "auto"),
     ("auto", "auto"),
 )

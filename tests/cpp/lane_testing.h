@@ -32,6 +32,32 @@ void for_each_lane_type(const Function& f) {
   for_each_packet(f);
 }
 
+/// A mask with the lanes of `bits` set.
+template <typename F>
+inline Mask<F> make_mask(uint32_t bits) {
+  if constexpr (kIsScalar<F>) {
+    return (bits & 1u) != 0;
+  } else {
+    const UInt<F> bit = (UInt<F>(bits) >> lane_index<F>()) & 1u;
+    return Mask<F>(bit == UInt<F>(1u));
+  }
+}
+
+/// Bit patterns to try as masks of W lanes: all of them up to 8 lanes, a spread of them at 16.
+template <typename F>
+inline std::vector<uint32_t> mask_patterns() {
+  constexpr uint32_t kAll = (1u << kWidth<F>)-1u;
+  std::vector<uint32_t> patterns;
+  if constexpr (kWidth<F> <= 8) {
+    for (uint32_t b = 0; b <= kAll; ++b) patterns.push_back(b);
+  } else {
+    patterns = {0u, kAll, 1u, 1u << (kWidth<F> - 1)};
+    std::mt19937 rng(7);
+    for (int i = 0; i < 500; ++i) patterns.push_back(rng() & kAll);
+  }
+  return patterns;
+}
+
 /// Whether two floats have the same bits, or both are NaN.
 inline bool same_bits(float a, float b) {
   return std::bit_cast<uint32_t>(a) == std::bit_cast<uint32_t>(b) || (a != a && b != b);

@@ -2,10 +2,12 @@
 #include "wavecomb/accel/embree_accelerator.h"
 
 #include <numeric>
+#include <tuple>
 
 #include "scene_testing.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/denormals.h"
+#include "wavecomb/integrate/stages/order_rays.h"
 
 namespace wavecomb {
 namespace {
@@ -36,6 +38,17 @@ struct Rays {
       *from[c] = static_cast<float>(o[c]);
       *dir[c] = static_cast<float>(d[c] / l);
     }
+  }
+  /// Ray order[i] in place i, with its slot.
+  Rays in_order(const std::vector<uint32_t>& order) const {
+    Rays moved(size);
+    const auto move = [&](const auto& from, auto& to) {
+      for (size_t i = 0; i < size; ++i) to[i] = from[order[i]];
+    };
+    move(ox, moved.ox), move(oy, moved.oy), move(oz, moved.oz);
+    move(dx, moved.dx), move(dy, moved.dy), move(dz, moved.dz);
+    move(tfar, moved.tfar), move(slot, moved.slot);
+    return moved;
   }
   RaySpan span(size_t begin, size_t n, bool limited) const {
     const auto b = static_cast<std::ptrdiff_t>(begin);
@@ -70,7 +83,7 @@ struct Keys {
     for (uint32_t& x : pixel_hash) x = rng();
     for (size_t i = 0; i < sample.size(); ++i) sample[i] = static_cast<uint32_t>(i % 17);
   }
-  PresenceKeys keys(uint32_t salt = 0) const { return {pixel_hash.data(), sample.data(), salt}; }
+  PresenceKeys keys(uint32_t salt = 0) const { return {pixel_hash.data(), sample.data(), 1, salt}; }
 };
 
 /// Traces in calls of at most `chunk` rays.
@@ -83,10 +96,11 @@ Hits trace(const EmbreeAccelerator& accel, const Rays& rays, uint32_t width, boo
   return hits;
 }
 std::vector<uint32_t> blocked(const EmbreeAccelerator& accel, const Rays& rays, uint32_t width,
-                              const PresenceKeys& keys, size_t chunk = 1u << 30) {
+                              bool coherent, const PresenceKeys& keys, size_t chunk = 1u << 30) {
   std::vector<uint32_t> out(rays.size + 16);
   for (size_t b = 0; b < rays.size; b += chunk)
-    accel.occluded(rays.span(b, std::min(chunk, rays.size - b), true), out.data() + b, width, keys);
+    accel.occluded(rays.span(b, std::min(chunk, rays.size - b), true), out.data() + b, width,
+                   coherent, keys);
   out.resize(rays.size);
   return out;
 }
@@ -108,43 +122,52 @@ void expect_same_hits(const Hits& a, const Hits& b, size_t n, const std::string&
                            << b.t[first] << ", prim " << a.prim[first] << " and " << b.prim[first];
 }
 
-/// Expects the same hits, bit for bit, for every width, tails, coherence and order of the rays.
+void expect_same_occlusion(const std::vector<uint32_t>& a, const std::vector<uint32_t>& b,
+                           const std::string& what) {
+  size_t differing = 0;
+  for (size_t i = 0; i < a.size(); ++i) differing += a[i] != b[i];
+  EXPECT_EQ(differing, 0u) << what << ", occlusion";
+}
+
+/// Expects the same hits and the same occlusion, bit for bit, for every width, tails, coherent
+/// traversal or not, and order of the rays.
 void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const Rays& rays,
                                           bool coherent_too = true) {
   const DenormalsOff denormals_off;
   const Keys keys(rays.size);
   const Hits single = trace(accel, rays, 1, false, keys.keys());
-  const std::vector<uint32_t> shadow = blocked(accel, rays, 1, keys.keys());
-  for (const uint32_t width : {4u, 8u, 16u}) {
-    const std::string name = "packets of " + std::to_string(width);
-    for (const bool coherent : {false, true}) {
-      if (coherent && !coherent_too) continue;
-      expect_same_hits(single, trace(accel, rays, width, coherent, keys.keys()), rays.size,
-                       name + (coherent ? ", coherent" : ""));
-    }
-    // Seven valid lanes, and one: tails.
-    expect_same_hits(single, trace(accel, rays, width, false, keys.keys(), false, width - 1),
-                     rays.size, name + " less one");
-    EXPECT_EQ(shadow, blocked(accel, rays, width, keys.keys())) << name << ", occlusion";
+  const std::vector<uint32_t> shadow = blocked(accel, rays, 1, false, keys.keys());
+  const auto expect_same = [&](uint32_t width, bool coherent, size_t chunk) {
+    const std::string name = "packets of " + std::to_string(width) +
+                             (coherent ? ", coherent" : "") + ", calls of " + std::to_string(chunk);
+    expect_same_hits(single, trace(accel, rays, width, coherent, keys.keys(), false, chunk),
+                     rays.size, name);
+    expect_same_occlusion(shadow, blocked(accel, rays, width, coherent, keys.keys(), chunk), name);
+  };
+  for (const bool coherent : {false, true}) {
+    if (coherent && !coherent_too) continue;
+    for (const uint32_t width : {1u, 4u, 8u, 16u}) expect_same(width, coherent, rays.size);
+    // All lanes but one, and seven: tails.
+    for (const uint32_t width : {4u, 8u, 16u}) expect_same(width, coherent, width - 1);
+    expect_same(16, coherent, 7);
   }
-  expect_same_hits(single, trace(accel, rays, 16, false, keys.keys(), false, 7), rays.size,
-                   "7 lanes of 16");
-  EXPECT_EQ(shadow, blocked(accel, rays, 16, keys.keys(), 7)) << "7 lanes of 16, occlusion";
 
   std::vector<uint32_t> order(rays.size);
   std::iota(order.begin(), order.end(), 0u);
   std::shuffle(order.begin(), order.end(), std::mt19937(3));
-  Rays shuffled(rays.size);
-  const auto move = [&](const auto& from, auto& to) {
-    for (size_t i = 0; i < rays.size; ++i) to[i] = from[order[i]];
-  };
-  move(rays.ox, shuffled.ox), move(rays.oy, shuffled.oy), move(rays.oz, shuffled.oz);
-  move(rays.dx, shuffled.dx), move(rays.dy, shuffled.dy), move(rays.dz, shuffled.dz);
-  move(rays.tfar, shuffled.tfar), move(rays.slot, shuffled.slot);
-  const Hits mixed = trace(accel, shuffled, 16, false, keys.keys());
-  size_t differing = 0;
-  for (size_t i = 0; i < rays.size; ++i) differing += !same_hit(single, order[i], mixed, i);
-  EXPECT_EQ(differing, 0u) << "shuffled";
+  const Rays shuffled = rays.in_order(order);
+  for (const bool coherent : {false, true}) {
+    if (coherent && !coherent_too) continue;
+    const Hits mixed = trace(accel, shuffled, 16, coherent, keys.keys());
+    const std::vector<uint32_t> mixed_shadow = blocked(accel, shuffled, 16, coherent, keys.keys());
+    size_t differing = 0, shadow_differing = 0;
+    for (size_t i = 0; i < rays.size; ++i) {
+      differing += !same_hit(single, order[i], mixed, i);
+      shadow_differing += shadow[order[i]] != mixed_shadow[i];
+    }
+    EXPECT_EQ(differing, 0u) << "shuffled" << (coherent ? ", coherent" : "");
+    EXPECT_EQ(shadow_differing, 0u) << "shuffled, occlusion" << (coherent ? ", coherent" : "");
+  }
 }
 
 /// Rays between random points of a cube.
@@ -299,28 +322,36 @@ TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
 TEST(Accelerator, HitsDoNotDependOnPackets) {
   const auto scene = soup_scene(3000);
   const EmbreeAccelerator accel(scene, 2);
-  expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(100000), 3, 5));
+  expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(30000), 3, 5));
 }
 
 TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
-  // Coherent rays from one point, which is what the coherent flag is for.
+  // Bundles from one point, which is what the coherent flag is for, and from a lens: those graze
+  // edges of the Cornell box from many points, where coherent packets differ (see below).
   for (const auto& scene : {mixed(), cornell(), emissive_meshes()}) {
     const EmbreeAccelerator accel(scene, 2);
-    const size_t side = size_for_build(240, 4);
-    Rays rays(side * side);
-    for (size_t i = 0; i < rays.size; ++i) {
-      const double x = static_cast<double>(i % side) / static_cast<double>(side) - 0.5;
-      const double y = static_cast<double>(i / side) / static_cast<double>(side) - 0.5;
-      rays.aim(i, {0.1, 0.6, 5}, {4 * x, 4 * y + 0.2, 0});
+    for (const double radius : {0.0, 0.05, 0.5}) {
+      SCOPED_TRACE(testing::Message() << "lens radius " << radius);
+      const size_t side = size_for_build(160, 4);
+      Rays rays(side * side);
+      std::mt19937 rng(6);
+      std::uniform_real_distribution<double> uniform(-radius, radius);
+      for (size_t i = 0; i < rays.size; ++i) {
+        const double x = static_cast<double>(i % side) / static_cast<double>(side) - 0.5;
+        const double y = static_cast<double>(i / side) / static_cast<double>(side) - 0.5;
+        rays.aim(i, {0.1 + uniform(rng), 0.6 + uniform(rng), 5}, {4 * x, 4 * y + 0.2, 0});
+      }
+      expect_hits_do_not_depend_on_packets(accel, rays, radius == 0);
     }
-    expect_hits_do_not_depend_on_packets(accel, rays);
   }
 }
 
+/// Where the rays of a bundle come from.
+enum class From { kAnywhere, kPoint, kLens };
+
 /// Rays at the vertices, the middles of edges and other points of edges of a mesh: from anywhere,
-/// or like a camera's from one point.
-Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed,
-                   bool from_one_point) {
+/// or like a camera's from one point or a lens.
+Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed, From where) {
   Rays rays(n);
   std::mt19937 rng(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -342,10 +373,30 @@ Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed,
     }
     if (i % 3 == 0) from = {to[0], to[1] + 4, to[2]};  // straight down
     from[1] = std::max(from[1], 2.0);
-    if (from_one_point) from = {0.5, 12, 0.25};
+    if (where == From::kPoint) from = {0.5, 12, 0.25};
+    if (where == From::kLens) from = {0.4 + 0.2 * uniform(rng), 12, 0.15 + 0.2 * uniform(rng)};
     rays.aim(i, from, to);
   }
   return rays;
+}
+
+/// Expects that coherent packets find nearly what single rays find, on rays chosen to disagree.
+void expect_coherent_differs_seldom(const EmbreeAccelerator& accel, const Rays& rays) {
+  const DenormalsOff denormals_off;
+  const Keys keys(rays.size);
+  const Hits a = trace(accel, rays, 1, false, keys.keys());
+  const auto shadow = blocked(accel, rays, 1, false, keys.keys());
+  for (const uint32_t width : {4u, 8u, 16u}) {
+    const Hits b = trace(accel, rays, width, true, keys.keys());
+    const auto coherent_shadow = blocked(accel, rays, width, true, keys.keys());
+    size_t differing = 0, shadow_differing = 0;
+    for (size_t i = 0; i < rays.size; ++i) {
+      differing += !same_hit(a, i, b, i);
+      shadow_differing += shadow[i] != coherent_shadow[i];
+    }
+    EXPECT_LT(differing, rays.size / 20) << width;
+    EXPECT_LT(shadow_differing, rays.size / 100) << width;
+  }
 }
 
 TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
@@ -365,12 +416,16 @@ TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
       }
       const EmbreeAccelerator accel(b.build(), 2);
       SCOPED_TRACE(testing::Message() << "bump " << bump << (instanced ? ", instanced" : ""));
-      const Rays rays = rays_at_edges(mesh, m, size_for_build(50000), 21, false);
+      const Rays rays = rays_at_edges(mesh, m, size_for_build(50000), 21, From::kAnywhere);
+      expect_hits_do_not_depend_on_packets(accel, rays, false);
       // Embree's coherent traversal tests boxes of a whole packet, and thereby some triangles that
       // a ray alone passes at a rounding's distance. It is for rays from one point.
-      expect_hits_do_not_depend_on_packets(accel, rays, false);
-      expect_hits_do_not_depend_on_packets(accel,
-                                           rays_at_edges(mesh, m, size_for_build(50000), 22, true));
+      expect_coherent_differs_seldom(accel, rays);
+      expect_hits_do_not_depend_on_packets(
+          accel, rays_at_edges(mesh, m, size_for_build(50000), 22, From::kPoint));
+      const Rays lens = rays_at_edges(mesh, m, size_for_build(50000), 23, From::kLens);
+      expect_hits_do_not_depend_on_packets(accel, lens, false);
+      expect_coherent_differs_seldom(accel, lens);
       if (bump > 0) continue;
       // And none slips through: the grid has no holes. (At its rim a ray may pass.)
       const Hits hits = trace(accel, rays, 16, false, Keys(rays.size).keys());
@@ -400,7 +455,7 @@ TEST(Accelerator, ClosedMeshesHaveNoHoles) {
     for (size_t i = 0; i < n; ++i) missed += hits.inst[i] == kNoHit;
     // Rays aim at vertices exactly; robust traversal lets one in some ten thousand through.
     EXPECT_LE(missed, n / 10000 + 1) << width;
-    const auto shadow = blocked(accel, rays, width, Keys(n).keys());
+    const auto shadow = blocked(accel, rays, width, false, Keys(n).keys());
     EXPECT_GE(std::count(shadow.begin(), shadow.end(), 1u) + static_cast<long>(n / 10000 + 1),
               static_cast<long>(n))
         << width;
@@ -420,6 +475,39 @@ TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
   expect_hits_do_not_depend_on_packets(accel, rays);
 }
 
+// Rays from all over onto surfaces that cross one another many times, some in the same plane, with
+// instances in the very same place; in any order, and in order of direction.
+TEST(Accelerator, IncoherentRaysAtCrossingSurfacesDoNotDependOnPackets) {
+  SceneBuilder b;
+  const uint32_t group = b.add_group("crossing");
+  for (const uint32_t seed : {1u, 2u, 3u})
+    b.add_to_group(group, b.add_mesh(make_mesh(grid(12, 0.4f, seed))));
+  b.add_to_group(group, b.add_mesh(make_mesh(grid(12, 0, 0))));
+  b.add_to_group(group, b.add_mesh(make_mesh(quad({-1, 0, -1}, {14, 0, 0}, {0, 0, 14}))));
+  const Affine m = rotate(0, 20) * rotate(2, 31) * translate(-6, 0, -6);
+  b.add_instance(0, group, m);
+  b.add_instance(0, group, m);
+  b.add_instance(0, group, rotate(1, 90) * m);
+  const EmbreeAccelerator accel(b.build(), 1);
+  Rays rays(size_for_build(30000));
+  std::mt19937 rng(13);
+  std::uniform_real_distribution<double> uniform(-6, 6);
+  for (size_t i = 0; i < rays.size; ++i) {
+    std::array<double, 3> from, to;
+    for (double& x : from) x = uniform(rng);
+    for (double& x : to) x = uniform(rng);
+    rays.aim(i, from, to);
+    rays.tfar[i] = static_cast<float>(std::abs(uniform(rng)));
+  }
+  expect_hits_do_not_depend_on_packets(accel, rays);
+
+  std::vector<uint32_t> key(rays.size), order(rays.size);
+  for (size_t i = 0; i < rays.size; ++i)
+    key[i] = direction_key<float>(Vec3<float>(rays.dx[i], rays.dy[i], rays.dz[i]));
+  sort_by_direction(key.data(), rays.slot.data(), rays.size, order.data());
+  expect_hits_do_not_depend_on_packets(accel, rays.in_order(order));
+}
+
 TEST(Accelerator, OcclusionAgreesWithIntersection) {
   const auto scene = soup_scene(300);
   const EmbreeAccelerator accel(scene, 2);
@@ -428,7 +516,7 @@ TEST(Accelerator, OcclusionAgreesWithIntersection) {
   const Keys keys(n);
   const Hits all = trace(accel, rays, 16, false, keys.keys());
   const Hits near = trace(accel, rays, 16, false, keys.keys(), true);
-  const std::vector<uint32_t> shadow = blocked(accel, rays, 16, keys.keys());
+  const std::vector<uint32_t> shadow = blocked(accel, rays, 16, false, keys.keys());
   size_t count = 0;
   for (size_t i = 0; i < n; ++i) {
     // tfar cuts off what lies behind it, and nothing else.
@@ -486,7 +574,7 @@ TEST(Accelerator, LightShapesAreFoundByTheirRecord) {
     expect(4, 3, std::sqrt(16 + 0.81 + 0.04));
     expect(8, 3, std::sqrt(16 + 0.01 / 4));
     for (const size_t i : {1u, 3u, 5u, 6u, 7u}) EXPECT_EQ(hits.inst[i], kNoHit) << i;
-    const auto shadow = blocked(accel, rays, width, keys.keys());
+    const auto shadow = blocked(accel, rays, width, false, keys.keys());
     EXPECT_EQ(shadow, (std::vector<uint32_t>{1, 0, 1, 0, 1, 0, 0, 0, 1}));
   }
 }
@@ -577,6 +665,31 @@ TEST(Accelerator, PresenceIsAProbability) {
   }
 }
 
+TEST(Accelerator, PresenceKeysMayStandInRows) {
+  // As in the path pool: both words of a key inside a row of 16.
+  const size_t n = 2000, words = 16;
+  Rays rays(n);
+  for (size_t i = 0; i < n; ++i) {
+    const double x = static_cast<double>(i) / n - 0.5;
+    rays.aim(i, {x, 0.1, 5}, {x, 0.1, 0});
+    rays.slot[i] = static_cast<uint32_t>(n - 1 - i);
+  }
+  const Keys keys(n);
+  std::vector<uint32_t> rows(words * n, 0xdeadbeefu);
+  for (size_t i = 0; i < n; ++i) {
+    rows[words * i + 13] = keys.pixel_hash[i];
+    rows[words * i + 14] = keys.sample[i];
+  }
+  const PresenceKeys in_rows{rows.data() + 13, rows.data() + 14, words, 5};
+  const EmbreeAccelerator accel(leaves(3, 0.4f, 0, false, true), 1);
+  for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+    expect_same_hits(trace(accel, rays, width, false, keys.keys(5)),
+                     trace(accel, rays, width, false, in_rows), n, "keys in rows");
+    EXPECT_EQ(blocked(accel, rays, width, false, keys.keys(5)),
+              blocked(accel, rays, width, false, in_rows));
+  }
+}
+
 TEST(Accelerator, PresenceByTextureAndThreshold) {
   const size_t n = 4096;
   Rays rays(n);
@@ -649,7 +762,7 @@ TEST(Accelerator, EmptySceneAndZeroAreaFaces) {
     for (const uint32_t width : {1u, 4u, 8u, 16u}) {
       const Hits hits = trace(*accel, rays, width, true, keys.keys());
       for (size_t i = 0; i < 40; ++i) EXPECT_EQ(hits.inst[i], kNoHit);
-      const auto shadow = blocked(*accel, rays, width, keys.keys());
+      const auto shadow = blocked(*accel, rays, width, false, keys.keys());
       EXPECT_EQ(std::count(shadow.begin(), shadow.end(), 1u), 0);
     }
 }

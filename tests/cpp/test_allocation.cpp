@@ -71,28 +71,45 @@ TEST(Allocation, IsCounted) {
   EXPECT_EQ(v.size(), 100u);
 }
 
+/// Expects that a wave that has run once allocates nothing the second time.
+void expect_no_allocation(const ScenePtr& scene, WaveCase c, const std::string& what) {
+  c.settings.width = c.settings.height = 16;
+  c.settings.spp = 4;
+  WaveRun run(scene, c);
+  run.all(1024);  // warm
+  const uint64_t before = allocations;
+  run.all(1024);
+  EXPECT_EQ(allocations - before, 0u) << c.lanes << " lanes, " << what;
+}
+
 TEST(Allocation, NoneInAWave) {
   for (const auto& scene : {cornell(), mixed(), emissive_meshes(), presence()}) {
     for (const uint32_t lanes : lane_widths()) {
       for (const std::string& policy : policy_names()) {
         for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
           WaveCase c;
-          c.settings.width = c.settings.height = 16;
-          c.settings.spp = 4;
           c.settings.policy = policy;
           c.settings.materialize = materialize;
           if (materialize == Materialize::kOn)
             c.settings.ray_order = c.settings.shadow_order = RayOrder::kAuto;
           c.lanes = lanes;
-          WaveRun run(scene, c);
-          run.all(1024);  // warm
-          const uint64_t before = allocations;
-          run.all(1024);
-          EXPECT_EQ(allocations - before, 0u) << lanes << " lanes, policy " << policy;
+          expect_no_allocation(scene, c, "policy " + policy);
         }
       }
     }
   }
+}
+
+TEST(Allocation, NoneToOrderRays) {
+  const ScenePtr scene = mixed();
+  for (const uint32_t lanes : lane_widths())
+    for (const RayOrder order :
+         {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant, RayOrder::kDirection}) {
+      WaveCase c;
+      c.settings.ray_order = c.settings.shadow_order = order;
+      c.lanes = lanes;
+      expect_no_allocation(scene, c, "ray order " + std::to_string(static_cast<int>(order)));
+    }
 }
 
 #endif

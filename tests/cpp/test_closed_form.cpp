@@ -314,7 +314,7 @@ DirectLight direct_light(const std::shared_ptr<const Scene>& scene, uint32_t blo
               const float tfar = l.distance * 0.9999f;
               uint32_t blocked = 0;
               accel.occluded({&o.x, &o.y, &o.z, &l.wi.x, &l.wi.y, &l.wi.z, &tfar, nullptr, 1},
-                             &blocked, 1, {});
+                             &blocked, 1, false, {});
               if (!blocked)
                 light_sum +=
                     static_cast<double>(bsdf.eval(wo, frame.to_local(l.wi)).f_cos.x) * l.weight.x;

@@ -12,32 +12,6 @@ namespace {
 
 using namespace lane_testing;
 
-/// A mask with the lanes of `bits` set.
-template <typename F>
-Mask<F> make_mask(uint32_t bits) {
-  if constexpr (kIsScalar<F>) {
-    return (bits & 1u) != 0;
-  } else {
-    const UInt<F> bit = (UInt<F>(bits) >> lane_index<F>()) & 1u;
-    return Mask<F>(bit == UInt<F>(1u));
-  }
-}
-
-/// Bit patterns to try as masks of W lanes: all of them up to 8 lanes, a spread of them at 16.
-template <typename F>
-std::vector<uint32_t> mask_patterns() {
-  constexpr uint32_t kAll = (1u << kWidth<F>)-1u;
-  std::vector<uint32_t> patterns;
-  if constexpr (kWidth<F> <= 8) {
-    for (uint32_t b = 0; b <= kAll; ++b) patterns.push_back(b);
-  } else {
-    patterns = {0u, kAll, 1u, 1u << (kWidth<F> - 1)};
-    std::mt19937 rng(7);
-    for (int i = 0; i < 500; ++i) patterns.push_back(rng() & kAll);
-  }
-  return patterns;
-}
-
 TEST(Lanes, WidthsAndTypes) {
   static_assert(kWidth<float> == 1 && kIsScalar<float>);
   static_assert(kWidth<FloatP<4>> == 4 && !kIsScalar<FloatP<4>>);
@@ -325,6 +299,47 @@ TEST(Lanes, CompressStoreKeepsOrderAndCounts) {
       for (size_t k = kWidth<F>; k < out.size(); ++k) {  // nothing past one packet
         ASSERT_EQ(out[k], -7.f);
         ASSERT_EQ(out_words[k], 77u);
+      }
+    }
+  });
+}
+
+TEST(Lanes, Lookup16ReadsATable) {
+  std::mt19937 rng(17);
+  alignas(64) uint32_t table[16];
+  for (uint32_t& x : table) x = static_cast<uint32_t>(rng());
+  for_each_lane_type([&]<typename F>() {
+    using U = UInt<F>;
+    const auto expect = [&](const uint32_t (&index)[16]) {
+      const U value = lookup16<U>(table, load<U>(index));
+      for (size_t k = 0; k < kWidth<F>; ++k)
+        ASSERT_EQ(lane(value, k), table[index[k]]) << kWidth<F> << " lanes, lane " << k;
+    };
+    uint32_t index[16];
+    for (uint32_t shift = 0; shift < 16; ++shift) {  // every entry in every lane
+      for (uint32_t k = 0; k < 16; ++k) index[k] = (k + shift) % 16;
+      expect(index);
+    }
+    for (int n = 0; n < 1000; ++n) {
+      for (uint32_t& i : index) i = static_cast<uint32_t>(rng()) % 16;
+      expect(index);
+    }
+  });
+}
+
+TEST(Lanes, ReverseBits) {
+  std::mt19937 rng(19);
+  std::vector<uint32_t> x = {0u, 0xffffffffu, 0x0f0f0f0fu, 0x12345678u};
+  for (uint32_t bit = 0; bit < 32; ++bit) x.push_back(1u << bit);
+  while (x.size() < 4096) x.push_back(static_cast<uint32_t>(rng()));
+  for_each_lane_type([&]<typename F>() {
+    using U = UInt<F>;
+    for (size_t i = 0; i < x.size(); i += kWidth<F>) {
+      const U y = reverse_bits<U>(load<U>(x.data() + i));
+      for (size_t k = 0; k < kWidth<F>; ++k) {
+        uint32_t expected = 0;
+        for (uint32_t bit = 0; bit < 32; ++bit) expected |= (x[i + k] >> bit & 1u) << (31 - bit);
+        ASSERT_EQ(lane(y, k), expected) << kWidth<F> << " lanes";
       }
     }
   });

@@ -248,6 +248,96 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
     }
 }
 
+/// Expects that find_interval finds what a search of the whole row finds, for numbers that go wrong
+/// first and random ones. `row` is the row of the guide.
+template <typename F>
+void expect_intervals(const Distribution2D& d, uint32_t row, const std::vector<float>& table,
+                      uint32_t first, uint32_t n, const std::vector<float>& x) {
+  using U = UInt<F>;
+  const float* cdf = table.data() + first;
+  for (size_t i = 0; i < x.size(); i += kWidth<F>) {
+    // One lane in five is off.
+    const Mask<F> active(not_(Mask<F>((lane_index<F>() + static_cast<uint32_t>(i)) % 5u == U(4u))));
+    const U found =
+        detail::find_interval<F>(d, U(row), table.data(), U(first), load<F>(x.data() + i), active);
+    for (size_t k = 0; k < kWidth<F>; ++k) {
+      if ((lane_bits<F>(active) >> k & 1u) == 0) continue;
+      const auto expected = std::upper_bound(cdf, cdf + n + 1, x[i + k]) - cdf - 1;
+      ASSERT_EQ(lane(found, k), static_cast<uint32_t>(expected))
+          << kWidth<F> << " lanes, " << n << " intervals, number " << x[i + k];
+    }
+  }
+}
+
+/// Numbers in [0, 1) at and beside all cumulative values (or some thousand of them) and all bounds
+/// of the guide, and random ones; a multiple of 16.
+std::vector<float> hard_numbers(const float* cdf, uint32_t n, std::mt19937& rng) {
+  std::vector<float> x;
+  const auto add = [&](float value) {
+    for (const float y : {std::nextafter(value, -1.f), value, std::nextafter(value, 2.f)})
+      if (y >= 0 && y < 1) x.push_back(y);
+  };
+  for (uint32_t i = 0; i <= n; i += 1 + n / 300) add(cdf[i]);
+  for (uint32_t k = 0; k <= Distribution2D::kGuide; ++k)
+    add(static_cast<float>(k) / Distribution2D::kGuide);
+  do x.push_back(static_cast<float>(rng() >> 8) * 0x1p-24f);
+  while (x.size() < 500 || x.size() % 16 != 0);
+  return x;
+}
+
+TEST(DomeDistribution, GuidedSearchEqualsSearchOfTheWholeRow) {
+  // Images with flat parts, black rows, one lit texel, steep ramps, and noise.
+  using Image = float (*)(uint32_t x, uint32_t y, uint32_t w, uint32_t h, uint32_t noise);
+  const Image images[] = {
+      [](uint32_t, uint32_t, uint32_t, uint32_t, uint32_t) { return 1.f; },
+      [](uint32_t, uint32_t, uint32_t, uint32_t, uint32_t noise) {
+        return static_cast<float>(noise % 1000);
+      },
+      [](uint32_t x, uint32_t y, uint32_t w, uint32_t h, uint32_t) {
+        return x == w / 3 && y == h / 2 ? 1e6f : 0.f;
+      },
+      [](uint32_t x, uint32_t y, uint32_t w, uint32_t h, uint32_t) {
+        return x + 1 == w && y + 1 == h ? 1e30f : 1e-30f;
+      },
+      [](uint32_t x, uint32_t y, uint32_t, uint32_t, uint32_t noise) {
+        return y / 4 % 2 == 0 || x / 8 % 2 == 0 ? 0.f : std::exp(static_cast<float>(noise % 40));
+      },
+      [](uint32_t x, uint32_t, uint32_t, uint32_t, uint32_t) {
+        return std::exp2(-0.25f * static_cast<float>(x));
+      }};
+  std::mt19937 rng(29);
+  for (const auto& [w, h] :
+       {std::pair{1u, 1u}, {2u, 1u}, {3u, 5u}, {127u, 64u}, {129u, 7u}, {1500u, 33u}, {40u, 600u}})
+    for (size_t image = 0; image < std::size(images); ++image) {
+      std::vector<float> rgb;
+      for (uint32_t y = 0; y < h; ++y)
+        for (uint32_t x = 0; x < w; ++x)
+          rgb.insert(rgb.end(), 3, images[image](x, y, w, h, static_cast<uint32_t>(rng())));
+      Lights lights;
+      const uint32_t texture = lights.add_texture(w, h, rgb);
+      const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1}, nullptr);
+      if (*std::max_element(rgb.begin(), rgb.end()) == 0) {  // an image smaller than its bands
+        EXPECT_EQ(d.width, 0u);
+        continue;
+      }
+      ASSERT_GT(d.width, 0u);
+      ASSERT_EQ(d.guide.size(), size_t{Distribution2D::kGuide} * (d.height + 1));
+      SCOPED_TRACE(testing::Message() << w << " x " << h << ", image " << image);
+      // All rows, or some twenty of many; the marginal's guide comes behind those of the rows.
+      for (uint32_t y = 0; y <= d.height;
+           y += y == d.height ? 1 : std::min(d.height - y, 1 + d.height / 20)) {
+        const bool marginal = y == d.height;
+        const std::vector<float>& table = marginal ? d.marginal : d.conditional;
+        const uint32_t n = marginal ? d.height : d.width;
+        const uint32_t first = marginal ? 0 : y * (d.width + 1);
+        const std::vector<float> x = hard_numbers(table.data() + first, n, rng);
+        lane_testing::for_each_lane_type(
+            [&]<typename F>() { expect_intervals<F>(d, y, table, first, n, x); });
+        if (HasFatalFailure()) return;
+      }
+    }
+}
+
 TEST(DomeDistribution, MeanAndBlack) {
   Lights lights;
   const uint32_t grey = lights.add_texture(5, 7, std::vector<float>(5 * 7 * 3, 0.25f));

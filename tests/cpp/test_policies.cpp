@@ -245,7 +245,6 @@ TEST(Policies, BatchesCoverTheQueueOnce) {
         queue.size = n;
         std::copy_n(r.program.data(), n, queue.uints(ShadingQueue::kProgram));
         std::copy_n(r.material.data(), n, queue.uints(ShadingQueue::kMaterial));
-        for (uint32_t i = 0; i < n; ++i) queue.uints(ShadingQueue::kArrival)[i] = i;
         const Order order = order_of(name, r);
         std::copy_n(order.data(), n, queue.sorted_indices);
         queue.ordered = name != "none";
@@ -259,12 +258,16 @@ TEST(Policies, BatchesCoverTheQueueOnce) {
           ASSERT_LE(end, n);
           ASSERT_LE(end - begin, kMaxBatch);
           const auto record = [&](size_t i) { return queue.ordered ? queue.sorted_indices[i] : i; };
+          const auto arrival = [&](size_t i) {
+            return queue.ordered || queue.moved ? queue.sorted_indices[i] : i;
+          };
           const auto program = [&](size_t i) {
             return queue.uints(ShadingQueue::kProgram)[record(i)];
           };
           for (size_t i = begin; i < end; ++i) {
             ASSERT_EQ(program(i), program(begin)) << "one program a batch";
-            ++times[queue.uints(ShadingQueue::kArrival)[record(i)]];
+            ASSERT_EQ(program(i), r.program[arrival(i)]) << "the record itself";
+            ++times[arrival(i)];
           }
           if (end < n && end - begin < kMaxBatch) {
             EXPECT_NE(program(end), program(begin)) << "a batch is as long as it can be";

@@ -2,57 +2,18 @@
 #include "wavecomb/schedule/ray_order.h"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
+#include <tuple>
 
 #include "lane_testing.h"
 #include "wavecomb/integrate/stages/order_rays.h"
+#include "wavecomb/integrate/stages/shade.h"
+#include "wavecomb/integrate/stages/trace.h"
 #include "wavecomb/schedule/radix_sort.h"
 
 namespace wavecomb {
 namespace {
-
-/// All columns of a queue as numbers that say which row and column they are.
-template <typename Queue>
-std::vector<float*> float_columns(Queue& q);
-template <>
-std::vector<float*> float_columns(RayQueue& q) {
-  return {q.ox,        q.oy,           q.oz,           q.dx,           q.dy,
-          q.dz,        q.throughput_r, q.throughput_g, q.throughput_b, q.pdf,
-          q.eta_scale, q.cone_width,   q.cone_spread};
-}
-template <>
-std::vector<float*> float_columns(ShadowQueue& q) {
-  return {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b};
-}
-
-template <typename Queue>
-void expect_rows_stay_whole() {
-  constexpr size_t kRows = 37;
-  Queue from(kRows), to(kRows);
-  from.size = kRows;
-  const std::vector<float*> columns = float_columns(from);
-  EXPECT_EQ(columns.size() + 2, Queue::kColumns) << "slot and alive are the others";
-  for (size_t i = 0; i < kRows; ++i) {
-    for (size_t c = 0; c < columns.size(); ++c) columns[c][i] = static_cast<float>(100 * c + i);
-    from.slot[i] = static_cast<uint32_t>(1000 + i);
-  }
-  std::vector<uint32_t> order(kRows);
-  std::iota(order.begin(), order.end(), 0u);
-  std::shuffle(order.begin(), order.end(), std::mt19937(1));
-  permute(from, to, order.data(), kRows);
-  EXPECT_EQ(to.size, kRows);
-  const std::vector<float*> moved = float_columns(to);
-  for (size_t i = 0; i < kRows; ++i) {
-    for (size_t c = 0; c < moved.size(); ++c)
-      EXPECT_EQ(moved[c][i], static_cast<float>(100 * c + order[i])) << "column " << c;
-    EXPECT_EQ(to.slot[i], 1000 + order[i]);
-  }
-}
-
-TEST(RayOrder, PermuteKeepsRowsWhole) {
-  expect_rows_stay_whole<RayQueue>();
-  expect_rows_stay_whole<ShadowQueue>();
-}
 
 /// Coordinates of a cell of the 1024^3 grid from its Morton code, bit by bit.
 std::array<uint32_t, 3> cell_of(uint32_t code) {
@@ -65,56 +26,114 @@ OrderGrid box() {
   return {{-2.f, 0.f, 10.f}, {1024.f / 4, 1024.f / 8, 1024.f / 1}};
 }
 
-/// A queue of rays from points spread over the box and beyond it.
-RayQueue random_rays(size_t n) {
-  RayQueue q(n);
-  q.size = n;
+/// Origin and direction.
+struct Ray {
+  float o[3], d[3];
+};
+
+/// Rays in slots of a pool, none side by side, listed in random order.
+struct PoolRays {
+  PathPool pool;
+  std::vector<uint32_t> slot;
+
+  explicit PoolRays(const std::vector<Ray>& rays)
+      : pool(2 * rays.size() + 1, false), slot(rays.size()) {
+    std::vector<uint32_t> slots(2 * rays.size());
+    std::iota(slots.begin(), slots.end(), 0u);
+    std::shuffle(slots.begin(), slots.end(), std::mt19937(1));
+    std::copy_n(slots.begin(), rays.size(), slot.begin());
+    for (size_t i = 0; i < rays.size(); ++i) {
+      const Ray& r = rays[i];
+      store_path<float>(pool, slot[i],
+                        {{r.o[0], r.o[1], r.o[2]},
+                         {r.d[0], r.d[1], r.d[2]},
+                         {2, 3, 4},
+                         5,
+                         6,
+                         7,
+                         8,
+                         {9, static_cast<uint32_t>(i)}},
+                        true);
+    }
+    slot.resize(rays.size() + SoaBlock::kPad);
+  }
+  template <typename F>
+  std::vector<uint64_t> keys(const OrderGrid& grid, bool by_octant) const {
+    std::vector<uint64_t> all(slot.size() - SoaBlock::kPad);
+    ray_keys<F>(pool.paths, slot.data(), all.size(), grid, by_octant, all.data());
+    return all;
+  }
+};
+
+/// Rays from points spread over the box and beyond it.
+std::vector<Ray> random_rays(size_t n) {
+  std::vector<Ray> rays(n);
   std::mt19937 rng(3);
   std::uniform_real_distribution<float> unit(-0.1f, 1.1f);
-  for (size_t i = 0; i < n; ++i) {
-    q.ox[i] = -2.f + 4.f * unit(rng);
-    q.oy[i] = 8.f * unit(rng);
-    q.oz[i] = 10.f + unit(rng);
-    q.dx[i] = unit(rng) - 0.5f;
-    q.dy[i] = unit(rng) - 0.5f;
-    q.dz[i] = unit(rng) - 0.5f;
+  for (Ray& r : rays) {
+    r.o[0] = -2.f + 4.f * unit(rng);
+    r.o[1] = 8.f * unit(rng);
+    r.o[2] = 10.f + unit(rng);
+    for (float& x : r.d) x = unit(rng) - 0.5f;
   }
-  return q;
+  return rays;
 }
 
 TEST(RayOrder, KeysRiseAlongTheMortonCurve) {
   const OrderGrid grid = box();
-  RayQueue q(1000);
   std::mt19937 rng(2);
   std::vector<uint32_t> codes(1000);
   for (uint32_t& code : codes) code = rng() & 0x3fffffffu;
   std::sort(codes.begin(), codes.end());
-  q.size = codes.size();
-  for (size_t i = 0; i < codes.size(); ++i) {
-    // The middle of the cell.
-    const auto [x, y, z] = cell_of(codes[i]);
-    q.ox[i] = grid.lo[0] + (static_cast<float>(x) + 0.5f) / grid.scale[0];
-    q.oy[i] = grid.lo[1] + (static_cast<float>(y) + 0.5f) / grid.scale[1];
-    q.oz[i] = grid.lo[2] + (static_cast<float>(z) + 0.5f) / grid.scale[2];
-    q.dx[i] = q.dy[i] = q.dz[i] = 1.f;
+  std::vector<Ray> rays;
+  for (const uint32_t code : codes) {
+    Ray r{{0, 0, 0}, {1, 1, 1}};
+    const std::array<uint32_t, 3> cell = cell_of(code);
+    for (size_t c = 0; c < 3; ++c)  // the middle of the cell
+      r.o[c] = grid.lo[c] + (static_cast<float>(cell[c]) + 0.5f) / grid.scale[c];
+    rays.push_back(r);
   }
-  std::vector<uint64_t> keys(codes.size());
-  ray_keys<float>(q, grid, false, keys.data());
-  for (size_t i = 0; i < codes.size(); ++i) EXPECT_EQ(keys[i], codes[i]);
-  ray_keys<float>(q, grid, true, keys.data());
-  for (size_t i = 0; i < codes.size(); ++i) EXPECT_EQ(keys[i], codes[i] >> 1) << "octant 0";
+  const PoolRays pool(rays);
+  const auto places = pool.keys<float>(grid, false), octant_0 = pool.keys<float>(grid, true);
+  for (size_t i = 0; i < codes.size(); ++i) {
+    EXPECT_EQ(places[i], codes[i]);
+    EXPECT_EQ(octant_0[i], codes[i] >> 1);
+  }
 }
 
 TEST(RayOrder, OctantsComeFirst) {
   const OrderGrid grid = box();
-  RayQueue q = random_rays(500);
-  std::vector<uint64_t> keys(q.size), places(q.size);
-  ray_keys<float>(q, grid, true, keys.data());
-  ray_keys<float>(q, grid, false, places.data());
-  for (size_t i = 0; i < q.size; ++i) {
-    const uint64_t octant = (q.dx[i] < 0 ? 4u : 0u) + (q.dy[i] < 0 ? 2u : 0u) + (q.dz[i] < 0);
+  const std::vector<Ray> rays = random_rays(500);
+  const PoolRays pool(rays);
+  const auto keys = pool.keys<float>(grid, true), places = pool.keys<float>(grid, false);
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const float* d = rays[i].d;
+    const uint64_t octant = (d[0] < 0 ? 4u : 0u) + (d[1] < 0 ? 2u : 0u) + (d[2] < 0);
     EXPECT_EQ(keys[i], octant << 29 | places[i] >> 1);
   }
+}
+
+TEST(RayOrder, DirectionKeysAreOctantAndLongAxes) {
+  const std::vector<float> values = lane_testing::padded(
+      {0.f, -0.f, kLong, -kLong, std::nextafter(kLong, 1.f), 1.f, -1.f}, 500, -1.f, 1.f);
+  lane_testing::for_each_lane_type([&]<typename F>() {
+    for (size_t i = 0; i + 32 + kWidth<F> <= values.size(); i += kWidth<F>) {
+      const float *x = &values[i], *y = &values[i + 16], *z = &values[i + 32];
+      const UInt<F> key = direction_key<F>(Vec3<F>(load<F>(x), load<F>(y), load<F>(z)));
+      for (size_t k = 0; k < kWidth<F>; ++k) {
+        uint32_t expected = 0;
+        for (const float* axis : {x, y, z}) expected = expected << 1 | std::signbit(axis[k]);
+        for (const float* axis : {x, y, z})
+          expected = expected << 1 | static_cast<uint32_t>(std::fabs(axis[k]) > kLong);
+        ASSERT_EQ(lane(key, k), expected) << x[k] << ", " << y[k] << ", " << z[k];
+        ASSERT_LT(expected, kDirectionKeys);
+      }
+    }
+  });
+  // Both keys fit beside the outcome of shading.
+  static_assert(kDirectionKeys <=
+                1u << (ShadingQueue::kShadowKeyShift - ShadingQueue::kRayKeyShift));
+  static_assert(ShadingQueue::kRayKeyShift >= 2 && ShadingQueue::kShadowKeyShift <= 26);
 }
 
 TEST(RayOrder, OutsideAndNotFiniteArePutAtTheEdge) {
@@ -137,14 +156,11 @@ TEST(RayOrder, OutsideAndNotFiniteArePutAtTheEdge) {
 TEST(RayOrder, AllWidthsMakeTheSameKeys) {
   const OrderGrid grid = box();
   for (const size_t n : {1u, 3u, 4u, 5u, 15u, 16u, 17u, 300u}) {
-    RayQueue q = random_rays(n);
+    const PoolRays pool(random_rays(n));
     for (const bool by_octant : {false, true}) {
-      std::vector<uint64_t> expected(n), keys(n);
-      ray_keys<float>(q, grid, by_octant, expected.data());
+      const std::vector<uint64_t> expected = pool.keys<float>(grid, by_octant);
       lane_testing::for_each_packet([&]<typename F>() {
-        keys.assign(n, 0);
-        ray_keys<F>(q, grid, by_octant, keys.data());
-        EXPECT_EQ(keys, expected) << kWidth<F> << " lanes, " << n;
+        EXPECT_EQ(pool.keys<F>(grid, by_octant), expected) << kWidth<F> << " lanes, " << n;
       });
     }
   }
@@ -152,16 +168,13 @@ TEST(RayOrder, AllWidthsMakeTheSameKeys) {
 
 TEST(RayOrder, SortEqualsStableSortOnRealKeys) {
   for (const size_t n : {0u, 1u, 15u, 16u, 17u, 4096u}) {
-    RayQueue q = random_rays(n);
-    for (size_t i = 1; i < n; i += 3) {  // some share their cell
-      q.ox[i] = q.ox[i - 1];
-      q.oy[i] = q.oy[i - 1];
-      q.oz[i] = q.oz[i - 1];
-    }
+    std::vector<Ray> rays = random_rays(n);
+    for (size_t i = 1; i < n; i += 3) std::copy_n(rays[i - 1].o, 3, rays[i].o);  // shared cells
+    const PoolRays pool(rays);
     for (const bool by_octant : {false, true}) {
+      const std::vector<uint64_t> keys = pool.keys<float>(box(), by_octant);
       RadixSorter sorter(n);
-      ray_keys<float>(q, box(), by_octant, sorter.keys());
-      const std::vector<uint64_t> keys(sorter.keys(), sorter.keys() + n);
+      std::copy(keys.begin(), keys.end(), sorter.keys());
       std::vector<uint32_t> expected(n), order(n);
       std::iota(expected.begin(), expected.end(), 0u);
       order = expected;
@@ -171,6 +184,159 @@ TEST(RayOrder, SortEqualsStableSortOnRealKeys) {
       EXPECT_EQ(order, expected) << n;
     }
   }
+}
+
+TEST(RayOrder, SortByDirectionEqualsStableSort) {
+  std::mt19937 rng(7);
+  for (const size_t n : {0u, 1u, 2u, 15u, 16u, 17u, 63u, 64u, 65u, 5000u})
+    for (const uint32_t keys : {1u, 2u, 3u, kDirectionKeys}) {
+      std::vector<std::pair<uint32_t, uint32_t>> pairs(n);  // key, slot
+      for (size_t i = 0; i < n; ++i)
+        pairs[i] = {kDirectionKeys - 1 - static_cast<uint32_t>(rng()) % keys,
+                    static_cast<uint32_t>(rng())};
+      std::vector<uint32_t> key(n), slot(n), sorted(n + 1, 77u), expected;
+      for (size_t i = 0; i < n; ++i) std::tie(key[i], slot[i]) = pairs[i];
+      sort_by_direction(key.data(), slot.data(), n, sorted.data());
+      std::stable_sort(pairs.begin(), pairs.end(),
+                       [](const auto& a, const auto& b) { return a.first < b.first; });
+      for (const auto& pair : pairs) expected.push_back(pair.second);
+      expected.push_back(77u);  // nothing behind the last
+      EXPECT_EQ(sorted, expected) << n << " rays, " << keys << " keys";
+    }
+}
+
+/// A wave by itself, without a scene: enough to order rays and to fetch them.
+struct BareWave {
+  Settings settings;
+  Film film{1, 1, false};
+  WaveContext context{};
+  std::unique_ptr<Wave> wave;
+
+  explicit BareWave(uint32_t capacity) {
+    context.settings = &settings;
+    context.film = &film;
+    context.grid = box();
+    wave = std::make_unique<Wave>(capacity, context);
+  }
+};
+
+/// Writes a shadow ray to its row: ten words.
+void store_shadow(const PathPool& pool, uint32_t slot, const Ray& r, float first) {
+  float* row = pool.shadows + slot * PathPool::kShadowWords;
+  std::copy_n(r.o, 3, row);
+  std::copy_n(r.d, 3, row + 3);
+  std::iota(row + 6, row + 10, first);  // tfar, r, g, b
+}
+
+TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
+  constexpr size_t kCapacity = 700;
+  for (const size_t n : {0u, 1u, 16u, 17u, 37u, 700u}) {
+    const std::vector<Ray> rays = random_rays(n);
+    std::vector<uint32_t> slots(kCapacity);
+    std::iota(slots.begin(), slots.end(), 0u);
+    std::shuffle(slots.begin(), slots.end(), std::mt19937(static_cast<uint32_t>(n)));
+    lane_testing::for_each_lane_type([&]<typename F>() {
+      for (const RayOrder order : {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant,
+                                   RayOrder::kDirection, RayOrder::kAuto}) {
+        SCOPED_TRACE(testing::Message()
+                     << kWidth<F> << " lanes, " << n << " rays, order " << static_cast<int>(order));
+        BareWave bare(kCapacity);
+        Wave& wave = *bare.wave;
+        std::vector<uint32_t> slot(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(n));
+        std::vector<size_t> ray_of(kCapacity);
+        std::vector<uint32_t> key(n);
+        for (size_t i = 0; i < n; ++i) {
+          const Ray& r = rays[i];
+          const Vec3<float> o(r.o[0], r.o[1], r.o[2]), d(r.d[0], r.d[1], r.d[2]);
+          ray_of[slot[i]] = i;
+          key[i] = direction_key<float>(d);
+          store_path<float>(wave.pool, slot[i], {o, d, {1, 1, 1}, 0, 0, 0, 0, {1, 2}}, true);
+          store_shadow(wave.pool, slot[i], r, static_cast<float>(10 * i));
+          wave.rays.slot[i] = wave.shadows.slot[i] = slot[i];
+          wave.rays.direction[i] = wave.shadows.direction[i] = key[i];
+        }
+        wave.rays.size = wave.shadows.size = n;
+
+        const auto check = [&](const RayOrderChoice& choice, const auto& queue) {
+          RayOrder done = order;
+          if (order == RayOrder::kAuto) {
+            EXPECT_EQ(choice.chosen, n > kWidth<F>);
+            done = static_cast<RayOrder>(choice.arm);
+            ASSERT_LT(choice.arm, Wave::kRayOrders);
+          }
+          if (n <= kWidth<F>) done = RayOrder::kSlot;  // a packet is not ordered
+          EXPECT_EQ(choice.coherent, done == RayOrder::kDirection);
+          std::vector<uint64_t> keys(n, 0);
+          if (done == RayOrder::kDirection)
+            std::copy(key.begin(), key.end(), keys.begin());
+          else if (done != RayOrder::kSlot)
+            keys = PoolRays(rays).keys<float>(box(), done == RayOrder::kMortonOctant);
+          std::vector<uint32_t> expected = slot;
+          std::stable_sort(expected.begin(), expected.end(), [&](uint32_t a, uint32_t b) {
+            return keys[ray_of[a]] < keys[ray_of[b]];
+          });
+          EXPECT_EQ(std::vector<uint32_t>(queue.slot, queue.slot + n), expected);
+          // Each entry has its own slot's ray, whatever the order.
+          const float* const columns[] = {queue.ox, queue.oy, queue.oz,
+                                          queue.dx, queue.dy, queue.dz};
+          for (size_t i = 0; i < n; ++i) {
+            const Ray& r = rays[ray_of[queue.slot[i]]];
+            for (size_t c = 0; c < 3; ++c) {
+              ASSERT_EQ(columns[c][i], r.o[c]);
+              ASSERT_EQ(columns[3 + c][i], r.d[c]);
+            }
+          }
+        };
+        RayOrderChoice choice = order_rays<F>(wave, bare.context, 1, order, wave.ray_chooser,
+                                              wave.pool.paths, wave.rays);
+        fetch_rays<F>(wave);
+        check(choice, wave.rays);
+        choice = order_rays<F>(wave, bare.context, 1, order, wave.shadow_chooser, wave.pool.shadows,
+                               wave.shadows);
+        fetch_shadows<F>(wave);
+        check(choice, wave.shadows);
+        const ShadowQueue& q = wave.shadows;
+        for (size_t i = 0; i < n; ++i) {
+          const auto first = static_cast<float>(10 * ray_of[q.slot[i]]);
+          const float rest[] = {q.tfar[i], q.r[i], q.g[i], q.b[i]};
+          for (size_t c = 0; c < 4; ++c) ASSERT_EQ(rest[c], first + static_cast<float>(c));
+        }
+      }
+    });
+  }
+}
+
+TEST(RayOrder, PathsThatGoOnAreListedInArrivalOrder) {
+  using Q = ShadingQueue;
+  std::mt19937 rng(11);
+  for (const size_t n : {0u, 1u, 16u, 17u, 300u})
+    lane_testing::for_each_lane_type([&]<typename F>() {
+      BareWave bare(300);
+      Wave& wave = *bare.wave;
+      std::vector<std::pair<uint32_t, uint32_t>> rays, shadows;  // slot, direction key
+      wave.shading.size = n;
+      for (size_t i = 0; i < n; ++i) {
+        const auto outcome = static_cast<uint32_t>(rng()) % 4;
+        const auto ray_key = static_cast<uint32_t>(rng()) % kDirectionKeys;
+        const auto shadow_key = static_cast<uint32_t>(rng()) % kDirectionKeys;
+        const auto slot = static_cast<uint32_t>(rng());
+        wave.shading.slot[i] = slot;
+        wave.shading.outcome[i] =
+            outcome | ray_key << Q::kRayKeyShift | shadow_key << Q::kShadowKeyShift;
+        if ((outcome & Q::kAlive) != 0) rays.emplace_back(slot, ray_key);
+        if ((outcome & Q::kShadowRay) != 0) shadows.emplace_back(slot, shadow_key);
+      }
+      compact<F>(wave);
+      const auto check = [&](const auto& queue, const auto& expected) {
+        ASSERT_EQ(queue.size, expected.size()) << kWidth<F> << " lanes, " << n;
+        for (size_t i = 0; i < expected.size(); ++i) {
+          ASSERT_EQ(queue.slot[i], expected[i].first);
+          ASSERT_EQ(queue.direction[i], expected[i].second);
+        }
+      };
+      check(wave.rays, rays);
+      check(wave.shadows, shadows);
+    });
 }
 
 }  // namespace

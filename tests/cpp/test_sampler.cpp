@@ -57,6 +57,33 @@ TEST(Sobol, DirectionNumbersAreThoseOfJoeAndKuo) {
   }
 }
 
+TEST(Sobol, NibbleTablesMultiplyByTheMatrix) {
+  std::mt19937 rng(23);
+  uint32_t random[detail::kIndexBits];
+  for (uint32_t& column : random) column = static_cast<uint32_t>(rng());
+  const auto expect_product = [&](const uint32_t (&columns)[detail::kIndexBits]) {
+    const detail::NibbleTables tables(columns);
+    std::vector<uint32_t> index = {0u, 0xfffffu};
+    for (uint32_t bit = 0; bit < 20; ++bit) index.push_back(1u << bit);
+    while (index.size() < 4096) index.push_back(static_cast<uint32_t>(rng()) & 0xfffffu);
+    for_each_lane_type([&]<typename F>() {
+      using U = UInt<F>;
+      for (size_t i = 0; i < index.size(); i += kWidth<F>) {
+        const U product = tables.product<U>(load<U>(&index[i]));
+        for (size_t k = 0; k < kWidth<F>; ++k) {
+          uint32_t expected = 0;
+          for (uint32_t bit = 0; bit < 20; ++bit)
+            if (index[i + k] >> bit & 1u) expected ^= columns[bit];
+          ASSERT_EQ(lane(product, k), expected) << kWidth<F> << " lanes, " << index[i + k];
+        }
+      }
+    });
+  };
+  expect_product(random);
+  expect_product(detail::kSobol2);
+  expect_product(detail::kSobol3);
+}
+
 /// Whether bit b of f(x) depends on bits 0..b of x only, and flips with bit b.
 TEST(Sobol, LaineKarrasIsAnOwenScramble) {
   std::mt19937 rng(1);

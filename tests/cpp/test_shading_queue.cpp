@@ -10,63 +10,109 @@
 namespace wavecomb {
 namespace {
 
-using Column = ShadingQueue::Column;
-constexpr uint32_t kColumns = ShadingQueue::kColumns;
+using Q = ShadingQueue;
 
-/// Fills the queue with n random records and gives it a random order.
-std::vector<std::vector<uint32_t>> fill(ShadingQueue& queue, size_t n, uint32_t seed) {
+/// A record as it arrived: its columns, its row's words, and what is noted by arrival.
+struct Record {
+  std::array<uint32_t, Q::kColumns> column;
+  std::array<uint32_t, Q::kRowWords> row;
+  uint32_t slot, outcome;
+};
+
+/// Fills the queue with n random records (any bits, so NaN too) and gives it a random order.
+std::vector<Record> fill(ShadingQueue& queue, size_t n, uint32_t seed) {
   std::mt19937 rng(seed);
+  const auto random = [&] { return static_cast<uint32_t>(rng()); };
   queue.clear();
   queue.size = n;
-  std::vector<std::vector<uint32_t>> records(kColumns, std::vector<uint32_t>(n));
-  for (uint32_t c = 0; c < kColumns; ++c)
-    for (size_t i = 0; i < n; ++i)
-      queue.uints(static_cast<Column>(c))[i] = records[c][i] = static_cast<uint32_t>(rng());
+  std::vector<Record> records(n);
+  for (size_t i = 0; i < n; ++i) {
+    Record& r = records[i];
+    for (uint32_t c = 0; c < Q::kColumns; ++c)
+      queue.uints(static_cast<Q::Column>(c))[i] = r.column[c] = random();
+    for (uint32_t& word : r.row) word = random();
+    std::memcpy(queue.rows() + i * Q::kRowWords, r.row.data(), sizeof(r.row));
+    queue.slot[i] = r.slot = random();
+    queue.outcome[i] = r.outcome = random();
+  }
   std::iota(queue.sorted_indices, queue.sorted_indices + n, 0u);
   std::shuffle(queue.sorted_indices, queue.sorted_indices + n, rng);
   queue.ordered = true;
   return records;
 }
 
-TEST(ShadingQueue, MaterializeEqualsGatherTwiceInARow) {
+/// Expects that the records stand in the given order of arrival.
+void expect_records(const ShadingQueue& queue, const std::vector<Record>& records,
+                    const std::vector<uint32_t>& order) {
+  ASSERT_EQ(queue.size, order.size());
+  for (size_t i = 0; i < order.size(); ++i) {
+    const Record& r = records[order[i]];
+    for (uint32_t c = 0; c < Q::kColumns; ++c)
+      ASSERT_EQ(queue.uints(static_cast<Q::Column>(c))[i], r.column[c]) << c << ", " << i;
+    ASSERT_EQ(std::memcmp(queue.rows() + i * Q::kRowWords, r.row.data(), sizeof(r.row)), 0) << i;
+    // By arrival, wherever the record stands.
+    ASSERT_EQ(queue.slot[i], records[i].slot);
+    ASSERT_EQ(queue.outcome[i], records[i].outcome);
+  }
+}
+
+TEST(ShadingQueue, MaterializeMovesColumnsAndRows) {
   ShadingQueue queue(300);
   for (uint32_t round = 0; round < 5; ++round) {
     for (const size_t n : {300u, 1u, 0u, 17u, 299u}) {
       const auto records = fill(queue, n, 10 * round + static_cast<uint32_t>(n));
+      EXPECT_FALSE(queue.moved);
       const std::vector<uint32_t> order(queue.sorted_indices, queue.sorted_indices + n);
       queue.materialize();
       EXPECT_FALSE(queue.ordered);
-      EXPECT_EQ(queue.size, n);
-      for (uint32_t c = 0; c < kColumns; ++c)
-        for (size_t i = 0; i < n; ++i)
-          ASSERT_EQ(queue.uints(static_cast<Column>(c))[i], records[c][order[i]]) << c << ", " << i;
+      EXPECT_TRUE(queue.moved);
+      expect_records(queue, records, order);
+      // Where each record arrived is known still.
+      EXPECT_EQ(std::vector<uint32_t>(queue.sorted_indices, queue.sorted_indices + n), order);
       // In order already: nothing moves.
-      const uint32_t* before = queue.uints(Column::kSlot);
+      const float* before = queue.rows();
       queue.materialize();
-      EXPECT_EQ(queue.uints(Column::kSlot), before);
-      // And once more, the other way about.
-      for (size_t i = 0; i < n; ++i) queue.sorted_indices[i] = static_cast<uint32_t>(n - 1 - i);
-      queue.ordered = true;
-      queue.materialize();
-      for (uint32_t c = 0; c < kColumns; ++c)
-        for (size_t i = 0; i < n; ++i)
-          ASSERT_EQ(queue.uints(static_cast<Column>(c))[i], records[c][order[n - 1 - i]]);
+      EXPECT_EQ(queue.rows(), before);
+      expect_records(queue, records, order);
     }
   }
 }
 
+TEST(ShadingQueue, WithoutAnOrderNothingMoves) {
+  ShadingQueue queue(40);
+  const auto records = fill(queue, 40, 3);
+  queue.ordered = false;
+  queue.materialize();
+  EXPECT_FALSE(queue.moved);
+  std::vector<uint32_t> arrival(40);
+  std::iota(arrival.begin(), arrival.end(), 0u);
+  expect_records(queue, records, arrival);
+}
+
 TEST(ShadingQueue, ColumnsAreAlignedAndApart) {
   const ShadingQueue queue(100);
-  for (uint32_t c = 0; c < kColumns; ++c) {
-    const auto a = reinterpret_cast<uintptr_t>(queue.uints(static_cast<Column>(c)));
-    EXPECT_EQ(a % 64, 0u);
-    for (uint32_t d = 0; d < c; ++d) {
-      const auto b = reinterpret_cast<uintptr_t>(queue.uints(static_cast<Column>(d)));
-      EXPECT_GE(a > b ? a - b : b - a, 4u * (100 + SoaBlock::kPad));
+  struct Range {
+    const void* begin;
+    size_t words;
+  };
+  std::vector<Range> ranges = {{queue.rows(), 100 * Q::kRowWords},
+                               {queue.sorted_indices, 100},
+                               {queue.slot, 100},
+                               {queue.outcome, 100}};
+  for (uint32_t c = 0; c < Q::kColumns; ++c)
+    ranges.push_back({queue.uints(static_cast<Q::Column>(c)), 100});
+  for (const Range& a : ranges) {
+    const auto begin = reinterpret_cast<uintptr_t>(a.begin);
+    EXPECT_EQ(begin % 64, 0u);
+    for (const Range& b : ranges) {
+      if (a.begin == b.begin) continue;
+      // A packet may be written at any index below the capacity.
+      const auto other = reinterpret_cast<uintptr_t>(b.begin);
+      EXPECT_TRUE(other < begin || other >= begin + 4 * (a.words + SoaBlock::kPad));
     }
   }
-  EXPECT_EQ(reinterpret_cast<void*>(queue.floats(Column::kT)), queue.uints(Column::kT));
-  EXPECT_GE(queue.bytes(), 2u * kColumns * 4 * 100);
+  // Records twice, since they are moved from one block to another.
+  EXPECT_GE(queue.bytes(), 4u * 100 * (2u * Q::kColumns + 2u * Q::kRowWords + 3u));
 }
 
 TEST(ShadingQueue, ClearForgetsTheOrder) {
@@ -75,6 +121,11 @@ TEST(ShadingQueue, ClearForgetsTheOrder) {
   queue.clear();
   EXPECT_EQ(queue.size, 0u);
   EXPECT_FALSE(queue.ordered);
+  fill(queue, 10, 2);
+  queue.materialize();
+  queue.clear();
+  EXPECT_EQ(queue.size, 0u);
+  EXPECT_FALSE(queue.moved);
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <utility>
+#include <vector>
 
-#include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/schedule/ray_queue.h"
 
 namespace wavecomb {
@@ -46,27 +46,41 @@ TEST(Soa, Moves) {
   EXPECT_EQ(SoaBlock().bytes(), 0u);
 }
 
+/// Expects that the columns lie apart, with room for a packet past the end.
+void expect_apart(const std::vector<const void*>& columns, size_t capacity) {
+  for (size_t i = 0; i < columns.size(); ++i) {
+    const auto a = reinterpret_cast<uintptr_t>(columns[i]);
+    EXPECT_EQ(a % 64, 0u) << i;
+    for (size_t j = 0; j < i; ++j) {
+      const auto b = reinterpret_cast<uintptr_t>(columns[j]);
+      EXPECT_GE(a > b ? a - b : b - a, 4 * (capacity + SoaBlock::kPad)) << i << ", " << j;
+    }
+  }
+}
+
 TEST(Soa, QueuesHaveAllTheirColumns) {
-  RayQueue rays(100);
-  float* const floats[] = {rays.ox,           rays.oy,  rays.oz,           rays.dx,
-                           rays.dy,           rays.dz,  rays.throughput_r, rays.throughput_g,
-                           rays.throughput_b, rays.pdf, rays.eta_scale,    rays.cone_width,
-                           rays.cone_spread};
-  EXPECT_EQ(std::size(floats) + 2, RayQueue::kColumns);
-  for (size_t i = 0; i < std::size(floats); ++i)
-    for (size_t j = 0; j < i; ++j) EXPECT_NE(floats[i], floats[j]);
-  EXPECT_NE(rays.slot, rays.alive);
+  const RayQueue rays(100);
+  const std::vector<const void*> of_rays = {rays.ox,   rays.oy,           rays.oz,
+                                            rays.dx,   rays.dy,           rays.dz,
+                                            rays.slot, rays.ordered_slot, rays.direction};
+  EXPECT_EQ(of_rays.size(), RayQueue::kColumns);
+  expect_apart(of_rays, 100);
   EXPECT_EQ(rays.capacity(), 100u);
   EXPECT_EQ(rays.size, 0u);
+  EXPECT_GE(rays.bytes(), RayQueue::kColumns * 400);
 
-  const PathPool plain(100, false), aovs(100, true);
-  EXPECT_FALSE(plain.has_aovs);
-  EXPECT_EQ(plain.albedo_r, nullptr);
-  EXPECT_TRUE(aovs.has_aovs);
-  EXPECT_NE(aovs.depth, nullptr);
-  EXPECT_LT(plain.bytes(), aovs.bytes());
-  EXPECT_GE(HitBuffer(100).bytes(), 6u * 400);
-  EXPECT_GE(ShadowQueue(100).bytes(), ShadowQueue::kColumns * 400);
+  const ShadowQueue q(100);
+  const std::vector<const void*> of_shadows = {q.ox,   q.oy,           q.oz,        q.dx,      q.dy,
+                                               q.dz,   q.tfar,         q.r,         q.g,       q.b,
+                                               q.slot, q.ordered_slot, q.direction, q.occluded};
+  EXPECT_EQ(of_shadows.size(), ShadowQueue::kColumns);
+  expect_apart(of_shadows, 100);
+  EXPECT_EQ(q.size, 0u);
+  EXPECT_GE(q.bytes(), ShadowQueue::kColumns * 400);
+
+  const HitBuffer hits(100);
+  expect_apart({hits.t, hits.u, hits.v, hits.prim, hits.geom, hits.inst}, 100);
+  EXPECT_GE(hits.bytes(), 6u * 400);
 }
 
 }  // namespace

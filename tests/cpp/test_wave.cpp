@@ -105,9 +105,10 @@ TEST(Wave, RayOrdersDoNotShow) {
     Settings s = small_settings();
     const Picture expected = reference(scene, s, accel);
     for (const uint32_t lanes : lane_widths())
-      for (const RayOrder bounce :
-           {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant, RayOrder::kAuto})
-        for (const RayOrder shadow : {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kAuto}) {
+      for (const RayOrder bounce : {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant,
+                                    RayOrder::kDirection, RayOrder::kAuto})
+        for (const RayOrder shadow :
+             {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kDirection, RayOrder::kAuto}) {
           s.ray_order = bounce;
           s.shadow_order = shadow;
           WaveRun run(scene, {s, lanes, lanes == 1 ? 1 : accel->native_width()}, accel);

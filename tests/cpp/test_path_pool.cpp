@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/integrate/path_pool.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "lane_testing.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace lane_testing;
+
+constexpr uint32_t kSlots = 53;
+
+/// Number of word k of a path in `slot` that no other word has.
+float word(uint32_t slot, uint32_t k) {
+  return static_cast<float>(100 * slot + k + 1);
+}
+template <typename F>
+PathLanes<F> numbered_path(const UInt<F>& slot) {
+  const auto at = [&](uint32_t k) { return F(Int<F>(slot * 100u + k + 1u)); };
+  return {{at(0), at(1), at(2)},
+          {at(3), at(4), at(5)},
+          {at(6), at(7), at(8)},
+          at(9),
+          at(10),
+          at(11),
+          at(12),
+          // Any bits, NaN too: keys are hashes.
+          {slot * 100u + 0x7f800001u, slot * 100u + 0xff800001u}};
+}
+
+/// All slots in random order, `kWidth` at a time, each packet with a mask of its own.
+template <typename F, typename Function>
+void for_each_packet_of_slots(uint32_t seed, const Function& f) {
+  std::mt19937 rng(seed);
+  std::vector<uint32_t> slots(kSlots);
+  std::iota(slots.begin(), slots.end(), 0u);
+  std::shuffle(slots.begin(), slots.end(), rng);
+  slots.resize(kSlots + 16, 0x7fffff00u / 16);  // inactive lanes point nowhere
+  for (size_t i = 0; i < kSlots; i += kWidth<F>)
+    f(load<UInt<F>>(slots.data() + i), first_lanes<F>(kSlots - i));
+}
+
+TEST(PathPool, PathsComeBackFromTheirSlots) {
+  for_each_lane_type([]<typename F>() {
+    using U = UInt<F>;
+    const PathPool pool(kSlots, false);
+    for_each_packet_of_slots<F>(1, [&](const U& slot, const Mask<F>& active) {
+      store_path<F>(pool, slot, numbered_path<F>(slot), active);
+    });
+    for (uint32_t s = 0; s < kSlots; ++s) {
+      const float* row = pool.paths + s * PathPool::kPathWords;
+      for (uint32_t k = 0; k < 13; ++k) ASSERT_EQ(row[k], word(s, k)) << s << ", " << k;
+      ASSERT_EQ(std::bit_cast<uint32_t>(row[13]), 100 * s + 0x7f800001u);
+      ASSERT_EQ(std::bit_cast<uint32_t>(row[14]), 100 * s + 0xff800001u);
+    }
+    // Shadow rays and radiance are untouched.
+    ASSERT_TRUE(std::all_of(pool.shadows, pool.radiance + kSlots * PathPool::kRadianceWords,
+                            [](float x) { return x == 0; }));
+    for_each_packet_of_slots<F>(2, [&](const U& slot, const Mask<F>& active) {
+      const PathLanes<F> p = load_path<F>(pool, slot, active), q = numbered_path<F>(slot);
+      const F a[] = {p.o.x,       p.o.y,          p.o.z,          p.d.x,          p.d.y,
+                     p.d.z,       p.throughput.x, p.throughput.y, p.throughput.z, p.pdf,
+                     p.eta_scale, p.cone_width,   p.cone_spread};
+      const F b[] = {q.o.x,       q.o.y,          q.o.z,          q.d.x,          q.d.y,
+                     q.d.z,       q.throughput.x, q.throughput.y, q.throughput.z, q.pdf,
+                     q.eta_scale, q.cone_width,   q.cone_spread};
+      const uint32_t all = lane_bits<F>(active);
+      for (size_t k = 0; k < std::size(a); ++k)
+        ASSERT_EQ(lane_bits<F>(Mask<F>(a[k] == b[k])) & all, all) << k;
+      ASSERT_EQ(lane_bits<F>(Mask<F>(p.key.pixel_hash == q.key.pixel_hash)) & all, all);
+      ASSERT_EQ(lane_bits<F>(Mask<F>(p.key.sample == q.key.sample)) & all, all);
+    });
+  });
+}
+
+TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
+  for_each_lane_type([]<typename F>() {
+    using U = UInt<F>;
+    const PathPool pool(kSlots, false);
+    std::vector<std::array<float, 3>> expected(kSlots, {0, 0, 0});
+    for (uint32_t round = 0; round < 3; ++round)
+      for_each_packet_of_slots<F>(round, [&](const U& slot, const Mask<F>& active) {
+        // Every third slot sits one round out.
+        const Mask<F> lit = active & Mask<F>((slot + round) % 3u != U(0u));
+        const F x = F(Int<F>(slot)) + 0.125f;
+        add_radiance<F>(pool, slot, {x, F(2.f * x), F(3.f * x)}, lit);
+        for (size_t k = 0; k < kWidth<F>; ++k)
+          if ((lane_bits<F>(lit) >> k & 1u) != 0)
+            for (size_t c = 0; c < 3; ++c)
+              expected[lane(slot, k)][c] += static_cast<float>(c + 1) * lane(x, k);
+      });
+    for (uint32_t s = 0; s < kSlots; ++s) {
+      const float* row = pool.radiance + s * PathPool::kRadianceWords;
+      for (size_t c = 0; c < 3; ++c) ASSERT_EQ(row[c], expected[s][c]) << s;
+    }
+    ASSERT_TRUE(std::all_of(pool.paths, pool.radiance, [](float x) { return x == 0; }));
+  });
+}
+
+TEST(PathPool, BlocksOfRows) {
+  const PathPool plain(100, false), aovs(100, true);
+  EXPECT_FALSE(plain.has_aovs);
+  EXPECT_EQ(plain.albedo_r, nullptr);
+  EXPECT_TRUE(aovs.has_aovs);
+  const float* const columns[] = {aovs.albedo_r, aovs.albedo_g, aovs.albedo_b, aovs.normal_x,
+                                  aovs.normal_y, aovs.normal_z, aovs.depth};
+  for (size_t i = 0; i < std::size(columns); ++i) {
+    ASSERT_NE(columns[i], nullptr);
+    for (size_t j = 0; j < i; ++j) EXPECT_NE(columns[i], columns[j]);
+  }
+  EXPECT_LT(plain.bytes(), aovs.bytes());
+  EXPECT_GE(plain.bytes(),
+            400u * (PathPool::kPathWords + PathPool::kShadowWords + PathPool::kRadianceWords));
+  // Paths and shadow rays are cache lines.
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.paths) % 64, 0u);
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.shadows) % 64, 0u);
+  EXPECT_EQ(plain.shadows - plain.paths, 100 * PathPool::kPathWords);
+  EXPECT_EQ(plain.radiance - plain.shadows, 100 * PathPool::kShadowWords);
+}
+
+}  // namespace
+}  // namespace wavecomb
