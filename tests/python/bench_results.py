@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from wavecomb.bench.columns import header_line, row_line
-from wavecomb.image import write_exr
 
 DEFAULTS: dict[str, Any] = {
     **{"suite": "made-up", "experiment": "policies", "stage": "mixed", "renderer": "wavecomb"},
@@ -46,11 +45,11 @@ def run_row(
     samples = row["width"] * row["height"] * row["spp"]
     rel_mse = row.pop("rel_mse", 0.4 / row["spp"])
     grouped = row["policy"] != "none"
-    key = [f"{name}-{row[name]}" for name in ("lanes", "wave_size", "roulette", "ray_order")]
+    varied = ("threads", "lanes", "wave_size", "roulette", "ray_order")
+    key = [row["renderer"], *(f"{name}-{row[name]}" for name in varied)]
     config = ".".join(
         [row["experiment"], row["stage"], *key, f"spp-{row['spp']}", f"policy-{row['policy']}"]
     )
-    config += f".{row['factor']}-{row['factor_value']}" if row.get("factor") else ""
     return {
         **row,
         **phases,
@@ -159,7 +158,7 @@ def write_folder(
     rng = np.random.default_rng(5)
     with (folder / "runs.jsonl").open("w") as file:
         for row in rows:
-            record = {"run_id": row["run_id"], "statistics": statistics(row, rng)}
+            record = {"row": row, "stats": statistics(rng)}
             file.write(json.dumps(record) + "\n")
     (folder / "suite.toml").write_text('name = "made-up"\ntitle = "Times that were made up"\n')
     (folder / "machine.json").write_text(json.dumps(MACHINE))
@@ -179,7 +178,7 @@ MACHINE = {
 }
 
 
-def statistics(row: Mapping[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+def statistics(rng: np.random.Generator) -> dict[str, Any]:
     """Costs of twelve materials: measured is 5 + 1.1 x calibrated, with noise."""
     materials = []
     for k in range(12):
@@ -206,9 +205,9 @@ def write_pictures(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     golden = np.stack([0.2 + 0.5 * x / 1.3, 0.3 + 0.4 * y, 0.5 - 0.2 * x * y], axis=2)
     for stage in sorted({row["stage"] for row in rows}):
         (folder / "golden").mkdir(exist_ok=True)
-        write_exr(folder / "golden" / f"{stage}-64x48-0.exr", {"beauty": golden})
+        np.save(folder / "golden" / f"{stage}-64x48-0a1b2c3d.npy", golden.astype(np.float32))
     (folder / "images").mkdir(exist_ok=True)
     for row in rows:
         if row["experiment"] == "policies" and row["repetition"] == 0 and row["lanes"] == 16:
             noisy = golden * np.exp(rng.normal(0, 0.1, golden.shape))
-            write_exr(folder / "images" / f"{row['run_id']}.exr", {"beauty": noisy})
+            np.save(folder / "images" / f"{row['run_id']}.npy", noisy.astype(np.float32))

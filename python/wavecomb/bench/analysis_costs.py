@@ -35,15 +35,15 @@ def material_costs(results: Results) -> pd.DataFrame:
     known = settings.to_dict("index")
     rows = []
     for record in results.records():
-        of_run = known.get(record.get("run_id"))
-        statistics = record.get("statistics") or {}
+        run_id = record["row"]["run_id"]
+        of_run = known.get(run_id)
         if of_run is None:
             continue
-        for entry in statistics.get("materials", ()):
+        for entry in (record.get("stats") or {}).get("materials", ()):
             if entry.get("timed_records", 0) >= LEAST_RECORDS and entry.get("ns_per_record", 0) > 0:
                 rows.append(
                     {
-                        "run_id": record["run_id"],
+                        "run_id": run_id,
                         **of_run,
                         "material": entry.get("name", ""),
                         "program": entry.get("program", ""),

@@ -67,14 +67,23 @@ class Results:
     suite_text: str
 
     def records(self) -> Iterator[dict[str, Any]]:
-        """The objects of runs.jsonl, one by one; a torn last line is left out."""
+        """The objects of runs.jsonl, one by one: {"row": ..., "stats": ...}.
+
+        A torn last line is left out.
+        """
         path = self.folder / "runs.jsonl"
         if not path.is_file():
             return
         with path.open(encoding="utf-8") as file:
-            for line in file:
-                if line.endswith("\n") and line.strip():
-                    yield json.loads(line)
+            for number, line in enumerate(file, 1):
+                if not line.endswith("\n"):
+                    return
+                try:
+                    record = json.loads(line)
+                    record["row"]["run_id"]
+                except (ValueError, KeyError, TypeError) as error:
+                    raise WavecombError(f"{path}: line {number} is no run") from error
+                yield record
 
 
 def load(folder: Path) -> Results:

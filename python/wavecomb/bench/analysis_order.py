@@ -170,7 +170,8 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
                     "policy": policy,
                     "n": estimate.n,
                     "regret": estimate.value,
-                    "low": estimate.low,
+                    # A fixed policy cannot be better than the best of them; adaptive can.
+                    "low": estimate.low if policy == "adaptive" else np.maximum(estimate.low, 0.0),
                     "high": estimate.high,
                     "best": best,
                 }
