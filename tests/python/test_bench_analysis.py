@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.stats
 from bench_results import POLICY_FACTORS, policy_rows, runs_of, write_folder
 
 from wavecomb.bench.analysis_costs import calibration, material_costs
@@ -19,12 +20,16 @@ from wavecomb.bench.analysis_interval import (
     bootstrap,
     holm,
     paired_p,
-    ratio,
+    to_column,
     verdict,
 )
 from wavecomb.bench.analysis_order import order_effects, regrets
 from wavecomb.bench.analysis_ratios import ratios
 from wavecomb.errors import WavecombError
+
+
+def ratio(times: np.ndarray, numerator: int, denominator: int) -> Estimate:
+    return to_column(times, denominator)[numerator]
 
 
 def results(tmp_path: Path, rows: list) -> Results:
@@ -59,16 +64,25 @@ def test_pairing_takes_out_what_a_round_shares() -> None:
     assert paired_p(times[:, 0], times[:, 1]) < 1e-3
 
 
+def test_p_value_is_students() -> None:
+    a, b = np.random.default_rng(3).lognormal(0, 0.3, (2, 7))
+    expected = scipy.stats.ttest_rel(np.log(a), np.log(b)).pvalue
+    assert paired_p(a, b) == pytest.approx(expected)
+    a[2] = np.nan
+    expected = scipy.stats.ttest_rel(np.log(a), np.log(b), nan_policy="omit").pvalue
+    assert paired_p(a, b) == pytest.approx(expected)
+
+
 def test_ties_and_single_runs() -> None:
     same = np.full((6, 2), 3.0)
     tie = ratio(same, 0, 1)
     assert (tie.value, tie.low, tie.high) == (1.0, 1.0, 1.0)
     assert paired_p(same[:, 0], same[:, 1]) == 1.0
-    assert verdict(tie, 1.0) == "same within 1 %"
+    assert verdict(tie, 1.0) == "same (1 %)"
     once = ratio(same[:1] * [2.0, 1.0], 0, 1)
     assert once.value == 2.0
     assert math.isnan(once.low)
-    assert verdict(once, 1.0).startswith("one run")
+    assert verdict(once, 1.0) == "one run"
     assert paired_p(np.array([2.0, 2.0]), np.array([1.0, 1.0])) == 0.0
 
 
@@ -96,8 +110,8 @@ def test_holm_and_verdicts() -> None:
     assert holm([0.9, 0.8]) == [1.0, 1.0]
     assert verdict(Estimate(0.9, 0.88, 0.92, 9), 0.01) == "faster"
     assert verdict(Estimate(1.1, 1.05, 1.2, 9), 0.01) == "slower"
-    assert verdict(Estimate(0.95, 0.88, 1.02, 9), 0.2) == "no difference shown"
-    assert verdict(Estimate(1.001, 0.995, 1.006, 9), 0.2) == "same within 1 %"
+    assert verdict(Estimate(0.95, 0.88, 1.02, 9), 0.2) == "not shown"
+    assert verdict(Estimate(1.001, 0.995, 1.006, 9), 0.2) == "same (1 %)"
 
 
 # ---- ratios --------------------------------------------------------------------------------------
@@ -115,7 +129,7 @@ def test_ratios_find_the_factors(tmp_path: Path) -> None:
         elif row.lanes == 16:
             assert row.verdict == "faster"
         else:
-            assert row.verdict in ("no difference shown", "same within 1 %")
+            assert row.verdict in ("not shown", "same (1 %)")
     assert table["cell"].nunique() == 4
 
 
@@ -224,7 +238,7 @@ def test_main_effects_and_interactions(tmp_path: Path) -> None:
         assert row.low <= value * 1.002, name
         assert row.high >= value * 0.998, name
     assert table.loc["policy program × lanes 16"].verdict == "less"
-    assert table.loc["policy material × lanes 16"].verdict == "same within 1 %"
+    assert table.loc["policy material × lanes 16"].verdict == "same (1 %)"
     assert table.loc["policy material"].cells == 8
     assert set(table[table["kind"] == "main"].index) == {
         *("policy material", "policy program", "lanes 16", "roulette off")

@@ -133,7 +133,7 @@ def cells(
         if levels.max() <= 1:
             yield cell, group
             continue
-        names = group["config"].map(lambda name: _without(name, varied))
+        names = group["config"].map(lambda name: _without(name, varied, "experiment" in ignore))
         for variant, part in group.groupby(names, sort=False):
             yield {**cell, "variant": variant}, part
 
@@ -183,7 +183,8 @@ def label(cell: dict[str, Any], varying: Sequence[str]) -> str:
 
 def varying(found: Sequence[dict[str, Any]]) -> list[str]:
     """Settings in which cells differ, but for the experiment; "stage" where they differ in none."""
-    names = [name for name in (*SETTINGS, "variant") if name not in ("experiment", "height")]
+    told = ("experiment", "height", "factor", "factor_value")  # by the heading, or by others
+    names = [name for name in (*SETTINGS, "variant") if name not in told]
     differ = [n for n in names if len({str(cell.get(n, "")) for cell in found}) > 1]
     return differ if "stage" in differ else ["stage", *differ]
 
@@ -200,11 +201,13 @@ def short_count(value: float) -> str:
     return f"{value:.4g}"
 
 
-def _without(config: str, varied: set[str]) -> str:
-    """The name of a configuration without the parts that name what is varied."""
-    return ".".join(
-        part for part in config.split(".") if not any(part.startswith(f"{v}-") for v in varied)
-    )
+def _without(config: str, varied: set[str], across: bool) -> str:
+    """The name of a configuration without the parts that name what is varied.
+
+    The first part is the experiment; it is left out, too, where cells go across experiments.
+    """
+    parts = config.split(".")[1 if across else 0 :]
+    return ".".join(part for part in parts if not any(part.startswith(f"{v}-") for v in varied))
 
 
 def _json(path: Path) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from wavecomb.bench.analysis_data import (
     rounds,
     varying,
 )
-from wavecomb.bench.analysis_interval import holm, paired_p, ratio, verdict
+from wavecomb.bench.analysis_interval import holm, paired_p, to_column, verdict
 from wavecomb.extras import needed
 
 if TYPE_CHECKING:
@@ -57,9 +57,9 @@ def ratios(
         if base not in levels or len(levels) < 2:
             continue
         k0 = levels.index(base)
-        for k, level in enumerate(levels):
-            estimate = ratio(values, k, k0)
-            estimates.append(estimate)
+        found = to_column(values, k0)
+        estimates += found
+        for k, (level, estimate) in enumerate(zip(levels, found, strict=True)):
             rows.append(
                 {
                     **cell,
@@ -86,11 +86,13 @@ def ratios(
     return pandas.DataFrame(rows)
 
 
-def means(runs: pd.DataFrame, factor: str, metrics: Sequence[str]) -> pd.DataFrame:
+def means(
+    runs: pd.DataFrame, factor: str, metrics: Sequence[str], ignore: Sequence[str] = ()
+) -> pd.DataFrame:
     """Means over repetitions, with their number ``n``, of each level in each cell."""
     pandas = needed("pandas", "the analysis")
     rows: list[dict[str, Any]] = []
-    for cell, group in cells(runs, factor):
+    for cell, group in cells(runs, factor, ignore):
         for level, part in group.groupby(factor, sort=False):
             figures = {m: part[m].mean() for m in metrics}
             rows.append({**cell, "level": level, "n": len(part), **figures})
@@ -98,8 +100,3 @@ def means(runs: pd.DataFrame, factor: str, metrics: Sequence[str]) -> pd.DataFra
     for row in rows:
         row["cell"] = label(row, names)
     return pandas.DataFrame(rows)
-
-
-def varies(runs: pd.DataFrame, factor: str) -> bool:
-    """Runs of one experiment have more than one level of it."""
-    return runs[factor].nunique() > 1

@@ -65,7 +65,7 @@ def forest(
     made, axes = figure(
         len(heights),
         columns,
-        0.55 + 0.36 * len(heights) + ROW * sum(heights),
+        0.55 + 0.5 * len(heights) + ROW * sum(heights),
         heights=[size + 0.8 for size in heights],
         share_x=True,
     )
@@ -126,7 +126,7 @@ def _panel(
     ax.tick_params(axis="y", length=0)
     ax.spines["left"].set_visible(False)
     ax.grid(axis="x")
-    ax.set_title(panel.title)
+    ax.set_title(panel.title, fontsize=9 if len(panel.title) < 40 else 7.5)
     if not log:
         ax.xaxis.set_major_locator(MaxNLocator(5))
         form = (lambda x, _: f"{100 * x:.3g} %") if percent else (lambda x, _: f"{x:.3g}")

@@ -82,8 +82,8 @@ def ratio_figure(
         panels.append(Panel(str(cell), rows))
     base = table.loc[table["is_baseline"], "level"].iloc[0]
     caption = (
-        f"{x_label}: ratio of means to {base}, 1 is no difference. {INTERVALS}, "
-        f"n = {count_words(table['n'])} rounds. Hollow: what is compared with, and bounds."
+        f"{x_label[:1].upper()}{x_label[1:]}: ratio of means to {base}, 1 is no difference. "
+        f"{INTERVALS}, n = {count_words(table['n'])} rounds. Hollow: the baseline, and bounds."
     )
     return forest(name, title, caption, x_label, panels)
 
@@ -242,7 +242,12 @@ def error_over_time(runs: pd.DataFrame, name: str) -> Drawn | None:
         guide = 1.6 * first["rel_mse"] * first["render_s"] / x
         ax.plot(x, guide, color=FAINT, linewidth=0.8, linestyle=(0, (4, 3)), scalex=False)
         ax.annotate(
-            "slope −1", (x[0], guide[0]), xytext=(6, -2), textcoords="offset points", color=FAINT
+            "slope −1",
+            (x[1], guide[1]),
+            xytext=(-4, 9),
+            textcoords="offset points",
+            ha="right",
+            color=FAINT,
         )
         plain_logarithm(ax.xaxis)
         plain_logarithm(ax.yaxis)

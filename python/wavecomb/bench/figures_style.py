@@ -154,7 +154,14 @@ def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> Non
             color=shade,
             fontsize=8,
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": shade, "linewidth": 0.4, "shrinkA": 0}
+            arrowprops={
+                "arrowstyle": "-",
+                "color": shade,
+                "linewidth": 0.4,
+                "relpos": (0.0, 0.5),
+                "shrinkA": 1,
+                "shrinkB": 3,
+            }
             if moved > 2.0
             else None,
         )
@@ -175,6 +182,12 @@ def plain_logarithm(axis: Axis) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
 
 
+def lay_out(drawn: Drawn) -> None:
+    """Finds places for everything once, so that saving in two formats does not find them again."""
+    drawn.figure.draw_without_rendering()
+    drawn.figure.set_layout_engine("none")
+
+
 def svg(drawn: Drawn) -> str:
     """The figure as an <svg> element for a page: ink in the page's colour, ids of its own."""
     buffer = io.StringIO()
@@ -191,8 +204,10 @@ def svg(drawn: Drawn) -> str:
     return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
 
 
-def save(drawn: Drawn, folder: Path) -> None:
-    """Writes NAME.svg and NAME.png, on white, whole or not at all."""
-    for kind in ("svg", "png"):
-        with replacing(folder / f"{drawn.name}.{kind}") as part:
-            drawn.figure.savefig(part, format=kind, facecolor="white")
+def save(drawn: Drawn, drawing: str, folder: Path) -> None:
+    """Writes NAME.svg, given as ``svg`` made it, and NAME.png, on white, whole or not at all."""
+    with replacing(folder / f"{drawn.name}.svg") as part:
+        on_white = drawing.replace("<svg", f'<svg style="background: #fff; color: {INK}"', 1)
+        part.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{on_white}\n', encoding="utf-8")
+    with replacing(folder / f"{drawn.name}.png") as part:
+        drawn.figure.savefig(part, format="png", facecolor="white")

@@ -56,8 +56,8 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | N
     if len(panels) > MOST_PANELS:
         return None
     caption = (
-        f"{metric_words}: ratio to random-runs, which has the runs of a material in an order that "
-        f"means nothing. Geometric mean over stages and settings. {INTERVALS}, "
+        f"{metric_words.capitalize()}: ratio to random-runs, which has the runs of a material in "
+        f"an order that means nothing. Geometric mean over stages and settings. {INTERVALS}, "
         f"n = {count_words(table['n'])} rounds. Hollow: the bounds."
     )
     return forest(name, "What an order is worth beyond grouping", caption, "to placebo", panels)
@@ -101,7 +101,7 @@ def effects_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn |
         ]
         panels.append(Panel("strongest interactions", rows))
     caption = (
-        f"{metric_words}: factor by which a level changes it, geometric mean over all "
+        f"{metric_words.capitalize()}: factor by which a level changes it, geometric mean over all "
         f"combinations of the others. {INTERVALS}, n = {count_words(table['n'])} rounds. Grey: no "
         "difference shown."
     )
