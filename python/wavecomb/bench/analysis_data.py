@@ -66,6 +66,11 @@ class Results:
     machine: dict[str, Any]
     suite_text: str
 
+    def experiments(self) -> list[tuple[str, pd.DataFrame]]:
+        """Names and runs, in the order of the suite."""
+        found = [(str(name), runs) for name, runs in self.runs.groupby("experiment")]
+        return sorted(found, key=lambda entry: self.suite_text.find(f'name = "{entry[0]}"'))
+
     def records(self) -> Iterator[dict[str, Any]]:
         """The objects of runs.jsonl, one by one: {"row": ..., "stats": ...}.
 
@@ -127,7 +132,7 @@ def cells(
     """
     varied = {vary} if isinstance(vary, str) else set(vary)
     keys = [name for name in SETTINGS if name not in varied and name not in ignore]
-    for values, group in runs.groupby(keys, dropna=False, sort=False):
+    for values, group in runs.groupby(keys, dropna=False, sort=True):
         cell = dict(zip(keys, values, strict=True))
         levels = group.groupby(sorted(varied), dropna=False)["config"].nunique()
         if levels.max() <= 1:

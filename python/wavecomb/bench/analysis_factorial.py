@@ -131,7 +131,7 @@ def _rows(terms: list[dict[str, Any]], contrasts: Array, values: Array) -> list[
         touched = np.isnan(logs).astype(float) @ used.T.astype(float) > 0
         return np.exp(np.where(touched, np.nan, known))
 
-    found = bootstrap(values, statistic)
+    found = bootstrap(values, statistic, positive=True)
     per_round = statistic(values)
     p_values = holm([paired_p(per_round[:, k], np.ones(len(values))) for k in range(len(terms))])
     return [

@@ -49,20 +49,24 @@ class Estimate:
         return math.isfinite(self.low) and math.isfinite(self.high)
 
 
-def bootstrap(rounds: Array, statistic: Statistic, level: float = LEVEL) -> list[Estimate]:
+def bootstrap(
+    rounds: Array, statistic: Statistic, *, positive: bool = False, level: float = LEVEL
+) -> list[Estimate]:
     """Intervals of statistics of the columns' means, by resampling rows.
 
     With fewer than ``LEAST_FOR_BOOTSTRAP`` rounds: value +- t(n - 1) x the jackknife's standard
-    error (Tukey 1958), which is as wide as so few rounds deserve. With more: BCa (Efron 1987,
-    "Better bootstrap confidence intervals") with the level widened for small n, that is with
-    t(n - 1) sqrt(n / (n - 1)) in place of the normal quantile (Hesterberg 2015, "What teachers
-    should know about the bootstrap"), since resampling alone is too narrow by sqrt((n - 1) / n).
+    error (Tukey 1958), of the logarithm if ``positive``, which is as wide as so few rounds deserve.
+    With more: BCa (Efron 1987, "Better bootstrap confidence intervals") with the level widened for
+    small n, that is with t(n - 1) sqrt(n / (n - 1)) in place of the normal quantile (Hesterberg
+    2015, "What teachers should know about the bootstrap"), since resampling alone is too narrow by
+    sqrt((n - 1) / n).
     The seed is fixed: the same figures give the same intervals.
 
     Args:
         rounds: (n, k): one row for each round, one column for each configuration; NaN where a run
             is missing, and then a mean is over the others.
         statistic: Means, (..., k), to statistics, (..., m).
+        positive: The statistics are ratios or times.
         level: Of confidence.
 
     Returns:
@@ -83,8 +87,7 @@ def bootstrap(rounds: Array, statistic: Statistic, level: float = LEVEL) -> list
     found = []
     for k, v in enumerate(value):
         if n < LEAST_FOR_BOOTSTRAP:
-            half = student * math.sqrt((n - 1) / n * _spread(left_out[:, k], 2))
-            found.append(Estimate(float(v), float(v) - half, float(v) + half, n))
+            found.append(_jackknife(float(v), left_out[:, k], student, positive))
             continue
         low, high = _bca(float(v), resampled[:, k], left_out[:, k], widened)
         found.append(Estimate(float(v), low, high, n))
@@ -118,6 +121,19 @@ def _bca(value: float, resampled: Array, left_out: Array, z: float) -> tuple[flo
     return ends[0], ends[1]
 
 
+def _jackknife(value: float, left_out: Array, student: float, positive: bool) -> Estimate:
+    """Few rounds: value +- t x standard error, as factors where it must be positive."""
+    n = len(left_out)
+    if positive and value > 0.0:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            left_out = np.log(left_out)
+    half = student * math.sqrt((n - 1) / n * _spread(left_out, 2))
+    if positive and value > 0.0:
+        factor = math.exp(min(half, 700.0)) if math.isfinite(half) else math.nan
+        return Estimate(value, value / factor, value * factor, n)
+    return Estimate(value, value - half, value + half, n)
+
+
 def _spread(left_out: Array, power: int) -> float:
     """Sum of powers of what each round does to the statistic; NaN where one is decisive."""
     return float(((left_out.mean() - left_out) ** power).sum())
@@ -125,7 +141,7 @@ def _spread(left_out: Array, power: int) -> float:
 
 def to_column(rounds: Array, denominator: int) -> list[Estimate]:
     """The ratio of each column's mean to one column's mean."""
-    return bootstrap(rounds, lambda means: means / means[..., [denominator]])
+    return bootstrap(rounds, lambda means: means / means[..., [denominator]], positive=True)
 
 
 def paired_p(a: Array, b: Array) -> float:

@@ -94,24 +94,26 @@ def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> li
     def statistic(means: Array) -> Array:
         logs = pooled(means)
         to_none = np.exp(logs - logs[..., none, None])
-        missing = np.full_like(to_none, np.nan)
         if placebo is None:
-            return np.concatenate([to_none, missing, missing], axis=-1)
-        to_placebo = np.exp(logs - logs[..., placebo, None])
-        if best is None:
-            return np.concatenate([to_none, to_placebo, missing], axis=-1)
+            return np.concatenate([to_none, np.full_like(to_none, np.nan)], axis=-1)
+        return np.concatenate([to_none, np.exp(logs - logs[..., placebo, None])], axis=-1)
+
+    def shares(means: Array) -> Array:
+        logs = pooled(means)
+        if placebo is None or best is None:
+            return np.full_like(logs, np.nan)
         gap = logs[..., placebo, None] - logs[..., best, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = (logs[..., placebo, None] - logs) / gap
-        return np.concatenate([to_none, to_placebo, share], axis=-1)
+            return (logs[..., placebo, None] - logs) / gap
 
-    found = bootstrap(matrix, statistic)
+    found = bootstrap(matrix, statistic, positive=True)
+    won = bootstrap(matrix, shares)
     oracle = found[count + best] if placebo is not None and best is not None else None
     gap_shown = oracle is not None and oracle.known and oracle.high < 1.0
     per_round = pooled(matrix)
     rows = []
     for k, policy in enumerate(policies):
-        share = found[2 * count + k]
+        share = won[k]
         rows.append(
             {
                 **key,
@@ -157,9 +159,9 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
             continue
 
         def statistic(means: Array, fixed: list[int] = fixed) -> Array:
-            return means / means[..., fixed].min(axis=-1, keepdims=True) - 1.0
+            return means / means[..., fixed].min(axis=-1, keepdims=True)
 
-        found = bootstrap(values, statistic)
+        found = bootstrap(values, statistic, positive=True)
         best = policies[fixed[int(np.nanmean(values[:, fixed], axis=0).argmin())]]
         for policy, estimate in zip(policies, found, strict=True):
             if policy in BOUNDS:
@@ -169,10 +171,10 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
                     **cell,
                     "policy": policy,
                     "n": estimate.n,
-                    "regret": estimate.value,
+                    "regret": estimate.value - 1.0,
                     # A fixed policy cannot be better than the best of them; adaptive can.
-                    "low": estimate.low if policy == "adaptive" else np.maximum(estimate.low, 0.0),
-                    "high": estimate.high,
+                    "low": np.maximum(estimate.low, 0.0 if policy == "adaptive" else 1.0) - 1.0,
+                    "high": estimate.high - 1.0,
                     "best": best,
                 }
             )

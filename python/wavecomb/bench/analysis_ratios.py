@@ -11,6 +11,7 @@ import numpy as np
 from wavecomb.bench.analysis_data import (
     baseline_of,
     cells,
+    in_order,
     label,
     rounds,
     varying,
@@ -93,7 +94,8 @@ def means(
     pandas = needed("pandas", "the analysis")
     rows: list[dict[str, Any]] = []
     for cell, group in cells(runs, factor, ignore):
-        for level, part in group.groupby(factor, sort=False):
+        for level in in_order(factor, list(group[factor].dropna().unique())):
+            part = group[group[factor] == level]
             figures = {m: part[m].mean() for m in metrics}
             rows.append({**cell, "level": level, "n": len(part), **figures})
     names = varying(rows)

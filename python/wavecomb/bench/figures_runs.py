@@ -112,7 +112,8 @@ def pipeline(runs: pd.DataFrame, name: str) -> Drawn | None:
         ax.tick_params(axis="y", length=0)
         ax.spines["left"].set_visible(False)
         ax.grid(axis="x")
-        ax.set_title(label(cell, names))
+        title = label(cell, names)
+        ax.set_title(title, fontsize=9 if len(title) < 40 else 7.5)
     for ax in axes[len(groups) :]:
         ax.set_visible(False)
     for ax in axes[max(0, len(groups) - columns) : len(groups)]:
@@ -148,7 +149,9 @@ def coherence(runs: pd.DataFrame, name: str) -> Drawn | None:
                 markersize=4,
                 label=label(cell, names),
             )
-        if not log:
+        if log:
+            plain_logarithm(ax.xaxis)
+        else:
             ax.set_xlim(-0.04, 1.04)
         ax.set_xlabel(text, fontsize=7.5)
         ax.grid(axis="both")
@@ -269,7 +272,7 @@ def intervals(runs: pd.DataFrame, x: str, metric: str) -> list[tuple[float, floa
     """x, mean and the ends of its interval, for each x."""
     levels, values = rounds(runs.dropna(subset=[metric]), x, metric)
     order = np.argsort(levels)
-    found = bootstrap(values, lambda means: means)
+    found = bootstrap(values, lambda means: means, positive=True)
     return [(float(levels[k]), found[k].value, found[k].low, found[k].high) for k in order]
 
 

@@ -167,6 +167,11 @@ def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> Non
         )
 
 
+def fixed(value: float, digits: int) -> str:
+    """A figure with so many decimals; no minus before 0."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
 def plain_logarithm(axis: Axis) -> None:
     """Numbers as people write them on a logarithmic axis, few enough to be read."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
@@ -179,7 +184,7 @@ def plain_logarithm(axis: Axis) -> None:
         subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0,)
         axis.set_major_locator(LogLocator(subs=subs))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
 
 
 def lay_out(drawn: Drawn) -> None:

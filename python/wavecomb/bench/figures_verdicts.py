@@ -20,6 +20,7 @@ from wavecomb.bench.figures_style import (
     Drawn,
     colour,
     figure,
+    fixed,
     marker,
     plain_logarithm,
     policy_colour,
@@ -141,14 +142,16 @@ def cost_figure(
             )
         ax.set_xscale("log")
         ax.set_yscale("log")
-        both = costs[[column, "measured_ns"]].to_numpy(np.float64)
+        of_materials = costs.groupby(["stage", "material"])[[column, "measured_ns"]].mean()
+        both = of_materials.to_numpy(np.float64)
         ends = np.array([np.nanmin(both), np.nanmax(both)])
         ax.plot(ends, ends, color=FAINT, linewidth=0.8, linestyle=(0, (4, 3)))
         x = np.geomspace(ends[0], ends[1], 50)
         fit = line["intercept"] + line["slope"] * x
-        ax.plot(x[fit > 0], fit[fit > 0], color=INK, linewidth=1.0)
+        shown = fit > 0.5 * ends[0]
+        ax.plot(x[shown], fit[shown], color=INK, linewidth=1.0)
         ax.set_title(
-            f"r² = {line['r2']:.2f}, slope {line['slope']:.2f} "
+            f"r² = {fixed(line['r2'], 2)}, slope {line['slope']:.2f} "
             f"[{line['slope_low']:.2f}, {line['slope_high']:.2f}]"
         )
         ax.set_xlabel(f"predicted, ns a record: {'calibrated' if 'calib' in column else 'average'}")

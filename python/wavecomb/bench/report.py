@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 from wavecomb.bench import report_pictures
 from wavecomb.bench.analysis_data import load
 from wavecomb.bench.figures_style import style
-from wavecomb.bench.report_html import Section, escape, folded, nested, page, paragraph, table
+from wavecomb.bench.report_html import (
+    Section,
+    escape,
+    folded,
+    nested,
+    page,
+    paragraph,
+    prose,
+    table,
+)
 from wavecomb.bench.report_sections import Writer, experiment, suite
 from wavecomb.files import replacing
 
@@ -33,14 +42,13 @@ def build(folder: Path) -> Path:
     figures.mkdir(exist_ok=True)
     out = Writer(figures)
     with style():
-        for name, runs in results.runs.groupby("experiment", sort=False):
-            experiment(out, str(name), runs)
+        for name, runs in results.experiments():
+            experiment(out, name, runs)
         suite(out, results)
         _pictures(out, results)
     _about(out, results)
     if out.findings:
-        shown = [line.replace(" %", "\u00a0%") for line in out.findings]
-        lines = "".join(f"<li>{escape(line)}</li>" for line in shown)
+        lines = "".join(f"<li>{prose(line)}</li>" for line in out.findings)
         out.sections.insert(0, _findings(f'<ul class="findings">{lines}</ul>'))
     target = folder / "report.html"
     document = page(_title(results), _lead(results), warnings_of(results), out.sections)

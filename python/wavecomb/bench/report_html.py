@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wavecomb.bench.figures_style import Drawn
+from wavecomb.bench.figures_style import Drawn, fixed
 
 _WORD = ' class="word"'
 _HERE = Path(__file__).parent
@@ -62,10 +62,15 @@ def key_of(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
 
 
+def prose(text: str) -> str:
+    """Escaped, and numbers keep their unit beside them."""
+    return escape(text).replace(" %", "\u00a0%").replace("n = ", "n\u00a0=\u00a0")
+
+
 def paragraph(text: str, kind: str = "") -> str:
     """A paragraph of plain text."""
     attribute = f' class="{kind}"' if kind else ""
-    return f"<p{attribute}>{escape(text)}</p>"
+    return f"<p{attribute}>{prose(text)}</p>"
 
 
 def table(
@@ -88,7 +93,7 @@ def table(
             named = f"<th {over}>{escape(first)}</th>" if k == 0 else ""
             body.append(f"<tr>{named}{''.join(map(_cell, row[1:]))}</tr>")
         body.append("</tbody>")
-    below = f'<p class="note">{escape(note)}</p>' if note else ""
+    below = f'<p class="note">{prose(note)}</p>' if note else ""
     return (
         f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
         f"<table><caption>{escape(caption)}</caption><thead><tr>{columns}</tr></thead>"
@@ -110,7 +115,7 @@ def figure(drawn: Drawn, drawing: str) -> str:
     )
     return (
         f'<figure id="{name}"><p class="title" id="{name}-title">{escape(drawn.title)}</p>'
-        f'{picture}<figcaption id="{name}-text">{escape(drawn.caption)}</figcaption></figure>'
+        f'{picture}<figcaption id="{name}-text">{prose(drawn.caption)}</figcaption></figure>'
     )
 
 
@@ -164,7 +169,7 @@ def interval(low: float, high: float, digits: int = 3) -> str:
     """[low, high]; nothing where it is not known."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
-    return f"[{low:.{digits}f}, {high:.{digits}f}]"
+    return f"[{fixed(low, digits)}, {fixed(high, digits)}]"
 
 
 def page(title: str, lead: str, warnings: Sequence[str], sections: Sequence[Section]) -> str:

@@ -12,7 +12,7 @@ from wavecomb.bench.analysis_factorial import effects, factors_of
 from wavecomb.bench.analysis_order import order_effects, regrets
 from wavecomb.bench.analysis_ratios import means, ratios
 from wavecomb.bench.columns import COUNTER_COLUMNS
-from wavecomb.bench.figures_style import Drawn, lay_out, save, svg
+from wavecomb.bench.figures_style import Drawn, fixed, lay_out, save, svg
 from wavecomb.bench.report_html import Section, figure, folded, key_of, paragraph
 from wavecomb.bench.report_tables import (
     calibration_table,
@@ -90,11 +90,11 @@ def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
 def suite(out: Writer, results: Results) -> None:
     """What goes across experiments: roulette, effects, costs."""
     ours = results.runs[results.runs["renderer"] == "wavecomb"]
-    fixed = ours[ours["factor"] == ""]
-    if fixed["roulette"].nunique() > 1:
-        _roulette(out, fixed)
-    if len(factors_of(fixed)) > 1:
-        _effects(out, fixed)
+    flat = ours[ours["factor"] == ""]
+    if flat["roulette"].nunique() > 1:
+        _roulette(out, flat)
+    if len(factors_of(flat)) > 1:
+        _effects(out, flat)
     costs = material_costs(results)
     if not costs.empty:
         lines = {column: calibration(costs, column) for column in PREDICTIONS}
@@ -104,8 +104,8 @@ def suite(out: Writer, results: Results) -> None:
             out.draw(figures_verdicts.cost_figure(costs, lines, "costs"))
             first = lines["calibrated_ns"] or lines["predicted_ns"]
             out.findings.append(
-                f"Calibration predicts what materials cost with r² = {first['r2']:.2f} and slope "
-                f"{first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
+                f"Calibration predicts what materials cost with r² = {fixed(first['r2'], 2)} and "
+                f"slope {first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
             )
 
 
@@ -175,13 +175,13 @@ def _order_findings(name: str, order: pd.DataFrame) -> list[str]:
             oracle = gained[gained["policy"] == "oracle"].iloc[0]
             text += (
                 f". The oracle takes {oracle.placebo_ratio:.3f} of the placebo's time: more than "
-                "that the order of runs cannot win"
+                "that better costs cannot win"
             )
         elif part["placebo_ratio"].notna().any() and set(part["policy"]) & {
             "oracle",
             "oracle-best",
         }:
-            text += ". The oracle is not shown to beat the placebo: the order of runs wins nothing"
+            text += ". The oracle is not shown to beat the placebo"
         where = name if stratum == "all" else f"{name}, {stratum}"
         lines.append(f"{where}: {text}.")
     return lines

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.bench.analysis_data import BOUNDS
 from wavecomb.bench.figures_runs import count_words
+from wavecomb.bench.figures_style import fixed
 from wavecomb.bench.report_html import Cell, interval, number, table
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ def calibration_table(lines: Mapping[str, Mapping[str, Any]], words: Mapping[str
                 [
                     words[column],
                     *(
-                        Cell(f"{line[k]:.2f}", interval(line[f"{k}_low"], line[f"{k}_high"], 2))
+                        Cell(fixed(line[k], 2), interval(line[f"{k}_low"], line[f"{k}_high"], 2))
                         for k in ("r2", "slope", "mean_error")
                     ),
                     str(line["materials"]),
