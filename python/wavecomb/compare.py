@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     Source: TypeAlias = str | os.PathLike[str] | Picture | NDArray[Any]
 
 REL_MSE_FLOOR = 0.01
+TRIMMED_SHARE = 0.001
 _REC709 = (0.2126, 0.7152, 0.0722)
 
 
@@ -44,6 +45,8 @@ class Comparison:
         mean_abs: Mean absolute difference of each channel.
         rmse: Square root of the mean squared difference over pixels and channels.
         rel_mse: Mean of (A - B)^2 / (B^2 + 0.01) over pixels and channels.
+        rel_mse_trimmed: The same without the 0.1 % of pixels with the largest terms, which a few
+            bright outliers would decide.
         layers: Other layers that both have -> {"equal": bool, "max_abs": float}; max_abs is over
             the values that are finite in both, None where the shapes differ.
         only_a: Layers that only A has.
@@ -65,6 +68,7 @@ class Comparison:
     mean_abs: tuple[float, ...]
     rmse: float
     rel_mse: float
+    rel_mse_trimmed: float
     layers: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)
     only_a: tuple[str, ...] = ()
     only_b: tuple[str, ...] = ()
@@ -91,15 +95,7 @@ def compare(a: Source, b: Source) -> Comparison:
         OSError: A file cannot be read.
     """
     layers_a, layers_b = layers_of(a), layers_of(b)
-    colour_a, colour_b = (
-        colour_layer(layers_a, _name(a, "A")),
-        colour_layer(layers_b, _name(b, "B")),
-    )
-    if colour_a.shape != colour_b.shape:
-        raise ValueError(
-            f"{_name(a, 'A')} is {_size(colour_a)}, {_name(b, 'B')} is {_size(colour_b)}: "
-            "only pictures of one size can be compared"
-        )
+    colour_a, colour_b = _colour_pair(a, layers_a, b, layers_b)
     others: dict[str, dict[str, Any]] = {}
     for name, layer in layers_a.items():
         if name in layers_b and layer is not colour_a:
@@ -140,6 +136,41 @@ def colour_layer(layers: Mapping[str, NDArray[Any]], name: str) -> NDArray[Any]:
     raise ValueError(f"{name}: has no colour channels R, G, B, only {', '.join(layers)}")
 
 
+def colour_pair(a: Source, b: Source) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The colour layers of two pictures of one size.
+
+    Raises:
+        ValueError: They have other sizes or numbers of channels.
+    """
+    return _colour_pair(a, layers_of(a), b, layers_of(b))
+
+
+def _colour_pair(
+    a: Source, layers_a: Mapping[str, NDArray[Any]], b: Source, layers_b: Mapping[str, NDArray[Any]]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    names = _name(a, "A"), _name(b, "B")
+    colour_a, colour_b = colour_layer(layers_a, names[0]), colour_layer(layers_b, names[1])
+    if colour_a.shape != colour_b.shape:
+        raise ValueError(
+            f"{names[0]} is {_size(colour_a)}, {names[1]} is {_size(colour_b)}: "
+            "only pictures of one size can be compared"
+        )
+    return colour_a, colour_b
+
+
+def trimmed_mean(values: NDArray[Any], share: float = TRIMMED_SHARE) -> float:
+    """The mean without the largest ones: floor(share x number) of them; 0 of none.
+
+    >>> import numpy as np
+    >>> trimmed_mean(np.array([1.0, 2.0, 3.0, 100.0]), 0.25)
+    2.0
+    """
+    import numpy as np
+
+    kept = values.size - int(share * values.size)
+    return float(np.partition(values.ravel(), kept - 1)[:kept].mean()) if kept else 0.0
+
+
 def luminance(pixels: NDArray[Any]) -> NDArray[Any]:
     """Rec.709 luminance in float64, (height, width); of fewer than 3 channels the first."""
     import numpy as np
@@ -168,6 +199,7 @@ def _comparison(
     squared = difference**2
     light = np.abs(luminance(difference))
     peak = int(light.argmax())
+    terms = squared / (wide_b**2 + REL_MSE_FLOOR)
     others_equal = all(entry["equal"] for entry in others.values())
     return Comparison(
         equal=others_equal and not bool(other_bits.any()),
@@ -184,7 +216,8 @@ def _comparison(
         mean_signed=tuple(float(v) for v in difference.sum(axis=(0, 1)) / kept),
         mean_abs=tuple(float(v) for v in np.abs(difference).sum(axis=(0, 1)) / kept),
         rmse=float(np.sqrt(squared.sum() / (kept * channels))),
-        rel_mse=float((squared / (wide_b**2 + REL_MSE_FLOOR)).sum() / (kept * channels)),
+        rel_mse=float(terms.sum() / (kept * channels)),
+        rel_mse_trimmed=trimmed_mean(terms[finite].mean(axis=1)),
         layers=others,
         only_a=only_a,
         only_b=only_b,

@@ -1,143 +1,183 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of where two pictures differ, with a colour bar."""
+"""A picture of where two pictures differ, with a title and a colour bar."""
 
 from __future__ import annotations
 
-import math
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.compare import colour_layer, layers_of, luminance
+from wavecomb.colour_maps import colour_map, signed_colour_map
+from wavecomb.compare import colour_pair, luminance
 
 if TYPE_CHECKING:
     from wavecomb.compare import Source
+    from wavecomb.ztest import ZTest
 
+Kind = Literal["absolute", "signed", "flip-ldr", "flip-hdr"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 DECADES = 4
+Z_RANGE = 5.0
+LEAST_WIDTH = 340
+"""Of the whole in pixels, so that title and numbers fit; a narrower picture has black beside it."""
+
 _NOT_FINITE = (0.0, 1.0, 1.0)
-_BAR_HEIGHT = 34
-# 3 x 5 pixels; each number is a row, its bits the pixels from left to right.
-_DIGITS: dict[str, tuple[int, int, int, int, int]] = {
-    "0": (7, 5, 5, 5, 7),
-    "1": (2, 6, 2, 2, 7),
-    "2": (7, 1, 7, 4, 7),
-    "3": (7, 1, 7, 1, 7),
-    "4": (5, 5, 7, 1, 1),
-    "5": (7, 4, 7, 1, 7),
-    "6": (7, 4, 7, 5, 7),
-    "7": (7, 1, 1, 2, 2),
-    "8": (7, 5, 7, 5, 7),
-    "9": (7, 5, 7, 1, 7),
-    "e": (0, 7, 7, 4, 7),
-    ".": (0, 0, 0, 0, 2),
-    "-": (0, 0, 7, 0, 0),
-    "+": (0, 2, 7, 2, 0),
-}
+_BAR_HEIGHT = 58
+_MARGIN = 8
+_TEXT_SIZE = 13
 
 
-def colour_map(count: int = 256) -> NDArray[np.float32]:
-    """Dark violet over red to light yellow, (count, 3), linear Rec.709.
+@dataclass(frozen=True)
+class _Scale:
+    """How values become colours.
 
-    Lightness of OKLab (Ottosson 2020) rises evenly, so equal steps look equal; the hue turns from
-    violet to yellow; chroma is the largest that the gamut has, up to 0.2.
+    Attributes:
+        title: Quantity and unit, for people.
+        colours: (count, 3).
+        ticks: Position along the bar, from 0 to 1, and label.
+        position: Of every pixel along the bar; NaN: black.
     """
-    t = np.linspace(0.0, 1.0, count)
-    lightness = 0.2 + 0.76 * t
-    hue = np.radians(300.0 + 170.0 * t)
-    low, high = np.zeros(count), np.full(count, 0.2)
-    for _ in range(20):
-        chroma = 0.5 * (low + high)
-        rgb = _linear_from_oklab(lightness, chroma * np.cos(hue), chroma * np.sin(hue))
-        inside = ((rgb >= 0.0) & (rgb <= 1.0)).all(axis=1)
-        low, high = np.where(inside, chroma, low), np.where(inside, high, chroma)
-    rgb = _linear_from_oklab(lightness, low * np.cos(hue), low * np.sin(hue))
-    return np.clip(rgb, 0.0, 1.0).astype(np.float32)
+
+    title: str
+    colours: NDArray[np.float32]
+    ticks: Sequence[tuple[float, str]]
+    position: NDArray[np.float64]
 
 
-def _linear_from_oklab(
-    lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]
-) -> NDArray[np.float64]:
-    """OKLab -> linear Rec.709, (n, 3): https://bottosson.github.io/posts/oklab/."""
-    long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
-    medium = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
-    short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
-    to_rgb = np.array(
-        [
-            [4.0767416621, -3.3077115913, 0.2309699292],
-            [-1.2684380046, 2.6097574011, -0.3413193965],
-            [-0.0041960863, -0.7034186147, 1.7076147010],
-        ]
-    )
-    return np.stack([long, medium, short], axis=1) @ to_rgb.T
+def heat_map(
+    a: Source, b: Source, kind: Kind = "absolute", *, exposure: float = 0.0
+) -> NDArray[np.float32]:
+    """Differences of picture A to the reference B as colours, with title and colour bar below.
 
+    - "absolute": of luminance, on a logarithmic scale from the largest down over four decades;
+      smaller ones have the darkest colour.
+    - "signed": of luminance, the same scale to both sides: orange where A is brighter, blue where
+      it is darker, black from four decades below the largest.
+    - "flip-ldr", "flip-hdr": FLIP from 0 to 1; ``perceptual.flip`` says what it is.
 
-def heat_map(a: Source, b: Source) -> NDArray[np.float32]:
-    """Absolute luminance differences as colours, with a bar and its numbers below.
-
-    The scale is logarithmic: from the largest difference down over four decades; smaller ones have
-    the darkest colour, equal pixels are black, pixels with a NaN or an infinity are cyan.
+    Equal pixels are black, pixels with a NaN or an infinity are cyan.
 
     Returns:
-        Linear Rec.709, (height + bar, width, 3).
+        Linear Rec.709, (height + bar, width, 3), at least ``LEAST_WIDTH`` wide.
     """
-    pixels_a, pixels_b = colour_layer(layers_of(a), "A"), colour_layer(layers_of(b), "B")
-    if pixels_a.shape != pixels_b.shape:
-        raise ValueError("only pictures of one size can be compared")
+    pixels_a, pixels_b = colour_pair(a, b)
     finite = np.isfinite(pixels_a).all(axis=2) & np.isfinite(pixels_b).all(axis=2)
+    if kind in ("flip-ldr", "flip-hdr"):
+        from wavecomb.perceptual import flip
+
+        values = flip(a, b, high_range=kind == "flip-hdr", exposure=exposure)
+        return _draw(_linear(values, kind), finite)
     kept = finite[:, :, None]
     wide_a = np.where(kept, pixels_a, 0).astype(np.float64)
-    difference = np.abs(luminance(wide_a - np.where(kept, pixels_b, 0)))
-    peak = float(difference.max())
-    colours = colour_map()
-    result = np.zeros((*difference.shape, 3), np.float32)
-    if peak > 0.0:
-        with np.errstate(divide="ignore"):
-            t = 1.0 + np.log10(difference / peak) / DECADES
-        index = (np.clip(t, 0.0, 1.0) * (len(colours) - 1) + 0.5).astype(np.intp)
-        result = np.where(difference[:, :, None] > 0.0, colours[index], np.float32(0))
-    result[~finite] = _NOT_FINITE
-    return np.concatenate([result, _bar(result.shape[1], peak, colours)])
+    difference = luminance(wide_a - np.where(kept, pixels_b, 0))
+    return _draw(_signed(difference) if kind == "signed" else _absolute(difference), finite)
 
 
-def write_heat_map(path: str | os.PathLike[str], a: Source, b: Source) -> None:
+def z_map(test: ZTest) -> NDArray[np.float32]:
+    """Deviates of a z-test from -5 to 5 standard errors, the largest of a pixel's channels."""
+    channel = np.abs(test.z_pixels).argmax(axis=2)[:, :, None]
+    z = np.take_along_axis(test.z_pixels, channel, axis=2)[:, :, 0]
+    ticks = [(0.5 + 0.5 * value / Z_RANGE, _number(value)) for value in (-5, -2.5, 0, 2.5, 5)]
+    position = np.where(z == 0.0, np.nan, 0.5 + 0.5 * z / Z_RANGE)
+    scale = _Scale("A - B in standard errors (z)", signed_colour_map(), ticks, position)
+    return _draw(scale, np.ones(z.shape, bool))
+
+
+def write_heat_map(
+    path: str | os.PathLike[str],
+    a: Source,
+    b: Source,
+    kind: Kind = "absolute",
+    *,
+    exposure: float = 0.0,
+) -> None:
     """Writes ``heat_map`` as a PNG file."""
     from wavecomb.image import write_png
 
-    write_png(path, heat_map(a, b))
+    write_png(path, heat_map(a, b, kind, exposure=exposure))
 
 
-def _bar(width: int, peak: float, colours: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The colour bar with a number under each decade; bare where the picture is too small."""
+def _absolute(difference: NDArray[np.float64]) -> _Scale:
+    size = np.abs(difference)
+    peak = float(size.max())
+    title = "|A - B|, linear luminance"
+    if peak == 0.0:
+        return _Scale(title, colour_map(), [(1.0, "0")], np.full(size.shape, np.nan))
+    ticks = [(k / DECADES, f"{peak * 10.0 ** (k - DECADES):.1e}") for k in range(DECADES + 1)]
+    position = np.where(size > 0.0, _decades(size, peak), np.nan)
+    return _Scale(title, colour_map(), ticks, position)
+
+
+def _signed(difference: NDArray[np.float64]) -> _Scale:
+    size = np.abs(difference)
+    peak = float(size.max())
+    title = "A - B, linear luminance"
+    if peak == 0.0:
+        return _Scale(title, signed_colour_map(), [(0.5, "0")], np.full(size.shape, np.nan))
+    position = 0.5 + 0.5 * np.sign(difference) * _decades(size, peak)
+    ticks = [(0.5, "0")]
+    for k in (2, 4):
+        label = f"{peak * 10.0 ** (k - DECADES):.1e}"
+        ticks += [(0.5 - 0.5 * k / DECADES, "-" + label), (0.5 + 0.5 * k / DECADES, "+" + label)]
+    return _Scale(title, signed_colour_map(), ticks, np.where(size > 0.0, position, np.nan))
+
+
+def _linear(values: NDArray[Any], kind: str) -> _Scale:
+    title = f"{kind.upper()} (0 looks equal, 1 is the most)"
+    ticks = [(t, _number(t)) for t in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    position = np.where(values > 0.0, values.astype(np.float64), np.nan)
+    return _Scale(title, colour_map(), ticks, position)
+
+
+def _decades(size: NDArray[np.float64], peak: float) -> NDArray[np.float64]:
+    """1 at the peak, 0 from four decades below it."""
+    with np.errstate(divide="ignore"):
+        return np.clip(1.0 + np.log10(size / peak) / DECADES, 0.0, 1.0)
+
+
+def _draw(scale: _Scale, finite: NDArray[np.bool_]) -> NDArray[np.float32]:
+    last = len(scale.colours) - 1
+    known = ~np.isnan(scale.position)
+    index = (np.clip(np.where(known, scale.position, 0.0), 0.0, 1.0) * last + 0.5).astype(np.intp)
+    colours = np.where(known[:, :, None], scale.colours[index], np.float32(0))
+    colours[~finite] = _NOT_FINITE
+    height, width = known.shape
+    result = np.zeros((height + _BAR_HEIGHT, max(width, LEAST_WIDTH), 3), np.float32)
+    result[:height, :width] = colours
+    result[height:] = _bar(result.shape[1], scale)
+    return result
+
+
+def _bar(width: int, scale: _Scale) -> NDArray[np.float32]:
+    """Title, colour ramp, and a tick with a number for as many values as fit."""
+    import OpenImageIO as oiio
+
+    length = width - 2 * _MARGIN
     bar = np.zeros((_BAR_HEIGHT, width, 3), np.float32)
-    margin = 6
-    length = width - 2 * margin
-    if length < 24:
-        return bar
-    ramp = np.linspace(0, len(colours) - 1, length).astype(np.intp)
-    bar[6:18, margin : margin + length] = colours[ramp]
-    if not (peak > 0.0 and math.isfinite(peak)):
-        _write(bar, "0", 22, width - margin - 6)
-        return bar
+    ramp = np.linspace(0, len(scale.colours) - 1, length).astype(np.intp)
+    bar[22:36, _MARGIN : _MARGIN + length] = scale.colours[ramp]
+    places = [(_MARGIN + round((length - 1) * t), label) for t, label in scale.ticks]
+    for middle, _ in places:
+        bar[36:39, middle] = 1.0
+    canvas = oiio.ImageBuf(np.ascontiguousarray(bar))
+
+    def write(x: int, y: int, text: str) -> None:
+        oiio.ImageBufAlgo.render_text(canvas, x, y, text, _TEXT_SIZE, "", (1.0, 1.0, 1.0))
+
+    write(_MARGIN, 16, scale.title)
     end = -1
-    for k in range(DECADES + 1):
-        text = f"{peak * 10.0 ** (k - DECADES):.1e}".replace("e-0", "e-").replace("e+0", "e+")
-        text_width = 8 * len(text)
-        middle = margin + round((length - 1) * k / DECADES)
-        left = min(max(middle - text_width // 2, 1), width - text_width - 1)
-        bar[18:20, middle] = 1.0
+    for middle, label in sorted(places):
+        extent = oiio.ImageBufAlgo.text_size(label, _TEXT_SIZE).width
+        left = min(max(middle - extent // 2, 2), width - extent - 2)
         if left > end:
-            _write(bar, text, 22, left)
-            end = left + text_width
-    return bar
+            write(left, 52, label)
+            end = left + extent + 6
+    return np.asarray(canvas.get_pixels(oiio.FLOAT), np.float32).reshape(bar.shape)
 
 
-def _write(image: NDArray[np.float32], text: str, top: int, left: int) -> None:
-    """Draws a number with the digits above at twice their size."""
-    for character in text:
-        rows = _DIGITS[character]
-        bits = np.array([[row >> (2 - x) & 1 for x in range(3)] for row in rows], np.float32)
-        glyph = bits.repeat(2, axis=0).repeat(2, axis=1)
-        image[top : top + 10, left : left + 6] = glyph[:, :, None]
-        left += 8
+def _number(value: float) -> str:
+    return f"{value:g}"

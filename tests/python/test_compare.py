@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wavecomb.colour_maps import colour_map, signed_colour_map
 from wavecomb.compare import compare, luminance
-from wavecomb.heatmap import colour_map, heat_map, write_heat_map
+from wavecomb.heatmap import LEAST_WIDTH, heat_map, write_heat_map
 from wavecomb.image import read_image, srgb_from_linear, write_exr
 
 
@@ -123,27 +124,51 @@ def test_colour_map_is_even() -> None:
     assert steps.max() < 0.1
 
 
+def test_signed_colour_map_is_even_to_both_sides() -> None:
+    light = luminance(signed_colour_map(65)[None].astype(np.float64))[0]
+    assert (np.diff(light[32:]) > 0).all()
+    assert (np.diff(light[:33]) < 0).all()
+    assert light[32] == 0
+    assert light[0] == pytest.approx(light[-1], rel=0.15)
+
+
 def test_heat_map(tmp_path: Path) -> None:
-    a = np.zeros((40, 200, 3), np.float32)
+    a = np.zeros((40, 400, 3), np.float32)
     b = a.copy()
     b[10, 10] = 1.0
     b[20, 20] = 1e-9
     b[30, 30] = np.nan
     heat = heat_map(a, b)
-    assert heat.shape[1:] == (200, 3)
+    assert heat.shape[1:] == (400, 3)
     assert heat.shape[0] > 40
     colours = colour_map()
     assert heat[10, 10] == pytest.approx(colours[-1])
     assert heat[20, 20] == pytest.approx(colours[0])
     assert heat[30, 30].tolist() == [0, 1, 1]
     assert heat[0, 0].tolist() == [0, 0, 0]
-    assert (heat[62:72] == 1).any()  # the numbers
+    assert (heat[44:58] == 1).all(axis=2).any()  # the title
+    assert (heat[82:] == 1).all(axis=2).any()  # the numbers
     write_heat_map(tmp_path / "h.png", a, b)
     assert read_image(tmp_path / "h.png").shape == heat.shape
 
 
+def test_signed_heat_map() -> None:
+    b = np.zeros((8, 400, 3), np.float32)
+    a = b.copy()
+    a[1, 1], a[2, 2], a[3, 3] = 2.0, -2.0, 2e-5
+    heat, colours = heat_map(a, b, "signed"), signed_colour_map()
+    assert heat[1, 1] == pytest.approx(colours[-1])
+    assert heat[2, 2] == pytest.approx(colours[0])
+    assert heat[3, 3].max() < 0.02
+    assert heat[1, 1, 0] > heat[1, 1, 2]  # brighter is orange
+    assert heat[2, 2, 0] < heat[2, 2, 2]
+
+
+@pytest.mark.parametrize("kind", ["absolute", "signed"])
 @pytest.mark.parametrize("shape", [(1, 1, 3), (3, 20, 1), (2, 60, 3)])
-def test_small_heat_maps(shape: tuple[int, int, int]) -> None:
+def test_small_heat_maps(shape: tuple[int, int, int], kind: str) -> None:
     a = np.zeros(shape, np.float32)
-    assert heat_map(a, a).shape[1] == shape[1]
-    assert heat_map(a, a + 1).shape[1] == shape[1]
+    for b in (a, a + 1):
+        heat = heat_map(a, b, kind)
+        assert heat.shape[1] == LEAST_WIDTH
+        assert (heat[shape[0] :] == 1).all(axis=2).any()

@@ -10,18 +10,59 @@ import click
 
 from wavecomb.cli.options import Real, examples
 
+_METRICS = ("ssim", "flip-ldr", "flip-hdr")
+_MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
+
 
 @click.command(
     "compare",
     epilog=examples(
         "wavecomb compare new.exr reference.exr",
-        "wavecomb compare new.exr reference.exr --heatmap difference.png",
+        "wavecomb compare new.exr reference.exr --heatmap difference.png --map signed",
         "wavecomb compare new.exr reference.exr --tolerance 1e-4 --json",
+        "wavecomb compare new.exr reference.exr --metric ssim --metric flip-hdr",
+        "wavecomb compare new.exr reference.exr --variance-b reference_variance.exr",
     ),
 )
 @click.argument("a", type=click.Path())
 @click.argument("b", type=click.Path())
+@click.option(
+    "--metric",
+    "metrics",
+    multiple=True,
+    type=click.Choice(_METRICS),
+    help="How different they look, may be given again.",
+)
+@click.option(
+    "--exposure",
+    type=Real(),
+    default=0.0,
+    metavar="STOPS",
+    help="For ssim and flip-ldr: pictures times 2^STOPS.  [default: 0]",
+)
+@click.option(
+    "--variance-a",
+    type=click.Path(),
+    metavar="FILE",
+    help="Variance of A's pixels, for a z-test.  [default: none]",
+)
+@click.option("--variance-b", type=click.Path(), metavar="FILE", help="Likewise of B.")
+@click.option(
+    "--significance",
+    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+    default=0.01,
+    show_default=True,
+    help="Of the z-test.",
+)
 @click.option("--heatmap", type=click.Path(), metavar="FILE.png", help="Where they differ.")
+@click.option(
+    "--map",
+    "kind",
+    type=click.Choice(_MAPS),
+    default="absolute",
+    show_default=True,
+    help="What --heatmap shows.",
+)
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 @click.option(
     "--tolerance",
@@ -30,43 +71,101 @@ from wavecomb.cli.options import Real, examples
     help="Exit with 0, too, where no colour channel differs by more than X.",
 )
 def compare_command(
-    a: str, b: str, heatmap: str | None, as_json: bool, tolerance: float | None
+    a: str,
+    b: str,
+    metrics: tuple[str, ...],
+    exposure: float,
+    variance_a: str | None,
+    variance_b: str | None,
+    significance: float,
+    heatmap: str | None,
+    kind: str,
+    as_json: bool,
+    tolerance: float | None,
 ) -> None:
     """Say how picture A differs from picture B, the reference.
 
     Equal means bit for bit, in every layer that both have. relMSE is the mean of
-    (A - B)^2 / (B^2 + 0.01). Pixels with a NaN or an infinity in A or B are counted and left out of
-    all figures; they are equal where their bits are. Whole-number formats (PNG, JPEG) are read as
-    sRGB and compared as linear light.
+    (A - B)^2 / (B^2 + 0.01), and trimmed the same without the 0.1 % of pixels with the largest
+    terms. Pixels with a NaN or an infinity in A or B are counted and left out of all figures; they
+    are equal where their bits are. Whole-number formats (PNG, JPEG) are read as sRGB and compared
+    as linear light.
 
-    Exit codes: 0 equal (or within --tolerance), 1 different, 2 an error.
+    A variance picture holds the variance of each pixel's mean. With one, or with both, a z-test
+    says whether the pictures can have the same expectation.
+
+    Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different,
+    2 an error.
     """
     from wavecomb.compare import compare
     from wavecomb.errors import WavecombError
     from wavecomb.files import check_writable
 
+    testing = variance_a is not None or variance_b is not None
+    if kind == "z" and not testing:
+        raise WavecombError("--map z needs --variance-a or --variance-b")
     if heatmap is not None:
         if not heatmap.lower().endswith(".png"):
             raise WavecombError(f"--heatmap {heatmap}: the name must end in .png")
         check_writable(heatmap)
+    test: Any = None
     try:
         result = compare(a, b)
+        measured = _measure(a, b, metrics, exposure)
+        if testing:
+            from wavecomb.ztest import z_test
+
+            test = z_test(
+                a, b, variance_a=variance_a, variance_b=variance_b, significance=significance
+            )
+        if heatmap is not None:
+            _write_map(heatmap, a, b, kind, exposure, test)
     except ValueError as error:
         raise WavecombError(str(error)) from error
     passed = result.equal or (tolerance is not None and result.within(tolerance))
-    if heatmap is not None:
-        from wavecomb.heatmap import write_heat_map
-
-        write_heat_map(heatmap, a, b)
+    passed = passed or (test is not None and test.agrees and result.not_finite_differ == 0)
     if as_json:
         document = {"a": a, "b": b, "tolerance": tolerance, "passed": passed, **result.to_dict()}
+        document |= {"metrics": measured, "z_test": test.to_dict() if test is not None else None}
         click.echo(json.dumps(document, indent=2))
     else:
-        for line in _lines(result):
+        for line in (*_lines(result), *_metric_lines(measured, test)):
             click.echo(line)
         if tolerance is not None and not result.equal:
-            click.echo("within the tolerance" if passed else "not within the tolerance")
+            within = result.within(tolerance)
+            click.echo("within the tolerance" if within else "not within the tolerance")
     raise click.exceptions.Exit(0 if passed else 1)
+
+
+def _measure(a: str, b: str, metrics: tuple[str, ...], exposure: float) -> dict[str, float]:
+    if not metrics:
+        return {}
+    from wavecomb.perceptual import METRICS, measure
+
+    return {name: measure(name, a, b, exposure) for name in METRICS if name in metrics}
+
+
+def _write_map(path: str, a: str, b: str, kind: str, exposure: float, test: Any) -> None:
+    from wavecomb.heatmap import KINDS, write_heat_map, z_map
+    from wavecomb.image import write_png
+
+    if kind == "z":
+        write_png(path, z_map(test))
+    else:
+        write_heat_map(path, a, b, next(k for k in KINDS if k == kind), exposure=exposure)
+
+
+def _metric_lines(measured: dict[str, float], test: Any) -> list[str]:
+    lines = [f"{name.upper()} {value:.4g}" for name, value in measured.items()]
+    if test is not None:
+        verdict = "no difference shown" if test.agrees else "different expectation"
+        where = f", worst tile at {test.worst_tile}" if test.worst_tile else ""
+        lines.append(
+            f"z-test: {verdict}, p = {test.p_value:.3g} over {test.tests} tests{where}; "
+            f"{100.0 * test.pixels_accepted:.4g} % of pixel channels accepted"
+        )
+        lines.append("        mean of the picture, z  " + _row(test.mean_z))
+    return lines
 
 
 def _lines(result: Any) -> list[str]:
@@ -84,7 +183,10 @@ def _lines(result: Any) -> list[str]:
         )
         lines.append("channels   mean A - B   " + _row(result.mean_signed))
         lines.append("           mean |A - B| " + _row(result.mean_abs))
-        lines.append(f"RMSE {result.rmse:.4g}, relMSE {result.rel_mse:.4g}")
+        lines.append(
+            f"RMSE {result.rmse:.4g}, relMSE {result.rel_mse:.4g}, "
+            f"trimmed {result.rel_mse_trimmed:.4g}"
+        )
     if result.pixels_not_finite:
         lines.append(
             f"not finite, left out: {result.pixels_not_finite} pixels, "

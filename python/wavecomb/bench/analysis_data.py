@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A result folder in memory, and the groups of its runs that may be compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.bench.columns import COLUMNS, read_rows
+from wavecomb.errors import WavecombError
+from wavecomb.extras import needed
+from wavecomb.files import reason
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SETTINGS = (
+    *("experiment", "stage", "renderer", "width", "height", "spp", "threads", "lanes"),
+    *("wave_size", "policy", "roulette", "ray_order", "shadow_order", "max_depth"),
+    *("factor", "factor_value"),
+)
+"""What was chosen for a run; two runs that agree in all of it are repetitions."""
+
+BASELINES = {
+    "policy": "none",
+    "roulette": "throughput",
+    "ray_order": "slot",
+    "shadow_order": "slot",
+    "renderer": "wavecomb",
+}
+"""What a level is compared with; of numbers it is the least."""
+
+POLICIES = (
+    *("none", "program", "material", "texture", "texture-locality", "cost-benefit"),
+    *("random-runs", "adaptive", "oracle", "oracle-best", "oracle-worst"),
+)
+"""In the order in which tables and figures show them."""
+
+PLACEBO = "random-runs"
+ORACLES = ("oracle-best", "oracle")
+BOUNDS = (PLACEBO, "oracle", "oracle-best", "oracle-worst")
+"""Orders that nobody would use: they bound what an order can win."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """A result folder.
+
+    Attributes:
+        folder: Where it is.
+        runs: The runs that came to an end, one row each, with the columns of ``columns``.
+        failed: The others.
+        machine: machine.json; empty where there is none.
+        suite_text: suite.toml; "" where there is none.
+    """
+
+    folder: Path
+    runs: pd.DataFrame
+    failed: pd.DataFrame
+    machine: dict[str, Any]
+    suite_text: str
+
+    def experiments(self) -> list[tuple[str, pd.DataFrame]]:
+        """Names and runs, in the order of the suite."""
+        found = [(str(name), runs) for name, runs in self.runs.groupby("experiment")]
+        return sorted(found, key=lambda entry: self.suite_text.find(f'name = "{entry[0]}"'))
+
+    def records(self) -> Iterator[dict[str, Any]]:
+        """The objects of runs.jsonl, one by one: {"row": ..., "stats": ...}.
+
+        A torn last line is left out.
+        """
+        path = self.folder / "runs.jsonl"
+        if not path.is_file():
+            return
+        with path.open(encoding="utf-8") as file:
+            for number, line in enumerate(file, 1):
+                if not line.endswith("\n"):
+                    return
+                try:
+                    record = json.loads(line)
+                    record["row"]["run_id"]
+                except (ValueError, KeyError, TypeError) as error:
+                    raise WavecombError(f"{path}: line {number} is no run") from error
+                yield record
+
+
+def load(folder: Path) -> Results:
+    """Reads a result folder.
+
+    Raises:
+        WavecombError: It is none, or holds no run; one line that names the file.
+    """
+    pandas = needed("pandas", "the analysis")
+    path = folder / "runs.csv"
+    if not path.is_file():
+        raise WavecombError(f"{folder}: holds no runs.csv; `wavecomb bench run` makes one")
+    try:
+        rows = read_rows(path)
+    except (OSError, ValueError, KeyError) as error:
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        raise WavecombError(f"{path}: cannot be read: {why}") from error
+    frame = pandas.DataFrame(rows, columns=[column.name for column in COLUMNS])
+    for column in COLUMNS:
+        if column.kind in ("number", "integer"):
+            frame[column.name] = pandas.to_numeric(frame[column.name])
+    ended = frame["status"] == "ok"
+    if not ended.any():
+        raise WavecombError(f"{path}: no run came to an end")
+    return Results(
+        folder=folder,
+        runs=frame[ended].reset_index(drop=True),
+        failed=frame[~ended].reset_index(drop=True),
+        machine=_json(folder / "machine.json"),
+        suite_text=_text(folder / "suite.toml"),
+    )
+
+
+def cells(
+    runs: pd.DataFrame, vary: str | Sequence[str], ignore: Sequence[str] = ()
+) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+    """Groups of runs that agree in every setting but ``vary`` (and ``ignore``).
+
+    Settings that are no columns (a case of a suite may change any) tell groups apart by the name
+    of the configuration, where otherwise two configurations would be one.
+    """
+    varied = {vary} if isinstance(vary, str) else set(vary)
+    keys = [name for name in SETTINGS if name not in varied and name not in ignore]
+    for values, group in runs.groupby(keys, dropna=False, sort=True):
+        cell = dict(zip(keys, values, strict=True))
+        levels = group.groupby(sorted(varied), dropna=False)["config"].nunique()
+        if levels.max() <= 1:
+            yield cell, group
+            continue
+        names = group["config"].map(lambda name: _without(name, varied, "experiment" in ignore))
+        for variant, part in group.groupby(names, sort=False):
+            yield {**cell, "variant": variant}, part
+
+
+def rounds(group: pd.DataFrame, by: str, metric: str) -> tuple[list[Any], NDArray[np.float64]]:
+    """Levels and their values, (rounds, levels), NaN where a run is missing."""
+    table = group.pivot_table(index="repetition", columns=by, values=metric, aggfunc="mean")
+    return in_order(by, table.columns), table[in_order(by, table.columns)].to_numpy(np.float64)
+
+
+def baseline_of(factor: str, levels: Sequence[Any]) -> Any:
+    """The level that others are compared with; None where it is missing."""
+    wanted = BASELINES.get(factor)
+    if wanted is not None:
+        return wanted if wanted in levels else None
+    return levels[0] if len(levels) else None
+
+
+def in_order(factor: str, levels: Sequence[Any]) -> list[Any]:
+    """Levels in the order of tables: policies as documented, the baseline first, numbers rising."""
+    if factor == "policy":
+        place = {name: k for k, name in enumerate(POLICIES)}
+        return sorted(levels, key=lambda name: (place.get(name, len(place)), str(name)))
+    return sorted(levels, key=lambda level: (level != BASELINES.get(factor), level))
+
+
+def label(cell: dict[str, Any], varying: Sequence[str]) -> str:
+    """A short name of a cell: the settings that tell it from the others of its table."""
+    words = {
+        "lanes": lambda v: f"{v:.0f} lane{'s' if v != 1 else ''}",
+        "spp": lambda v: f"{v:.0f} spp",
+        "threads": lambda v: f"{v:.0f} thread{'s' if v != 1 else ''}",
+        "wave_size": lambda v: f"waves of {short_count(v)}",
+        "width": lambda v: f"{v:.0f} wide",
+        "roulette": lambda v: f"roulette {v}",
+        "ray_order": lambda v: f"rays by {v}",
+        "shadow_order": lambda v: f"shadow rays by {v}",
+    }
+    parts = []
+    for name in varying:
+        value = cell.get(name)
+        if value is None or value == "" or value != value:
+            continue
+        parts.append(words[name](value) if name in words else str(value))
+    return ", ".join(parts) or str(cell.get("stage", "all"))
+
+
+def varying(found: Sequence[dict[str, Any]]) -> list[str]:
+    """Settings in which cells differ, but for the experiment; "stage" where they differ in none."""
+    told = ("experiment", "height", "factor", "factor_value")  # by the heading, or by others
+    names = [name for name in (*SETTINGS, "variant") if name not in told]
+    differ = [n for n in names if len({str(cell.get(n, "")) for cell in found}) > 1]
+    return differ if "stage" in differ else ["stage", *differ]
+
+
+def short_count(value: float) -> str:
+    """A count for people: 4096 -> 4 K, 1048576 -> 1 M.
+
+    >>> short_count(65536), short_count(1 << 20), short_count(100)
+    ('64 K', '1 M', '100')
+    """
+    for unit, size in (("M", 1 << 20), ("K", 1 << 10)):
+        if value >= size:
+            return f"{value / size:.4g} {unit}"
+    return f"{value:.4g}"
+
+
+def _without(config: str, varied: set[str], across: bool) -> str:
+    """The name of a configuration without the parts that name what is varied.
+
+    The first part is the experiment; it is left out, too, where cells go across experiments.
+    """
+    parts = config.split(".")[1 if across else 0 :]
+    return ".".join(part for part in parts if not any(part.startswith(f"{v}-") for v in varied))
+
+
+def _json(path: Path) -> dict[str, Any]:
+    text = _text(path)
+    try:
+        document = json.loads(text) if text else {}
+    except ValueError as error:
+        raise WavecombError(f"{path}: is no JSON: {error}") from error
+    return document if isinstance(document, dict) else {}
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.is_file() else ""

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How figures look: colours that all can tell apart, ink that follows the page, direct labels."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.extras import needed
+from wavecomb.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+INK = "#1a1b1e"
+"""Of text, axes and what is compared with; becomes the page's own text colour in the report."""
+FAINT = "#8a8d93"
+GRID = "#8a8d9340"
+WIDTH = 7.4
+"""Of a figure in inches: a column of text in print."""
+
+# Okabe and Ito 2008, "Color universal design"; without yellow, which paper does not show.
+BLUE, SKY, ORANGE, RED = "#0072b2", "#56b4e9", "#e69f00", "#d55e00"
+GREEN, PURPLE, BROWN = "#009e73", "#cc79a7", "#8c6d1f"
+CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, BROWN)
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_POLICY = {
+    **{"none": INK, "program": BLUE, "material": ORANGE, "texture": GREEN},
+    **{"texture-locality": SKY, "cost-benefit": RED, "adaptive": PURPLE},
+    **{"random-runs": FAINT, "oracle": FAINT, "oracle-best": FAINT, "oracle-worst": FAINT},
+}
+_SETTINGS: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.5,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": FAINT,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "text.color": INK,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4.5,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.dpi": 160,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "wavecomb",
+}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure with its words.
+
+    Attributes:
+        name: Of its files; unique in a report.
+        title: Short.
+        caption: What is shown, in which unit, what whiskers are, how many runs.
+        figure: Matplotlib's.
+    """
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Settings of Matplotlib for as long as figures are made and saved."""
+    matplotlib = needed("matplotlib", "a figure")
+    with matplotlib.rc_context(_SETTINGS):
+        yield
+
+
+def figure(
+    rows: int,
+    columns: int,
+    height: float,
+    *,
+    heights: Sequence[float] | None = None,
+    share_x: bool = False,
+    share_y: bool = False,
+) -> tuple[Figure, list[Axes]]:
+    """A figure of the column's width and its axes, row by row; ``heights`` is of rows."""
+    made = needed("matplotlib.figure", "a figure").Figure(
+        figsize=(WIDTH, height), layout="constrained"
+    )
+    axes = made.subplots(
+        rows, columns, squeeze=False, sharex=share_x, sharey=share_y, height_ratios=heights
+    )
+    return made, list(axes.ravel())
+
+
+def policy_colour(policy: str) -> str:
+    """Of a policy, the same in all figures; the bounds are grey."""
+    return _POLICY.get(policy, BROWN)
+
+
+def marker(index: int) -> str:
+    """Shapes tell series apart where colours do not."""
+    return MARKERS[index % len(MARKERS)]
+
+
+def colour(index: int) -> str:
+    """Of a series without a colour of its own."""
+    return CYCLE[index % len(CYCLE)]
+
+
+def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> None:
+    """Names series at their last points, (x, y, text, colour), apart from one another."""
+    figure_ = axes.get_figure()
+    assert figure_ is not None
+    point = figure_.dpi / 72.0
+    placed: list[tuple[float, float]] = []
+    for x, y, text, shade in sorted(ends, key=lambda end: end[1]):
+        pixel_x, pixel_y = (float(v) for v in axes.transData.transform((x, y)))
+        target = pixel_y
+        for other_x, other_y in placed:
+            if abs(other_x - pixel_x) < 60.0 * point:
+                target = max(target, other_y + 10.5 * point)
+        placed.append((pixel_x, target))
+        moved = (target - pixel_y) / point
+        axes.annotate(
+            text,
+            (x, y),
+            xytext=(8, moved),
+            textcoords="offset points",
+            va="center",
+            color=shade,
+            fontsize=8,
+            annotation_clip=False,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": shade,
+                "linewidth": 0.4,
+                "relpos": (0.0, 0.5),
+                "shrinkA": 1,
+                "shrinkB": 3,
+            }
+            if moved > 2.0
+            else None,
+        )
+
+
+def fixed(value: float, digits: int) -> str:
+    """A figure with so many decimals; no minus before 0."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def plain_logarithm(axis: Axis) -> None:
+    """Numbers as people write them on a logarithmic axis, few enough to be read."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    if decades < 0.8:
+        axis.set_major_locator(MaxNLocator(4))
+    else:
+        subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0,)
+        axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+
+
+def lay_out(drawn: Drawn) -> None:
+    """Finds places for everything once, so that saving in two formats does not find them again."""
+    drawn.figure.draw_without_rendering()
+    drawn.figure.set_layout_engine("none")
+
+
+def svg(drawn: Drawn) -> str:
+    """The figure as an <svg> element for a page: ink in the page's colour, ids of its own."""
+    buffer = io.StringIO()
+    blank = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    drawn.figure.savefig(buffer, format="svg", metadata=blank)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :].strip()
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = text.replace(INK, "currentColor")
+    # Verdana has the widths of DejaVu Sans, and is there where the other is not.
+    text = text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")
+    text = re.sub(r'\b(id="|url\(#|href="#)', rf"\g<1>{drawn.name}-", text)
+    # The page sets the width; the view box keeps the shape.
+    return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
+
+
+def save(drawn: Drawn, drawing: str, folder: Path) -> None:
+    """Writes NAME.svg, given as ``svg`` made it, and NAME.png, on white, whole or not at all."""
+    with replacing(folder / f"{drawn.name}.svg") as part:
+        on_white = drawing.replace("<svg", f'<svg style="background: #fff; color: {INK}"', 1)
+        part.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{on_white}\n', encoding="utf-8")
+    with replacing(folder / f"{drawn.name}.png") as part:
+        drawn.figure.savefig(part, format="png", facecolor="white")

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a result folder: one HTML page that needs nothing else, and figure files."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.bench import report_pictures
+from wavecomb.bench.analysis_data import load
+from wavecomb.bench.figures_style import style
+from wavecomb.bench.report_html import (
+    Section,
+    escape,
+    folded,
+    nested,
+    page,
+    paragraph,
+    prose,
+    table,
+)
+from wavecomb.bench.report_sections import Writer, experiment, suite
+from wavecomb.files import replacing
+
+if TYPE_CHECKING:
+    from wavecomb.bench.analysis_data import Results
+
+FEW_ROUNDS = 5
+
+
+def build(folder: Path) -> Path:
+    """Writes DIR/report.html, and DIR/figures with each figure as SVG and PNG.
+
+    Raises:
+        WavecombError: The folder holds no results, or a file in it is damaged; or a library of the
+            extra "bench" is missing.
+        OSError: It cannot be written.
+    """
+    results = load(folder)
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    out = Writer(figures)
+    with style():
+        for name, runs in results.experiments():
+            experiment(out, name, runs)
+        suite(out, results)
+        _pictures(out, results)
+    _about(out, results)
+    if out.findings:
+        lines = "".join(f"<li>{prose(line)}</li>" for line in out.findings)
+        out.sections.insert(0, _findings(f'<ul class="findings">{lines}</ul>'))
+    target = folder / "report.html"
+    document = page(_title(results), _lead(results), warnings_of(results), out.sections)
+    with replacing(target) as part:
+        part.write_text(document, encoding="utf-8")
+    return target
+
+
+def warnings_of(results: Results) -> list[str]:
+    """Why the figures deserve care, most serious first."""
+    lines: list[str] = []
+    _, different = report_pictures.equality(results)
+    if different:
+        lines.append(
+            f"Pictures that must be equal differ, in {len(different)} groups: times of unequal "
+            f"work are compared. {different[0]}."
+        )
+    noise = results.machine.get("noise")
+    told = noise.get("lines", ()) if isinstance(noise, dict) else ()
+    lines += [f"Noisy machine: {line}." for line in told]
+    noisy = int(results.runs["noisy"].fillna(False).astype(bool).sum())
+    if noisy and not told:
+        lines.append(
+            f"{noisy} of {len(results.runs)} runs were disturbed by other work on the machine."
+        )
+    least = int(results.runs.groupby("config").size().min())
+    if least < FEW_ROUNDS:
+        some = "once" if least == 1 else f"{least} times"
+        lines.append(
+            f"Some configurations ran only {some}: their intervals are wide, or there is none."
+        )
+    if len(results.failed):
+        first = results.failed.iloc[0]
+        lines.append(f"{len(results.failed)} runs failed; the first: {first.run_id}: {first.error}")
+    if results.machine.get("dirty"):
+        lines.append("The source was changed after the commit that is named.")
+    return lines
+
+
+def _title(results: Results) -> str:
+    return f"Wavecomb benchmark: {results.runs['suite'].iloc[0] or results.folder.name}"
+
+
+def _lead(results: Results) -> str:
+    machine, runs = results.machine, results.runs
+    about = [
+        str(machine.get("cpu") or "unknown CPU"),
+        f"{machine['cores']} cores" if machine.get("cores") else "",
+        str(machine.get("isa") or ""),
+        f"commit {str(machine['commit'])[:10]}" if machine.get("commit") else "",
+    ]
+    started = [text for text in runs["started"] if text]
+    when = f", {min(started)[:16].replace('T', ' ')} to {max(started)[:16].replace('T', ' ')} UTC"
+    counts = (
+        f"{len(runs)} runs of {runs['config'].nunique()} configurations on "
+        f"{runs['stage'].nunique()} stages{when if started else ''}"
+    )
+    lines = [" · ".join(part for part in about if part), counts]
+    return "".join(f'<p class="facts">{escape(line)}</p>' for line in lines)
+
+
+def _findings(inside: str) -> Section:
+    note = paragraph(
+        "Found by the rules of docs/bench-report.md, not chosen by hand. A difference is spoken of "
+        "where its p-value, corrected for all comparisons of its table, is below 5 %.",
+        "note",
+    )
+    return Section("findings", "What the figures say", [inside, note])
+
+
+def _pictures(out: Writer, results: Results) -> None:
+    groups, different = report_pictures.equality(results)
+    found = report_pictures.shots(results)
+    if not groups and not found:
+        return
+    out.begin("Pictures")
+    if groups:
+        same = groups - len(different)
+        text = (
+            f"{same} of {groups} groups of runs that may differ in the order and spread of work "
+            "only gave equal pictures, bit for bit"
+        )
+        out.add(paragraph(text + ("." if same == groups else "; these did not:")))
+        out.add("".join(paragraph(line, "worse") for line in different[:10]))
+    for shot in found:
+        out.add(report_pictures.viewer(shot))
+        out.draw(report_pictures.differences(shot))
+
+
+def _about(out: Writer, results: Results) -> None:
+    out.begin("How to repeat it")
+    commands = [
+        sitting["command"]
+        for sitting in results.machine.get("sittings", ())
+        if isinstance(sitting, dict) and sitting.get("command")
+    ]
+    commands.append(f"wavecomb bench report {shlex.quote(results.folder.name)}")
+    out.add(f"<pre><code>{escape(chr(10).join(dict.fromkeys(commands)))}</code></pre>")
+    if results.suite_text:
+        suite_text = f"<pre><code>{escape(results.suite_text)}</code></pre>"
+        out.add(folded("The suite: suite.toml", suite_text))
+    settings = [
+        [str(row.config), f"{row.width:.0f} x {row.height:.0f}", *_numbers(row), str(row.runs)]
+        for row in _configurations(results)
+    ]
+    head = ["configuration", "pixels", "spp", "threads", "lanes", "wave", "max depth", "runs"]
+    text = table("Settings as used", head, settings)
+    out.add(folded(f"Settings of all {len(settings)} configurations", text))
+    if len(results.failed):
+        rows = [[str(row.run_id), str(row.error)] for row in results.failed.itertuples()]
+        out.add(folded("Runs that failed", table("Runs that failed", ["run", "why"], rows)))
+    out.begin("Machine")
+    out.add(nested({k: v for k, v in results.machine.items() if k not in ("schema", "noise")}))
+    out.begin("Words")
+    out.add(nested(WORDS))
+
+
+def _configurations(results: Results) -> list[Any]:
+    numbers = ("width", "height", "spp", "threads", "lanes", "wave_size", "max_depth")
+    first = results.runs.groupby("config", sort=False)[list(numbers)].first()
+    sizes = results.runs.groupby("config").size()
+    return list(first.assign(runs=sizes).reset_index().itertuples())
+
+
+def _numbers(row: Any) -> list[str]:
+    values = (row.spp, row.threads, row.lanes, row.wave_size, row.max_depth)
+    return ["–" if value != value else f"{value:.0f}" for value in values]
+
+
+WORDS = {
+    "record": "A hit that waits for shading.",
+    "round": "One repetition of all configurations, in random order.",
+    "order": "Keys, sort and moving of records: what an order of shading costs.",
+    "placebo": "random-runs: the runs of a material in an order that means nothing.",
+    "oracle": "cost-benefit with true costs, recorded before: what a cost model could win.",
+    "run length": "Mean number of consecutive records of one material.",
+    "relMSE": "Mean of (x − r)² / (r² + 0.01) to the golden picture r.",
+    "efficiency": "1 / (relMSE × render time).",
+    "regret": "Time above that of the best fixed policy, as a share of it.",
+    "interval": "95 %; rounds are resampled whole. docs/bench-report.md has the formulas.",
+}

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures of the report: what is equal bit for bit, viewers, difference maps."""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.bench.analysis_data import SETTINGS, in_order
+from wavecomb.bench.figures_style import Drawn
+from wavecomb.bench.figures_verdicts import difference_figure
+from wavecomb.bench.report_html import escape, key_of
+from wavecomb.errors import WavecombError
+from wavecomb.image import write_png
+
+if TYPE_CHECKING:
+    from wavecomb.bench.analysis_data import Results
+
+MOST_STAGES = 6
+MOST_PICTURES = 8
+LARGEST = 720
+"""Side of a picture in the page, in pixels; a larger one is made smaller by averaging."""
+
+_CHANGES_NOTHING = ("policy", "threads", "lanes", "wave_size", "ray_order", "shadow_order")
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A picture that runs gave.
+
+    Attributes:
+        name: Policies that gave it, and what else tells it from the others.
+        pixels: Linear, (height, width, 3).
+    """
+
+    name: str
+    pixels: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """All pictures of one stage and frame, with the golden one."""
+
+    stage: str
+    golden: NDArray[Any] | None
+    kept: Sequence[Kept]
+
+
+def equality(results: Results) -> tuple[int, list[str]]:
+    """Runs that must have equal pictures: how many groups there are, and those that differ.
+
+    A group agrees in all settings but those that only order or spread the work, and in the seed.
+    """
+    runs = results.runs[results.runs["renderer"] == "wavecomb"]
+    runs = runs[runs["picture_sha256"] != ""]
+    keys = [name for name in SETTINGS if name not in (*_CHANGES_NOTHING, "experiment")]
+    keys = [*(key for key in keys if not key.startswith("factor")), "seed"]
+    different = []
+    groups = 0
+    for values, group in runs.groupby(keys, dropna=False, sort=False):
+        if len(group) < 2:
+            continue
+        groups += 1
+        if group["picture_sha256"].nunique() > 1:
+            place = dict(zip(keys, values, strict=True))
+            different.append(
+                f"{place['stage']}, roulette {place['roulette']}, {place['spp']:.0f} spp, seed "
+                f"{place['seed']:.0f}: {group['picture_sha256'].nunique()} different pictures"
+            )
+    return groups, different
+
+
+def shots(results: Results) -> list[Shot]:
+    """The kept pictures by stage and golden picture; equal ones together.
+
+    Raises:
+        WavecombError: A picture file is damaged.
+    """
+    found: dict[str, list[tuple[dict[str, Any], Path]]] = {}
+    for record in results.records():
+        image, golden = (record.get("job", {}).get(key) for key in ("image", "golden"))
+        row = record["row"]
+        if image and row.get("status") == "ok" and (results.folder / image).is_file():
+            frame = golden or f"{row['stage']} {row['width']}x{row['height']}"
+            found.setdefault(frame, []).append((row, results.folder / image))
+    made = []
+    for frame, pictures in list(found.items())[:MOST_STAGES]:
+        golden_file = results.folder / frame
+        golden = _read(golden_file) if golden_file.is_file() else None
+        first_seed = min(row["seed"] for row, _ in pictures)
+        same_seed = [(row, path) for row, path in pictures if row["seed"] == first_seed]
+        made.append(Shot(same_seed[0][0]["stage"], golden, _distinct(same_seed)))
+    return made
+
+
+def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[Kept]:
+    groups: dict[str, list[dict[str, Any]]] = {}
+    pixels: dict[str, NDArray[Any]] = {}
+    for row, path in pictures:
+        read = _read(path)
+        same = next(
+            (key for key, other in pixels.items() if np.array_equal(read, other, equal_nan=True)),
+            None,
+        )
+        if same is None:
+            same = row["run_id"]
+            pixels[same] = read
+        groups.setdefault(same, []).append(row)
+    kept = [Kept(_name(rows, pictures), pixels[key]) for key, rows in groups.items()]
+    return kept[:MOST_PICTURES]
+
+
+def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, Any], Path]]) -> str:
+    """Who gave a picture: renderers, roulettes and sizes where they differ, and policies."""
+    parts = []
+    for key in ("renderer", "roulette", "spp"):
+        if len({row.get(key) for row, _ in everything}) > 1:
+            parts.append(" / ".join(dict.fromkeys(str(row.get(key) or "") for row in rows)))
+    policies = in_order("policy", list({row["policy"] for row in rows if row.get("policy")}))
+    parts.append(", ".join(policies))
+    return ": ".join(part for part in parts if part)
+
+
+def viewer(shot: Shot) -> str:
+    """Pictures that can be flipped and subtracted."""
+    entries = [(kept.name, kept.pixels) for kept in shot.kept]
+    if shot.golden is not None:
+        entries.append(("golden (converged)", shot.golden))
+    if len(entries) < 2:
+        return ""
+    key = f"viewer-{key_of(shot.stage)}"
+    options = "".join(f"<option>{escape(name)}</option>" for name, _ in entries)
+    last = options[::-1].replace("<option>"[::-1], "<option selected>"[::-1], 1)[::-1]
+    sources = "".join(
+        f'<figure><img src="{_data_uri(pixels)}" alt="{escape(f"{shot.stage}: {name}")}">'
+        f"<figcaption>{escape(name)}</figcaption></figure>"
+        for name, pixels in entries
+    )
+    modes = "".join(
+        f'<label><input type="radio" name="{key}-mode" value="{value}"{checked}> {text}</label>'
+        for value, text, checked in (
+            ("a", "A", " checked"),
+            ("b", "B", ""),
+            ("difference", "difference", ""),
+        )
+    )
+    return (
+        f'<div class="viewer" role="group" aria-label="{escape(f"Pictures of {shot.stage}")}">'
+        f'<p class="title">{escape(shot.stage)}</p><div class="controls" hidden>'
+        f"<label>A <select>{options}</select></label><label>B <select>{last}</select></label>"
+        f"<fieldset><legend>Show</legend>{modes}</fieldset>"
+        '<label>Gain <input type="range" min="0" max="8" step="1" value="2"> '
+        "<output>×4</output></label></div>"
+        '<canvas hidden tabindex="0" role="img" width="8" height="8"></canvas>'
+        '<p class="shown" aria-live="polite"></p>'
+        '<p class="note" hidden>Click the picture, or press Space, to flip between A and B; '
+        "a, b and d choose. Differences are of the 8-bit picture as shown.</p>"
+        f'<div class="sources">{sources}</div></div>'
+    )
+
+
+def differences(shot: Shot) -> Drawn | None:
+    """Maps of the differences to the golden picture."""
+    if shot.golden is None or not shot.kept:
+        return None
+    pictures = [(kept.name, kept.pixels) for kept in shot.kept]
+    pictures = [
+        (name if len(name) < 34 else name[:31] + "…", p)
+        for name, p in pictures
+        if p.shape == shot.golden.shape
+    ]
+    if not pictures:
+        return None
+    name, title = f"difference-{key_of(shot.stage)}", f"{shot.stage}: difference to golden"
+    return difference_figure(pictures, shot.golden, name, title)
+
+
+def _read(path: Path) -> NDArray[Any]:
+    """Pixels of a .npy file or a picture, (height, width, 3)."""
+    try:
+        if path.suffix == ".npy":
+            pixels = np.load(path, allow_pickle=False)
+        else:
+            from wavecomb.image import read_image
+
+            pixels = read_image(path)
+    except (OSError, ValueError) as error:
+        raise WavecombError(f"{path}: cannot be read as a picture: {error}") from error
+    if pixels.ndim != 3 or pixels.shape[2] < 3:
+        raise WavecombError(f"{path}: is no colour picture: its shape is {pixels.shape}")
+    return np.asarray(pixels[:, :, :3], np.float32)
+
+
+def _data_uri(pixels: NDArray[Any]) -> str:
+    step = -(-max(pixels.shape[:2]) // LARGEST)
+    height, width = (side // step * step for side in pixels.shape[:2])
+    blocks = pixels[:height, :width].reshape(height // step, step, width // step, step, 3)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        write_png(path, blocks.mean(axis=(1, 3)))
+        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")

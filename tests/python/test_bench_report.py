@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report and its figures, from made-up results of every kind."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import html5lib
+import numpy as np
+import pytest
+from bench_results import everything, runs_of, write_folder
+
+from wavecomb.bench.report import build
+from wavecomb.bench.report_html import nested, number, table
+from wavecomb.image import read_image
+
+HTML = "{http://www.w3.org/1999/xhtml}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with its report."""
+    path = write_folder(tmp_path_factory.mktemp("bench") / "made up", everything(), pictures=True)
+    assert build(path) == path / "report.html"
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def tree(page: str) -> ElementTree.Element:
+    """The page, parsed strictly: any error of its HTML fails."""
+    return html5lib.HTMLParser(strict=True).parse(page)
+
+
+def texts(tree: ElementTree.Element, tag: str) -> list[str]:
+    return ["".join(element.itertext()) for element in tree.iter(HTML + tag)]
+
+
+def test_page_is_sound_and_can_be_read_by_all(tree: ElementTree.Element) -> None:
+    ids = [element.get("id") for element in tree.iter() if element.get("id")]
+    assert len(ids) == len(set(ids))
+    for element in tree.iter():
+        for name in ("aria-labelledby", "href"):
+            value = element.get(name) or ""
+            if name == "href" and not value.startswith("#"):
+                assert value == ""
+                continue
+            assert all(key.lstrip("#") in ids for key in value.split()), value
+    assert all(image.get("alt") for image in tree.iter(HTML + "img"))
+    assert all(
+        cell.get("scope") for head in tree.iter(HTML + "tr") for cell in head.iter(HTML + "th")
+    )
+    assert len(list(tree.iter(HTML + "caption"))) == len(list(tree.iter(HTML + "table")))
+    root = tree if tree.tag == HTML + "html" else tree.find(HTML + "html")
+    assert root is not None
+    assert root.get("lang") == "en"
+    for control in (*tree.iter(HTML + "select"), *tree.iter(HTML + "input")):
+        assert any(control in list(label) for label in tree.iter(HTML + "label"))
+
+
+def test_page_needs_nothing_else(page: str) -> None:
+    without_names = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
+    assert not re.search(r"""(src|href|xlink:href)=["'](?!#|data:)""", without_names)
+    assert "@import" not in page
+    assert "url(" not in re.sub(r"url\(#", "", page)
+    assert "currentColor" in page
+
+
+def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
+    headings = texts(tree, "h2")
+    for wanted in (
+        *("Read the figures with care", "What the figures say", "Experiment policies"),
+        *("Roulette apart from order", "Effects of the factors", "Predicted cost", "Pictures"),
+        *("How to repeat it", "Machine"),
+    ):
+        assert wanted in headings
+    captions = texts(tree, "caption")
+    assert "Renderers, ratio of means to Wavecomb" in captions
+    assert "Variance and efficiency" in captions
+    assert "equal runs vary by 12% (made up)" in page
+    assert "wavecomb bench run made-up.toml -o results" in page
+    assert "Made-up CPU &lt;4 GHz&gt; &amp; friends" in page
+    findings = " ".join(texts(tree, "li"))
+    assert "policies, 16 lanes: 6 of 6 orders are quicker than arrival order" in findings
+    assert "policies, 1 lane: no order is shown to be quicker" in findings
+    assert "The oracle is not shown to beat the placebo" in findings
+    assert "adaptive takes" in findings
+
+
+def test_viewers(tree: ElementTree.Element) -> None:
+    viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]
+    assert len(viewers) == 2
+    for viewer in viewers:
+        pictures = list(viewer.iter(HTML + "img"))
+        assert len(pictures) == 3  # cost-benefit, all others together, golden
+        for select in viewer.iter(HTML + "select"):
+            assert len(list(select)) == len(pictures)
+    named = "".join(viewers[0].itertext())
+    assert "none, program, material" in named
+
+
+def test_figures_open_and_are_not_blank(folder: Path) -> None:
+    names = {path.stem for path in (folder / "figures").iterdir()}
+    for part in (
+        *("policies-policies", "policies-pipeline", "policies-coherence", "policies-order"),
+        *("policies-regret", "policies-mixed-lanes", "scaling-threads-mixed-curve"),
+        *("scaling-wave-size-mixed-curve", "error-error", "effects-render-time", "costs"),
+        *("difference-mixed", "peers-renderers-efficiency"),
+    ):
+        assert part in names
+    for name in names:
+        pixels = read_image(folder / "figures" / f"{name}.png")[:, :, :3]
+        assert pixels.shape[1] > 800
+        ink = (np.abs(pixels - 1.0) > 0.1).any(axis=2)
+        assert 0.003 < ink.mean() < 0.95, name
+        # Ink in three quarters; the last panel of a row of two may be missing.
+        half_y, half_x = ink.shape[0] // 2, ink.shape[1] // 2
+        for quarter in (ink[:half_y, :half_x], ink[:half_y, half_x:], ink[half_y:, :half_x]):
+            assert quarter.any(), name
+        drawing = ElementTree.parse(folder / "figures" / f"{name}.svg").getroot()
+        assert drawing.tag.endswith("svg")
+        shapes = [e for e in drawing.iter() if e.tag.endswith(("path", "text", "image", "use"))]
+        assert len(shapes) > 20
+
+
+def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
+    rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=2)
+    rows[3]["picture_sha256"] = "1" * 64
+    text = build(write_folder(tmp_path / "r", rows)).read_text(encoding="utf-8")
+    assert "Pictures that must be equal differ, in 1 groups" in text
+    assert "mixed, roulette throughput, 16 spp, seed 1: 2 different pictures" in text
+
+
+def test_one_run_makes_a_report(tmp_path: Path) -> None:
+    rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
+    rows.append({**rows[0], "run_id": "x", "status": "failed", "error": "no <memory> left"})
+    text = build(write_folder(tmp_path / "r", rows)).read_text(encoding="utf-8")
+    html5lib.HTMLParser(strict=True).parse(text)
+    assert "Some configurations ran only once" in text
+    assert "no &lt;memory&gt; left" in text
+
+
+def test_parts() -> None:
+    assert [number(v) for v in (0.0, 123456.0, 0.5, 1e-9)] == ["0", "123,000", "0.500", "1.00e-09"]
+    html = table("Caption", ["a", "b"], [["x", "1"], ["x", "2"], ["y & z", "3"]])
+    assert 'rowspan="2" scope="rowgroup">x</th>' in html
+    assert "y &amp; z" in html
+    assert nested({"a": {"b": [1, 2]}, "empty": {}, "none": None}).count("<dt>") == 2
+
+
+def test_nothing_heavy_is_imported_for_a_render() -> None:
+    code = (
+        "import sys, wavecomb.cli, wavecomb.compare, wavecomb.bench; "
+        "print([m for m in ('pandas', 'matplotlib', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
