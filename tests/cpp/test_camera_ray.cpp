@@ -47,7 +47,7 @@ TEST(CameraRay, PinholeAtCornersAndCentre) {
     EXPECT_EQ(ray.o.x, 0);
     EXPECT_EQ(ray.o.y, 0);
     EXPECT_EQ(ray.o.z, 0);
-    EXPECT_NEAR(ray.spread, 0.25, 1e-6);
+    EXPECT_NEAR(ray.spread, 0.25 * kConeShare, 1e-6);
     EXPECT_GT(ray.tfar, 1e29f);
   }
 }
