@@ -79,7 +79,7 @@ def test_suites_are_as_large_as_they_should_be() -> None:
         configs = configurations(load_suite(find_suite(name)), LIMITS)
         return sum(config.experiment == experiment for config in configs)
 
-    assert count("ablation", "factorial") == 2 * (2 * 3 * 8 * 3 * 4)
+    assert count("ablation", "factorial") == 2 * (2 * 3 * 8 * 3 * 5)
     assert count("paper", "orders") == 2 * 2 * 4 * 4
     assert len(load_suite(find_suite("scenes")).stages) >= 12
 
