@@ -253,7 +253,9 @@ TEST(Policies, BatchesCoverTheQueueOnce) {
         std::vector<uint32_t> times(n);
         size_t begin = 0, batches = 0;
         while (begin < queue.size) {
-          const size_t end = batch_end(queue, begin);
+          const size_t end = batch_end<float>(queue, begin);
+          ASSERT_EQ(batch_end<FloatP<4>>(queue, begin), end);
+          ASSERT_EQ(batch_end<FloatP<16>>(queue, begin), end);
           ASSERT_GT(end, begin);
           ASSERT_LE(end, n);
           ASSERT_LE(end - begin, kMaxBatch);

@@ -13,36 +13,37 @@ namespace wavecomb {
 /// reads, and writes anew for the next ray; its shadow ray is another row. Whatever order hits are
 /// shaded in, each touches its own lines and no other's (docs/decisions/path-rows.md).
 ///
-/// Contract: owned by one wave. AOV columns are there only where asked for.
+/// Contract: owned by one wave. AOVs are there only where asked for.
 class PathPool {
  public:
   /// Words of a row: 15 for a path, 10 for its shadow ray, 3 for its radiance.
   static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
+  /// And 6 for what was hit first: albedo, normal.
+  static constexpr uint32_t kFirstWords = 8;
 
   PathPool() = default;
   PathPool(size_t capacity, bool with_aovs)
       : rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)),
-        aovs_(with_aovs ? 7 : 0, capacity),
+        first_rows_(1, with_aovs ? capacity * kFirstWords : 0),
+        depths_(1, with_aovs ? capacity : 0),
         has_aovs(with_aovs) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kPathWords;
     radiance = shadows + capacity * kShadowWords;
     if (!with_aovs) return;
-    size_t c = 0;
-    for (float** f : {&albedo_r, &albedo_g, &albedo_b, &normal_x, &normal_y, &normal_z, &depth})
-      *f = aovs_.floats(c++);
+    first = first_rows_.floats(0);
+    depth = depths_.floats(0);
   }
 
   float* paths = nullptr;     ///< rows of load_path
   float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b
   float* radiance = nullptr;  ///< r, g, b so far
-  float *albedo_r = nullptr, *albedo_g = nullptr, *albedo_b = nullptr;
-  float *normal_x = nullptr, *normal_y = nullptr, *normal_z = nullptr;
-  float* depth = nullptr;  ///< along the camera's axis; infinite where nothing was hit
-  size_t bytes() const { return rows_.bytes() + aovs_.bytes(); }
+  float* first = nullptr;     ///< albedo, normal
+  float* depth = nullptr;     ///< along the camera's axis; infinite where nothing was hit
+  size_t bytes() const { return rows_.bytes() + first_rows_.bytes() + depths_.bytes(); }
 
  private:
-  SoaBlock rows_, aovs_;
+  SoaBlock rows_, first_rows_, depths_;
 
  public:
   bool has_aovs = false;

@@ -110,7 +110,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
         hits.fill < 1.f
             ? std::min(queue.size,
                        static_cast<size_t>(hits.fill * static_cast<float>(W * batch) + 0.5f))
-            : batch_end(queue, begin);
+            : batch_end<F>(queue, begin);
     visit_program<F>(
         static_cast<ProgramId>(context.traits[hits.material].program),
         [&]<typename Bsdf>() { shade_batch<Bsdf, F>(wave, context, settings, 1, begin, end); });

@@ -34,12 +34,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     store_path<F>(pool, slot,
                   {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), F(0.f), ray.spread, key},
                   active);
-    if (pool.has_aovs) {
-      for (float* column : {pool.albedo_r, pool.albedo_g, pool.albedo_b, pool.normal_x,
-                            pool.normal_y, pool.normal_z})
-        store(column + i, F(0.f));
-      store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
-    }
+    if (pool.has_aovs) store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
     store(rays.ox + i, ray.o.x);
     store(rays.oy + i, ray.o.y);
     store(rays.oz + i, ray.o.z);
@@ -50,6 +45,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     store(tfar + i, ray.tfar);
   }
   std::memset(pool.radiance, 0, size_t{n} * PathPool::kRadianceWords * 4);
+  if (pool.has_aovs) std::memset(pool.first, 0, size_t{n} * PathPool::kFirstWords * 4);
   rays.size = n;
   return camera.has_far ? tfar : nullptr;
 }

@@ -8,37 +8,42 @@
 
 namespace wavecomb {
 
+namespace detail {
+
+/// Adds the rows of slots [first, end) to `sum`, word by word, in the order of the slots.
+template <size_t N>
+inline void add_rows(const float* rows, size_t first, size_t end, double (&sum)[N]) {
+  for (size_t s = first; s < end; ++s)
+    for (size_t c = 0; c < N; ++c) sum[c] += double{rows[s * N + c]};
+}
+
+}  // namespace detail
+
 inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask& task) {
   const PathPool& pool = wave.pool;
   Film& film = *context.film;
   size_t slot = 0;
   for (uint32_t i = 0; i < task.pixel_count; ++i) {
     const uint32_t x = task.pixels[i] & 0xffffu, y = task.pixels[i] >> 16;
-    Film::Pixel sum = film.pixel(x, y);
     const size_t end = slot + task.samples;
-    for (size_t s = slot; s < end; ++s) {
-      const float* c = pool.radiance + s * PathPool::kRadianceWords;
-      sum.r += c[0];
-      sum.g += c[1];
-      sum.b += c[2];
-    }
-    sum.samples += task.samples;
-    film.pixel(x, y) = sum;
+    Film::Pixel& pixel = film.pixel(x, y);
+    double sum[PathPool::kRadianceWords] = {pixel.r, pixel.g, pixel.b};
+    detail::add_rows(pool.radiance, slot, end, sum);
+    pixel = {sum[0], sum[1], sum[2], pixel.samples + task.samples};
     if (pool.has_aovs) {
-      Film::AovPixel aov = film.aov(x, y);
-      for (size_t s = slot; s < end; ++s) {
-        aov.albedo[0] += pool.albedo_r[s];
-        aov.albedo[1] += pool.albedo_g[s];
-        aov.albedo[2] += pool.albedo_b[s];
-        aov.normal[0] += pool.normal_x[s];
-        aov.normal[1] += pool.normal_y[s];
-        aov.normal[2] += pool.normal_z[s];
+      Film::AovPixel& aov = film.aov(x, y);
+      double hit[PathPool::kFirstWords] = {aov.albedo[0], aov.albedo[1], aov.albedo[2],
+                                           aov.normal[0], aov.normal[1], aov.normal[2]};
+      detail::add_rows(pool.first, slot, end, hit);
+      for (size_t c = 0; c < 3; ++c) {
+        aov.albedo[c] = hit[c];
+        aov.normal[c] = hit[3 + c];
+      }
+      for (size_t s = slot; s < end; ++s)
         if (std::isfinite(pool.depth[s])) {
-          aov.depth += pool.depth[s];
+          aov.depth += double{pool.depth[s]};
           ++aov.depth_samples;
         }
-      }
-      film.aov(x, y) = aov;
     }
     slot = end;
   }

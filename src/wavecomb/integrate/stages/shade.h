@@ -45,12 +45,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
     if (wants_aovs) {
-      scatter<F>(pool.albedo_r, v.albedo.x, slot, active);
-      scatter<F>(pool.albedo_g, v.albedo.y, slot, active);
-      scatter<F>(pool.albedo_b, v.albedo.z, slot, active);
-      scatter<F>(pool.normal_x, v.normal.x, slot, active);
-      scatter<F>(pool.normal_y, v.normal.y, slot, active);
-      scatter<F>(pool.normal_z, v.normal.z, slot, active);
+      const F none(0.f);
+      store_rows<PathPool::kFirstWords, F>(
+          pool.first, slot * PathPool::kFirstWords,
+          {v.albedo.x, v.albedo.y, v.albedo.z, v.normal.x, v.normal.y, v.normal.z, none, none},
+          active);
     }
     const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
                       select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
@@ -80,17 +79,20 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
 inline constexpr size_t kMaxBatch = 256;
 
 /// End of the batch that starts at `begin`: a run of one program.
-inline size_t batch_end(const ShadingQueue& queue, size_t begin) {
+template <typename F>
+size_t batch_end(const ShadingQueue& queue, size_t begin) {
+  using U = UInt<F>;
   const uint32_t* program = queue.uints(ShadingQueue::kProgram);
-  const uint32_t* order = queue.ordered ? queue.sorted_indices : nullptr;
   const size_t limit = std::min(queue.size, begin + kMaxBatch);
-  const uint32_t first = order ? program[order[begin]] : program[begin];
-  size_t end = begin + 1;
-  if (order)
-    while (end < limit && program[order[end]] == first) ++end;
-  else
-    while (end < limit && program[end] == first) ++end;
-  return end;
+  const U first(program[queue.ordered ? queue.sorted_indices[begin] : begin]);
+  for (size_t i = begin; i < limit; i += kWidth<F>) {
+    const Mask<U> active(first_lanes<F>(limit - i));
+    const U here = queue.ordered ? gather<U>(program, load<U>(queue.sorted_indices + i), active)
+                                 : load<U>(program + i);
+    const uint32_t other = lane_bits<F>(Mask<F>(here != first) & Mask<F>(active));
+    if (other != 0) return i + static_cast<size_t>(std::countr_zero(other));
+  }
+  return limit;
 }
 
 /// Charges a batch's time to the materials of its records.
@@ -112,7 +114,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   const ShadingQueue& queue = wave.shading;
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
-    const size_t end = batch_end(queue, begin);
+    const size_t end = batch_end<F>(queue, begin);
     const uint32_t at = queue.ordered ? queue.sorted_indices[begin] : static_cast<uint32_t>(begin);
     const auto program = static_cast<ProgramId>(queue.uints(ShadingQueue::kProgram)[at]);
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
