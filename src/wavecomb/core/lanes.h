@@ -58,6 +58,9 @@ struct Width<drjit::Packet<T, W>> {
   static constexpr size_t value = W;
   using U64 = drjit::Packet<uint64_t, W>;
 };
+// The halves of a packet that is wider than a register.
+template <typename T, size_t W>
+struct Width<drjit::Array<T, W>> : Width<drjit::Packet<T, W>> {};
 }  // namespace detail
 
 template <typename T>
