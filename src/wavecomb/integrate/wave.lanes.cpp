@@ -24,9 +24,10 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   const float* tfar = generate<F>(wave, context, task);
   wave.counts.samples += task.path_count();
   for (uint32_t depth = 0; wave.rays.size > 0; ++depth) {
-    // Camera rays are coherent as they come.
+    // Camera rays of a pinhole are coherent as they come, and from one point packets give the same
+    // hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
+    const bool coherent = depth == 0 && context.camera->lens_radius == 0;
     RayOrderChoice ray_order;
-    ray_order.coherent = depth == 0;
     clock.enter(Phase::kTrace);
     if (depth > 0) {
       ray_order = order_rays<F>(wave, context, depth, s.ray_order, wave.ray_chooser,
@@ -35,7 +36,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
       fetch_rays<F>(wave);
     }
     Clock::time_point start = Clock::now();
-    trace(wave, context, depth, depth == 0 ? tfar : nullptr, ray_order.coherent);
+    trace(wave, context, depth, depth == 0 ? tfar : nullptr, coherent);
     learn_order(wave.ray_chooser, depth, ray_order, start);
 
     clock.enter(Phase::kShade);
@@ -59,7 +60,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
     clock.enter(Phase::kShadow);
     fetch_shadows<F>(wave);
     start = Clock::now();
-    shadow<F>(wave, context, depth, shadow_order.coherent);
+    shadow<F>(wave, context, depth);
     learn_order(wave.shadow_chooser, depth, shadow_order, start);
   }
   clock.enter(Phase::kResolve);

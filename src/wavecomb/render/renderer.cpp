@@ -33,16 +33,10 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Samples of a pixel that a pass adds.
+/// Paths a wave holds unless told otherwise (docs/decisions/wave-size.md), and samples of a pixel
+/// that a pass adds.
+constexpr uint32_t kDefaultWaveSize = 4096;
 constexpr uint32_t kPassSamples = 16;
-
-/// Paths a wave holds unless told otherwise (docs/decisions/wave-size.md). A larger wave has more
-/// rays of each direction to trace together, which is what counts while the scene stays in the
-/// cache beside it; otherwise they share the cache.
-uint32_t default_wave_size(uint64_t scene_bytes) {
-  constexpr uint64_t kSmallScene = 1 << 20;
-  return scene_bytes < kSmallScene ? 8192 : 4096;
-}
 
 /// The kernels of one width.
 struct LaneKernels {
@@ -218,10 +212,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   // A wave is no larger than what keeps every worker busy a few times over.
   const uint64_t total = uint64_t{settings.spp} * pixels.size();
   const uint64_t share = std::max<uint64_t>(64, total / (uint64_t{threads} * 4));
-  const SceneBytes scene_bytes = scene.bytes();
-  const uint64_t read = impl_->accel->bytes() + scene_bytes.meshes + scene_bytes.textures;
-  const uint32_t wave_size = static_cast<uint32_t>(std::min<uint64_t>(
-      settings.wave_size != 0 ? settings.wave_size : default_wave_size(read), share));
+  const uint32_t wave_size = static_cast<uint32_t>(
+      std::min<uint64_t>(settings.wave_size != 0 ? settings.wave_size : kDefaultWaveSize, share));
   // At least enough samples a pass for a wave to be full when the picture is smaller than a wave.
   const uint32_t fill = static_cast<uint32_t>((wave_size + pixels.size() - 1) / pixels.size());
   const uint32_t pass_samples = std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});

@@ -56,7 +56,6 @@ void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid
 /// What was done, for the chooser to learn from.
 struct RayOrderChoice {
   bool chosen = false;
-  bool coherent = false;  ///< packets are to be traversed together
   size_t arm = 0;
   Work work;
   double prepare_ns = 0;
@@ -82,7 +81,6 @@ RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth
     order = static_cast<RayOrder>(choice.arm);
   }
   if (order == RayOrder::kDirection) {
-    choice.coherent = true;
     sort_by_direction(queue.direction, queue.slot, queue.size, queue.ordered_slot);
     std::swap(queue.slot, queue.ordered_slot);
   } else if (order != RayOrder::kSlot) {

@@ -55,12 +55,12 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
 /// Adds what the unblocked shadow rays bring to their slots. A slot has at most one, so the order
 /// of the queue cannot matter.
 template <typename F>
-void shadow(Wave& wave, const WaveContext& context, uint32_t depth, bool coherent) {
+void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;
   ShadowQueue& q = wave.shadows;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.slot, q.size};
-  if (context.recorder) context.recorder->occluded(&wave, rays, depth, coherent);
-  context.accel->occluded(rays, q.occluded, context.traversal_width, coherent,
+  if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
+  context.accel->occluded(rays, q.occluded, context.traversal_width, false,
                           presence_keys(wave.pool, depth, true));
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
