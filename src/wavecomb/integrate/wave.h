@@ -72,7 +72,7 @@ struct Wave {
         columns(3, capacity),
         sorter(capacity),
         ray_sorter(context.orders_rays() ? capacity : 0),
-        ray_indices(context.orders_rays() ? capacity : 0),
+        ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
         scratch(context.traits.size()),
         costs(context.traits.size()),
         policy_chooser(context.policies.size()),
@@ -87,8 +87,8 @@ struct Wave {
   ShadowQueue shadows;
   SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
   RadixSorter sorter, ray_sorter;
-  std::vector<uint32_t> ray_indices;
-  std::vector<float> scratch;  ///< one a material, for policies
+  std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
+  std::vector<float> scratch;         ///< one a material, for policies
   CostTracker costs;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
