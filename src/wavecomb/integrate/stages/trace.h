@@ -6,32 +6,30 @@
 
 namespace wavecomb {
 
+/// Brings words 0, 1, 2 ... of the rows of the queue's slots side by side, a column each. Rows are
+/// of kPathWords, of which N are loaded.
+template <size_t N, typename F, typename Queue, size_t C>
+void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
+  static_assert(C <= N && PathPool::kPathWords == PathPool::kShadowWords);
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i);
+    const auto r = load_rows<N, F>(rows, load<UInt<F>>(q.slot + i) * PathPool::kPathWords, active);
+    for (size_t c = 0; c < C; ++c) store(columns[c] + i, r[c]);
+  }
+}
+
 /// Brings the rays of the listed slots side by side.
 template <typename F>
 void fetch_rays(Wave& wave) {
-  using U = UInt<F>;
   RayQueue& q = wave.rays;
-  for (size_t i = 0; i < q.size; i += kWidth<F>) {
-    const Mask<F> active = first_lanes<F>(q.size - i);
-    const U slot = load<U>(q.slot + i);
-    const auto r = load_rows<8, F>(wave.pool.paths, slot * PathPool::kPathWords, active);
-    float* const columns[] = {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz};
-    for (size_t c = 0; c < 6; ++c) store(columns[c] + i, r[c]);
-  }
+  fetch<8, F>(q, wave.pool.paths, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz});
 }
 
 /// Brings the shadow rays of the listed slots side by side.
 template <typename F>
 void fetch_shadows(Wave& wave) {
-  using U = UInt<F>;
   ShadowQueue& q = wave.shadows;
-  for (size_t i = 0; i < q.size; i += kWidth<F>) {
-    const Mask<F> active = first_lanes<F>(q.size - i);
-    const U slot = load<U>(q.slot + i);
-    const auto r = load_rows<16, F>(wave.pool.shadows, slot * PathPool::kShadowWords, active);
-    float* const columns[] = {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b};
-    for (size_t c = 0; c < 10; ++c) store(columns[c] + i, r[c]);
-  }
+  fetch<16, F>(q, wave.pool.shadows, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
 }
 
 /// Keys of presence for rays of `depth`; shadow rays draw other numbers than the rays themselves.
