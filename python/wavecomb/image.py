@@ -9,7 +9,7 @@ Errors are OSError (the file) or ValueError (the arrays), one line that names th
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,6 +22,8 @@ Array = NDArray[np.float32]
 Transfer = Literal["clamp", "neutral"]
 
 _HALF_MAX = 65504.0
+_BAND = 64
+"""Rows that are made ready and written at once: four blocks of an EXR file."""
 _SUFFIXES = {"beauty": "RGB", "albedo": "RGB", "normal": "XYZ", "depth": "Z"}
 _ALWAYS_FLOAT = ("depth", "samples")
 _NAN_COLOUR = (255, 0, 255)
@@ -69,30 +71,30 @@ def write_exr(
         raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
     if not layers:
         raise ValueError(f"{name}: there is nothing to write")
-    planes: list[Array] = []
+    planes: list[tuple[NDArray[Any], bool]] = []
     names: list[str] = []
     formats: list[Any] = []
     for layer, pixels in layers.items():
-        plane = np.asarray(pixels, dtype=np.float32)
+        plane = np.asarray(pixels)
         plane = plane[:, :, None] if plane.ndim == 2 else plane
-        if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0].shape[:2]):
+        if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0][0].shape[:2]):
             raise ValueError(f"{name}: layer {layer!r} has the shape {np.shape(pixels)}")
         as_half = half and layer not in _ALWAYS_FLOAT
-        if as_half:
-            clamped = np.clip(plane, -_HALF_MAX, _HALF_MAX)
-            plane = np.where(np.isfinite(plane), clamped, plane)
-        planes.append(plane)
+        planes.append((plane, as_half))
         names += channel_names(layer, plane.shape[2])
         formats += [oiio.TypeDesc("half" if as_half else "float")] * plane.shape[2]
-    pixels = np.ascontiguousarray(np.concatenate(planes, axis=2))
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, "float")
+    height, width = planes[0][0].shape[:2]
+    spec = oiio.ImageSpec(width, height, len(names), "float")
     spec.channelnames = tuple(names)
     spec.channelformats = tuple(formats)
     spec.attribute("compression", "zip")
     for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
         spec.attribute(key, value)
-    _write(name, spec, pixels)
+    bands = (
+        np.concatenate([_float(plane[rows], as_half) for plane, as_half in planes], axis=2)
+        for rows in _bands(height)
+    )
+    _write(name, spec, bands)
 
 
 def write_png(
@@ -115,12 +117,33 @@ def write_png(
     name = os.fspath(path)
     if Path(name).suffix.lower() != ".png":
         raise ValueError(f"{name}: the name of a PNG file must end in .png")
-    pixels = display(rgb, exposure=exposure, tone_map=tone_map)
-    height, width, channels = pixels.shape
+    linear = _colours(rgb)
+    height, width, channels = linear.shape
     spec = oiio.ImageSpec(width, height, channels, "uint8")
     spec.attribute("oiio:ColorSpace", "sRGB")
     spec.attribute("Software", "Wavecomb")
-    _write(name, spec, pixels)
+    bands = (display(linear[rows], exposure=exposure, tone_map=tone_map) for rows in _bands(height))
+    _write(name, spec, bands)
+
+
+def _bands(height: int) -> Iterator[slice]:
+    """The rows of a picture, a band at a time, so that nothing of its size is held twice."""
+    return (slice(row, min(row + _BAND, height)) for row in range(0, height, _BAND))
+
+
+def _float(plane: NDArray[Any], as_half: bool) -> Array:
+    """Pixels as they are handed to the library, finite ones within the range of a half."""
+    values = np.asarray(plane, dtype=np.float32)
+    if not as_half:
+        return values
+    return np.where(np.isfinite(values), np.clip(values, -_HALF_MAX, _HALF_MAX), values)
+
+
+def _colours(rgb: NDArray[Any]) -> NDArray[Any]:
+    pixels = np.asarray(rgb)
+    if pixels.ndim != 3 or pixels.shape[2] != 3:
+        raise ValueError(f"a colour picture has the shape (height, width, 3), not {pixels.shape}")
+    return pixels
 
 
 def display(
@@ -130,9 +153,7 @@ def display(
 
     Pixels with a NaN become magenta, so that they are seen; infinities are clamped.
     """
-    linear = np.asarray(rgb, dtype=np.float32)
-    if linear.ndim != 3 or linear.shape[2] != 3:
-        raise ValueError(f"a colour picture has the shape (height, width, 3), not {linear.shape}")
+    linear = _colours(rgb).astype(np.float32, copy=False)
     broken = np.isnan(linear).any(axis=2)
     linear = np.nan_to_num(linear, nan=0.0, posinf=_HALF_MAX, neginf=0.0)
     linear = np.clip(linear * np.float32(2.0**exposure), 0.0, np.float32(1e30))
@@ -250,14 +271,18 @@ def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
     return image, names
 
 
-def _write(name: str, spec: Any, pixels: NDArray[Any]) -> None:
+def _write(name: str, spec: Any, bands: Iterator[NDArray[Any]]) -> None:
+    """Writes a picture, given a band of rows at a time from the top."""
     import OpenImageIO as oiio
 
     with replacing(name) as part:
         output = oiio.ImageOutput.create(str(part))
         if output is None:
             raise OSError(f"{name}: no writer for this kind: {_one_line(oiio.geterror(), name)}")
-        ok = output.open(str(part), spec) and output.write_image(pixels)
+        ok, row = output.open(str(part), spec), 0
+        while ok and (pixels := next(bands, None)) is not None:
+            ok = output.write_scanlines(row, row + len(pixels), 0, pixels)
+            row += len(pixels)
         problem = output.geterror()
         if not (output.close() and ok):
             problem = problem or output.geterror()

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 import time
 from types import FrameType, TracebackType
@@ -11,6 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress
+
+
+_FORCED = ("FORCE_COLOR", "TTY_COMPATIBLE")
 
 
 def count_text(value: float) -> str:
@@ -74,20 +80,37 @@ class Interrupt:
             self._before = None
 
 
+def progress_console(*, quiet: bool = False) -> Console | None:
+    """The terminal to show progress on: standard error, or None where nobody would see it.
+
+    Rich decides what a terminal is. It is not loaded where it could only say no: standard error is
+    none, and no variable that Rich goes by claims that it is.
+    """
+    if quiet or not (sys.stderr.isatty() or any(name in os.environ for name in _FORCED)):
+        return None
+    from rich.console import Console
+
+    console = Console(stderr=True, emoji=False)
+    return console if console.is_terminal else None
+
+
 class RenderProgress:
-    """A bar with percent, samples per second and time left, on a terminal; elsewhere silent.
+    """A bar with percent, samples per second and time left, on a console; silent without one.
 
     Use as a context manager, and call it as the core does: progress(samples_done, samples_total).
     Returns False, which stops the render, once ``interrupt.requested``.
     """
 
-    def __init__(self, console: Console, interrupt: Interrupt, *, visible: bool = True) -> None:
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
+    def __init__(self, console: Console | None, interrupt: Interrupt) -> None:
         self.done = 0
         self.total = 0
         self._interrupt = interrupt
         self._start = time.perf_counter()
+        self._bar: Progress | None = None
+        if console is None:
+            return
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
         self._bar = Progress(
             TextColumn("rendering"),
             BarColumn(),
@@ -97,12 +120,12 @@ class RenderProgress:
             console=console,
             auto_refresh=False,
             transient=True,
-            disable=not (visible and console.is_terminal),
         )
         self._task = self._bar.add_task("", total=None, rate="", left="")
 
     def __enter__(self) -> RenderProgress:
-        self._bar.start()
+        if self._bar is not None:
+            self._bar.start()
         self._start = time.perf_counter()
         return self
 
@@ -112,12 +135,13 @@ class RenderProgress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._bar.stop()
+        if self._bar is not None:
+            self._bar.stop()
 
     def __call__(self, done: int, total: int) -> bool:
         """Shows how far it is; False asks the core to stop."""
         self.done, self.total = done, total
-        if not self._bar.disable:
+        if self._bar is not None:
             seconds = time.perf_counter() - self._start
             rate = done / seconds if seconds > 0.0 else 0.0
             left = f"{time_text((total - done) / rate)} left" if rate > 0.0 else ""

@@ -58,7 +58,7 @@ def make_stats(
     report = loaded.report if loaded is not None else None
     return {
         "schema": SCHEMA,
-        "version": version(),
+        "version": _build_info()["version"],
         "stage": stage,
         "camera": loaded.camera_path if loaded is not None else None,
         "cancelled": bool(result.cancelled),
@@ -135,9 +135,8 @@ def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
 
 def picture_metadata(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
     """What of the statistics goes into the header of a picture."""
-    metadata: dict[str, str | int | float] = {
-        "Software": f"Wavecomb {stats.get('version', version())}"
-    }
+    number = stats["version"] if "version" in stats else version()
+    metadata: dict[str, str | int | float] = {"Software": f"Wavecomb {number}"}
     if stats.get("stage"):
         metadata["wavecomb:stage"] = str(stats["stage"])
     if stats.get("camera"):

@@ -131,6 +131,29 @@ TEST(Film, AovsAreMeans) {
   EXPECT_EQ(film.depth()[0], std::numeric_limits<float>::infinity());
 }
 
+TEST(Film, FinishGivesTheSameMeans) {
+  Film film(5, 3, true);
+  std::mt19937 rng(2);
+  std::uniform_real_distribution<double> uniform(-3, 3);
+  for (uint32_t y = 0; y < film.height(); ++y)
+    for (uint32_t x = 0; x < film.width(); ++x) {
+      const uint32_t n = x + 5 * y;  // the first has no samples
+      film.pixel(x, y) = {uniform(rng), uniform(rng), uniform(rng), n};
+      Film::AovPixel& aov = film.aov(x, y);
+      for (size_t c = 0; c < 3; ++c) aov.albedo[c] = uniform(rng), aov.normal[c] = uniform(rng);
+      aov.depth = uniform(rng);
+      aov.depth_samples = n / 2;
+    }
+  const Film before = film;
+  const Film::Layers layers = std::move(film).finish();
+  EXPECT_EQ(layers.beauty, before.beauty());
+  EXPECT_EQ(layers.albedo, before.albedo());
+  EXPECT_EQ(layers.normal, before.normal());
+  EXPECT_EQ(layers.depth, before.depth());
+  EXPECT_EQ(layers.samples, before.samples());
+  EXPECT_EQ(layers.samples[14], 14u);
+}
+
 TEST(Film, WithoutAovs) {
   const Film film(3, 2, false);
   EXPECT_FALSE(film.has_aovs());

@@ -157,6 +157,7 @@ def render_command(
     writes what is done (exit code 130). Files are written whole or not at all.
     """
     from wavecomb.api import make_settings
+    from wavecomb.progress import progress_console
 
     costs_file = costs if costs is not None and costs not in SOURCES else None
     _check_outputs(stage, output, png, stats_file, costs_file)
@@ -171,10 +172,10 @@ def render_command(
     profile = _read_costs(costs_file)
     settings = make_settings(size, spp, **chosen)
 
-    console = _console()
-    loaded = _load(source, stage, settings.threads, console, quiet)
+    console = progress_console(quiet=quiet)
+    loaded = _load(source, stage, settings.threads, console)
     warn(stage_warnings(loaded))
-    picture, done = _render(loaded, stage, settings, profile, console, quiet)
+    picture, done = _render(loaded, stage, settings, profile, console)
     if picture.cancelled and done <= 0.0:
         click.echo("stopped before the first sample; nothing was written", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
@@ -190,12 +191,6 @@ def render_command(
     if picture.cancelled:
         click.echo(f"stopped at {100.0 * done:.0f} %; {output} holds what was done", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    return Console(stderr=True, emoji=False)
 
 
 def _check_outputs(
@@ -237,8 +232,8 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     return load_costs(costs_file)
 
 
-def _load(source: StageOptions, stage: str, threads: int, console: Console, quiet: bool) -> Any:
-    if quiet or not console.is_terminal:
+def _load(source: StageOptions, stage: str, threads: int, console: Console | None) -> Any:
+    if console is None:
         return source.load(stage, threads)
     from rich.markup import escape
 
@@ -251,8 +246,7 @@ def _render(
     stage: str,
     settings: Any,
     profile: dict[str, dict[str, float]] | None,
-    console: Console,
-    quiet: bool,
+    console: Console | None,
 ) -> tuple[Any, float]:
     """The picture, and how much of it was done, from 0 to 1."""
     from wavecomb import _core
@@ -262,7 +256,7 @@ def _render(
 
     with (
         Interrupt() as interrupt,
-        RenderProgress(console, interrupt, visible=not quiet) as progress,
+        RenderProgress(console, interrupt) as progress,
     ):
         result = _core.render(loaded.scene, settings, progress, None, profile)
     stats = make_stats(result, stage=stage, loaded=loaded)

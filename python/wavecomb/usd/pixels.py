@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 from pxr import Ar
 
@@ -86,6 +85,9 @@ def read_image(path: str) -> Image:
 
 
 def _read_file(path: str) -> Image:
+    # Not before an image is read: the library takes 30 MB as soon as it is loaded.
+    import OpenImageIO as oiio
+
     # Colours as stored: not multiplied by alpha.
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)

@@ -10,6 +10,23 @@ double inverse(uint32_t n) {
   return n == 0 ? 0.0 : 1.0 / n;
 }
 
+/// Means of an AOV of three numbers, where pixel i has count(i) samples.
+template <typename Count>
+std::vector<float> aov_means(const std::vector<Film::AovPixel>& aovs,
+                             double (Film::AovPixel::*sum)[3], const Count& count) {
+  std::vector<float> out(3 * aovs.size());
+  for (size_t i = 0; i < aovs.size(); ++i)
+    for (size_t c = 0; c < 3; ++c)
+      out[3 * i + c] = static_cast<float>((aovs[i].*sum)[c] * inverse(count(i)));
+  return out;
+}
+
+/// Frees what a vector holds.
+template <typename T>
+void release(std::vector<T>& values) {
+  std::vector<T>().swap(values);
+}
+
 }  // namespace
 
 Film::Film(uint32_t width, uint32_t height, bool with_aovs)
@@ -30,19 +47,11 @@ std::vector<float> Film::beauty() const {
 }
 
 std::vector<float> Film::albedo() const {
-  std::vector<float> out(3 * aovs_.size());
-  for (size_t i = 0; i < aovs_.size(); ++i)
-    for (size_t c = 0; c < 3; ++c)
-      out[3 * i + c] = static_cast<float>(aovs_[i].albedo[c] * inverse(pixels_[i].samples));
-  return out;
+  return aov_means(aovs_, &AovPixel::albedo, [&](size_t i) { return pixels_[i].samples; });
 }
 
 std::vector<float> Film::normal() const {
-  std::vector<float> out(3 * aovs_.size());
-  for (size_t i = 0; i < aovs_.size(); ++i)
-    for (size_t c = 0; c < 3; ++c)
-      out[3 * i + c] = static_cast<float>(aovs_[i].normal[c] * inverse(pixels_[i].samples));
-  return out;
+  return aov_means(aovs_, &AovPixel::normal, [&](size_t i) { return pixels_[i].samples; });
 }
 
 std::vector<float> Film::depth() const {
@@ -58,6 +67,19 @@ std::vector<uint32_t> Film::samples() const {
   std::vector<uint32_t> out(pixels_.size());
   for (size_t i = 0; i < pixels_.size(); ++i) out[i] = pixels_[i].samples;
   return out;
+}
+
+Film::Layers Film::finish() && {
+  Layers layers;
+  layers.beauty = beauty();
+  layers.samples = samples();
+  release(pixels_);
+  const auto count = [&](size_t i) { return layers.samples[i]; };
+  layers.albedo = aov_means(aovs_, &AovPixel::albedo, count);
+  layers.normal = aov_means(aovs_, &AovPixel::normal, count);
+  layers.depth = depth();
+  release(aovs_);
+  return layers;
 }
 
 }  // namespace wavecomb

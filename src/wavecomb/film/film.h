@@ -45,6 +45,15 @@ class Film {
   std::vector<float> depth() const;
   std::vector<uint32_t> samples() const;
 
+  /// All of these.
+  struct Layers {
+    std::vector<float> beauty, albedo, normal, depth;
+    std::vector<uint32_t> samples;
+  };
+  /// The means, and the end of the film: sums are freed as soon as they were used, for sums and
+  /// layers together are the most memory that a small scene needs.
+  Layers finish() &&;
+
  private:
   uint32_t width_, height_;
   std::vector<Pixel> pixels_;

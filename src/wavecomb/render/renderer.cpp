@@ -417,10 +417,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   s.scene_bytes = scene.bytes();
   s.accelerator_bytes = impl_->accel->bytes();
   s.film_bytes = film.bytes();
+  Film::Layers layers = std::move(film).finish();
   s.peak_rss_bytes = peak_rss_bytes();
 
-  return {settings.width, settings.height, film.beauty(), film.albedo(),
-          film.normal(),  film.depth(),    film.samples()};
+  return {settings.width,           settings.height,         std::move(layers.beauty),
+          std::move(layers.albedo), std::move(layers.normal), std::move(layers.depth),
+          std::move(layers.samples)};
 }
 
 std::vector<uint32_t> lane_widths() {
