@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,32 @@ def test_exr_float_is_exact(tmp_path: Path, layers: dict[str, np.ndarray]) -> No
     for name, pixels in layers.items():
         want = pixels.astype(np.float32)
         assert back[name].reshape(want.shape).tobytes() == want.tobytes()
+
+
+@pytest.mark.parametrize("ending", ["exr", "png"])
+def test_writing_holds_no_copy(tmp_path: Path, ending: str) -> None:
+    beauty = np.full((2048, 256, 3), 0.5, np.float32)
+    layers = {"beauty": beauty, "normal": beauty, "depth": beauty[:, :, 0]}
+    image.write_exr(tmp_path / "first.exr", layers)  # what modules take when they are loaded
+    tracemalloc.start()
+    try:
+        if ending == "exr":
+            image.write_exr(tmp_path / "a.exr", layers, half=True)
+        else:
+            image.write_png(tmp_path / "a.png", beauty, tone_map="neutral")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 0.5 * beauty.nbytes
+
+
+def test_bands_meet(tmp_path: Path) -> None:
+    rows = np.arange(150, dtype=np.float32)[:, None, None] * np.ones((1, 3, 3), np.float32)
+    image.write_exr(tmp_path / "a.exr", {"beauty": rows})
+    assert np.array_equal(image.read_image(tmp_path / "a.exr"), rows)
+    image.write_png(tmp_path / "a.png", rows / 150.0)
+    pixels = oiio.ImageBuf(str(tmp_path / "a.png")).get_pixels(oiio.UINT8)
+    assert np.array_equal(pixels, image.display(rows / 150.0))
 
 
 def test_exr_channel_names(tmp_path: Path, layers: dict[str, np.ndarray]) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -182,3 +183,33 @@ def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
     assert got["peak"] - got["imports"] <= 1.5 * sum(parts.values())
     assert got["shares"]["1"] > 0.95
     assert got["shares"]["2"] < 0.75
+
+
+def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
+    """OpenImageIO without an image to read, and Rich without a terminal, before the picture."""
+    path = tmp_path / "stage.usda"
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.Sphere.Define(stage, "/Ball")
+    stage.Save()
+    code = """
+import json, sys
+from wavecomb import _core, api
+from wavecomb.progress import Interrupt, RenderProgress, progress_console
+loaded = api.load(sys.argv[1])
+with Interrupt() as interrupt, RenderProgress(progress_console(), interrupt) as progress:
+    _core.render(loaded.scene, api.make_settings((8, 8), 1), progress, None, None)
+print(json.dumps([name for name in ("OpenImageIO", "rich") if name in sys.modules]))
+"""
+    unforced = {k: v for k, v in os.environ.items() if k not in ("FORCE_COLOR", "TTY_COMPATIBLE")}
+    command = [sys.executable, "-c", code, str(path)]
+    found = {}
+    for force in ("", "1"):
+        run = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**unforced, **({"FORCE_COLOR": force} if force else {})},
+        )
+        found[force] = json.loads(run.stdout)
+    assert found == {"": [], "1": ["rich"]}

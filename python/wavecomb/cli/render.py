@@ -17,6 +17,9 @@ from wavecomb.scheduling import POLICIES, RAY_ORDERS
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from wavecomb.api import Picture
+    from wavecomb.usd import LoadedStage, LoadReport
+
 _INTEGERS = click.IntRange(min=0)
 
 
@@ -173,9 +176,7 @@ def render_command(
     settings = make_settings(size, spp, **chosen)
 
     console = progress_console(quiet=quiet)
-    loaded = _load(source, stage, settings.threads, console)
-    warn(stage_warnings(loaded))
-    picture, done = _render(loaded, stage, settings, profile, console)
+    picture, done, report = _render(source, stage, settings, profile, console)
     if picture.cancelled and done <= 0.0:
         click.echo("stopped before the first sample; nothing was written", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
@@ -187,7 +188,7 @@ def render_command(
         save_costs(costs_file, picture.costs)
     if not quiet:
         files = [name for name in (output, png, stats_file, costs_file) if name]
-        print_summary(picture.stats, loaded, files)
+        print_summary(picture.stats, report, files)
     if picture.cancelled:
         click.echo(f"stopped at {100.0 * done:.0f} %; {output} holds what was done", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
@@ -232,7 +233,7 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     return load_costs(costs_file)
 
 
-def _load(source: StageOptions, stage: str, threads: int, console: Console | None) -> Any:
+def _load(source: StageOptions, stage: str, threads: int, console: Console | None) -> LoadedStage:
     if console is None:
         return source.load(stage, threads)
     from rich.markup import escape
@@ -242,18 +243,23 @@ def _load(source: StageOptions, stage: str, threads: int, console: Console | Non
 
 
 def _render(
-    loaded: Any,
+    source: StageOptions,
     stage: str,
     settings: Any,
     profile: dict[str, dict[str, float]] | None,
     console: Console | None,
-) -> tuple[Any, float]:
-    """The picture, and how much of it was done, from 0 to 1."""
+) -> tuple[Picture, float, LoadReport]:
+    """The picture, how much of it was done, from 0 to 1, and what there is to say of the stage.
+
+    The scene is freed here: nothing needs it while files are written.
+    """
     from wavecomb import _core
     from wavecomb.api import picture_of
     from wavecomb.progress import Interrupt, RenderProgress
     from wavecomb.stats import make_stats
 
+    loaded = _load(source, stage, settings.threads, console)
+    warn(stage_warnings(loaded))
     with (
         Interrupt() as interrupt,
         RenderProgress(console, interrupt) as progress,
@@ -261,7 +267,8 @@ def _render(
         result = _core.render(loaded.scene, settings, progress, None, profile)
     stats = make_stats(result, stage=stage, loaded=loaded)
     total = int(settings.width) * int(settings.height) * int(settings.spp)
-    return picture_of(result, stats), float(stats["counts"]["samples"]) / total
+    done = float(stats["counts"]["samples"]) / total
+    return picture_of(result, stats), done, loaded.report
 
 
 def _picture_warnings(picture: Any) -> list[str]:

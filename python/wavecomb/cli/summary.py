@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from wavecomb.usd import LoadReport
+
 MOST_MATERIALS = 6
 """Rows of the table of materials; the statistics file has all."""
 
 MOST_DEPTHS = 8
 
 
-def print_summary(stats: Mapping[str, Any], loaded: Any, files: Sequence[str]) -> None:
+def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[str]) -> None:
     """Prints the figures of a render in a few lines and small tables."""
     from rich.console import Console
     from rich.markup import escape
@@ -37,11 +39,11 @@ def print_summary(stats: Mapping[str, Any], loaded: Any, files: Sequence[str]) -
         console.print(escape(line))
     _phases(console, stats)
     _programs_and_materials(console, stats)
-    if loaded.report.unsupported:
+    if report.unsupported:
         console.print("not supported, and left out:")
-        for finding in loaded.report.unsupported:
+        for finding in report.unsupported:
             console.print(f"  {escape(finding.line())}")
-    for finding in loaded.report.notes:
+    for finding in report.notes:
         console.print(f"note: {escape(finding.line())}")
     console.print("wrote " + escape(", ".join(files)))
 
