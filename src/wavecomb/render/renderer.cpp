@@ -420,7 +420,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   Film::Layers layers = std::move(film).finish();
   s.peak_rss_bytes = peak_rss_bytes();
 
-  return {settings.width,           settings.height,         std::move(layers.beauty),
+  return {settings.width,           settings.height,          std::move(layers.beauty),
           std::move(layers.albedo), std::move(layers.normal), std::move(layers.depth),
           std::move(layers.samples)};
 }
