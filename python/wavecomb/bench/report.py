@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from wavecomb.bench import report_pictures
 from wavecomb.bench.analysis_data import load
 from wavecomb.bench.figures_style import style
+from wavecomb.bench.report_experiment import experiment
 from wavecomb.bench.report_html import (
     Section,
     escape,
@@ -20,7 +21,8 @@ from wavecomb.bench.report_html import (
     prose,
     table,
 )
-from wavecomb.bench.report_sections import Writer, experiment, suite
+from wavecomb.bench.report_suite import suite
+from wavecomb.bench.report_writer import Writer
 from wavecomb.files import replacing
 
 if TYPE_CHECKING:
