@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wavecomb.bench.analysis_interval import RESAMPLES, SEED
+from wavecomb.bench.oracle import ORACLES
 from wavecomb.extras import needed
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def material_costs(results: Results) -> pd.DataFrame:
     for record in results.records():
         run_id = record["row"]["run_id"]
         of_run = known.get(run_id)
-        if of_run is None:
+        if of_run is None or of_run["policy"] in ORACLES:  # their costs are no predictions
             continue
         for entry in (record.get("stats") or {}).get("materials", ()):
             if entry.get("timed_records", 0) >= LEAST_RECORDS and entry.get("ns_per_record", 0) > 0:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.bench.columns import COLUMNS, read_rows
+from wavecomb.bench.oracle import BEST, COSTS, ORACLES
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
 from wavecomb.files import reason
@@ -43,8 +44,9 @@ POLICIES = (
 """In the order in which tables and figures show them."""
 
 PLACEBO = "random-runs"
-ORACLES = ("oracle-best", "oracle")
-BOUNDS = (PLACEBO, "oracle", "oracle-best", "oracle-worst")
+BEST_FIRST = (BEST, COSTS)
+"""The oracle that a share is told of: the first that was run."""
+BOUNDS = (PLACEBO, *ORACLES)
 """Orders that nobody would use: they bound what an order can win."""
 
 

@@ -3,7 +3,8 @@
 
 Roulette, lanes, waves and the order of rays are the same on both sides of every ratio here, so
 what differs is the order of shading alone. Two orders bound what a policy can win: the placebo
-(runs of one material in an order that means nothing) and an oracle that knows true costs.
+(runs of one material in an order that means nothing) and an oracle: the order of these runs that
+a trace with true costs says is best, or else cost-benefit with true costs.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.bench.analysis_data import (
+    BEST_FIRST,
     BOUNDS,
-    ORACLES,
     PLACEBO,
     cells,
     in_order,
@@ -89,7 +90,7 @@ def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> li
 
     none = policies.index("none")
     placebo = policies.index(PLACEBO) if PLACEBO in policies else None
-    best = next((policies.index(name) for name in ORACLES if name in policies), None)
+    best = next((policies.index(name) for name in BEST_FIRST if name in policies), None)
 
     def statistic(means: Array) -> Array:
         logs = pooled(means)

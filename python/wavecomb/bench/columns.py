@@ -77,7 +77,7 @@ _KEYS = (
     ),
     *_of(
         "text",
-        ("policy", "", "Order of shading: docs/scheduling.md, or oracle: docs/bench.md."),
+        ("policy", "", "Order of shading: docs/scheduling.md; oracles: docs/bench.md."),
         ("roulette", "", "off, throughput, cost-aware."),
         ("ray_order", "", "Order of bounce rays."),
         ("shadow_order", "", "Order of shadow rays."),

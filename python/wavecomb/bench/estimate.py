@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.bench.plan import Config, Run
-from wavecomb.bench.suite import WAVECOMB
+from wavecomb.bench.suite_model import WAVECOMB
 
 _SIZE = 160
 _SPP = 8

@@ -6,13 +6,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from wavecomb.bench.oracle import COSTS, ORACLES, policy_of
 from wavecomb.bench.plan import Config, Run
 from wavecomb.bench.results import ResultFolder
 from wavecomb.bench.stages import stage_file
-from wavecomb.bench.suite import ORACLE, WAVECOMB, Golden, Suite
+from wavecomb.bench.suite_model import WAVECOMB, Golden, Suite
 
 RECORDINGS = 3
 """Renders, with different seeds, that the oracle's costs are pooled from."""
+ORDERINGS = 12
+"""Renders under different orders of materials that an oracle's order is found from."""
 
 Job = dict[str, Any]
 
@@ -34,8 +37,14 @@ class Jobs:
         return self._folder.path / "golden" / f"{config.golden_key()}.npy"
 
     def profile(self, config: Config) -> Path:
-        """The oracle's costs."""
-        return self._folder.path / "trace" / f"{config.recording_key()}.json"
+        """What an oracle starts from: true costs, or ranks."""
+        policy = config.settings.get("policy")
+        which = "" if policy == COSTS else f"-{policy}"
+        return self._folder.path / "trace" / f"{config.recording_key()}{which}.json"
+
+    def trace(self, config: Config) -> Path:
+        """The recordings that the best and the worst order are found from."""
+        return self._folder.path / "trace" / f"{config.recording_key()}-orders.json"
 
     def image(self, run: Run) -> Path | None:
         """Where the run's picture is kept; None if it is not."""
@@ -46,9 +55,8 @@ class Jobs:
         """A run of the plan. Its seed is its repetition, so a round has one picture."""
         config = run.config
         settings = {**config.settings, "seed": run.repetition}
-        oracle = settings.get("policy") == ORACLE
-        if oracle:
-            settings |= {"policy": "cost-benefit", "cost_weight": 0.0}
+        oracle = settings.get("policy") in ORACLES
+        settings |= policy_of(settings)
         image = self.image(run)
         golden = {"file": str(self.golden(config)), "spp": self._suite.golden.spp}
         return self._job(
@@ -73,10 +81,16 @@ class Jobs:
         settings |= {"spp": golden.spp, "seed": golden.seed, "integrator": golden.integrator}
         return self._job(config, settings, image=str(self.golden(config)))
 
-    def recording(self, config: Config, number: int) -> Job:
-        """A render that costs are read from: sorted by material, so that batches hold one."""
+    def recording(self, config: Config, number: int, ranks: Path | None = None) -> Job:
+        """A render that costs are read from: sorted by material, so that batches hold one.
+
+        With ``ranks``, a cost file, materials are shaded in the order of these.
+        """
         settings = {**config.settings, "policy": "material", "roulette": "throughput"}
-        return self._job(config, {**settings, "seed": self._suite.golden.seed + 1 + number}, warm=1)
+        settings |= {"seed": self._suite.golden.seed + 1 + number}
+        if ranks is None:
+            return self._job(config, settings, warm=1)
+        return self._job(config, {**settings, "cost_weight": 0.0}, warm=1, profile=str(ranks))
 
     def _job(self, config: Config, settings: dict[str, Any], **more: Any) -> Job:
         assert config.renderer == WAVECOMB
@@ -88,35 +102,3 @@ class Jobs:
             "cpus": self._cpus[:threads],
             **more,
         }
-
-
-def pooled_costs(answers: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """True costs from recordings: measured ns over all timed records of a material.
-
-    A material that was never timed has its calibrated cost. Textures: mean over the recordings.
-
-    >>> material = {"name": "M", "timed_records": 10, "ns_per_record": 50.0, "calibrated_ns": 9.0}
-    >>> other = {**material, "timed_records": 30, "ns_per_record": 90.0}
-    >>> costs = {"textures": {}}
-    >>> found = [{"stats": {"materials": [m]}, "costs": costs} for m in (material, other)]
-    >>> pooled_costs(found)
-    {'materials': {'M': 80.0}, 'textures': {}}
-    """
-    spent: dict[str, float] = {}
-    timed: dict[str, int] = {}
-    fallback: dict[str, float] = {}
-    textures: dict[str, list[float]] = {}
-    for answer in answers:
-        for material in answer["stats"]["materials"]:
-            name, count = material["name"], int(material["timed_records"])
-            spent[name] = spent.get(name, 0.0) + count * float(material["ns_per_record"])
-            timed[name] = timed.get(name, 0) + count
-            fallback[name] = float(material["calibrated_ns"])
-        for name, ns in answer["costs"]["textures"].items():
-            textures.setdefault(name, []).append(float(ns))
-    return {
-        "materials": {
-            name: spent[name] / timed[name] if timed[name] else fallback[name] for name in spent
-        },
-        "textures": {name: sum(values) / len(values) for name, values in textures.items()},
-    }

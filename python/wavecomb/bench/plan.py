@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from wavecomb.bench.suite import WAVECOMB, Experiment, StageSource, Suite
+from wavecomb.bench.suite_model import WAVECOMB, Experiment, StageSource, Suite
 from wavecomb.errors import WavecombError
 
-STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
 """Of settings that a row names, what is meant where a suite says nothing."""
 
@@ -142,25 +141,6 @@ def schedule(configs: Sequence[Config], repetitions: int, seed: int) -> list[Run
         rng.shuffle(round_)
         runs += round_
     return runs
-
-
-def with_folder(suite: Suite, folder: Path) -> Suite:
-    """The suite with the stages of a folder added to each experiment that varies none."""
-    files = sorted(p for p in folder.glob("*") if p.suffix.lower() in STAGE_SUFFIXES)
-    if not folder.is_dir() or not files:
-        raise WavecombError(f"--stages {folder}: no {', '.join(STAGE_SUFFIXES)} in this folder")
-    more = {path.stem: StageSource(file=path.resolve()) for path in files}
-    twice = set(more) & set(suite.stages)
-    if twice or len(more) < len(files):
-        name = min(twice) if twice else "two of its files"
-        raise WavecombError(f"--stages {folder}: {name} has the name of another stage; rename it")
-    experiments = tuple(
-        experiment
-        if experiment.stage_vary
-        else replace(experiment, stages=(*experiment.stages, *more))
-        for experiment in suite.experiments
-    )
-    return replace(suite, stages={**suite.stages, **more}, experiments=experiments)
 
 
 def _of_experiment(

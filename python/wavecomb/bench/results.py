@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.bench.columns import header_line, row_line
-from wavecomb.bench.suite import Suite
+from wavecomb.bench.suite_model import Suite
 from wavecomb.errors import WavecombError
 from wavecomb.files import reason, replacing
 
@@ -54,7 +54,8 @@ class ResultFolder:
         if self.suite_toml.read_text(encoding="utf-8") != suite.text:
             raise WavecombError(
                 f"{self.path}: was made with another suite than {suite.path}; "
-                "choose another folder, or give this folder's suite.toml"
+                "choose another folder, or give this folder's suite.toml, which names the "
+                "folder of --stages, too"
             )
         for name in FOLDERS:
             (self.path / name).mkdir(parents=True, exist_ok=True)

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from wavecomb.bench.columns import COUNTER_COLUMNS
+from wavecomb.bench.oracle import ORDERS
 from wavecomb.bench.plan import Run
-from wavecomb.bench.suite import Suite
+from wavecomb.bench.suite_model import Suite
 from wavecomb.stats import SORTING
 
 _PHASES = (
@@ -70,7 +71,7 @@ def _wavefront(
     used, phases, counts = stats["settings"], stats["phases_s"], stats["counts"]
     order = sum(phases[name] for name in SORTING)
     coherence, prediction = stats["coherence"], stats["cost_prediction"]
-    compared = bool(prediction["materials"])
+    compared = bool(prediction["materials"]) and settings.get("policy") not in ORDERS
     row = {
         "lanes": stats["lanes"],
         "wave_size": stats["wave_size"],

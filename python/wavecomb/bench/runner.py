@@ -16,15 +16,16 @@ from typing import Any
 from wavecomb.bench import machine, noise, peers
 from wavecomb.bench.counters import available
 from wavecomb.bench.estimate import Estimator, calibrate, from_results
-from wavecomb.bench.jobs import RECORDINGS, Jobs, pooled_costs
+from wavecomb.bench.jobs import Jobs
+from wavecomb.bench.oracle import ORACLES
 from wavecomb.bench.plan import Config, Run, chosen, configurations, schedule
 from wavecomb.bench.process import Outcome, run_worker
+from wavecomb.bench.recordings import make_profile
 from wavecomb.bench.results import ResultFolder
 from wavecomb.bench.rows import run_row
 from wavecomb.bench.stages import check_files, generate
-from wavecomb.bench.suite import ORACLE, WAVECOMB, Suite
+from wavecomb.bench.suite_model import WAVECOMB, Suite
 from wavecomb.bench.worker import judge_picture
-from wavecomb.costs import save_costs
 from wavecomb.errors import WavecombError
 from wavecomb.progress import time_text
 
@@ -171,11 +172,11 @@ class Sitting:
             if not path.exists():
                 self.say(f"golden {path.stem}: {self.suite.golden.spp} samples per pixel")
                 self._converge(config, path)
-        profiles = {self.jobs.profile(c): c for c in configs if c.settings.get("policy") == ORACLE}
+        profiles = {self.jobs.profile(c): c for c in configs if c.settings.get("policy") in ORACLES}
         for path, config in profiles.items():
             if not path.exists():
-                self.say(f"true costs {path.stem}: {RECORDINGS} recordings")
-                self._record(config, path)
+                self.say(f"trace {path.stem}")
+                make_profile(self.jobs, config, self.folder.path)
         for _ in range(self.suite.warm_up):
             for config in stages.values():
                 if config.renderer == WAVECOMB:
@@ -190,16 +191,6 @@ class Sitting:
             outcome = peers.run_peer(config, stage, golden.spp, golden.seed, path, threads)
         if outcome.answer["status"] != "ok":
             raise WavecombError(f"golden picture of {config.stage}: {outcome.answer['error']}")
-
-    def _record(self, config: Config, path: Path) -> None:
-        answers = []
-        for number in range(RECORDINGS):
-            job = self.jobs.recording(config, number)
-            answer = run_worker(job, {}, self.folder.path).answer
-            if answer["status"] != "ok":
-                raise WavecombError(f"true costs of {config.stage}: {answer['error']}")
-            answers.append(answer)
-        save_costs(path, pooled_costs(answers))
 
     # ---- runs ----------------------------------------------------------------------------------
 

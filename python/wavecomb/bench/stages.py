@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from wavecomb.bench.plan import Config, digest
-from wavecomb.bench.suite import StageSource
+from wavecomb.bench.suite_model import StageSource
 from wavecomb.errors import WavecombError
 
 

@@ -6,10 +6,18 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from wavecomb.bench.stage_folder import with_folder
+from wavecomb.bench.suite_model import (
+    RENDERERS,
+    WAVECOMB,
+    Experiment,
+    Golden,
+    StageSource,
+    Suite,
+)
 from wavecomb.bench.table import Table
 from wavecomb.errors import WavecombError
 from wavecomb.files import reason
@@ -22,11 +30,6 @@ else:
 SUITES = Path(__file__).parent / "suites"
 DEFAULT_REPETITIONS = 16
 IMAGES = ("none", "first", "all")
-WAVECOMB = "wavecomb"
-PEERS = ("mitsuba-scalar", "mitsuba-llvm", "cycles")
-RENDERERS = (WAVECOMB, *PEERS)
-ORACLE = "oracle"
-"""Policy of suites only: cost-benefit with the true costs of an earlier recording, frozen."""
 
 SETTINGS = {
     "size": "pair",
@@ -53,92 +56,6 @@ SETTINGS = {
     "cost_weight": "number",
 }
 """Settings that a suite may choose, and their kinds; a count is an integer, "all" or "widest"."""
-
-
-@dataclass(frozen=True)
-class StageSource:
-    """Where a stage comes from: a generated scene with options, or a file.
-
-    Attributes:
-        scene: Name of a generated scene, or "".
-        options: Its ``SceneOptions``.
-        file: Path of a stage, or None.
-        camera: Camera prim of a file, or None.
-    """
-
-    scene: str = ""
-    options: dict[str, Any] = field(default_factory=dict)
-    file: Path | None = None
-    camera: str | None = None
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """Runs that are compared with one another.
-
-    Attributes:
-        name: Unique in the suite.
-        stages: Names of stages.
-        renderers: Of ``RENDERERS``.
-        settings: The same in all runs.
-        vary: Setting -> values; all combinations are run.
-        stage_vary: Option of the stage -> values, likewise.
-        cases: Settings that change together; each is combined with all of ``vary``.
-        skip: Combinations to leave out: those that agree with all keys of one entry.
-        factor: The key of ``vary`` or ``stage_vary`` that a scaling curve is drawn over, or "".
-        images: Which repetitions keep their picture: "none", "first" or "all".
-        golden: Pictures are compared with a converged one.
-    """
-
-    name: str
-    stages: tuple[str, ...]
-    renderers: tuple[str, ...] = (WAVECOMB,)
-    settings: dict[str, Any] = field(default_factory=dict)
-    vary: dict[str, list[Any]] = field(default_factory=dict)
-    stage_vary: dict[str, list[Any]] = field(default_factory=dict)
-    cases: tuple[dict[str, Any], ...] = ({},)
-    skip: tuple[dict[str, Any], ...] = ()
-    factor: str = ""
-    images: str = "none"
-    golden: bool = False
-
-
-@dataclass(frozen=True)
-class Golden:
-    """How converged pictures are made: samples per pixel, integrator, seed."""
-
-    spp: int = 1024
-    integrator: str = "reference"
-    seed: int = 90001
-
-
-@dataclass(frozen=True)
-class Suite:
-    """A suite as its file says it.
-
-    Attributes:
-        name: Short.
-        title: One line.
-        path: The file.
-        text: What it holds.
-        repetitions: Of each configuration.
-        warm_up: Discarded runs of each stage before the first round.
-        seed: Of the order of runs.
-        golden: See ``Golden``.
-        stages: By name.
-        experiments: In order.
-    """
-
-    name: str
-    title: str
-    path: Path
-    text: str
-    repetitions: int
-    warm_up: int
-    seed: int
-    golden: Golden
-    stages: dict[str, StageSource]
-    experiments: tuple[Experiment, ...]
 
 
 def suite_names() -> list[str]:
@@ -196,6 +113,7 @@ def load_suite(path: Path) -> Suite:
             for number, entry in enumerate(top.list_of_tables("experiment"), 1)
         ),
     )
+    folder = top.take("stages_folder", str, "")
     golden.end()
     top.end()
     if not suite.experiments:
@@ -204,7 +122,7 @@ def load_suite(path: Path) -> Suite:
     for name in names:
         if names.count(name) > 1:
             raise top.error("experiment", f"two are named {name!r}; give each its own name")
-    return suite
+    return with_folder(suite, path.parent / os.path.expanduser(folder)) if folder else suite
 
 
 def _stage(table: Table) -> StageSource:

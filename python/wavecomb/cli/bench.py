@@ -76,14 +76,14 @@ def run_command(
     Each run is a process of its own, on cores of its own. Results are in DIR as soon as a run is
     done; after Ctrl-C or a kill, --resume goes on.
     """
-    from wavecomb.bench.plan import with_folder
     from wavecomb.bench.results import ResultFolder
     from wavecomb.bench.runner import Options, Sitting
+    from wavecomb.bench.stage_folder import naming_folder
     from wavecomb.bench.suite import find_suite, load_suite
 
     chosen = load_suite(find_suite(suite))
     if stages is not None:
-        chosen = with_folder(chosen, Path(stages))
+        chosen = naming_folder(chosen, Path(stages))
     limit = time_limit * 60.0 if time_limit is not None else None
     options = Options(repetitions, only, threads, seed, limit, resume)
 
