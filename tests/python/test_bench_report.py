@@ -16,6 +16,7 @@ from bench_results import everything, runs_of, write_folder
 
 from wavecomb.bench.report import build
 from wavecomb.bench.report_html import nested, number, table
+from wavecomb.bench.report_markdown import LARGEST_PNG, LARGEST_SVG
 from wavecomb.image import read_image
 
 HTML = "{http://www.w3.org/1999/xhtml}"
@@ -87,6 +88,7 @@ def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
     assert "Variance and efficiency" in captions
     assert "equal runs vary by 12% (made up)" in page
     assert "wavecomb bench run made-up.toml -o results" in page
+    assert "counters that are not available here: cycles: perf_event_paranoid is 3" in page
     assert "Made-up CPU &lt;4 GHz&gt; &amp; friends" in page
     findings = " ".join(texts(tree, "li"))
     assert "policies, 16 lanes: 6 of 6 orders are quicker than arrival order" in findings
@@ -129,6 +131,28 @@ def test_figures_open_and_are_not_blank(folder: Path) -> None:
         assert drawing.tag.endswith("svg")
         shapes = [e for e in drawing.iter() if e.tag.endswith(("path", "text", "image", "use"))]
         assert len(shapes) > 20
+
+
+def test_markdown_page(folder: Path, tmp_path: Path) -> None:
+    target = tmp_path / "docs" / "made-up.md"
+    build(folder, target)
+    text = target.read_text(encoding="utf-8")
+    assert text.startswith("# Wavecomb benchmark: made-up\n")
+    assert "## What the figures say" in text and "equal runs vary by 12% (made up)" in text
+    shown = re.findall(r"!\[[^]]+\]\(made-up/([^)]+)\)", text)
+    assert len(shown) > 10 and any("difference-mixed" in name for name in shown)
+    files = {path.name for path in (tmp_path / "docs" / "made-up").iterdir()}
+    assert set(shown) == files
+    for path in (tmp_path / "docs" / "made-up").iterdir():
+        limit = LARGEST_SVG if path.suffix == ".svg" else LARGEST_PNG
+        assert 0 < path.stat().st_size <= limit, path.name
+    # Tables are whole: every row has as many cells as its head, and a head of several rows is told.
+    tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    assert len(tables) > 5
+    for lines in tables:
+        assert len({line.count(" | ") for line in lines.splitlines() if "---" not in line}) == 1
+    assert "| dragon, 16 lanes | oracle |" in text
+    assert not re.search(r"</?(p|td|th|tr|table|details|span|svg)\b", text)
 
 
 def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:

@@ -178,6 +178,7 @@ def label(cell: dict[str, Any], varying: Sequence[str]) -> str:
         "roulette": lambda v: f"roulette {v}",
         "ray_order": lambda v: f"rays by {v}",
         "shadow_order": lambda v: f"shadow rays by {v}",
+        "factor_value": lambda v: f"asked for {short_count(v)}",
     }
     parts = []
     for name in varying:
@@ -189,11 +190,20 @@ def label(cell: dict[str, Any], varying: Sequence[str]) -> str:
 
 
 def varying(found: Sequence[dict[str, Any]]) -> list[str]:
-    """Settings in which cells differ, but for the experiment; "stage" where they differ in none."""
+    """Settings in which cells differ, but for the experiment; "stage" where they differ in none.
+
+    The value of a factor is named where nothing else tells cells apart: a renderer may have used
+    less than it was given, as of waves that are larger than a picture.
+    """
     told = ("experiment", "height", "factor", "factor_value")  # by the heading, or by others
     names = [name for name in (*SETTINGS, "variant") if name not in told]
     differ = [n for n in names if len({str(cell.get(n, "")) for cell in found}) > 1]
-    return differ if "stage" in differ else ["stage", *differ]
+    names = differ if "stage" in differ else ["stage", *differ]
+
+    def apart(keys: Sequence[str]) -> int:
+        return len({tuple(str(cell.get(key, "")) for key in keys) for cell in found})
+
+    return names if apart(names) == apart([*names, "factor_value"]) else [*names, "factor_value"]
 
 
 def short_count(value: float) -> str:
@@ -205,7 +215,7 @@ def short_count(value: float) -> str:
     for unit, size in (("M", 1 << 20), ("K", 1 << 10)):
         if value >= size:
             return f"{value / size:.4g} {unit}"
-    return f"{value:.4g}"
+    return f"{value:.3g}" if value < 1000.0 else f"{value:.4g}"
 
 
 def _without(config: str, varied: set[str], across: bool) -> str:

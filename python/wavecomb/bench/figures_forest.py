@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from wavecomb.bench.figures_style import FAINT, INK, Drawn, figure, plain_logarithm
+from wavecomb.bench.figures_style import FAINT, INK, Drawn, clipped, figure, plain_logarithm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +75,9 @@ def forest(
             continue
         _panel(ax, panels[k], heights[k // columns], centre, log, percent)
     if log:
-        low, high = axes[0].get_xlim()
+        low, high = clipped(
+            *axes[0].get_xlim(), [centre, *(row.value for panel in panels for row in panel.rows)]
+        )
         for ax in axes:  # room at both sides of what is compared with
             ax.set_xlim(min(low, centre * 0.95), max(high, centre * 1.05))
             plain_logarithm(ax.xaxis)

@@ -29,6 +29,7 @@ from wavecomb.bench.figures_style import (
     RED,
     SKY,
     Drawn,
+    clipped,
     colour,
     figure,
     label_ends,
@@ -189,16 +190,18 @@ def curve(
         return None
     made, axes = figure(1, len(kept), 2.7)
     for ax, (metric, text) in zip(axes, kept, strict=True):
-        ends = []
+        ends, means = [], []
         names = in_order(series, sorted(runs[series].dropna().unique()))
         for k, level in enumerate(names):
             points = intervals(runs[runs[series] == level], x, metric)
+            means += [mean for _, mean, _, _ in points]
             shade = policy_colour(level) if series == "policy" else colour(k)
             _line(ax, points, shade, marker(k))
             ends.append((points[-1][0], points[-1][1], str(level), shade))
         ax.set_xscale("log", base=2)
         ax.set_yscale("log")
         _measured_ticks(ax, sorted(runs[x].unique()))
+        ax.set_ylim(*clipped(*ax.get_ylim(), means))
         plain_logarithm(ax.yaxis)
         ax.set_xlabel(x_label)
         ax.set_title(text)

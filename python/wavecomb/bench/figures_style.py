@@ -24,6 +24,8 @@ INK = "#1a1b1e"
 """Of text, axes and what is compared with; becomes the page's own text colour in the report."""
 FAINT = "#8a8d93"
 GRID = "#8a8d9340"
+WHISKERS = 4.0
+"""How far a logarithmic axis goes beyond the points, as a factor."""
 WIDTH = 7.4
 """Of a figure in inches: a column of text in print."""
 
@@ -172,7 +174,19 @@ def fixed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def plain_logarithm(axis: Axis) -> None:
+def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, float]:
+    """Limits of a logarithmic axis on which no whisker is much longer than what is compared.
+
+    Intervals of two or three disturbed runs can span decades; they run out of the axes then, and
+    points can still be told apart.
+
+    >>> clipped(1e-9, 1e6, [0.5, 2.0])
+    (0.125, 8.0)
+    """
+    return max(low, min(values) / WHISKERS), min(high, max(values) * WHISKERS)
+
+
+def plain_logarithm(axis: Axis, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
     """Numbers as people write them on a logarithmic axis, few enough to be read."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
@@ -181,8 +195,7 @@ def plain_logarithm(axis: Axis) -> None:
     if decades < 0.8:
         axis.set_major_locator(MaxNLocator(4))
     else:
-        subs = (1.0, 2.0, 5.0) if decades < 2.2 else (1.0,)
-        axis.set_major_locator(LogLocator(subs=subs))
+        axis.set_major_locator(LogLocator(subs=tuple(subs) if decades < 2.2 else (1.0,)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
 

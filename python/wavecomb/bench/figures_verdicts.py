@@ -157,8 +157,8 @@ def cost_figure(
         ax.set_xlabel(f"predicted, ns a record: {'calibrated' if 'calib' in column else 'average'}")
         ax.grid()
         ax.set_aspect("equal", adjustable="datalim")
-        plain_logarithm(ax.xaxis)
-        plain_logarithm(ax.yaxis)
+        for axis in (ax.xaxis, ax.yaxis):
+            plain_logarithm(axis, (1.0, 3.0))
     axes[0].set_ylabel("measured, ns a record")
     handles, texts = axes[0].get_legend_handles_labels()
     made.legend(handles, texts, loc="outside upper left", ncols=6, handletextpad=0.1)

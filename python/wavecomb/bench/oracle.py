@@ -88,6 +88,7 @@ def shuffled(names: Sequence[str], number: int) -> list[str]:
 
 def recorded(order: Sequence[str], answer: Mapping[str, Any]) -> Recording:
     """A recording of the trace: the order of materials, and of each what was measured."""
+    stats = answer["stats"]
     materials = {
         entry["name"]: {
             "program": entry["program"],
@@ -95,19 +96,23 @@ def recorded(order: Sequence[str], answer: Mapping[str, Any]) -> Recording:
             "timed_records": int(entry["timed_records"]),
             "ns_per_record": float(entry["ns_per_record"]),
         }
-        for entry in answer["stats"]["materials"]
+        for entry in stats["materials"]
         if entry["records"]
     }
-    return {"order": [name for name in order if name in materials], "materials": materials}
+    return {
+        "order": [name for name in order if name in materials],
+        "trace_ns_per_ray": 1e9 * stats["phases_s"]["trace"] / max(1, stats["counts"]["rays"]),
+        "materials": materials,
+    }
 
 
 def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
     """The orders of material runs that the trace says are quickest and slowest.
 
     For materials a, b of one program, cost(b after a) is the mean of b's measured ns a record over
-    the recordings in which b's run came next after a's, each recording scaled to the mean of all
-    (a machine drifts), and one more measurement at b's mean over all recordings: a pair that was
-    seen once is not believed at its word. The time of an order is
+    the recordings in which b's run came next after a's (each recording scaled by its time of
+    traversal a ray, since machines drift), and one more measurement at b's mean over all
+    recordings: a pair that was seen once is not believed at its word. The time of an order is
 
         sum over b of records(b) * cost(b after its predecessor)
 
@@ -141,14 +146,10 @@ def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
 
 
 def _scales(trace: Sequence[Recording]) -> list[float]:
-    """Factors that bring the recordings to one mean cost of a record."""
-    means = []
-    for recording in trace:
-        entries = [e for e in recording["materials"].values() if e["timed_records"]]
-        total = sum(e["records"] for e in entries)
-        means.append(sum(e["records"] * e["ns_per_record"] for e in entries) / max(1, total))
-    overall = sum(means) / len(means)
-    return [overall / mean if mean > 0.0 else 1.0 for mean in means]
+    """Factors that take out the machine's drift, by traversal, which no order changes."""
+    times = [float(recording["trace_ns_per_ray"]) for recording in trace]
+    overall = sum(times) / len(times)
+    return [overall / time if time > 0.0 else 1.0 for time in times]
 
 
 def _costs(

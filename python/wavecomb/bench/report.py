@@ -21,6 +21,7 @@ from wavecomb.bench.report_html import (
     prose,
     table,
 )
+from wavecomb.bench.report_markdown import copy_figures, write_page
 from wavecomb.bench.report_suite import suite
 from wavecomb.bench.report_writer import Writer
 from wavecomb.files import replacing
@@ -31,8 +32,12 @@ if TYPE_CHECKING:
 FEW_ROUNDS = 5
 
 
-def build(folder: Path) -> Path:
+def build(folder: Path, markdown: Path | None = None) -> Path:
     """Writes DIR/report.html, and DIR/figures with each figure as SVG and PNG.
+
+    Args:
+        folder: DIR.
+        markdown: A .md file that is written, too, with a folder of figures beside it.
 
     Raises:
         WavecombError: The folder holds no results, or a file in it is damaged; or a library of the
@@ -53,9 +58,12 @@ def build(folder: Path) -> Path:
         lines = "".join(f"<li>{prose(line)}</li>" for line in out.findings)
         out.sections.insert(0, _findings(f'<ul class="findings">{lines}</ul>'))
     target = folder / "report.html"
-    document = page(_title(results), _lead(results), warnings_of(results), out.sections)
+    words = (_title(results), _lead(results), warnings_of(results), out.sections)
     with replacing(target) as part:
-        part.write_text(document, encoding="utf-8")
+        part.write_text(page(*words), encoding="utf-8")
+    if markdown is not None:
+        write_page(markdown, *words)
+        copy_figures(figures, markdown)
     return target
 
 
@@ -163,9 +171,20 @@ def _about(out: Writer, results: Results) -> None:
         rows = [[str(row.run_id), str(row.error)] for row in results.failed.itertuples()]
         out.add(folded("Runs that failed", table("Runs that failed", ["run", "why"], rows)))
     out.begin("Machine")
+    out.add(_no_counters(results.machine))
     out.add(nested({k: v for k, v in results.machine.items() if k not in ("schema", "noise")}))
     out.begin("Words")
     out.add(nested(WORDS))
+
+
+def _no_counters(machine: dict[str, Any]) -> str:
+    """Which hardware counters there are not, and why."""
+    missing = (machine.get("counters") or {}).get("missing") or {}
+    reasons: dict[str, list[str]] = {}
+    for name, why in missing.items():
+        reasons.setdefault(str(why), []).append(name.replace("_", " "))
+    text = "; ".join(f"{', '.join(names)}: {why}" for why, names in reasons.items())
+    return paragraph(f"Hardware counters that are not available here: {text}.") if text else ""
 
 
 def _configurations(results: Results) -> list[Any]:
@@ -186,6 +205,9 @@ WORDS = {
     "order": "Keys, sort and moving of records: what an order of shading costs.",
     "placebo": "random-runs: the runs of a material in an order that means nothing.",
     "oracle": "cost-benefit with true costs, recorded before: what a cost model could win.",
+    "oracle-best, oracle-worst": (
+        "the order of the runs of materials that a trace with true costs says is quickest, slowest."
+    ),
     "run length": "Mean number of consecutive records of one material.",
     "relMSE": "Mean of (x − r)² / (r² + 0.01) to the golden picture r.",
     "efficiency": "1 / (relMSE × render time).",

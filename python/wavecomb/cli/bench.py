@@ -20,6 +20,7 @@ from wavecomb.cli.options import Real, examples
         "wavecomb bench run quick -o results --resume",
         "wavecomb bench run my.toml -o results --only 'orders.*'",
         "wavecomb bench report results",
+        "wavecomb bench report results --markdown docs/results/quick.md",
     ),
 )
 def bench_command() -> None:
@@ -122,10 +123,18 @@ def _dry_run(sitting: object) -> None:
 
 @bench_command.command("report")
 @click.argument("folder", type=click.Path(), metavar="DIR")
-def report_command(folder: str) -> None:
+@click.option(
+    "--markdown",
+    type=click.Path(),
+    metavar="FILE.md",
+    help="Also a page of Markdown, with its figures in a folder FILE beside it.",
+)
+def report_command(folder: str, markdown: str | None) -> None:
     """Write DIR/report.html and DIR/figures from the results in DIR."""
     from wavecomb.errors import WavecombError
 
+    if markdown is not None and not markdown.endswith(".md"):
+        raise WavecombError(f"--markdown {markdown}: give a file whose name ends in .md")
     if not (Path(folder) / "runs.csv").is_file():
         raise WavecombError(f"{folder}: holds no runs.csv; `wavecomb bench run` makes it")
     try:
@@ -134,4 +143,7 @@ def report_command(folder: str) -> None:
         raise WavecombError(
             f"bench report: {error.name} is missing; run `pip install 'wavecomb[bench]'`"
         ) from error
-    click.echo(f"wrote {build(Path(folder))}")
+    page = Path(markdown) if markdown is not None else None
+    click.echo(f"wrote {build(Path(folder), page)}")
+    if page is not None:
+        click.echo(f"wrote {page}")
