@@ -207,12 +207,13 @@ def varying(found: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def short_count(value: float) -> str:
-    """A count for people: 4096 -> 4 K, 1048576 -> 1 M.
+    """A count for people, in 1024s where it is made of them: 4096 -> 4 K, 50000 -> 50 k.
 
-    >>> short_count(65536), short_count(1 << 20), short_count(100)
-    ('64 K', '1 M', '100')
+    >>> short_count(65536), short_count(1 << 20), short_count(100), short_count(1e6)
+    ('64 K', '1 M', '100', '1 million')
     """
-    for unit, size in (("M", 1 << 20), ("K", 1 << 10)):
+    binary, decimal = (("M", 1 << 20), ("K", 1 << 10)), (("million", 10**6), ("k", 10**3))
+    for unit, size in binary if value % 1024 == 0 else decimal:
         if value >= size:
             return f"{value / size:.4g} {unit}"
     return f"{value:.3g}" if value < 1000.0 else f"{value:.4g}"
