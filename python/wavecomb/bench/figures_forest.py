@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 ROW = 0.21
 """Height of a row in inches."""
+LONGEST = 56
+"""Letters of a panel's title that have room."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,8 @@ def _panel(
     ax.tick_params(axis="y", length=0)
     ax.spines["left"].set_visible(False)
     ax.grid(axis="x")
-    ax.set_title(panel.title, fontsize=9 if len(panel.title) < 40 else 7.5)
+    title = panel.title if len(panel.title) <= LONGEST else f"{panel.title[: LONGEST - 1]}…"
+    ax.set_title(title, fontsize=9 if len(title) < 40 else 7.5)
     if not log:
         ax.xaxis.set_major_locator(MaxNLocator(5))
         form = (lambda x, _: f"{100 * x:.3g} %") if percent else (lambda x, _: f"{x:.3g}")

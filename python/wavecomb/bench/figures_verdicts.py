@@ -181,11 +181,11 @@ def difference_figure(
         for text, pixels in pictures
     ]
     limit = float(np.quantile(np.abs([values for _, values in maps]), 0.99)) or 1e-6
-    columns = min(3, len(maps))
+    columns = min(3, max(2, len(maps)))  # one map alone would fill a page
     lines = -(-len(maps) // columns)
     height, width = reference.shape
     made, axes = figure(
-        lines, columns, 0.6 + lines * (0.25 + WIDTH * 0.9 / columns * height / width)
+        lines, columns, 0.95 + lines * (0.3 + WIDTH * 0.96 / columns * height / width)
     )
     for ax, (text, values) in zip(axes, maps, strict=False):
         shown = ax.imshow(values, cmap="PuOr_r", vmin=-limit, vmax=limit, interpolation="nearest")
