@@ -25,6 +25,9 @@ Matrix = NDArray[np.float64]
 _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 """Half a turn about y: between what looks or shines along -z and what does along +z."""
 
+MOST_PATHS = 1 << 24
+"""Of one pass: the vectorized variants hold all paths of a pass in memory, some 100 bytes each."""
+
 _FAR = 1e4
 """Distance of the sphere that stands for a distant light, in sizes of the scene."""
 
@@ -113,9 +116,19 @@ class MitsubaScene:
         self.scene = mi.load_dict(scene)
 
     def render(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
-        """(height, width, 3)."""
-        image = np.array(self.mi.render(self.scene, spp=spp, seed=seed))
-        return image.reshape(self.settings.height, self.settings.width, -1)[:, :, :3]
+        """(height, width, 3); in passes where all paths at once would not fit into memory."""
+        pixels = self.settings.width * self.settings.height
+        passes = -(-spp * pixels // MOST_PATHS)
+        most = -(-spp // passes)
+        total: Any = 0.0
+        for number in range(passes):
+            count = min(most, spp - number * most)
+            if count > 0:
+                taken = seed if number == 0 else seed + 1_000_003 * number
+                image = np.array(self.mi.render(self.scene, spp=count, seed=taken))
+                total = total + image * np.float32(count / spp)
+        picture: NDArray[np.float32] = total
+        return picture.reshape(self.settings.height, self.settings.width, -1)[:, :, :3]
 
     # ---- camera ----------------------------------------------------------------------------------
 

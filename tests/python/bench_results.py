@@ -190,10 +190,16 @@ MACHINE = {
 
 
 def _job(row: Mapping[str, Any]) -> dict[str, Any]:
-    job: dict[str, Any] = {"golden": f"golden/{row['stage']}-64x48-0a1b2c3d.npy"}
+    job: dict[str, Any] = {"golden": f"golden/{_golden(row)}"}
     if has_picture(row):
         job["image"] = f"images/{row['run_id']}.npy"
     return job
+
+
+def _golden(row: Mapping[str, Any]) -> str:
+    """File name of the golden picture: of a stage, and of a peer its own."""
+    peer = "" if row["renderer"] == "wavecomb" else f"-{row['renderer']}"
+    return f"{row['stage']}{peer}-64x48-0a1b2c3d.npy"
 
 
 def has_picture(row: Mapping[str, Any]) -> bool:
@@ -227,9 +233,9 @@ def write_pictures(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     y, x = np.mgrid[0:48, 0:64] / 48.0
     golden = np.stack([0.2 + 0.5 * x / 1.3, 0.3 + 0.4 * y, 0.5 - 0.2 * x * y], axis=2)
     shared = rng.normal(0, 0.1, golden.shape)
-    for stage in sorted({row["stage"] for row in rows}):
+    for name in sorted({_golden(row) for row in rows}):
         (folder / "golden").mkdir(exist_ok=True)
-        np.save(folder / "golden" / f"{stage}-64x48-0a1b2c3d.npy", golden.astype(np.float32))
+        np.save(folder / "golden" / name, golden.astype(np.float32))
     (folder / "images").mkdir(exist_ok=True)
     for row in rows:
         if has_picture(row):

@@ -155,6 +155,16 @@ def test_markdown_page(folder: Path, tmp_path: Path) -> None:
     assert not re.search(r"</?(p|td|th|tr|table|details|span|svg)\b", text)
 
 
+def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:
+    """Each renderer has a golden picture, a viewer and a map of its own."""
+    vary = {"renderer": ["wavecomb", "cycles"]}
+    rows = runs_of(vary, lambda renderer: 1.0, repetitions=1, lanes=16)
+    folder = write_folder(tmp_path / "r", rows, pictures=True)
+    html5lib.HTMLParser(strict=True).parse(build(folder).read_text(encoding="utf-8"))
+    names = {path.stem for path in (folder / "figures").glob("difference-*.svg")}
+    assert names == {"difference-mixed-wavecomb", "difference-mixed-cycles"}
+
+
 def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=2)
     rows[3]["picture_sha256"] = "1" * 64

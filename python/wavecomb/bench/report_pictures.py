@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import base64
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from wavecomb.image import write_png
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results
 
-MOST_STAGES = 6
+MOST_STAGES = 12
 MOST_PICTURES = 8
 LARGEST = 720
 """Side of a picture in the page, in pixels; a larger one is made smaller by averaging."""
@@ -46,7 +46,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class Shot:
-    """All pictures of one stage and frame, with the golden one."""
+    """All pictures of one stage and frame, with the golden one; titles are unique in a report."""
 
     stage: str
     golden: NDArray[Any] | None
@@ -96,8 +96,19 @@ def shots(results: Results) -> list[Shot]:
         golden = _read(golden_file) if golden_file.is_file() else None
         first_seed = min(row["seed"] for row, _ in pictures)
         same_seed = [(row, path) for row, path in pictures if row["seed"] == first_seed]
-        made.append(Shot(same_seed[0][0]["stage"], golden, _distinct(same_seed)))
+        made.append(Shot(_titled(same_seed[0][0], found.values()), golden, _distinct(same_seed)))
     return made
+
+
+def _titled(row: dict[str, Any], frames: Iterable[list[tuple[dict[str, Any], Path]]]) -> str:
+    """The stage, with renderer and size where other frames show the same stage."""
+    others = [frame[0][0] for frame in frames if frame[0][0]["stage"] == row["stage"]]
+    parts = [str(row["stage"])]
+    if len({other["renderer"] for other in others}) > 1:
+        parts.append(str(row["renderer"]))
+    if len({(other["width"], other["height"]) for other in others}) > 1:
+        parts.append(f"{row['width']} x {row['height']}")
+    return ", ".join(parts)
 
 
 def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[Kept]:
@@ -125,7 +136,7 @@ def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, A
             parts.append(" / ".join(dict.fromkeys(str(row.get(key) or "") for row in rows)))
     policies = in_order("policy", list({row["policy"] for row in rows if row.get("policy")}))
     parts.append(", ".join(policies))
-    return ": ".join(part for part in parts if part)
+    return ": ".join(part for part in parts if part) or str(rows[0].get("renderer"))
 
 
 def viewer(shot: Shot) -> str:
