@@ -133,6 +133,6 @@ def _panel(
     title = panel.title if len(panel.title) <= LONGEST else f"{panel.title[: LONGEST - 1]}…"
     ax.set_title(title, fontsize=9 if len(title) < 40 else 7.5)
     if not log:
-        ax.xaxis.set_major_locator(MaxNLocator(5))
-        form = (lambda x, _: f"{100 * x:.3g} %") if percent else (lambda x, _: f"{x:.3g}")
+        ax.xaxis.set_major_locator(MaxNLocator(4))
+        form = (lambda x, _: f"{100 * x:,.4g} %") if percent else (lambda x, _: f"{x:.3g}")
         ax.xaxis.set_major_formatter(FuncFormatter(form))

@@ -60,7 +60,7 @@ def policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
             out.findings.append(
                 f"{name}: adaptive takes {100 * of_adaptive['regret'].mean():+.1f} % on average "
                 f"beside the best fixed policy of each cell, at worst {100 * worst.regret:+.1f} % "
-                f"[{100 * worst.low:.1f}, {100 * worst.high:.1f}] ({worst.cell})."
+                f"{interval(100 * worst.low, 100 * worst.high, 1)} ({worst.cell})."
             )
 
 
