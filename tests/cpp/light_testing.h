@@ -91,9 +91,19 @@ inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b
   return t;
 }
 
-/// Distance along dir to the geometry of a rect, disk, sphere or triangle.
-inline std::optional<float> trace(const LightRecord& r, const Vec3<float>& origin,
+/// Distance along dir to the geometry of the first light: a rect, disk, sphere or triangle.
+inline std::optional<float> trace(const LightView& view, const Vec3<float>& origin,
                                   const Vec3<float>& dir) {
+  LightRecord r{};
+  if (view.first_triangle > 0) {
+    r = view.lights[0];
+  } else {
+    const TriangleLight& t = view.triangles[0];
+    r.kind = static_cast<uint32_t>(LightKind::kTriangle);
+    std::copy(t.p, t.p + 3, r.p);
+    std::copy(t.u, t.u + 3, r.u);
+    std::copy(t.v, t.v + 3, r.v);
+  }
   const double o[3] = {origin.x - r.p[0], origin.y - r.p[1], origin.z - r.p[2]};
   const double d[3] = {dir.x, dir.y, dir.z};
   const auto dot = [](const double* a, const double* b) {

@@ -127,17 +127,16 @@ TEST(LightBuilder, InfiniteLightsFirstThenTrianglesLast) {
   const std::vector<EmissiveTriangle> triangles(3, make_triangle({0, 0, 0}, {1, 0, 0}, {0, 2, 0}));
   const Lights lights(input, triangles);
   EXPECT_EQ(lights.set.infinite_count, 2u);
-  EXPECT_EQ(lights.set.first_triangle, 5u);
-  ASSERT_EQ(lights.set.records.size(), 8u);
+  EXPECT_EQ(lights.set.first_triangle(), 5u);
+  ASSERT_EQ(lights.set.size(), 8u);
   EXPECT_EQ(lights.set.of_input, (std::vector<uint32_t>{2, 0, 3, 1, 4}));
   for (size_t i = 0; i < input.size(); ++i) {
     EXPECT_EQ(lights.set.records[lights.set.of_input[i]].kind,
               static_cast<uint32_t>(input[i].kind));
   }
-  EXPECT_FLOAT_EQ(lights.set.records[5].area, 1);
-  expect_vec(lights.set.records[5].n, 0, 0, 1);
+  expect_vec(lights.set.triangles[0].m, 0, 0, 1);
   double sum = 0;
-  for (const LightRecord& r : lights.set.records) sum += r.pick_pdf;
+  for (size_t i = 0; i < lights.set.size(); ++i) sum += double{lights.set.pick_pdf(i)};
   EXPECT_EQ(sum, 1);  // multiples of 2^-24
 }
 
@@ -154,46 +153,79 @@ TEST(LightBuilder, ProbabilitiesFollowPower) {
 }
 
 TEST(LightBuilder, PickPdfIsExact) {
-  // Every number that u_pick can be, counted.
-  for (const uint32_t n : {1u, 2u, 3u, 7u, 64u, 1000u, 70001u}) {
+  // Every number that u_pick can be, counted; with no other lights, a weak one, a strong one.
+  for (const auto& [n, records, color] : {std::tuple{1u, 0u, 1.f},
+                                          {2u, 0u, 1.f},
+                                          {3u, 1u, 1e-9f},
+                                          {7u, 2u, 1e4f},
+                                          {64u, 5u, 10.f},
+                                          {1000u, 0u, 1.f},
+                                          {70001u, 3u, 1e5f},
+                                          {70001u, 2000u, 1.f}}) {
     std::vector<EmissiveTriangle> triangles(n, make_triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
     std::mt19937 rng(n);
     for (auto& t : triangles)
       t.mean_scale = rng() % 5 == 0 ? 0.f : std::exp(static_cast<float>(rng() % 1000) / 100.f);
     triangles[0].mean_scale = 1;
-    const Lights lights({}, triangles);
+    std::vector<Light> others(records, make_light(LightKind::kRect));
+    for (Light& light : others) light.color = {color, color, rng() % 7 == 0 ? 0 : color};
+    if (records > 1) others[1].color = {0, 0, 0};
+    const Lights lights(others, triangles);
     const LightView view = lights.view();
-    std::vector<uint32_t> hits(n, 0);
+    ASSERT_EQ(view.count, n + records);
+    std::vector<uint32_t> hits(view.count, 0);
     using F = FloatP<16>;
     for (uint32_t k = 0; k < 1u << 24; k += 16) {
       const F u = F(Int<F>(UInt<F>(k) + lane_index<F>())) * 0x1p-24f;
       uint32_t out[16];
       store(out, detail::pick_light<F>(view, u, Mask<F>(true)));
       for (const uint32_t i : out) {
-        ASSERT_LT(i, n);
+        ASSERT_LT(i, view.count);
         ++hits[i];
       }
     }
-    for (uint32_t i = 0; i < n; ++i) {
-      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, view.lights[i].pick_pdf)
-          << i << " of " << n;
-      ASSERT_EQ(hits[i] > 0, triangles[i].mean_scale > 0);
+    for (uint32_t i = 0; i < view.count; ++i) {
+      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, lights.set.pick_pdf(i))
+          << i << " of " << n << " triangles and " << records;
+      const bool lit = i < records ? others[i].color.x > 0 : triangles[i - records].mean_scale > 0;
+      ASSERT_EQ(hits[i] > 0, lit);
     }
   }
 }
 
-TEST(LightBuilder, AliasTableOfMillions) {
-  std::vector<double> weights(1500000, 1);
-  weights[7] = 1e12;
-  weights[8] = 0;
-  weights[9] = 1e-300;
-  std::vector<AliasEntry> table;
-  std::vector<float> probability;
-  build_alias_table(weights, table, probability);
-  EXPECT_EQ(probability[8], 0);
-  EXPECT_GT(probability[9], 0);
-  EXPECT_GT(probability[7], 0.5);
-  EXPECT_GT(*std::min_element(probability.begin() + 10, probability.end()), 0);
+TEST(LightBuilder, PickTableOfMillions) {
+  for (const size_t n : {size_t{1500000}, size_t{kMaxLights}}) {
+    std::vector<double> weights(n, 1);
+    weights[7] = 1e12;
+    weights[8] = 0;
+    weights[9] = 1e-300;
+    for (const size_t first_triangle : {size_t{0}, size_t{8}, n}) {
+      std::vector<uint32_t> bins, numbers;
+      build_pick_table(weights, first_triangle, bins, numbers);
+      EXPECT_EQ(numbers[8], 0u);
+      EXPECT_GT(numbers[9], 0u);
+      if (n < 1u << 21) {
+        EXPECT_GT(numbers[7], 1u << 22);
+      }
+      EXPECT_GT(*std::min_element(numbers.begin() + 10, numbers.end()), 0u);
+      uint64_t sum = 0;
+      for (const uint32_t x : numbers) sum += x;
+      EXPECT_EQ(sum, 1u << 24);
+      EXPECT_LE(bins.size(), size_t{1} << 24);
+    }
+  }
+}
+
+TEST(LightBuilder, FewStrongLightsHaveASmallTable) {
+  // A dome next to a million triangles: what chooses it stays in the cache.
+  std::vector<double> weights(1000001, 1);
+  weights[0] = 1e6;
+  std::vector<uint32_t> bins, numbers;
+  const PickTable table = build_pick_table(weights, 1, bins, numbers);
+  // Half of the power, less the floor: four numbers for each light.
+  EXPECT_NEAR(numbers[0], (0x1p24 - 4 * 1000001) / 2, 1 << 14);
+  EXPECT_EQ(table.split, numbers[0]);
+  EXPECT_LE(table.triangle_bins, 1024u);
 }
 
 /// Mean of max(bilinear, 0) style radiance over a cell, to be compared with the density.
@@ -214,12 +246,15 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
       ASSERT_GT(d.width, 0u);
       ASSERT_LE(d.width, 1024u);
       ASSERT_LE(d.height, 512u);
-      double mass = 0;
-      for (const float x : d.density)
-        mass += static_cast<double>(x) / (static_cast<double>(d.width) * d.height);
-      ASSERT_NEAR(mass, 1, 1e-6);
-      ASSERT_EQ(d.marginal.front(), 0.f);
-      ASSERT_EQ(d.marginal.back(), 1.f);
+      uint64_t row_counts = 0;
+      for (uint32_t y = 0; y < d.height; ++y) {
+        row_counts += detail::interval_at<float>(d, d.height, d.height, y, true).count;
+        uint64_t counts = 0;
+        for (uint32_t x = 0; x < d.width; ++x)
+          counts += detail::interval_at<float>(d, y, d.width, x, true).count;
+        ASSERT_EQ(counts, Distribution2D::kCounts);
+      }
+      ASSERT_EQ(row_counts, Distribution2D::kCounts);
       Light light = make_light(LightKind::kDome);
       light.texture = texture;
       lights.build({light});
@@ -242,50 +277,56 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
                 std::min(static_cast<uint32_t>(sf * static_cast<float>(d.width)), d.width - 1);
             const auto cy =
                 std::min(static_cast<uint32_t>(df * static_cast<float>(d.height)), d.height - 1);
-            ASSERT_GT(d.density[size_t{cy} * d.width + cx], 0.f) << w << " x " << h;
+            ASSERT_GT(detail::interval_at<float>(d, d.height, d.height, cy, true).count, 0u);
+            ASSERT_GT(detail::interval_at<float>(d, cy, d.width, cx, true).count, 0u)
+                << w << " x " << h;
           }
         }
     }
 }
 
-/// Expects that find_interval finds what a search of the whole row finds, for numbers that go wrong
-/// first and random ones. `row` is the row of the guide.
+const uint16_t* values_of(const Distribution2D& d, uint32_t row) {
+  return d.cumulative[size_t{row} * d.row_lines].value;
+}
+
+/// Expects that find_interval finds what a search of the whole row finds, for the given counts.
 template <typename F>
-void expect_intervals(const Distribution2D& d, uint32_t row, const std::vector<float>& table,
-                      uint32_t first, uint32_t n, const std::vector<float>& x) {
+void expect_intervals(const Distribution2D& d, uint32_t row, uint32_t n,
+                      const std::vector<uint32_t>& counts) {
   using U = UInt<F>;
-  const float* cdf = table.data() + first;
-  for (size_t i = 0; i < x.size(); i += kWidth<F>) {
+  const uint16_t* from = values_of(d, row);
+  for (size_t i = 0; i < counts.size(); i += kWidth<F>) {
     // One lane in five is off.
     const Mask<F> active(not_(Mask<F>((lane_index<F>() + static_cast<uint32_t>(i)) % 5u == U(4u))));
-    const U found =
-        detail::find_interval<F>(d, U(row), table.data(), U(first), load<F>(x.data() + i), active);
-    for (size_t k = 0; k < kWidth<F>; ++k) {
+    const auto found = detail::find_interval<F>(d, U(row), n, load<U>(&counts[i]), active);
+    for (uint32_t k = 0; k < kWidth<F>; ++k) {
       if ((lane_bits<F>(active) >> k & 1u) == 0) continue;
-      const auto expected = std::upper_bound(cdf, cdf + n + 1, x[i + k]) - cdf - 1;
-      ASSERT_EQ(lane(found, k), static_cast<uint32_t>(expected))
-          << kWidth<F> << " lanes, " << n << " intervals, number " << x[i + k];
+      const uint32_t x = counts[i + k];
+      const auto expected = static_cast<uint32_t>(std::upper_bound(from, from + n, x) - from - 1);
+      const uint32_t end = expected + 1 == n ? Distribution2D::kCounts : from[expected + 1];
+      ASSERT_EQ(lane(found.index, k), expected)
+          << kWidth<F> << " lanes, " << n << " intervals, count " << x;
+      ASSERT_EQ(lane(found.begin, k), from[expected]);
+      ASSERT_EQ(lane(found.count, k), end - from[expected]);
     }
   }
 }
 
-/// Numbers in [0, 1) at and beside all cumulative values (or some thousand of them) and all bounds
-/// of the guide, and random ones; a multiple of 16.
-std::vector<float> hard_numbers(const float* cdf, uint32_t n, std::mt19937& rng) {
-  std::vector<float> x;
-  const auto add = [&](float value) {
-    for (const float y : {std::nextafter(value, -1.f), value, std::nextafter(value, 2.f)})
-      if (y >= 0 && y < 1) x.push_back(y);
+/// Counts at and beside all cumulative values (or some hundreds of them), and random ones; a
+/// multiple of 16.
+std::vector<uint32_t> hard_counts(const uint16_t* cumulative, uint32_t n, std::mt19937& rng) {
+  std::vector<uint32_t> x;
+  const auto add = [&](uint32_t count) {
+    for (const uint32_t y : {count - 1, count, count + 1})
+      if (y < Distribution2D::kCounts) x.push_back(y);
   };
-  for (uint32_t i = 0; i <= n; i += 1 + n / 300) add(cdf[i]);
-  for (uint32_t k = 0; k <= Distribution2D::kGuide; ++k)
-    add(static_cast<float>(k) / Distribution2D::kGuide);
-  do x.push_back(static_cast<float>(rng() >> 8) * 0x1p-24f);
+  for (uint32_t i = 0; i < n; i += 1 + n / 300) add(cumulative[i]);
+  do x.push_back(rng() % Distribution2D::kCounts);
   while (x.size() < 500 || x.size() % 16 != 0);
   return x;
 }
 
-TEST(DomeDistribution, GuidedSearchEqualsSearchOfTheWholeRow) {
+TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
   // Images with flat parts, black rows, one lit texel, steep ramps, and noise.
   using Image = float (*)(uint32_t x, uint32_t y, uint32_t w, uint32_t h, uint32_t noise);
   const Image images[] = {
@@ -321,18 +362,15 @@ TEST(DomeDistribution, GuidedSearchEqualsSearchOfTheWholeRow) {
         continue;
       }
       ASSERT_GT(d.width, 0u);
-      ASSERT_EQ(d.guide.size(), size_t{Distribution2D::kGuide} * (d.height + 1));
+      ASSERT_EQ(d.coarse.size(), d.height + 1);
       SCOPED_TRACE(testing::Message() << w << " x " << h << ", image " << image);
-      // All rows, or some twenty of many; the marginal's guide comes behind those of the rows.
+      // All rows, or some twenty of many; the marginal comes behind them.
       for (uint32_t y = 0; y <= d.height;
            y += y == d.height ? 1 : std::min(d.height - y, 1 + d.height / 20)) {
-        const bool marginal = y == d.height;
-        const std::vector<float>& table = marginal ? d.marginal : d.conditional;
-        const uint32_t n = marginal ? d.height : d.width;
-        const uint32_t first = marginal ? 0 : y * (d.width + 1);
-        const std::vector<float> x = hard_numbers(table.data() + first, n, rng);
+        const uint32_t n = y == d.height ? d.height : d.width;
+        const auto counts = hard_counts(values_of(d, y), n, rng);
         lane_testing::for_each_lane_type(
-            [&]<typename F>() { expect_intervals<F>(d, y, table, first, n, x); });
+            [&]<typename F>() { expect_intervals<F>(d, y, n, counts); });
         if (HasFatalFailure()) return;
       }
     }
@@ -394,7 +432,10 @@ TEST(LightBuilder, DegenerateLightsHaveNoProbability) {
     for (const float x : {r.radiance[0], r.area, r.radius, r.pick_pdf, r.n[0], r.n[1], r.n[2]})
       EXPECT_TRUE(std::isfinite(x));
   }
-  EXPECT_EQ(set.set.records.back().pick_pdf, 0);
+  for (const TriangleLight& t : set.set.triangles) {
+    for (const float x : {t.radiance[0], t.m[0], t.m[1], t.m[2]}) EXPECT_TRUE(std::isfinite(x));
+    EXPECT_EQ(t.pick_pdf, 0);
+  }
 }
 
 }  // namespace

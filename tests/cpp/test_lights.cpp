@@ -20,18 +20,18 @@ using lane_testing::kNan;
 /// What MIS sees of the density of direction `dir` from `from`, when the set holds one light.
 float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& dir) {
   const LightView view = lights.view();
+  if (view.first_triangle == 0) {
+    const auto t = trace(view, from, dir);
+    return t ? triangle_light_pdf<float>(view, 0u, dir, *t, true) : 0.f;
+  }
   const LightRecord& r = view.lights[0];
   switch (static_cast<LightKind>(r.kind)) {
     case LightKind::kDistant:
       return detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf * r.pick_pdf;
     case LightKind::kDome:
       return detail::hit_dome<float>(view, r, dir, true).pdf * r.pick_pdf;
-    case LightKind::kTriangle: {
-      const auto t = trace(r, from, dir);
-      return t ? triangle_light_pdf<float>(view, 0u, dir, *t, true) : 0.f;
-    }
     default: {
-      const auto t = trace(r, from, dir);
+      const auto t = trace(view, from, dir);
       return t ? light_hit<float>(view, 0u, from, dir, *t, true).pdf : 0.f;
     }
   }
@@ -112,7 +112,8 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
   const auto number = [&rng] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
   for (Case& c : cases) {
     const LightView view = c.lights.view();
-    const bool is_dome_image = view.lights[0].texture != kNoTexture;
+    const bool is_triangle = view.first_triangle == 0;
+    const bool is_dome_image = !is_triangle && view.lights[0].texture != kNoTexture;
     int outside = 0;
     for (int i = 0; i < 20000; ++i) {
       const auto s = sample_light<float>(view, c.from, number(), number(), number(), true);
@@ -132,10 +133,10 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
       if (view.infinite_count) {
         ASSERT_NEAR(escaped.y, s.weight.y * s.pdf, 1e-3 * escaped.y + 1e-5) << c.name;
       }
-      if (const auto t = view.infinite_count ? std::nullopt : trace(view.lights[0], c.from, s.wi)) {
+      if (const auto t = view.infinite_count ? std::nullopt : trace(view, c.from, s.wi)) {
         ASSERT_NEAR(*t, s.distance, 1e-3 * *t) << c.name;
         const UInt<float> light = 0;
-        if (view.lights[0].kind != static_cast<uint32_t>(LightKind::kTriangle)) {
+        if (!is_triangle) {
           ASSERT_NEAR(light_hit<float>(view, light, c.from, s.wi, *t, true).radiance.y, 3, 1e-5)
               << c.name;
         }

@@ -40,22 +40,22 @@ inline F balance_weight(const F& a, const F& b) {
 
 namespace detail {
 
-/// Index of a light, by alias table, out of the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)).
-/// The product u_pick * count is formed exactly, so that LightRecord::pick_pdf is exact for any
-/// count below 2^24: k = 2^24 u_pick in base 2^8, digit by digit.
+/// Index of a light out of the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)), as PickTable
+/// says: integers all the way, so that pick_pdf is exact.
 template <typename F>
 inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
   using U = UInt<F>;
-  const U k = U(to_int<F>(F(u_pick * 0x1p24f)));
-  const U c0 = (k & 0xffu) * view.count;
-  const U c1 = (c0 >> 8) + ((k >> 8) & 0xffu) * view.count;
-  const U c2 = (c1 >> 8) + (k >> 16) * view.count;
-  const U rest = ((c2 & 0xffu) << 16) | ((c1 & 0xffu) << 8) | (c0 & 0xffu);
-  const U bin = c2 >> 8;
-  const F remapped = F(Int<F>(rest)) * 0x1p-24f;
-  const F threshold = gather<F>(view.alias, bin << 1, active);
-  const U other = float_bits<F>(gather<F>(view.alias, (bin << 1) + 1u, active));
-  return select(remapped < threshold, bin, other);
+  const PickTable& pick = view.pick;
+  const U number = U(to_int<F>(F(u_pick * 0x1p24f)));
+  const Mask<U> triangle = number >= U(pick.split);
+  const U k = number - select(triangle, U(pick.split), U(0u));
+  const U shift = select(triangle, U(pick.shift[1]), U(pick.shift[0]));
+  const U bin = k >> shift;
+  const U entry =
+      gather<U>(pick.bins, bin + select(triangle, U(pick.triangle_bins), U(0u)), Mask<U>(active));
+  const U other = entry >> shift;
+  const U rest = k - (bin << shift), threshold = entry - (other << shift);
+  return select(rest < threshold, bin, other) + select(triangle, U(view.first_triangle), U(0u));
 }
 
 /// Runs `one(kind, lanes)` for each kind of light among the active lanes.
@@ -82,7 +82,7 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const Li
     case LightKind::kDome:
       return sample_dome<F>(view, light, u, v, lanes);
     case LightKind::kTriangle:
-      return sample_triangle<F>(light, view.materials, p, u, v, lanes);
+      break;  // has no record
   }
   return {};
 }
@@ -103,23 +103,33 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
                         Mask<F>(false)};
   if (view.count == 0 || none(active)) return result;
   const UInt<F> index = detail::pick_light<F>(view, u_pick, active);
-  const detail::LightReader<F> any_light(view.lights, index, active);
-  detail::for_each_kind<F>(
-      any_light.bits(offsetof(LightRecord, kind)), active,
-      [&](LightKind kind, const Mask<F>& lanes) {
-        // Often there is one light of a kind, whose record is the same in all its lanes.
-        const detail::LightReader<F> light(view.lights, index, lanes);
-        const detail::KindSample<F> s = detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
-        const F pdf = s.pdf * light.pick_pdf();
-        const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
-        const F inverse = 1.f / select(valid, pdf, F(1.f));
-        result.wi = select<F>(valid, s.wi, result.wi);
-        result.distance = select(valid, s.distance, result.distance);
-        result.weight = select<F>(valid, s.radiance * inverse, result.weight);
-        result.pdf = select(valid, pdf, result.pdf);
-        result.is_delta = result.is_delta | (valid & s.is_delta);
-        result.valid = result.valid | valid;
-      });
+  const auto put = [&](const detail::KindSample<F>& s, const F& pick_pdf, const Mask<F>& lanes) {
+    const F pdf = s.pdf * pick_pdf;
+    const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
+    const F inverse = 1.f / select(valid, pdf, F(1.f));
+    result.wi = select<F>(valid, s.wi, result.wi);
+    result.distance = select(valid, s.distance, result.distance);
+    result.weight = select<F>(valid, s.radiance * inverse, result.weight);
+    result.pdf = select(valid, pdf, result.pdf);
+    result.is_delta = result.is_delta | (valid & s.is_delta);
+    result.valid = result.valid | valid;
+  };
+  const Mask<F> triangle = active & Mask<F>(index >= UInt<F>(view.first_triangle));
+  if (any(triangle)) {
+    const detail::TriangleReader<F> light(view, index, triangle);
+    put(detail::sample_triangle<F>(light, view, p, u, v, triangle), light.pick_pdf, triangle);
+  }
+  const Mask<F> others = active & not_(triangle);
+  if (none(others)) return result;
+  const detail::LightReader<F> any_light(view.lights, index, others);
+  detail::for_each_kind<F>(any_light.bits(offsetof(LightRecord, kind)), others,
+                           [&](LightKind kind, const Mask<F>& lanes) {
+                             // Often there is one light of a kind, whose record is the same in all
+                             // its lanes.
+                             const detail::LightReader<F> light(view.lights, index, lanes);
+                             put(detail::sample_kind<F>(kind, view, light, p, u, v, lanes),
+                                 light.pick_pdf(), lanes);
+                           });
   return result;
 }
 
@@ -133,8 +143,9 @@ struct LightHit {
 /// hit it at distance t. Other kinds and inactive lanes give 0.
 template <typename F>
 inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const Vec3<F>& origin,
-                             const Vec3<F>& dir, const F& t, const Mask<F>& active) {
+                             const Vec3<F>& dir, const F& t, const Mask<F>& hit_lanes) {
   LightHit<F> result{Color<F>(F(0.f)), F(0.f)};
+  const Mask<F> active = hit_lanes & Mask<F>(light < UInt<F>(view.first_triangle));
   if (none(active)) return result;
   const detail::LightReader<F> reader(view.lights, light, active);
   const F pick_pdf = reader.pick_pdf();
@@ -151,13 +162,13 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const 
   return result;
 }
 
-/// The sampling density of triangle light `light` for a hit at distance t along dir.
+/// The sampling density of triangle light `light` for a hit at distance t along dir; 0 for others.
 template <typename F>
 inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const Vec3<F>& dir,
                             const F& t, const Mask<F>& active) {
-  if (none(active)) return F(0.f);
-  const detail::LightReader<F> reader(view.lights, light, active);
-  return select(active, F(detail::triangle_pdf<F>(reader, dir, t) * reader.pick_pdf()), F(0.f));
+  const Mask<F> lanes = active & Mask<F>(light >= UInt<F>(view.first_triangle));
+  if (none(lanes)) return F(0.f);
+  return select(lanes, detail::triangle_pdf<F>(view, light, dir, t, lanes), F(0.f));
 }
 
 /// Sum over all infinite lights of radiance * MIS weight for a ray that left the scene along dir;

@@ -2,6 +2,7 @@
 /// Triangles of emissive meshes: uniform over the area, shining to both sides.
 #pragma once
 
+#include "wavecomb/core/rows.h"
 #include "wavecomb/light/record.h"
 #include "wavecomb/texture/lookup.h"
 
@@ -37,35 +38,64 @@ inline Color<F> textured_emission(const MaterialView& view, const UInt<F>& mater
   return {sane(select(rgb, c[0], one)), sane(select(rgb, c[1], one)), sane(select(rgb, c[2], one))};
 }
 
+/// The triangles of the lights in the active lanes.
+template <typename F>
+struct TriangleReader {
+  Vec3<F> p, u, v, m;
+  Color<F> radiance;
+  F pick_pdf;
+
+  TriangleReader(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
+    constexpr uint32_t kWords = sizeof(TriangleLight) / 4;
+    const auto r =
+        load_rows<kWords, F>(view.triangles, (light - view.first_triangle) * kWords, active);
+    const auto vec3 = [&](size_t offset_bytes) {
+      return Vec3<F>(r[offset_bytes / 4], r[offset_bytes / 4 + 1], r[offset_bytes / 4 + 2]);
+    };
+    p = vec3(offsetof(TriangleLight, p));
+    u = vec3(offsetof(TriangleLight, u));
+    v = vec3(offsetof(TriangleLight, v));
+    m = vec3(offsetof(TriangleLight, m));
+    radiance = vec3(offsetof(TriangleLight, radiance));
+    pick_pdf = r[offsetof(TriangleLight, pick_pdf) / 4];
+  }
+};
+
 /// A point q = p + b1 u + b2 v, with density 1 / area.
 template <typename F>
-inline KindSample<F> sample_triangle(const LightReader<F>& light, const MaterialView& materials,
+inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const LightView& view,
                                      const Vec3<F>& from, const F& u, const F& v,
                                      const Mask<F>& active) {
   const Vec2<F> b = square_to_triangle(u, v);
-  const Vec3<F> q = fma(light.u(), b.x, fma(light.v(), b.y, light.p()));
+  const Vec3<F> q = fma(light.u, b.x, fma(light.v, b.y, light.p));
   const Direction<F> d = make_direction<F>(q - from);
-  const F pdf = area_to_solid_angle<F>(d.length2, abs(dot(d.wi, light.n())), light.area());
+  const F pdf = area_to_solid_angle<F>(d.length2, abs(dot(d.wi, light.m)), F(1.f));
 
-  Color<F> radiance = light.radiance();
-  const UInt<F> material = light.bits(offsetof(LightRecord, material));
-  const Mask<F> textured = active & (pdf > 0.f) & Mask<F>(material != UInt<F>(kNoLight));
+  Color<F> radiance = light.radiance;
+  const Mask<F> textured = active & (pdf > 0.f) & (light.radiance.x == TriangleLight::kTextured);
   if (any(textured)) {
-    const Vec2<F> uv0 = light.vec2(offsetof(LightRecord, uv0)),
-                  uv1 = light.vec2(offsetof(LightRecord, uv1)),
-                  uv2 = light.vec2(offsetof(LightRecord, uv2));
-    const Vec2<F> uv{fma(F(uv1.x - uv0.x), b.x, fma(F(uv2.x - uv0.x), b.y, uv0.x)),
-                     fma(F(uv1.y - uv0.y), b.x, fma(F(uv2.y - uv0.y), b.y, uv0.y))};
+    const UInt<F> material = float_bits<F>(light.radiance.y),
+                  index = float_bits<F>(light.radiance.z);
+    const auto uvs = load_rows<8, F>(view.triangle_uvs, index * 8u, textured);
+    const Vec2<F> uv{fma(F(uvs[2] - uvs[0]), b.x, fma(F(uvs[4] - uvs[0]), b.y, uvs[0])),
+                     fma(F(uvs[3] - uvs[1]), b.x, fma(F(uvs[5] - uvs[1]), b.y, uvs[1]))};
     radiance =
-        select<F>(textured, textured_emission<F>(materials, material, uv, textured), radiance);
+        select<F>(textured, textured_emission<F>(view.materials, material, uv, textured), radiance);
   }
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }
 
-/// Density over solid angle for a hit at distance t along dir.
+/// Density over solid angle, the choice of the light included, for a hit at distance t along dir.
 template <typename F>
-inline F triangle_pdf(const LightReader<F>& light, const Vec3<F>& dir, const F& t) {
-  return area_to_solid_angle<F>(F(t * t), abs(dot(dir, light.n())), light.area());
+inline F triangle_pdf(const LightView& view, const UInt<F>& light, const Vec3<F>& dir, const F& t,
+                      const Mask<F>& active) {
+  static_assert(offsetof(TriangleLight, pick_pdf) == offsetof(TriangleLight, m) + 12);
+  const auto r = load_rows<4, F>(
+      view.triangles,
+      (light - view.first_triangle) * (sizeof(TriangleLight) / 4) + offsetof(TriangleLight, m) / 4,
+      active);
+  const F projected = abs(dot(dir, Vec3<F>(r[0], r[1], r[2])));
+  return area_to_solid_angle<F>(F(t * t), projected, F(1.f)) * r[3];
 }
 
 }  // namespace wavecomb::detail

@@ -2,6 +2,7 @@
 /// The density that dome lights are sampled by.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "wavecomb/scene/light_builder.h"
 #include "wavecomb/scene/parallel.h"
@@ -14,10 +15,6 @@ constexpr double kPiD = 3.14159265358979323846;
 constexpr uint32_t kMaxWidth = 1024, kMaxHeight = 512;
 /// Rows of texels that are read at once.
 constexpr uint32_t kRows = 256;
-/// Least share of a lit cell in its row, and of a lit row, relative to the mean: so that float
-/// cumulative values can tell it apart and no lit cell is missed.
-constexpr double kFloor = 1e-3;
-
 /// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; parts of one cell
 /// sum to 1.
 template <typename Add>
@@ -74,50 +71,27 @@ class RowMeans {
   uint32_t cells_;
 };
 
-/// Cumulative floats of the given weights, 0 first and 1 last; lit entries have some floor.
-/// Returns the sum of the weights.
-double accumulate(std::vector<double>& weights, float* cdf) {
-  double sum = 0;
-  size_t lit = 0;
-  for (const double w : weights) {
-    sum += w;
-    lit += w > 0;
-  }
+/// Cumulative counts of the given weights: each lit entry, and the last one, has one count, and the
+/// others go by weight. So no lit entry is missed, no dark one is chosen but the last, and the
+/// count 65536 never stands before an entry. Returns the sum of the weights.
+double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   const size_t n = weights.size();
-  if (!(sum > 0)) {  // never chosen; some valid table
-    for (size_t i = 0; i <= n; ++i)
-      cdf[i] = static_cast<float>(static_cast<double>(i) / static_cast<double>(n));
-    return 0;
-  }
-  const double least = kFloor * sum / static_cast<double>(n);
-  double total = 0;
-  for (double& w : weights) {
-    if (w > 0) w = std::max(w, least);
-    total += w;
-  }
+  double sum = 0;
+  for (const double w : weights) sum += w;
+  const auto counts = [&](size_t i) { return !(sum > 0) || weights[i] > 0 || i + 1 == n; };
+  uint32_t lit = 0;
+  for (size_t i = 0; i < n; ++i) lit += counts(i);
+  const uint32_t free = Distribution2D::kCounts - lit;
   double running = 0;
-  size_t last = 0;
-  cdf[0] = 0;
+  uint32_t before = 0;
   for (size_t i = 0; i < n; ++i) {
+    const double part = sum > 0 ? std::min(1.0, running / sum) : 0;
+    cumulative[i] =
+        static_cast<uint16_t>(before + static_cast<uint32_t>(std::nearbyint(part * free)));
+    before += counts(i);
     running += weights[i];
-    cdf[i + 1] = static_cast<float>(running / total);
-    if (weights[i] > 0) last = i;
   }
-  for (size_t i = last + 1; i <= n; ++i) cdf[i] = 1;
   return sum;
-}
-
-/// Guide entries of the cumulative values cdf[0 .. n].
-void add_guide(const float* cdf, uint32_t n, std::vector<uint32_t>& guide) {
-  constexpr uint32_t kEntries = Distribution2D::kGuide;
-  uint32_t first = 0, last = 0;
-  for (uint32_t k = 0; k < kEntries; ++k) {
-    const float from = static_cast<float>(k) / kEntries, to = static_cast<float>(k + 1) / kEntries;
-    while (first + 1 < n && cdf[first + 1] <= from) ++first;
-    last = std::max(last, first);
-    while (last + 1 < n && cdf[last + 1] < to) ++last;
-    guide.push_back(first | (last << 16));
-  }
 }
 
 }  // namespace
@@ -150,36 +124,37 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
     row = std::move(below);
   }
 
-  d.conditional.resize(size_t{d.height} * (d.width + 1));
-  d.marginal.resize(d.height + 1);
-  d.density.resize(size_t{d.width} * d.height);
-  std::vector<double> rows(d.height), line(d.width);
+  using Line = Distribution2D::Line;
+  static_assert(kMaxWidth <= Distribution2D::kMost && kMaxHeight <= Distribution2D::kMost);
+  const auto lines_of = [](uint32_t n) {
+    return (n + Distribution2D::kLine - 1) / Distribution2D::kLine;
+  };
+  Line pad;
+  std::fill(std::begin(pad.value), std::end(pad.value), Distribution2D::kPad);
+  d.row_lines = lines_of(d.width);
+  d.cumulative.assign(size_t{d.row_lines} * d.height + lines_of(d.height), pad);
+  d.coarse.assign(d.height + 1, pad);
+  std::vector<uint16_t> line(std::max(d.width, d.height));
+  const auto put = [&](uint32_t y, uint32_t n) {
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t at = i / Distribution2D::kLine, within = i % Distribution2D::kLine;
+      d.cumulative[size_t{y} * d.row_lines + at].value[within] = line[i];
+      if (within == 0) d.coarse[y].value[at] = line[i];
+    }
+  };
+  std::vector<double> rows(d.height);
   double mean = 0;
   for (uint32_t y = 0; y < d.height; ++y) {
-    const auto from = cells.begin() + static_cast<std::ptrdiff_t>(size_t{y} * d.width);
-    std::copy(from, from + d.width, line.begin());
     // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
     const double ring = std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height);
-    rows[y] = ring * accumulate(line, d.conditional.data() + size_t{y} * (d.width + 1)) / d.width;
+    const std::span<const double> weights(cells.data() + size_t{y} * d.width, d.width);
+    rows[y] = ring * accumulate(weights, line.data()) / d.width;
+    put(y, d.width);
     mean += rows[y] / 2;
   }
   if (mean_luminance) *mean_luminance = mean;
-  if (!(accumulate(rows, d.marginal.data()) > 0)) return {};
-
-  static_assert(kMaxWidth < 1u << 16 && kMaxHeight < 1u << 16);
-  for (uint32_t y = 0; y < d.height; ++y)
-    add_guide(d.conditional.data() + size_t{y} * (d.width + 1), d.width, d.guide);
-  add_guide(d.marginal.data(), d.height, d.guide);
-
-  // The density that the float tables really have.
-  for (uint32_t y = 0; y < d.height; ++y) {
-    const double row_part = (double{d.marginal[y + 1]} - double{d.marginal[y]}) * d.height;
-    const float* cdf = d.conditional.data() + size_t{y} * (d.width + 1);
-    for (uint32_t x = 0; x < d.width; ++x) {
-      d.density[size_t{y} * d.width + x] =
-          static_cast<float>(row_part * (double{cdf[x + 1]} - double{cdf[x]}) * d.width);
-    }
-  }
+  if (!(accumulate(rows, line.data()) > 0)) return {};
+  put(d.height, d.height);
   return d;
 }
 

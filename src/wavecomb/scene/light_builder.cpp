@@ -2,6 +2,7 @@
 #include "wavecomb/scene/light_builder.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 
@@ -84,6 +85,12 @@ void check(const Light& light, size_t texture_count) {
 
 bool is_infinite(LightKind kind) {
   return kind == LightKind::kDistant || kind == LightKind::kDome;
+}
+
+/// A power that can be compared with others.
+double sane_power(double power) {
+  const bool sane = std::isfinite(power) && power > 0;
+  return sane ? power : (power > 0 ? 1e300 : 0);
 }
 
 /// A record in the making, and the power that its choice rests on.
@@ -189,7 +196,6 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
   LightRecord& r = made.record;
   r.kind = static_cast<uint32_t>(light.kind);
   r.texture = kNoTexture;
-  r.material = kNoLight;
   if (light.kind == LightKind::kRect || light.kind == LightKind::kDome) r.texture = light.texture;
 
   const Double3 color = {std::max(0.0, double{light.color.x}), std::max(0.0, double{light.color.y}),
@@ -233,25 +239,29 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
   return made;
 }
 
-Made make_triangle(const EmissiveTriangle& t) {
-  Made made;
-  LightRecord& r = made.record;
-  r.kind = static_cast<uint32_t>(LightKind::kTriangle);
-  r.texture = kNoTexture;
-  r.material = t.material;
+struct MadeTriangle {
+  TriangleLight light{};
+  double power = 0;
+};
+
+/// Index of the texture coordinates left to the caller.
+MadeTriangle make_triangle(const EmissiveTriangle& t) {
+  MadeTriangle made;
+  TriangleLight& r = made.light;
   const Double3 p0 = to_double(t.p0);
   const Double3 u = subtract(to_double(t.p1), p0), v = subtract(to_double(t.p2), p0);
-  const Double3 m = cross(u, v);
-  const double area = length(m) / 2;
+  const Double3 m = cross(u, v) * 0.5;
+  const double area = length(m);
   put(r.p, p0);
   put(r.u, u);
   put(r.v, v);
-  put(r.n, unit(m));
-  put_radiance(r, to_double(t.radiance));
-  r.area = static_cast<float>(area);
-  std::copy(t.uv0, t.uv0 + 2, r.uv0);
-  std::copy(t.uv1, t.uv1 + 2, r.uv1);
-  std::copy(t.uv2, t.uv2 + 2, r.uv2);
+  put(r.m, m);
+  const auto sane = [](float x) { return std::clamp(double{x}, 0.0, kMostRadiance); };
+  put(r.radiance, {sane(t.radiance[0]), sane(t.radiance[1]), sane(t.radiance[2])});
+  if (t.material != kNoLight) {
+    r.radiance[0] = TriangleLight::kTextured;
+    r.radiance[1] = std::bit_cast<float>(t.material);
+  }
   const double mean =
       luminance(double{t.radiance[0]}, double{t.radiance[1]}, double{t.radiance[2]}) *
       double{t.mean_scale};
@@ -259,13 +269,68 @@ Made make_triangle(const EmissiveTriangle& t) {
   return made;
 }
 
+/// The triangles of `set`, whose powers go to `powers`.
+void make_triangles(LightSet& set, size_t count, const TriangleSource& source, double* powers) {
+  constexpr size_t kChunk = 4096;
+  const size_t chunks = (count + kChunk - 1) / kChunk;
+  std::vector<std::vector<TriangleUvs>> uvs(chunks);
+  const auto each = [&](size_t chunk, const auto& one) {
+    for (size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) one(i);
+  };
+  set.triangles.resize(count);
+  parallel_for(chunks, [&](size_t chunk) {
+    each(chunk, [&](size_t i) {
+      const EmissiveTriangle t = source(i);
+      const MadeTriangle made = make_triangle(t);
+      set.triangles[i] = made.light;
+      powers[i] = sane_power(made.power);
+      if (t.material == kNoLight) return;
+      uvs[chunk].push_back({{t.uv0[0], t.uv0[1]}, {t.uv1[0], t.uv1[1]}, {t.uv2[0], t.uv2[1]}});
+    });
+  });
+  for (size_t chunk = 0; chunk < chunks; ++chunk) {
+    if (uvs[chunk].empty()) continue;
+    auto next = static_cast<uint32_t>(set.triangle_uvs.size());
+    each(chunk, [&](size_t i) {
+      float* const radiance = set.triangles[i].radiance;
+      if (radiance[0] == TriangleLight::kTextured) radiance[2] = std::bit_cast<float>(next++);
+    });
+    set.triangle_uvs.insert(set.triangle_uvs.end(), uvs[chunk].begin(), uvs[chunk].end());
+  }
+}
+
+/// Fills the bins of one group: light i has numbers[i] of the bins' 2^shift each, which they sum
+/// to.
+void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
+  const uint32_t size = 1u << shift;
+  std::vector<uint32_t> left(bins.size(), 0), small, large;
+  std::copy(numbers.begin(), numbers.end(), left.begin());
+  for (uint32_t b = 0; b < bins.size(); ++b) {
+    bins[b] = b << shift;  // full
+    if (left[b] != size) (left[b] < size ? small : large).push_back(b);
+  }
+  while (!small.empty()) {  // what one lacks another has
+    const uint32_t s = small.back(), l = large.back();
+    small.pop_back();
+    bins[s] = (l << shift) | left[s];
+    left[l] -= size - left[s];
+    if (left[l] > size) continue;
+    large.pop_back();
+    if (left[l] < size) small.push_back(l);
+  }
+}
+
 }  // namespace
 
 LightView LightSet::view(const MaterialView& materials) const {
   LightView v;
   v.lights = records.data();
-  v.alias = alias.data();
-  v.count = static_cast<uint32_t>(records.size());
+  v.triangles = triangles.data();
+  v.triangle_uvs = triangle_uvs.data();
+  v.pick = pick;
+  v.pick.bins = pick_bins.data();
+  v.count = static_cast<uint32_t>(size());
+  v.first_triangle = first_triangle();
   v.infinite_count = infinite_count;
   v.distributions = distributions.data();
   v.materials = materials;
@@ -283,12 +348,8 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   const double scene_radius = std::isfinite(radius) && radius > 0 ? double{radius} : 1.0;
   LightSet set;
   std::vector<double> powers;
-  set.records.reserve(lights.size() + triangle_count);
+  set.records.reserve(lights.size());
   powers.reserve(lights.size() + triangle_count);
-  const auto power_of = [](const Made& made) {
-    const bool sane = std::isfinite(made.power) && made.power > 0;
-    return sane ? made.power : (made.power > 0 ? 1e300 : 0);
-  };
   set.of_input.resize(lights.size());
   for (const bool infinite : {true, false}) {
     for (size_t i = 0; i < lights.size(); ++i) {
@@ -297,96 +358,105 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
       set.of_input[i] = static_cast<uint32_t>(set.records.size());
       const Made made = make_light(set, lights[i], scene_radius, textures);
       set.records.push_back(made.record);
-      powers.push_back(power_of(made));
+      powers.push_back(sane_power(made.power));
     }
     if (infinite) set.infinite_count = static_cast<uint32_t>(set.records.size());
   }
-  set.first_triangle = static_cast<uint32_t>(set.records.size());
-  set.records.resize(set.first_triangle + triangle_count);
-  powers.resize(set.records.size());
-  constexpr size_t kChunk = 4096;
-  parallel_for((triangle_count + kChunk - 1) / kChunk, [&](size_t chunk) {
-    const size_t end = std::min(triangle_count, (chunk + 1) * kChunk);
-    for (size_t i = chunk * kChunk; i < end; ++i) {
-      const Made made = make_triangle(triangle(i));
-      set.records[set.first_triangle + i] = made.record;
-      powers[set.first_triangle + i] = power_of(made);
-    }
-  });
+  powers.resize(lights.size() + triangle_count);
+  make_triangles(set, triangle_count, triangle, powers.data() + lights.size());
 
   for (const double power : powers) set.total_power += power;
-  std::vector<float> probability;
-  build_alias_table(powers, set.alias, probability);
-  for (size_t i = 0; i < set.records.size(); ++i) set.records[i].pick_pdf = probability[i];
+  std::vector<uint32_t> numbers;
+  set.pick = build_pick_table(powers, set.first_triangle(), set.pick_bins, numbers);
+  const auto pdf = [&](size_t i) { return static_cast<float>(numbers[i]) * 0x1p-24f; };
+  for (size_t i = 0; i < set.records.size(); ++i) set.records[i].pick_pdf = pdf(i);
+  for (size_t i = 0; i < triangle_count; ++i)
+    set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
   return set;
 }
 
-void build_alias_table(std::span<const double> weights, std::vector<AliasEntry>& table,
-                       std::vector<float>& probability) {
+PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
+                           std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers) {
+  constexpr uint32_t kNumbers = 1u << 24;
   const size_t n = weights.size();
-  table.assign(n, {0, 0});
-  probability.assign(n, 0);
-  double total = 0, largest = 0;
-  size_t lit = 0;
-  for (const double w : weights) {
-    largest = std::max(largest, w);
-    lit += w > 0;
+  const std::span<const double> groups[2] = {weights.first(first_triangle),
+                                             weights.subspan(first_triangle)};
+  bins.clear();
+  numbers.assign(n, 0);
+  const auto count_lit = [](std::span<const double> of) {
+    return static_cast<size_t>(std::count_if(of.begin(), of.end(), [](double w) { return w > 0; }));
+  };
+  const size_t lit = count_lit(weights), lit_of[2] = {count_lit(groups[0]), count_lit(groups[1])};
+  PickTable table;
+  if (lit == 0) {  // number 0 for all; some table
+    table.split = first_triangle > 0 ? kNumbers : 0;
+    table.shift[0] = table.shift[1] = 24;
+    bins.assign(1, 0);
+    return table;
   }
-  for (size_t i = 0; i < n; ++i) table[i].alias = static_cast<uint32_t>(i);
-  if (lit == 0) return;
-  for (const double w : weights) total += w / largest;
 
   // Share of the uniform floor: 1 %, or what gives each light 4 of the 2^24 random numbers.
-  constexpr double kNumbers = 16777216.0;
   const double floor_share = std::min(0.5, std::max(0.01, 4 * static_cast<double>(lit) / kNumbers));
-  std::vector<double> scaled(n);  // n times the probability
-  std::vector<uint32_t> small, large;
-  for (size_t i = 0; i < n; ++i) {
-    const double p = weights[i] > 0 ? (1 - floor_share) * (weights[i] / largest / total) +
-                                          floor_share / static_cast<double>(lit)
-                                    : 0;
-    scaled[i] = p * static_cast<double>(n);
-    (scaled[i] < 1 ? small : large).push_back(static_cast<uint32_t>(i));
-  }
-  // Thresholds are multiples of 2^-24 so that comparing with them is exact.
-  const auto keep = [&](uint32_t i, double part) {
-    table[i].threshold =
-        static_cast<float>(std::clamp(std::nearbyint(part * kNumbers), 0.0, kNumbers) / kNumbers);
+  const double largest = *std::max_element(weights.begin(), weights.end());
+  double sum[2] = {0, 0};
+  for (size_t g = 0; g < 2; ++g)
+    for (const double w : groups[g]) sum[g] += w / largest;
+  const double total = sum[0] + sum[1];
+  const auto share = [&](double w) {
+    return w > 0
+               ? (1 - floor_share) * (w / largest / total) + floor_share / static_cast<double>(lit)
+               : 0;
   };
-  while (!small.empty() && !large.empty()) {
-    const uint32_t s = small.back(), l = large.back();
-    small.pop_back();
-    keep(s, scaled[s]);
-    table[s].alias = l;
-    scaled[l] = (scaled[l] + scaled[s]) - 1;
-    if (scaled[l] < 1) {
-      large.pop_back();
-      small.push_back(l);
-    }
-  }
-  for (const uint32_t i : large) keep(i, 1);
-  // Left by rounding: full bins, or empty ones that any light may fill.
-  const auto brightest =
-      static_cast<uint32_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
-  for (const uint32_t i : small) {
-    keep(i, weights[i] > 0 ? 1 : 0);
-    table[i].alias = weights[i] > 0 ? i : brightest;
-  }
 
-  // Count the numbers k of 2^24 that lead to each light: those of bin b are ceil(b 2^24 / n) and
-  // on; the kept ones have k n - b 2^24 < threshold 2^24.
-  std::vector<uint64_t> hits(n, 0);
-  const auto ceil_div = [](uint64_t a, uint64_t b) { return (a + b - 1) / b; };
-  constexpr uint64_t kAll = uint64_t{1} << 24;
-  for (size_t b = 0; b < n; ++b) {
-    const uint64_t begin = ceil_div(b * kAll, n), end = ceil_div((b + 1) * kAll, n);
-    const auto part = static_cast<uint64_t>(double{table[b].threshold} * kNumbers);
-    const uint64_t middle = std::clamp(ceil_div(b * kAll + part, n), begin, end);
-    hits[b] += middle - begin;
-    hits[table[b].alias] += end - middle;
+  // The numbers of a group are a multiple of those of its bins, and there are bins for all its
+  // lights. Few and large bins stay in the cache; 1024 for all numbers divide them well enough.
+  const auto least = [&](size_t g, uint32_t shift) {
+    const uint64_t units = (groups[g].size() + (size_t{1} << shift) - 1) >> shift;
+    return lit_of[g] > 0 ? units << shift : 0;
+  };
+  uint32_t unit = 14;
+  while (unit > 0 && least(0, unit) + least(1, unit) > kNumbers) --unit;
+  double first_share = 0;
+  for (const double w : groups[0]) first_share += share(w);
+  const auto wanted = static_cast<uint64_t>(std::nearbyint(first_share * kNumbers)) >> unit << unit;
+  table.split = static_cast<uint32_t>(std::clamp<uint64_t>(
+      wanted, least(0, unit), lit_of[1] > 0 ? kNumbers - least(1, unit) : kNumbers));
+  if (lit_of[0] == 0) table.split = 0;
+  if (lit_of[1] == 0) table.split = kNumbers;
+
+  const uint32_t numbers_of[2] = {table.split, kNumbers - table.split};
+  for (size_t g = 0; g < 2; ++g) {
+    if (g == 1) table.triangle_bins = static_cast<uint32_t>(bins.size());
+    if (numbers_of[g] == 0) continue;
+    const std::span<uint32_t> counts(numbers.data() + (g == 0 ? 0 : first_triangle),
+                                     groups[g].size());
+    double all = 0, running = 0;
+    for (const double w : groups[g]) all += share(w);
+    // One number each, and the others by share: rounding the running sum makes the sum exact.
+    const auto free = static_cast<double>(numbers_of[g] - lit_of[g]);
+    const auto up_to = [&](double part) {
+      return static_cast<uint32_t>(std::nearbyint(std::min(1.0, part / all) * free));
+    };
+    uint32_t given = 0;
+    size_t last = 0;
+    for (size_t i = 0; i < counts.size(); ++i) {
+      if (!(groups[g][i] > 0)) continue;
+      last = i;
+      running += share(groups[g][i]);
+      const uint32_t to = up_to(running);
+      counts[i] = 1 + to - given;
+      given = to;
+    }
+    counts[last] += static_cast<uint32_t>(free) - given;
+
+    uint32_t shift = unit;
+    while (numbers_of[g] >> shift < counts.size()) --shift;
+    table.shift[g] = shift;
+    const size_t first = bins.size();
+    bins.resize(first + (numbers_of[g] >> shift));
+    fill_bins(counts, shift, std::span(bins).subspan(first));
   }
-  for (size_t i = 0; i < n; ++i)
-    probability[i] = static_cast<float>(static_cast<double>(hits[i]) / kNumbers);
+  return table;
 }
 
 }  // namespace wavecomb

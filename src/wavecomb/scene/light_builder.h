@@ -27,22 +27,32 @@ struct EmissiveTriangle {
   float mean_scale = 1;
 };
 
-/// All lights of a scene, ready for kernels. Order of `records`: infinite lights, then rects, disks
-/// and spheres, then the triangles; each kind of group in the order of the input.
+/// All lights of a scene, ready for kernels. Order: infinite lights, then rects, disks and spheres
+/// (`records`), then the triangles; each kind of group in the order of the input.
 struct LightSet {
   std::vector<LightRecord> records;
-  std::vector<AliasEntry> alias;  ///< as many as records
+  std::vector<TriangleLight> triangles;
+  std::vector<TriangleUvs> triangle_uvs;  ///< of triangles with textured emission
+  std::vector<uint32_t> pick_bins;
+  PickTable pick;  ///< without its pointer
   std::vector<Distribution2D> distributions;
   uint32_t infinite_count = 0;
-  uint32_t first_triangle = 0;     ///< record of emissive triangle i is first_triangle + i
   std::vector<uint32_t> of_input;  ///< record of each input light
   double total_power = 0;          ///< estimate that the choice of lights rests on, W
+
+  size_t size() const { return records.size() + triangles.size(); }
+  /// Index of the first triangle among all lights.
+  uint32_t first_triangle() const { return static_cast<uint32_t>(records.size()); }
+  /// Probability of choosing light `i`.
+  float pick_pdf(size_t i) const {
+    return i < records.size() ? records[i].pick_pdf : triangles[i - records.size()].pick_pdf;
+  }
 
   /// What kernels take. Contract: points into this set, which must stay where it is.
   LightView view(const MaterialView& materials) const;
 };
 
-/// Most lights that the alias table can tell apart (its random number has 24 bits).
+/// Most lights that the choice can tell apart (its random number has 24 bits).
 inline constexpr uint32_t kMaxLights = (1u << 24) - 1;
 
 /// Emissive triangle i. Called from many threads at once.
@@ -75,11 +85,12 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color,
                                        double* mean_luminance);
 
-/// Vose's alias table for the given weights (>= 0), and the probability that each entry really has
-/// when the random number is a multiple of 2^-24. Entries of weight 0 are never chosen, all others
-/// have some floor of probability. All weights 0: probabilities 0. M. Vose, "A Linear Algorithm for
+/// The table that chooses among lights of the given weights (>= 0), of which those before
+/// `first_triangle` are one group, and how many of the 2^24 numbers choose each light. Lights of
+/// weight 0 are never chosen, all others have some floor of probability. All weights 0: numbers 0.
+/// At most kMaxLights. The alias tables are Vose's, in integers: M. Vose, "A Linear Algorithm for
 /// Generating Random Numbers with a Given Distribution", 1991.
-void build_alias_table(std::span<const double> weights, std::vector<AliasEntry>& table,
-                       std::vector<float>& probability);
+PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
+                           std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);
 
 }  // namespace wavecomb

@@ -34,15 +34,14 @@ struct Light {
   uint32_t texture = kNoTexture;  ///< rect (u right, v up as seen from the front), dome (latlong)
 };
 
-/// A light as lanes read it: 32 words. Vectors are in world space. Use by kind:
+/// A light as lanes read it, triangles of meshes apart: 32 words. Vectors are in world space. Use
+/// by kind:
 ///   rect      p corner, u, v edges, n unit normal (direction of emission), area
 ///   disk      p centre, u, v half axes, n, area
 ///   sphere    p centre, radius (0: point light, radiance then is radiant intensity), area
 ///   distant   n unit direction the light travels, one_minus_cos of its half angle (0: a direction,
 ///             radiance then is irradiance at normal incidence)
 ///   dome      u, v, n: world axes of the dome's local x, y, z
-///   triangle  p vertex 0, u, v edges, n unit geometric normal, area; shines to both sides;
-///             uv0, uv1, uv2 and `material` for textured emission
 struct alignas(64) LightRecord {
   float p[3], u[3], v[3], n[3];
   float radiance[3];
@@ -52,37 +51,74 @@ struct alignas(64) LightRecord {
   float pick_pdf;  ///< probability of choosing this light
   uint32_t kind;
   uint32_t texture;
-  uint32_t material;  ///< triangle: material whose emission slot is textured, else kNoLight
-  float uv0[2], uv1[2], uv2[2];
   uint32_t distribution;  ///< dome: index into LightView::distributions
-  uint32_t pad;
 };
 static_assert(sizeof(LightRecord) == 128);
 
-/// A piecewise constant density over [0,1]^2 for importance sampling a dome: rows of `width` + 1
-/// cumulative values in [0, 1] per row, and one column of `height` + 1.
+/// A triangle of an emissive mesh, in world space, which shines to both sides. There may be
+/// millions, chosen at random: one is one cache line.
+struct alignas(64) TriangleLight {
+  float p[3], u[3], v[3];  ///< vertex 0 and the edges from it
+  /// Radiance; where it is textured: kTextured, then the bits of the material whose emission slot
+  /// it is, and of the index of its TriangleUvs.
+  float radiance[3];
+  float m[3];      ///< unit geometric normal times the area
+  float pick_pdf;  ///< probability of choosing this light
+  static constexpr float kTextured = -1.f;
+};
+static_assert(sizeof(TriangleLight) == 64);
+
+/// Texture coordinates of the corners of a triangle with textured emission.
+struct alignas(32) TriangleUvs {
+  float uv0[2], uv1[2], uv2[2];
+};
+static_assert(sizeof(TriangleUvs) == 32);
+
+/// A piecewise constant density over [0,1]^2 for importance sampling a dome, in counts of 65536:
+/// interval x of row y is chosen for as many of a row's 65536 counts as lie between its cumulative
+/// value and the next, so that its probability is exact in integers.
+///
+/// Inversion reads two cache lines: the row's coarse one, which holds each 32nd value and stays in
+/// the cache, and one of the 32 values that it leads to.
 struct Distribution2D {
+  static constexpr uint32_t kCounts = 65536;
+  static constexpr uint32_t kLine = 32;             ///< values in a cache line
+  static constexpr uint32_t kMost = kLine * kLine;  ///< intervals of a row
+  /// Behind the last value of a row, which is at most that: kCounts itself is not stored.
+  static constexpr uint16_t kPad = kCounts - 1;
+  struct alignas(64) Line {
+    uint16_t value[kLine];
+  };
   uint32_t width = 0, height = 0;
-  std::vector<float> conditional;  ///< height rows of width + 1
-  std::vector<float> marginal;     ///< height + 1
-  std::vector<float> density;      ///< height x width, pdf over the unit square
-  /// Where inversion finds numbers in [k, k + 1) / kGuide: the first interval, and the last one in
-  /// the upper 16 bits. kGuide entries for each row of `conditional`, then those of `marginal`.
-  static constexpr uint32_t kGuide = 128;
-  std::vector<uint32_t> guide;
+  uint32_t row_lines = 0;  ///< lines of a row of `cumulative`
+  /// `height` rows of `width` values, each from 0 upwards; then the marginal, `height` values in as
+  /// many lines as they need. Each row starts a line.
+  std::vector<Line> cumulative;
+  /// First values of the lines of each row, and of the marginal: one line each.
+  std::vector<Line> coarse;
 };
 
-/// An entry of Vose's alias table.
-struct AliasEntry {
-  float threshold;  ///< keep the bin where the remapped number is below this
-  uint32_t alias;
+/// How a light is chosen out of a number k in [0, 2^24), in integers. Numbers below `split` choose
+/// among the records, the others among the triangles, so that a few strong lights keep clear of a
+/// table of millions. Each of the two groups has an alias table whose bins take 2^shift numbers.
+struct PickTable {
+  /// Of both groups. Number r of the 2^shift of bin b chooses light b of the group where
+  /// r < bin mod 2^shift, else light bin >> shift.
+  const uint32_t* bins = nullptr;
+  uint32_t split = 0;
+  uint32_t shift[2] = {};
+  uint32_t triangle_bins = 0;  ///< first bin of the triangles
 };
 
-/// What kernels need of all lights. Infinite lights (distant, dome) come first.
+/// What kernels need of all lights. Light i is record i for i < first_triangle, else triangle
+/// i - first_triangle. Infinite lights (distant, dome) come first.
 struct LightView {
   const LightRecord* lights = nullptr;
-  const AliasEntry* alias = nullptr;
-  uint32_t count = 0;
+  const TriangleLight* triangles = nullptr;
+  const TriangleUvs* triangle_uvs = nullptr;
+  PickTable pick;
+  uint32_t count = 0;  ///< records and triangles
+  uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
   const Distribution2D* distributions = nullptr;
   MaterialView materials;  ///< textures, and emission of textured triangle lights

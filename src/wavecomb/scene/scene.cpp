@@ -157,9 +157,10 @@ SceneBytes Scene::bytes() const {
   b.records = of(meshes_) + of(instances_) + of(materials_) + of(mesh_records_) +
               of(instance_records_) + of(geometry_mesh_) + of(emissive_lights_) +
               of(material_program_) + of(material_records_) + of(use_records_) +
-              of(texture_views_) + of(light_set_.records) + of(light_set_.alias);
+              of(texture_views_) + of(light_set_.records) + of(light_set_.triangles) +
+              of(light_set_.triangle_uvs) + of(light_set_.pick_bins);
   for (const Distribution2D& d : light_set_.distributions)
-    b.records += of(d.conditional) + of(d.marginal) + of(d.density);
+    b.records += of(d.cumulative) + of(d.coarse);
   return b;
 }
 

@@ -109,7 +109,7 @@ void SceneBuilder::make_lights(Scene& scene) const {
       build_lights(scene.lights_, triangle_count, triangle, center, radius, scene.textures_);
   // Table entries now point at the first triangle; make them light ids.
   for (uint32_t& entry : table)
-    if (entry != kNoLight) entry += scene.light_set_.first_triangle;
+    if (entry != kNoLight) entry += scene.light_set_.first_triangle();
 
   SceneView& v = scene.view_;
   v.meshes = scene.mesh_records_.data();
