@@ -45,6 +45,7 @@ namespace detail {
 template <typename F>
 inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
   using U = UInt<F>;
+  if (view.count == 1) return U(0u);
   const PickTable& pick = view.pick;
   const U number = U(to_int<F>(F(u_pick * 0x1p24f)));
   const Mask<U> triangle = number >= U(pick.split);
