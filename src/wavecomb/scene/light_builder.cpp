@@ -395,8 +395,9 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     return table;
   }
 
-  // Share of the uniform floor: 1 %, or what gives each light 4 of the 2^24 random numbers.
-  const double floor_share = std::min(0.5, std::max(0.01, 4 * static_cast<double>(lit) / kNumbers));
+  // One number in a hundred goes by heads, so that weak lights near by are found. (Every lit light
+  // has one of the 2^24 besides.)
+  constexpr double floor_share = 0.01;
   const double largest = *std::max_element(weights.begin(), weights.end());
   double sum[2] = {0, 0};
   for (size_t g = 0; g < 2; ++g)
