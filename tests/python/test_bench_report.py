@@ -112,7 +112,8 @@ def test_viewers(tree: ElementTree.Element) -> None:
 def test_figures_open_and_are_not_blank(folder: Path) -> None:
     names = {path.stem for path in (folder / "figures").iterdir()}
     for part in (
-        *("policies-policies", "policies-pipeline", "policies-coherence", "policies-order"),
+        *("policies-shade", "policies-policies", "policies-pipeline"),
+        *("policies-coherence", "policies-order"),
         *("policies-regret", "policies-mixed-lanes", "scaling-threads-mixed-curve"),
         *("scaling-wave-size-mixed-curve", "error-error", "effects-render-time", "costs"),
         *("difference-mixed", "peers-renderers-efficiency"),

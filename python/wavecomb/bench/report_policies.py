@@ -39,8 +39,11 @@ def policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
         return  # curves over the factor say more
     key = key_of(name)
     words = "shade + order time"
-    title = "Shade + order time by policy"
-    out.draw(figures_runs.ratio_figure(main, f"{key}-policies", title, words, "policy"))
+    for short, metric in (("shade", "shade"), ("policies", "shade + order")):
+        title, table = f"{metric.capitalize()} time by policy", metrics[metric]
+        out.draw(
+            figures_runs.ratio_figure(table, f"{key}-{short}", title, f"{metric} time", "policy")
+        )
     out.draw(figures_runs.pipeline(runs, f"{key}-pipeline"))
     out.draw(figures_runs.coherence(runs, f"{key}-coherence"))
     order = order_effects(runs)
