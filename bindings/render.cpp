@@ -11,7 +11,9 @@
 #include <memory>
 
 #include "bind.h"
+#include "wavecomb/core/aov.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/film/cryptomatte.h"
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/render/ray_recording.h"
 #include "wavecomb/render/renderer.h"
@@ -83,14 +85,43 @@ void def_enum(Class& c, const char* attribute, Enum Settings::* member, const Na
       [member, &names](Settings& s, const std::string& text) { s.*member = names.parse(text); });
 }
 
-constexpr const char* kAttributes[] = {"width",           "height",         "spp",
-                                       "max_depth",       "seed",           "sampler",
-                                       "filter",          "filter_width",   "roulette",
-                                       "roulette_depth",  "clamp_indirect", "fresnel",
-                                       "cosine_sampling", "integrator",     "threads",
-                                       "wave_size",       "lanes",          "traversal",
-                                       "policy",          "materialize",    "ray_order",
-                                       "shadow_order",    "costs",          "cost_weight"};
+constexpr const char* kAttributes[] = {
+    "width",           "height",       "spp",         "max_depth",      "seed",           "sampler",
+    "filter",          "filter_width", "roulette",    "roulette_depth", "clamp_indirect", "fresnel",
+    "cosine_sampling", "integrator",   "aovs",        "threads",        "wave_size",      "lanes",
+    "traversal",       "policy",       "materialize", "ray_order",      "shadow_order",   "costs",
+    "cost_weight"};
+
+/// Before the name of a light group, in names of AOVs and of layers.
+constexpr const char* kLightPrefix = "light_";
+
+/// Settings::aovs and light_groups as names.
+std::vector<std::string> aov_names(const Settings& s) {
+  std::vector<std::string> names = s.aovs.names();
+  if (s.light_groups.empty()) return names;
+  names.erase(std::remove(names.begin(), names.end(), "light_groups"), names.end());
+  for (const std::string& group : s.light_groups) names.push_back(kLightPrefix + group);
+  return names;
+}
+
+/// "light_groups" stands for all of them, "light_NAME" for one.
+void set_aovs(Settings& s, const std::vector<std::string>& names) {
+  AovSet set{0};
+  std::vector<std::string> groups;
+  bool all_groups = false;
+  for (const std::string& name : names) {
+    if (name != "light_groups" && name.starts_with(kLightPrefix)) {
+      groups.push_back(name.substr(std::string(kLightPrefix).size()));
+      set.bits |= static_cast<uint32_t>(Aov::kLightGroups);
+    } else {
+      const Aov aov = AovSet::parse(name);
+      all_groups |= aov == Aov::kLightGroups;
+      set.bits |= static_cast<uint32_t>(aov);
+    }
+  }
+  s.aovs = set;
+  s.light_groups = all_groups ? std::vector<std::string>{} : groups;
+}
 
 nb::dict to_dict(nb::handle settings) {
   nb::dict d;
@@ -217,6 +248,32 @@ auto image(nb::handle owner, const std::vector<T>& values, const Picture& p, siz
   return nb::ndarray<nb::numpy, const T>(values.data(), channels == 1 ? 2 : 3, shape, owner);
 }
 
+/// A layer of the picture, None where it was not asked for.
+template <typename T>
+nb::object layer(nb::handle owner, std::vector<T> Picture::* values, size_t channels) {
+  const Picture& p = nb::cast<const Result&>(owner).picture;
+  if ((p.*values).empty()) return nb::none();
+  return nb::cast(image(owner, p.*values, p, channels));
+}
+
+nb::dict aovs_dict(nb::handle owner) {
+  const Picture& p = nb::cast<const Result&>(owner).picture;
+  nb::dict d;
+  for (const AovLayer& one : p.aovs)
+    d[one.name.c_str()] = nb::cast(image(owner, one.values, p, one.channels));
+  return d;
+}
+
+nb::dict manifests_dict(const Result& r) {
+  nb::dict d;
+  for (const CryptoManifest& manifest : r.picture.manifests) {
+    nb::dict names;
+    for (const auto& [name, id] : manifest.names) names[name.c_str()] = id;
+    d[manifest.level.c_str()] = names;
+  }
+  return d;
+}
+
 /// Lists by depth: rays, shadow rays, records, and how many paths ended there.
 nb::dict depths_dict(const RenderStatistics& s) {
   nb::dict d;
@@ -318,8 +375,10 @@ nb::dict statistics_dict(const Result& r) {
   memory["waves"] = s.wave_bytes;
   memory["film"] = s.film_bytes;
   const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
-  memory["picture"] = bytes(r.picture.beauty, r.picture.albedo, r.picture.normal, r.picture.depth,
-                            r.picture.samples);
+  size_t picture = bytes(r.picture.beauty, r.picture.albedo, r.picture.normal, r.picture.depth,
+                         r.picture.samples);
+  for (const AovLayer& layer : r.picture.aovs) picture += bytes(layer.values);
+  memory["picture"] = picture;
   memory["meshes"] = s.scene_bytes.meshes;
   memory["textures"] = s.scene_bytes.textures;
   memory["records"] = s.scene_bytes.records;
@@ -390,6 +449,7 @@ void bind_render(nb::module_& m) {
       .def_rw("lanes", &Settings::lanes)
       .def_rw("policy", &Settings::policy)
       .def_rw("cost_weight", &Settings::cost_weight)
+      .def_prop_rw("aovs", &aov_names, &set_aovs)
       .def("check", &Settings::check)
       .def("to_dict", [](nb::handle_t<Settings> self) { return to_dict(self); });
   def_enum(c, "sampler", &Settings::sampler, kSamplers);
@@ -405,36 +465,25 @@ void bind_render(nb::module_& m) {
 
   nb::class_<Result>(m, "Result")
       .def_prop_ro("beauty",
-                   [](nb::handle_t<Result> self) {
-                     const Picture& p = nb::cast<const Result&>(self).picture;
-                     return image(self, p.beauty, p, 3);
-                   })
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::beauty, 3); })
       .def_prop_ro("albedo",
-                   [](nb::handle_t<Result> self) {
-                     const Picture& p = nb::cast<const Result&>(self).picture;
-                     return image(self, p.albedo, p, 3);
-                   })
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::albedo, 3); })
       .def_prop_ro("normal",
-                   [](nb::handle_t<Result> self) {
-                     const Picture& p = nb::cast<const Result&>(self).picture;
-                     return image(self, p.normal, p, 3);
-                   })
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::normal, 3); })
       .def_prop_ro("depth",
-                   [](nb::handle_t<Result> self) {
-                     const Picture& p = nb::cast<const Result&>(self).picture;
-                     return image(self, p.depth, p, 1);
-                   })
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::depth, 1); })
       .def_prop_ro("samples",
-                   [](nb::handle_t<Result> self) {
-                     const Picture& p = nb::cast<const Result&>(self).picture;
-                     return image(self, p.samples, p, 1);
-                   })
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::samples, 1); })
+      .def_prop_ro("aovs", [](nb::handle_t<Result> self) { return aovs_dict(self); })
+      .def_prop_ro("manifests", &manifests_dict)
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
       .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
       .def_prop_ro("stats", &statistics_dict);
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
         "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none());
+  m.attr("AOVS") = nb::cast(AovSet{(1u << kAovCount) - 1}.names());
+  m.def("crypto_id", [](const std::string& name) { return crypto_id(name); });
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);
   m.def("peak_rss_bytes", &peak_rss_bytes);

@@ -185,8 +185,10 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
                   const std::optional<Array<float>>& normals,
                   const std::optional<Array<float>>& uvs,
                   const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                  const std::string& name) {
+                  const std::string& name, const std::string& light_group, uint32_t asset_length) {
   Mesh mesh;
+  mesh.light_group = builder.light_group(light_group);
+  mesh.asset_length = asset_length;
   mesh.name = name;
   if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 ||
       indices.shape(1) != 3)
@@ -219,7 +221,10 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
 
 void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
                    const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transforms,
-                   const std::optional<Array<uint32_t>>& materials) {
+                   const std::optional<Array<uint32_t>>& materials,
+                   const std::optional<std::vector<std::string>>& names,
+                   const std::optional<Array<uint32_t>>& numbers,
+                   const std::optional<std::vector<uint32_t>>& asset_lengths) {
   if (transforms.ndim() != 3 || transforms.shape(1) != 4 || transforms.shape(2) != 4)
     throw Error("transforms of instances must have the shape (k, 4, 4)");
   const bool is_double = transforms.dtype() == nb::dtype<double>();
@@ -228,18 +233,32 @@ void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
   const size_t k = transforms.shape(0);
   if (materials && (materials->ndim() != 1 || materials->shape(0) != k))
     throw Error("materials of instances must be one for each transform");
+  if (names && names->size() != 1 && names->size() != k)
+    throw Error("names of instances must be one, or one for each transform");
+  if (numbers && (numbers->ndim() != 1 || numbers->shape(0) != k))
+    throw Error("numbers of instances must be one for each transform");
+  if (asset_lengths && (!names || asset_lengths->size() != names->size()))
+    throw Error("asset lengths of instances must be one for each name");
+  std::vector<uint32_t> texts;
+  for (size_t i = 0; names && i < names->size(); ++i)
+    texts.push_back(
+        builder.add_placement_name((*names)[i], asset_lengths ? (*asset_lengths)[i] : 0));
   for (size_t i = 0; i < k; ++i)
     builder.add_instance(parent, child,
                          is_double ? affine(static_cast<const double*>(transforms.data()) + 16 * i)
                                    : affine(static_cast<const float*>(transforms.data()) + 16 * i),
-                         materials ? materials->data()[i] : kInheritMaterial);
+                         materials ? materials->data()[i] : kInheritMaterial,
+                         texts.empty() ? kNoName : texts[texts.size() == 1 ? 0 : i],
+                         numbers ? numbers->data()[i] : kNoName);
 }
 
 uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
                    const std::string& name, const Color3& color, float width, float height,
-                   float radius, float angle, bool normalize, std::optional<uint32_t> texture) {
+                   float radius, float angle, bool normalize, std::optional<uint32_t> texture,
+                   const std::string& group) {
   Light light;
+  light.group = builder.light_group(group);
   light.name = name;
   light.kind = choose<LightKind>("light kind", kind,
                                  {{"rect", LightKind::kRect},
@@ -256,6 +275,23 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   light.normalize = normalize;
   light.texture = texture.value_or(kNoTexture);
   return builder.add_light(std::move(light));
+}
+
+/// The camera as set_camera takes it, its transform as rows of floats.
+nb::dict camera_dict(const Scene& scene) {
+  const Camera& c = scene.camera();
+  std::vector<std::vector<float>> to_world;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<float> axis = c.to_world.axis(i);
+    to_world.push_back({axis.x, axis.y, axis.z, 0});
+  }
+  to_world.push_back({c.to_world.t.x, c.to_world.t.y, c.to_world.t.z, 1});
+  nb::dict d;
+  d["to_world"] = to_world;
+  d["window"] = nb::make_tuple(c.window[0], c.window[1], c.window[2], c.window[3]);
+  d["near_clip"] = c.near_clip;
+  d["far_clip"] = c.far_clip;
+  return d;
 }
 
 void set_camera(SceneBuilder& builder,
@@ -308,6 +344,16 @@ void bind_scene(nb::module_& m) {
                        out.emplace_back(texture->name(), texture->bytes());
                      return out;
                    })
+      .def_prop_ro("camera", &camera_dict)
+      .def_prop_ro("light_groups", &Scene::light_groups)
+      .def_prop_ro("object_names",
+                   [](const Scene& s) {
+                     const ObjectNames names(s);
+                     std::vector<std::pair<std::string, std::string>> out;
+                     for (uint32_t i = 0; i < names.count(); ++i)
+                       out.emplace_back(names.object(i), names.asset(i));
+                     return out;
+                   })
       .def_prop_ro("warnings", &Scene::warnings)
       .def_prop_ro("bounds", [](const Scene& s) {
         const Bounds& b = s.bounds();
@@ -328,14 +374,16 @@ void bind_scene(nb::module_& m) {
            "textures"_a = nb::dict())
       .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
-           "material"_a = kInheritMaterial, "name"_a = "")
-      .def("add_group", &SceneBuilder::add_group, "name"_a = "")
+           "material"_a = kInheritMaterial, "name"_a = "", "light_group"_a = "",
+           "asset_length"_a = 0)
+      .def("add_group", &SceneBuilder::add_group, "name"_a = "", "root"_a = "")
       .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
-           "materials"_a = nb::none())
+           "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
+           "numbers"_a = nb::none(), "asset_lengths"_a = nb::none())
       .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
            "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f,
-           "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none())
+           "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(), "group"_a = "")
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
            "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,
            "far_clip"_a = 1e30f)

@@ -11,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -366,12 +367,14 @@ inline ScenePtr mixed() {
   b.add_light(disk);
   Light bulb = make_light(LightKind::kSphere, {9, 3, 3}, translate(-2.5f, 1.4f, 1));
   bulb.radius = 0.2f;
+  bulb.group = b.light_group("bulb");
   b.add_light(bulb);
   bulb.radius = 0;
   bulb.to_world = translate(1, 2.5f, 2);
   b.add_light(bulb);
   Light sun = make_light(LightKind::kDistant, {90, 80, 70}, rotate(0, -50) * rotate(1, 20));
   sun.angle = 3;
+  sun.group = b.light_group("sun");
   b.add_light(sun);
   Camera camera = make_camera({0.4, 1.3, 5.5}, {0, -0.2, 0}, 0.8f);
   camera.lens_radius = 0.03f;
@@ -399,7 +402,9 @@ inline ScenePtr emissive_meshes() {
   room.face_materials[6] = textured;  // one triangle of the ceiling
   b.add_to_group(0, b.add_mesh(make_mesh(room)));
   const uint32_t group = b.add_group("lamp");
-  b.add_to_group(group, b.add_mesh(make_mesh(sphere(4, true))));
+  Mesh ball = make_mesh(sphere(4, true));
+  ball.light_group = b.light_group("lamps");
+  b.add_to_group(group, b.add_mesh(std::move(ball)));
   b.add_instance(0, group, translate(-1, 0, -1) * scale(0.4f, 0.2f, 0.4f), constant);
   b.add_instance(0, group, translate(0.8f, -0.5f, 0) * scale(-0.4f, 0.4f, 0.4f), glossy);
   b.add_instance(0, group, translate(0.2f, 0.5f, -0.5f) * scale(0.2f, 0.2f, 0.2f), textured);
@@ -467,6 +472,20 @@ inline void expect_same_picture(const Picture& a, const Picture& b, const std::s
   expect_same_bits(a.normal, b.normal, what + ", normal");
   expect_same_bits(a.depth, b.depth, what + ", depth");
   EXPECT_EQ(a.samples, b.samples) << what;
+  ASSERT_EQ(a.aovs.size(), b.aovs.size()) << what;
+  for (size_t i = 0; i < a.aovs.size(); ++i) {
+    const AovLayer &x = a.aovs[i], &y = b.aovs[i];
+    ASSERT_EQ(x.name, y.name) << what;
+    if (x.name != "cost") expect_same_bits(x.values, y.values, what + ", " + x.name);
+  }
+}
+
+/// The layer of that name, which must be there.
+inline const AovLayer& layer(const Picture& picture, const std::string& name) {
+  const auto at = std::find_if(picture.aovs.begin(), picture.aovs.end(),
+                               [&](const AovLayer& one) { return one.name == name; });
+  if (at == picture.aovs.end()) throw std::runtime_error("no layer " + name);
+  return *at;
 }
 
 /// Mean over all pixels' red values (or green, blue) and its standard error; pixels are

@@ -100,6 +100,16 @@ TEST(Allocation, NoneInAWave) {
   }
 }
 
+TEST(Allocation, NoneForAovs) {
+  for (const auto& scene : {mixed(), emissive_meshes()})
+    for (const uint32_t lanes : lane_widths()) {
+      WaveCase c;
+      c.settings.aovs.bits = (1u << kAovCount) - 1;
+      c.lanes = lanes;
+      expect_no_allocation(scene, c, "all AOVs");
+    }
+}
+
 TEST(Allocation, NoneToOrderRays) {
   const ScenePtr scene = mixed();
   for (const uint32_t lanes : lane_widths())

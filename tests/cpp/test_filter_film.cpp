@@ -90,7 +90,7 @@ TEST(Filter, LastNumberStaysInside) {
 }
 
 TEST(Film, ManySamplesStayExact) {
-  Film film(2, 1, true);
+  Film film(2, 1, {});
   std::mt19937 rng(1);
   std::uniform_real_distribution<float> uniform(0, 10);
   constexpr uint32_t kSamples = 65536;
@@ -117,10 +117,10 @@ TEST(Film, ManySamplesStayExact) {
 }
 
 TEST(Film, AovsAreMeans) {
-  Film film(3, 2, true);
-  EXPECT_TRUE(film.has_aovs());
+  Film film(3, 2, {});
+  EXPECT_TRUE(film.aovs().has_first());
   film.pixel(2, 1).samples = 4;
-  Film::AovPixel& aov = film.aov(2, 1);
+  AovFilm::First& aov = film.aovs().first(film.index(2, 1));
   aov.albedo[1] = 2;
   aov.normal[2] = -1;
   aov.depth = 9;
@@ -132,20 +132,20 @@ TEST(Film, AovsAreMeans) {
 }
 
 TEST(Film, FinishGivesTheSameMeans) {
-  Film film(5, 3, true);
+  Film film(5, 3, {});
   std::mt19937 rng(2);
   std::uniform_real_distribution<double> uniform(-3, 3);
   for (uint32_t y = 0; y < film.height(); ++y)
     for (uint32_t x = 0; x < film.width(); ++x) {
       const uint32_t n = x + 5 * y;  // the first has no samples
       film.pixel(x, y) = {uniform(rng), uniform(rng), uniform(rng), n};
-      Film::AovPixel& aov = film.aov(x, y);
+      AovFilm::First& aov = film.aovs().first(film.index(x, y));
       for (size_t c = 0; c < 3; ++c) aov.albedo[c] = uniform(rng), aov.normal[c] = uniform(rng);
       aov.depth = uniform(rng);
       aov.depth_samples = n / 2;
     }
   const Film before = film;
-  const Film::Layers layers = std::move(film).finish();
+  const Film::Layers layers = std::move(film).finish({});
   EXPECT_EQ(layers.beauty, before.beauty());
   EXPECT_EQ(layers.albedo, before.albedo());
   EXPECT_EQ(layers.normal, before.normal());
@@ -155,8 +155,10 @@ TEST(Film, FinishGivesTheSameMeans) {
 }
 
 TEST(Film, WithoutAovs) {
-  const Film film(3, 2, false);
-  EXPECT_FALSE(film.has_aovs());
+  const Film film(3, 2, {AovSet{0}});
+  EXPECT_FALSE(film.aovs().has_first());
+  EXPECT_EQ(film.aovs().bytes(), 0u);
+  EXPECT_TRUE(Film(film).finish({}).aovs.empty());
   EXPECT_TRUE(film.albedo().empty());
   EXPECT_TRUE(film.normal().empty());
   EXPECT_TRUE(film.depth().empty());

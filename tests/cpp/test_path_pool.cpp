@@ -46,7 +46,7 @@ void for_each_packet_of_slots(uint32_t seed, const Function& f) {
 TEST(PathPool, PathsComeBackFromTheirSlots) {
   for_each_lane_type([]<typename F>() {
     using U = UInt<F>;
-    const PathPool pool(kSlots, false);
+    const PathPool pool(kSlots, {AovSet{0}});
     for_each_packet_of_slots<F>(1, [&](const U& slot, const Mask<F>& active) {
       store_path<F>(pool, slot, numbered_path<F>(slot), active);
     });
@@ -79,7 +79,7 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
 TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
   for_each_lane_type([]<typename F>() {
     using U = UInt<F>;
-    const PathPool pool(kSlots, false);
+    const PathPool pool(kSlots, {AovSet{0}});
     std::vector<std::array<float, 3>> expected(kSlots, {0, 0, 0});
     for (uint32_t round = 0; round < 3; ++round)
       for_each_packet_of_slots<F>(round, [&](const U& slot, const Mask<F>& active) {
@@ -101,14 +101,14 @@ TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
 }
 
 TEST(PathPool, BlocksOfRows) {
-  const PathPool plain(100, false), aovs(100, true);
-  EXPECT_FALSE(plain.has_aovs);
-  EXPECT_EQ(plain.first, nullptr);
-  EXPECT_EQ(plain.depth, nullptr);
-  EXPECT_TRUE(aovs.has_aovs);
+  const PathPool plain(100, {AovSet{0}}), aovs(100, {AovSet{}});
+  for (const float* rows : {plain.first, plain.depth, plain.hits, plain.centre, plain.parts[0],
+                            plain.parts[1], plain.groups, plain.cost_ns})
+    EXPECT_EQ(rows, nullptr);
   ASSERT_NE(aovs.first, nullptr);
   ASSERT_NE(aovs.depth, nullptr);
   EXPECT_GE(std::abs(aovs.depth - aovs.first), 100);
+  EXPECT_EQ(aovs.hits, nullptr);
   EXPECT_LT(plain.bytes(), aovs.bytes());
   EXPECT_GE(plain.bytes(),
             400u * (PathPool::kPathWords + PathPool::kShadowWords + PathPool::kRadianceWords));
@@ -117,6 +117,26 @@ TEST(PathPool, BlocksOfRows) {
   EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.shadows) % 64, 0u);
   EXPECT_EQ(plain.shadows - plain.paths, 100 * PathPool::kPathWords);
   EXPECT_EQ(plain.radiance - plain.shadows, 100 * PathPool::kShadowWords);
+  // What nobody asks for takes nothing: a path, its shadow ray and its radiance are 144 bytes.
+  EXPECT_LE(plain.bytes(), 100u * 144 + 4 * (SoaBlock::kPad + 32));
+  const PathPool all(100, {AovSet{(1u << kAovCount) - 1}, 3});
+  for (const float* rows :
+       {all.hits, all.centre, all.parts[0], all.parts[1], all.groups, all.cost_ns})
+    EXPECT_NE(rows, nullptr);
+  EXPECT_TRUE(all.wants_uv);
+}
+
+TEST(PathPool, LightGroupsKeepApart) {
+  const PathPool pool(8, {AovSet{static_cast<uint32_t>(Aov::kLightGroups)}, 3});
+  add_group_radiance<float>(pool, 2, 1, {1.f, 2.f, 3.f}, true);
+  add_group_radiance<float>(pool, 2, 1, {1.f, 0.f, 0.f}, true);
+  add_group_radiance<float>(pool, 2, kNoGroup, {9.f, 9.f, 9.f}, true);
+  add_group_radiance<float>(pool, 3, 0, {9.f, 9.f, 9.f}, false);
+  for (uint32_t word = 0; word < 8 * 3 * PathPool::kRadianceWords; ++word) {
+    const uint32_t row = 2 * 3 + 1, at = word - row * PathPool::kRadianceWords;
+    const float expected = at == 0 ? 2.f : at == 1 ? 2.f : at == 2 ? 3.f : 0.f;
+    EXPECT_EQ(pool.groups[word], at < 3 ? expected : 0.f) << word;
+  }
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ struct PoolRays {
   std::vector<uint32_t> slot;
 
   explicit PoolRays(const std::vector<Ray>& rays)
-      : pool(2 * rays.size() + 1, false), slot(rays.size()) {
+      : pool(2 * rays.size() + 1, {AovSet{0}}), slot(rays.size()) {
     std::vector<uint32_t> slots(2 * rays.size());
     std::iota(slots.begin(), slots.end(), 0u);
     std::shuffle(slots.begin(), slots.end(), std::mt19937(1));
@@ -208,7 +208,7 @@ TEST(RayOrder, SortByDirectionEqualsStableSort) {
 /// A wave by itself, without a scene: enough to order rays and to fetch them.
 struct BareWave {
   Settings settings;
-  Film film{1, 1, false};
+  Film film{1, 1, {AovSet{0}}};
   WaveContext context{};
   std::unique_ptr<Wave> wave;
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first promise: any schedule gives the same picture, bit for bit.
+#include <bit>
+
 #include "wave_testing.h"
 
 namespace wavecomb {
@@ -236,6 +238,104 @@ TEST(Wave, DepthZeroSeesEmittersOnly) {
   EXPECT_LT(lit, picture.depth.size() / 4);
   const Picture lamps = WavefrontRenderer(emissive_meshes()).render(s);
   EXPECT_GT(*std::max_element(lamps.beauty.begin(), lamps.beauty.end()), 1);
+}
+
+Settings with_all_aovs() {
+  Settings s = small_settings();
+  s.aovs.bits = (1u << kAovCount) - 1;
+  return s;
+}
+
+TEST(Wave, AllAovsAreOnePicture) {
+  Settings s = with_all_aovs();
+  expect_one_picture(mixed(), s);
+  expect_one_picture(emissive_meshes(), s);
+  s.clamp_indirect = 0.05f;
+  s.roulette = RouletteKind::kCostAware;
+  s.roulette_depth = 0;
+  expect_one_picture(mixed(), s);
+}
+
+TEST(Wave, PartsAndLightGroupsAddUp) {
+  for (const ScenePtr& scene : {mixed(), emissive_meshes(), cornell()})
+    for (const float clamp : {0.f, 0.05f}) {
+      Settings s = with_all_aovs();
+      s.clamp_indirect = clamp;
+      const Picture p = WavefrontRenderer(scene).render(s);
+      std::vector<double> groups(p.beauty.size());
+      std::vector<double> lit(scene->light_groups().size());
+      for (size_t g = 0; g < lit.size(); ++g) {
+        const AovLayer& one = layer(p, "light_" + scene->light_groups()[g]);
+        for (size_t i = 0; i < groups.size(); ++i) {
+          groups[i] += one.values[i];
+          lit[g] += one.values[i];
+        }
+      }
+      const std::vector<float>&e = layer(p, "emission").values, &d = layer(p, "direct").values,
+            &r = layer(p, "indirect").values;
+      double parts[3] = {0, 0, 0};
+      for (size_t i = 0; i < groups.size(); ++i) {
+        const double tolerance = 2e-6 * (1.0 + p.beauty[i]);
+        ASSERT_NEAR(groups[i], p.beauty[i], tolerance) << i;
+        ASSERT_NEAR(double{e[i]} + d[i] + r[i], p.beauty[i], tolerance) << i;
+        parts[0] += e[i];
+        parts[1] += d[i];
+        parts[2] += r[i];
+      }
+      for (const double part : parts) EXPECT_GT(part, 0);
+      // All but the first are of lights that were put there.
+      for (size_t g = 1; g < lit.size(); ++g) {
+        EXPECT_GT(lit[g], 0) << scene->light_groups()[g];
+      }
+    }
+}
+
+TEST(Wave, OneLightGroupByName) {
+  Settings s = small_settings();
+  s.aovs.bits = static_cast<uint32_t>(Aov::kLightGroups);
+  const Picture all = WavefrontRenderer(mixed()).render(s);
+  EXPECT_TRUE(all.albedo.empty());
+  s.light_groups = {"sun"};
+  const Picture one = WavefrontRenderer(mixed()).render(s);
+  ASSERT_EQ(one.aovs.size(), 1u);
+  expect_same_bits(one.aovs[0].values, layer(all, "light_sun").values, "sun");
+  s.light_groups = {"moon"};
+  try {
+    WavefrontRenderer(mixed()).render(s);
+    FAIL() << "there is no moon";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "the scene has no light group 'moon'; it has other, bulb, sun");
+  }
+}
+
+TEST(Wave, IdsAndPlacesOfASimpleScene) {
+  SceneBuilder b;
+  const uint32_t red = b.add_material(make_material(ProgramId::kDiffuse, {0.8f, 0.2f, 0.1f}));
+  MeshData wall = quad({-9, -9, -3}, {18, 0, 0}, {0, 18, 0});
+  wall.uvs = {0, 0, 2, 0, 2, 2, 0, 2};
+  wall.uvs_at = Attribute::kVertex;
+  b.add_to_group(0, b.add_mesh(make_mesh(wall, red)));
+  b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
+  const Settings s = with_all_aovs();
+  const ScenePtr scene = b.build();
+  const Picture p = WavefrontRenderer(scene).render(s);
+  const std::vector<float>&position = layer(p, "position").values, &uv = layer(p, "uv").values;
+  const std::vector<float>& pairs = layer(p, "crypto_material").values;
+  for (size_t i = 0; i < p.depth.size(); ++i) {
+    EXPECT_NEAR(position[3 * i + 2], -3, 1e-5);
+    EXPECT_NEAR(uv[2 * i], (position[3 * i] + 9) / 9, 1e-5);
+    EXPECT_NEAR(uv[2 * i + 1], (position[3 * i + 1] + 9) / 9, 1e-5);
+    EXPECT_EQ(layer(p, "material_id").values[i], 1);
+    EXPECT_EQ(layer(p, "instance_id").values[i], 1);
+    EXPECT_EQ(std::bit_cast<uint32_t>(pairs[12 * i]), crypto_id(scene->materials()[0].name));
+    EXPECT_EQ(pairs[12 * i + 1], 1);
+    EXPECT_EQ(pairs[12 * i + 3], 0);
+    EXPECT_GT(layer(p, "cost").values[i], 0);
+  }
+  // The nearest sample of five is within a pixel of where the centre of its pixel looks.
+  const size_t middle = s.width / 2 + size_t{s.height / 2} * s.width;
+  const float pixel = position[3 * (middle + 1)] - position[3 * middle];
+  EXPECT_LT(std::abs(position[3 * middle]), 1.5f * std::abs(pixel));
 }
 
 TEST(Wave, AovsOfASimpleScene) {

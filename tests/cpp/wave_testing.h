@@ -31,7 +31,8 @@ class WaveRun {
         camera_(scene_->camera(), case_.settings.width, case_.settings.height, filter_),
         traits_(material_traits(*scene_)),
         costs_(model_costs(*scene_)),
-        film_(case_.settings.width, case_.settings.height, true),
+        aovs_(*scene_, case_.settings),
+        film_(case_.settings.width, case_.settings.height, aovs_.layout),
         pixels_(morton_pixel_order(case_.settings.width, case_.settings.height)) {
     // "adaptive" chooses among all others.
     for (const std::string& name : policy_names())
@@ -50,6 +51,7 @@ class WaveRun {
     context_.traits = traits_;
     context_.costs = context_.roulette_costs = &costs_;
     context_.film = &film_;
+    context_.aovs = &aovs_;
     context_.traversal_width = case_.traversal;
     context_.measures_costs = true;
     const Bounds& b = scene_->bounds();
@@ -91,8 +93,10 @@ class WaveRun {
   }
 
   Picture picture() const {
-    return {case_.settings.width, case_.settings.height, film_.beauty(), film_.albedo(),
-            film_.normal(),       film_.depth(),         film_.samples()};
+    Film::Layers layers = Film(film_).finish(aovs_.kept_names);
+    return {case_.settings.width, case_.settings.height, layers.beauty,
+            layers.albedo,        layers.normal,         layers.depth,
+            layers.samples,       layers.aovs,           {}};
   }
   const Wave& wave() const { return *wave_; }
   const Counts& reference_counts() const { return counts_; }
@@ -130,6 +134,7 @@ class WaveRun {
   CameraSetup camera_;
   std::vector<MaterialTraits> traits_;
   CostSnapshot costs_;
+  AovTables aovs_;
   Film film_;
   std::vector<uint32_t> pixels_;
   std::unique_ptr<Wave> wave_;

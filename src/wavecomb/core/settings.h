@@ -4,6 +4,9 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include "wavecomb/core/aov.h"
 
 namespace wavecomb {
 
@@ -43,6 +46,8 @@ struct Settings {
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
+  AovSet aovs;  ///< to be kept beside the beauty, which they do not change
+  std::vector<std::string> light_groups;  ///< of Aov::kLightGroups, by name; empty: all
   // ---- below: how it is computed; never changes the picture ----
   uint32_t threads = 0;    ///< 0: all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0: default

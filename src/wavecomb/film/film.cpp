@@ -10,17 +10,6 @@ double inverse(uint32_t n) {
   return n == 0 ? 0.0 : 1.0 / n;
 }
 
-/// Means of an AOV of three numbers, where pixel i has count(i) samples.
-template <typename Count>
-std::vector<float> aov_means(const std::vector<Film::AovPixel>& aovs,
-                             double (Film::AovPixel::*sum)[3], const Count& count) {
-  std::vector<float> out(3 * aovs.size());
-  for (size_t i = 0; i < aovs.size(); ++i)
-    for (size_t c = 0; c < 3; ++c)
-      out[3 * i + c] = static_cast<float>((aovs[i].*sum)[c] * inverse(count(i)));
-  return out;
-}
-
 /// Frees what a vector holds.
 template <typename T>
 void release(std::vector<T>& values) {
@@ -29,10 +18,11 @@ void release(std::vector<T>& values) {
 
 }  // namespace
 
-Film::Film(uint32_t width, uint32_t height, bool with_aovs)
-    : width_(width), height_(height), pixels_(size_t{width} * height) {
-  if (with_aovs) aovs_.resize(pixels_.size());
-}
+Film::Film(uint32_t width, uint32_t height, const AovLayout& aovs)
+    : width_(width),
+      height_(height),
+      pixels_(size_t{width} * height),
+      aovs_(size_t{width} * height, aovs) {}
 
 std::vector<float> Film::beauty() const {
   std::vector<float> out(3 * pixels_.size());
@@ -47,20 +37,15 @@ std::vector<float> Film::beauty() const {
 }
 
 std::vector<float> Film::albedo() const {
-  return aov_means(aovs_, &AovPixel::albedo, [&](size_t i) { return pixels_[i].samples; });
+  return aovs_.albedo([&](size_t i) { return pixels_[i].samples; });
 }
 
 std::vector<float> Film::normal() const {
-  return aov_means(aovs_, &AovPixel::normal, [&](size_t i) { return pixels_[i].samples; });
+  return aovs_.normal([&](size_t i) { return pixels_[i].samples; });
 }
 
 std::vector<float> Film::depth() const {
-  std::vector<float> out(aovs_.size());
-  for (size_t i = 0; i < aovs_.size(); ++i)
-    out[i] = aovs_[i].depth_samples == 0
-                 ? std::numeric_limits<float>::infinity()
-                 : static_cast<float>(aovs_[i].depth * inverse(aovs_[i].depth_samples));
-  return out;
+  return aovs_.depth();
 }
 
 std::vector<uint32_t> Film::samples() const {
@@ -69,16 +54,16 @@ std::vector<uint32_t> Film::samples() const {
   return out;
 }
 
-Film::Layers Film::finish() && {
+Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
   Layers layers;
   layers.beauty = beauty();
   layers.samples = samples();
   release(pixels_);
   const auto count = [&](size_t i) { return layers.samples[i]; };
-  layers.albedo = aov_means(aovs_, &AovPixel::albedo, count);
-  layers.normal = aov_means(aovs_, &AovPixel::normal, count);
-  layers.depth = depth();
-  release(aovs_);
+  layers.albedo = aovs_.albedo(count);
+  layers.normal = aovs_.normal(count);
+  layers.depth = aovs_.depth();
+  layers.aovs = std::move(aovs_).finish(layers.samples, light_groups);
   return layers;
 }
 

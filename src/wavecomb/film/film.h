@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "wavecomb/film/aov_film.h"
+
 namespace wavecomb {
 
 /// Sums of samples per pixel, in double precision, so that 65,536 samples stay exact to float.
@@ -14,30 +16,27 @@ namespace wavecomb {
 /// pixels may be written at once. Row 0 is the top.
 class Film {
  public:
-  Film(uint32_t width, uint32_t height, bool with_aovs);
+  Film(uint32_t width, uint32_t height, const AovLayout& aovs);
 
   /// Sums of one pixel.
   struct Pixel {
     double r = 0, g = 0, b = 0;
     uint32_t samples = 0;
   };
-  struct AovPixel {
-    double albedo[3] = {0, 0, 0};
-    double normal[3] = {0, 0, 0};
-    double depth = 0;  ///< sum over samples that hit something
-    uint32_t depth_samples = 0;
-  };
 
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
-  bool has_aovs() const { return !aovs_.empty(); }
-  Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[size_t{y} * width_ + x]; }
+  Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
+  /// What AovFilm calls a pixel.
+  size_t index(uint32_t x, uint32_t y) const { return size_t{y} * width_ + x; }
+  AovFilm& aovs() { return aovs_; }
+  const AovFilm& aovs() const { return aovs_; }
   /// Memory of the sums.
-  size_t bytes() const { return pixels_.size() * sizeof(Pixel) + aovs_.size() * sizeof(AovPixel); }
-  AovPixel& aov(uint32_t x, uint32_t y) { return aovs_[size_t{y} * width_ + x]; }
+  size_t bytes() const { return pixels_.size() * sizeof(Pixel) + aovs_.bytes(); }
 
   /// Means: rgb interleaved; black where a pixel has no samples.
   std::vector<float> beauty() const;
+  /// Empty where not kept.
   std::vector<float> albedo() const;
   /// Mean normals, not normalised.
   std::vector<float> normal() const;
@@ -45,19 +44,21 @@ class Film {
   std::vector<float> depth() const;
   std::vector<uint32_t> samples() const;
 
-  /// All of these.
+  /// All of these; empty where not kept.
   struct Layers {
     std::vector<float> beauty, albedo, normal, depth;
     std::vector<uint32_t> samples;
+    std::vector<AovLayer> aovs;  ///< of AovFilm::finish
   };
   /// The means, and the end of the film: sums are freed as soon as they were used, for sums and
   /// layers together are the most memory that a small scene needs.
-  Layers finish() &&;
+  /// `light_groups` are names of the groups kept.
+  Layers finish(const std::vector<std::string>& light_groups) &&;
 
  private:
   uint32_t width_, height_;
   std::vector<Pixel> pixels_;
-  std::vector<AovPixel> aovs_;
+  AovFilm aovs_;
 };
 
 }  // namespace wavecomb

@@ -46,6 +46,14 @@ inline F filter_offset(const float* table, const F& u, const Mask<F>& active) {
   return fma(F(b - a), F(x - F(bin)), a);
 }
 
+/// Squared distance of the sample from the pixel's centre, in pixels.
+template <typename F>
+inline F centre_distance2(const CameraSetup& camera, const Sample4<F>& r, const Mask<F>& active) {
+  const F dx = filter_offset<F>(camera.filter, r.x, active);
+  const F dy = filter_offset<F>(camera.filter, r.y, active);
+  return fma(dx, dx, F(dy * dy));
+}
+
 /// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set.
 template <typename F>
 inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y,

@@ -2,6 +2,10 @@
 /// The path slots of a wave.
 #pragma once
 
+#include <array>
+#include <cstring>
+
+#include "wavecomb/core/aov.h"
 #include "wavecomb/core/rows.h"
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/soa.h"
@@ -18,35 +22,58 @@ class PathPool {
  public:
   /// Words of a row: 15 for a path, 10 for its shadow ray, 3 for its radiance.
   static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
-  /// And 6 for what was hit first: albedo, normal.
+  /// And 8 for what was hit first: albedo, normal, uv.
   static constexpr uint32_t kFirstWords = 8;
+  static constexpr uint32_t kHitWords = 8;      ///< of AovHit
+  static constexpr uint32_t kShadowGroup = 10;  ///< word of a shadow ray's row
 
   PathPool() = default;
-  PathPool(size_t capacity, bool with_aovs)
-      : rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)),
-        first_rows_(1, with_aovs ? capacity * kFirstWords : 0),
-        depths_(1, with_aovs ? capacity : 0),
-        has_aovs(with_aovs) {
+  PathPool(size_t capacity, const AovLayout& aovs)
+      : light_groups(aovs.light_groups),
+        rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kPathWords;
     radiance = shadows + capacity * kShadowWords;
-    if (!with_aovs) return;
-    first = first_rows_.floats(0);
-    depth = depths_.floats(0);
+    const AovSet& set = aovs.set;
+    const auto block = [&](SoaBlock& owner, float*& rows, bool wanted, size_t words) {
+      if (!wanted) return;
+      owner = SoaBlock(1, capacity * words);
+      rows = owner.floats(0);
+    };
+    block(aov_blocks_[0], first, set.first() || set.has(Aov::kUv), kFirstWords);
+    block(aov_blocks_[1], depth, set.has(Aov::kDepth), 1);
+    block(aov_blocks_[2], hits, set.nearest() || set.crypto(), kHitWords);
+    block(aov_blocks_[3], centre, set.nearest(), 1);
+    block(aov_blocks_[4], parts[0], set.parts(), kRadianceWords);
+    block(aov_blocks_[5], parts[1], set.parts(), kRadianceWords);
+    block(aov_blocks_[6], groups, light_groups > 0, kRadianceWords * light_groups);
+    block(aov_blocks_[7], cost_ns, set.has(Aov::kCost), 1);
+    wants_uv = set.has(Aov::kUv);
   }
 
   float* paths = nullptr;     ///< rows of load_path
-  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b
+  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group
   float* radiance = nullptr;  ///< r, g, b so far
-  float* first = nullptr;     ///< albedo, normal
-  float* depth = nullptr;     ///< along the camera's axis; infinite where nothing was hit
-  size_t bytes() const { return rows_.bytes() + first_rows_.bytes() + depths_.bytes(); }
+  // Null where not asked for.
+  float* first = nullptr;   ///< albedo, normal, uv
+  float* depth = nullptr;   ///< along the camera's axis; infinite where nothing was hit
+  float* hits = nullptr;    ///< AovHit
+  float* centre = nullptr;  ///< squared distance of the sample from the pixel's centre, pixels
+  float* parts[2] = {nullptr, nullptr};  ///< radiance as it was before scattering 0 and 1
+  float* groups = nullptr;               ///< radiance by light group: rows of r, g, b, a slot's
+                                         ///< groups side by side
+  float* cost_ns = nullptr;              ///< time spent on the path
+  uint32_t light_groups = 0;
+  bool wants_uv = false;
+  size_t bytes() const {
+    size_t n = rows_.bytes();
+    for (const SoaBlock& block : aov_blocks_) n += block.bytes();
+    return n;
+  }
 
  private:
-  SoaBlock rows_, first_rows_, depths_;
-
- public:
-  bool has_aovs = false;
+  SoaBlock rows_;
+  std::array<SoaBlock, 8> aov_blocks_;
 };
 
 /// A path between two vertices, as its row holds it.
@@ -86,16 +113,46 @@ WAVECOMB_INLINE void store_path(const PathPool& pool, const UInt<F>& slot, const
       active);
 }
 
+/// Keeps all radiance as it is once the light that scattering `depth` (0, 1) has met is in it, and
+/// none that it gathers.
+inline void keep_part(const PathPool& pool, uint32_t depth, uint32_t paths) {
+  if (pool.parts[depth])
+    std::memcpy(pool.parts[depth], pool.radiance, size_t{paths} * PathPool::kRadianceWords * 4);
+}
+
+namespace detail {
+
+/// Adds c to the active lanes' rows, which are distinct.
+template <typename F>
+WAVECOMB_INLINE void add_to_rows(float* rows, const UInt<F>& row, const Color<F>& c,
+                                 const Mask<F>& active) {
+  const UInt<F> word = row * PathPool::kRadianceWords;
+  auto r = load_rows<PathPool::kRadianceWords, F>(rows, word, active);
+  r[0] += c.x;
+  r[1] += c.y;
+  r[2] += c.z;
+  store_rows<PathPool::kRadianceWords, F>(rows, word, r, active);
+}
+
+}  // namespace detail
+
 /// Adds c to the radiance of the active lanes' slots, which are distinct.
 template <typename F>
 WAVECOMB_INLINE void add_radiance(const PathPool& pool, const UInt<F>& slot, const Color<F>& c,
                                   const Mask<F>& active) {
-  const UInt<F> word = slot * PathPool::kRadianceWords;
-  auto r = load_rows<PathPool::kRadianceWords, F>(pool.radiance, word, active);
-  r[0] += c.x;
-  r[1] += c.y;
-  r[2] += c.z;
-  store_rows<PathPool::kRadianceWords, F>(pool.radiance, word, r, active);
+  detail::add_to_rows<F>(pool.radiance, slot, c, active);
+}
+
+/// A light group that is not kept.
+inline constexpr uint32_t kNoGroup = 0xffffffffu;
+
+/// Adds c to light group `group` (kNoGroup: to none) of the active lanes' slots, which are
+/// distinct.
+template <typename F>
+inline void add_group_radiance(const PathPool& pool, const UInt<F>& slot, const UInt<F>& group,
+                               const Color<F>& c, const Mask<F>& active) {
+  const Mask<F> kept = active & Mask<F>(group != UInt<F>(kNoGroup));
+  if (any(kept)) detail::add_to_rows<F>(pool.groups, slot * pool.light_groups + group, c, kept);
 }
 
 }  // namespace wavecomb

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/integrate/reference.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "wavecomb/integrate/light_groups.h"
 #include "wavecomb/integrate/vertex.h"
 
 namespace wavecomb {
@@ -13,15 +15,26 @@ using F = float;
 /// What one path gives.
 struct PathResult {
   Color<F> radiance{0.f, 0.f, 0.f};
+  Color<F> parts[2];  ///< radiance before scattering 0 and 1
   Color<F> albedo{0.f, 0.f, 0.f};
   Vec3<F> normal{0.f, 0.f, 0.f};
+  F uv[2] = {0.f, 0.f};
   F depth = INFINITY;
+  AovHit hit;
+  F centre2 = 0.f;
 };
 
 class PathTracer {
  public:
   PathTracer(const WaveContext& context, PhaseClock& clock, Counts& counts)
-      : context_(context), settings_(*context.settings), clock_(clock), counts_(counts) {}
+      : context_(context),
+        settings_(*context.settings),
+        clock_(clock),
+        counts_(counts),
+        groups_(size_t{3} * context.film->aovs().layout().light_groups) {}
+
+  /// Radiance of the last path by light group, rgb side by side; valid until the next one.
+  const std::vector<F>& groups() const { return groups_; }
 
   PathResult trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
@@ -31,6 +44,11 @@ class PathTracer {
     const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
                                            static_cast<F>(pixel >> 16), r, true);
     PathResult result;
+    result.centre2 = centre_distance2<F>(*context_.camera, r, true);
+    std::fill(groups_.begin(), groups_.end(), 0.f);
+    const auto keep_parts = [&](uint32_t first, uint32_t last) {
+      for (uint32_t d = first; d <= last && d < 2; ++d) result.parts[d] = result.radiance;
+    };
     Vec3<F> o = ray.o;
     F cone_at_origin = 0.f;
     PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread};
@@ -44,31 +62,54 @@ class PathTracer {
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
       if (hit.inst == kNoHit) {
         result.radiance += environment_emission<F>(scene, settings_, depth, path, true);
+        if (!groups_.empty())
+          split_environment<F>(
+              scene, settings_, depth, context_.aovs->kept_group.data(), path, true,
+              [&](uint32_t group, const Color<F>& share) { add_to_group(group, share); });
+        keep_parts(depth, 1);
         return result;
       }
       if (depth == 0) result.depth = camera_depth(o, path.dir, hit.t);
+      if (depth == 0) note_hit(result.hit, hit, fma(path.dir, hit.t, o));
       if (hit.inst == kLightShape) {
-        result.radiance +=
+        const Color<F> c =
             shape_emission<F>(scene, settings_, depth, hit.geom, o, hit.t, path, true);
+        result.radiance += c;
+        add_light(hit.geom, c);
+        keep_parts(depth, 1);
         return result;
       }
       const uint32_t mesh = mesh_of(hit), material = material_of(hit, mesh);
+      if (depth == 0) result.hit.material = material;
       if (settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
-        if (!(cost_aware_number<F>(key, depth) < q)) return result;
+        if (!(cost_aware_number<F>(key, depth) < q)) {
+          keep_parts(depth, 1);
+          return result;
+        }
         path.throughput *= 1.f / q;
       }
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path);
       result.radiance += v.emitted;
+      add_light(v.emitter, v.emitted);
+      keep_parts(depth, depth);
       if (depth == 0) {
+        result.uv[0] = v.uv.x;
+        result.uv[1] = v.uv.y;
         result.albedo = v.albedo;
         result.normal = v.normal;
       }
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
-        if (!occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth)) result.radiance += v.direct;
+        if (!occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth)) {
+          result.radiance += v.direct;
+          add_light(v.lit_by, v.direct);
+        }
       }
-      if (!v.alive) return result;
+      if (!v.alive) {
+        keep_parts(depth + 1, 1);
+        return result;
+      }
       o = v.o;
       path = v.next;
       cone_at_origin = v.next.cone_width;
@@ -99,6 +140,30 @@ class PathTracer {
     return blocked != 0;
   }
 
+  /// All that the first hit says of itself but its material.
+  void note_hit(AovHit& out, const Hit& hit, const Vec3<F>& p) const {
+    const AovTables* tables = context_.aovs;
+    out = {{p.x, p.y, p.z}, kNothingHit, kNothingHit, kNothingHit, {0, 0}};
+    if (hit.inst == kLightShape) {
+      if (tables) out.object = tables->light_object(hit.geom);
+      return;
+    }
+    out.instance = hit.inst;
+    if (tables) out.object = tables->object<F>(hit.inst, hit.geom, true);
+  }
+
+  void add_to_group(uint32_t group, const Color<F>& c) {
+    if (group == kNoGroup) return;
+    groups_[3 * group] += c.x;
+    groups_[3 * group + 1] += c.y;
+    groups_[3 * group + 2] += c.z;
+  }
+  /// Adds what light record `light` gave to its group.
+  void add_light(uint32_t light, const Color<F>& c) {
+    if (!groups_.empty())
+      add_to_group(kept_group<F>(context_.aovs->kept_group.data(), light, true), c);
+  }
+
   uint32_t mesh_of(const Hit& hit) const {
     const SceneView& scene = context_.scene;
     return scene.geometry_mesh[scene.instances[hit.inst].geometry + hit.geom];
@@ -118,11 +183,11 @@ class PathTracer {
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v};
     VertexResult<F> v{};
-    visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
-                     [&]<typename Bsdf>() {
-                       v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom,
-                                                 hit.t, material, path, depth == 0, true);
-                     });
+    visit_program<F>(
+        static_cast<ProgramId>(scene.material_program[material]), [&]<typename Bsdf>() {
+          v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom, hit.t,
+                                    material, path, {depth == 0, depth == 0}, true);
+        });
     return v;
   }
 
@@ -138,7 +203,33 @@ class PathTracer {
   PhaseClock& clock_;
   Counts& counts_;
   PresenceKeys keys_;
+  std::vector<F> groups_;
 };
+
+/// Adds what a path found beside radiance to its pixel.
+void add_aovs(AovFilm& film, size_t pixel, const PathResult& path, const std::vector<F>& groups,
+              const AovTables* tables) {
+  const AovSet& set = film.layout().set;
+  const auto rgb = [](const Color<F>& c) { return std::array<F, 3>{c.x, c.y, c.z}; };
+  if (film.has_first()) {
+    AovFilm::First& first = film.first(pixel);
+    const auto albedo = rgb(path.albedo), normal = rgb(path.normal);
+    for (size_t c = 0; c < 3; ++c) {
+      first.albedo[c] += albedo[c];
+      first.normal[c] += normal[c];
+    }
+    if (std::isfinite(path.depth)) {
+      first.depth += path.depth;
+      ++first.depth_samples;
+    }
+  }
+  if (set.nearest() || set.crypto())
+    film.add_hit(pixel, path.hit, path.centre2, path.uv, tables ? &tables->crypto : nullptr);
+  if (set.parts())
+    film.add_parts(pixel, rgb(path.parts[0]).data(), rgb(path.parts[1]).data(),
+                   rgb(path.radiance).data());
+  for (size_t i = 0; i < groups.size(); ++i) film.groups(pixel)[i] += double{groups[i]};
+}
 
 }  // namespace
 
@@ -152,25 +243,18 @@ void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock&
     Film::Pixel sum = film.pixel(x, y);
     for (uint32_t s = 0; s < task.samples; ++s) {
       clock.enter(Phase::kGenerate);
+      const auto start = PhaseClock::Clock::now();
       const PathResult path = tracer.trace_path(pixel, task.first_sample + s);
+      if (film.aovs().layout().set.has(Aov::kCost))
+        film.aovs().add_cost(
+            film.index(x, y),
+            std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count());
       clock.enter(Phase::kResolve);
       sum.r += path.radiance.x;
       sum.g += path.radiance.y;
       sum.b += path.radiance.z;
       ++sum.samples;
-      if (film.has_aovs()) {
-        Film::AovPixel& aov = film.aov(x, y);
-        const F albedo[3] = {path.albedo.x, path.albedo.y, path.albedo.z};
-        const F normal[3] = {path.normal.x, path.normal.y, path.normal.z};
-        for (int c = 0; c < 3; ++c) {
-          aov.albedo[c] += albedo[c];
-          aov.normal[c] += normal[c];
-        }
-        if (std::isfinite(path.depth)) {
-          aov.depth += path.depth;
-          ++aov.depth_samples;
-        }
-      }
+      add_aovs(film.aovs(), film.index(x, y), path, tracer.groups(), context.aovs);
     }
     film.pixel(x, y) = sum;
   }

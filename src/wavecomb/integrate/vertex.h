@@ -67,6 +67,13 @@ struct VertexResult {
   PathState<F> next;
   Color<F> albedo;  ///< first-hit AOVs
   Vec3<F> normal;
+  Vec2<F> uv;
+  UInt<F> emitter, lit_by;  ///< light records behind `emitted` and `direct`, or kNoLight
+};
+
+/// First-hit AOVs that shading is to give.
+struct FirstHitAovs {
+  bool any = false, uv = false;
 };
 
 /// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
@@ -160,7 +167,7 @@ template <typename Bsdf, typename F>
 inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings& settings,
                                     const SampleKey<F>& key, uint32_t depth, const MeshHit<F>& hit,
                                     const UInt<F>& geom, const F& t, const UInt<F>& material,
-                                    const PathState<F>& path, bool wants_aovs,
+                                    const PathState<F>& path, FirstHitAovs aovs,
                                     const Mask<F>& active) {
   using U = UInt<F>;
   VertexResult<F> out;
@@ -168,6 +175,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.direct = Color<F>(F(0.f));
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
+  out.emitter = out.lit_by = U(kNoLight);
 
   // Programs that emit read one slot more than their BSDF does.
   constexpr bool kEmits =
@@ -182,7 +190,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   const Mask<F> reads_texture = active & Mask<F>((slots & kSlots) != U(0u));
   const bool textured = any(reads_texture);
   constexpr bool kOpaque = Bsdf::kProgram != ProgramId::kDielectric;
-  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, textured, kOpaque, active);
+  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, textured || aovs.uv, kOpaque, active);
   const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
   const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
 
@@ -203,6 +211,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
             hit.inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
             Mask<U>(emits));
         const U base = gather<U>(scene.emissive_lights, first + geom, Mask<U>(emits));
+        out.emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
         const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
         if (any(sampled))
           light_pdf = select(
@@ -235,7 +244,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   const Frame<F> frame = textured ? make_frame<F>(n, tangent) : make_frame<F>(n);
   const Vec3<F> wo = frame.to_local(-path.dir);
 
-  if (wants_aovs) {
+  if (aovs.any) {
+    out.uv = s.uv;
     out.albedo = bsdf.albedo();
     out.normal = select<F>(dot(path.dir, s.ng) > 0.f, -frame.n, frame.n);
   }
@@ -264,6 +274,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
+    out.lit_by = l.light;
     out.shadow_o = spawn_origin<F>(s, l.wi);
     out.shadow_d = l.wi;
     out.shadow_tfar = l.distance * 0.9999f;

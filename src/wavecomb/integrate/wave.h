@@ -10,6 +10,7 @@
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
+#include "wavecomb/integrate/aov_tables.h"
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/path_pool.h"
@@ -41,9 +42,10 @@ struct WaveContext {
   OrderGrid grid;                      ///< for ray orders and hit positions
   Film* film;                          ///< each wave writes its own pixels only
   uint32_t traversal_width;
-  bool wants_position;    ///< some policy reads position keys
-  bool measures_costs;    ///< batches are timed
-  RayRecorder* recorder;  ///< gets the rays; null in any render that is not measured
+  bool wants_position;              ///< some policy reads position keys
+  bool measures_costs;              ///< batches are timed
+  RayRecorder* recorder;            ///< gets the rays; null in any render that is not measured
+  const AovTables* aovs = nullptr;  ///< what indices mean to AOVs; null where none asks
 
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
@@ -64,7 +66,7 @@ struct WaveTask {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.film->has_aovs()),
+      : pool(capacity, context.film->aovs().layout()),
         rays(capacity),
         hits(capacity),
         shading(capacity),

@@ -23,7 +23,8 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   clock.start(Phase::kGenerate);
   const float* tfar = generate<F>(wave, context, task);
   wave.counts.samples += task.path_count();
-  for (uint32_t depth = 0; wave.rays.size > 0; ++depth) {
+  uint32_t depth = 0;
+  for (; wave.rays.size > 0; ++depth) {
     // Camera rays of a pinhole are coherent as they come, and from one point packets give the same
     // hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
     const bool coherent = depth == 0 && context.camera->lens_radius == 0;
@@ -53,6 +54,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
           std::chrono::duration<double, std::nano>(Clock::now() - start).count(),
           choice.prepare_ns);
     compact<F>(wave);
+    if (depth < 2) keep_part(wave.pool, depth, task.path_count());
 
     if (wave.shadows.size == 0) continue;
     const RayOrderChoice shadow_order = order_rays<F>(
@@ -64,6 +66,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
     learn_order(wave.shadow_chooser, depth, shadow_order, start);
   }
   clock.enter(Phase::kResolve);
+  for (; depth < 2; ++depth) keep_part(wave.pool, depth, task.path_count());
   resolve(wave, context, task);
   clock.stop();
 }

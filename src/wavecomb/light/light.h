@@ -29,6 +29,7 @@ struct LightSample {
   F pdf;
   Mask<F> is_delta;
   Mask<F> valid;  ///< false: no light arrives; weight and pdf are 0, wi is finite
+  UInt<F> light;  ///< record that was chosen
 };
 
 /// Balance heuristic (E. Veach, "Robust Monte Carlo Methods", 1997, eq. 9.8): a / (a + b), 0 where
@@ -101,9 +102,11 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
                         Color<F>(zero),
                         zero,
                         Mask<F>(false),
-                        Mask<F>(false)};
+                        Mask<F>(false),
+                        UInt<F>(kNoLight)};
   if (view.count == 0 || none(active)) return result;
   const UInt<F> index = detail::pick_light<F>(view, u_pick, active);
+  result.light = index;
   const auto put = [&](const detail::KindSample<F>& s, const F& pick_pdf, const Mask<F>& lanes) {
     const F pdf = s.pdf * pick_pdf;
     const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
@@ -172,6 +175,22 @@ inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const V
   return select(lanes, detail::triangle_pdf<F>(view, light, dir, t, lanes), F(0.f));
 }
 
+/// Radiance * MIS weight of infinite light `light` for a ray that left the scene along dir, as
+/// escaped_radiance sums them up.
+template <typename F>
+inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& dir,
+                                        const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
+                                        const Mask<F>& active) {
+  const LightRecord& record = view.lights[light];
+  const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
+  const detail::KindHit<F> hit =
+      is_dome ? detail::hit_dome<F>(view, record, dir, active)
+              : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
+  const F weight =
+      select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
+  return hit.radiance * weight;
+}
+
 /// Sum over all infinite lights of radiance * MIS weight for a ray that left the scene along dir;
 /// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
 /// too).
@@ -179,16 +198,8 @@ template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
                                  const Mask<F>& bsdf_is_delta, const Mask<F>& active) {
   Color<F> sum(F(0.f));
-  for (uint32_t i = 0; i < view.infinite_count; ++i) {
-    const LightRecord& record = view.lights[i];
-    const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
-    const detail::KindHit<F> hit =
-        is_dome ? detail::hit_dome<F>(view, record, dir, active)
-                : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
-    const F weight =
-        select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
-    sum += hit.radiance * weight;
-  }
+  for (uint32_t i = 0; i < view.infinite_count; ++i)
+    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

@@ -118,6 +118,17 @@ void apply_profile(const Scene& scene, const CostProfile& profile, CostSnapshot&
   costs.mean_ns = static_cast<float>(sum / static_cast<double>(costs.material_ns.size()));
 }
 
+/// Names of what the Cryptomatte layers among `layers` hold.
+std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
+                                             const std::vector<AovLayer>& layers) {
+  std::vector<CryptoManifest> manifests;
+  for (const AovLayer& layer : layers)
+    for (const Aov level : {Aov::kCryptoObject, Aov::kCryptoMaterial, Aov::kCryptoAsset})
+      if (layer.name == aov_name(level))
+        manifests.push_back({layer.name, crypto_manifest(scene, level, crypto_ids(layer))});
+  return manifests;
+}
+
 /// What one worker owns.
 struct Worker {
   std::unique_ptr<Wave> wave;
@@ -205,7 +216,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   costs = model_costs(scene);
   const FilterTable filter(settings.filter, settings.filter_width);
   const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
-  Film film(settings.width, settings.height, true);
+  const AovTables aovs(scene, settings);
+  Film film(settings.width, settings.height, aovs.layout);
   const std::vector<uint32_t> pixels = morton_pixel_order(settings.width, settings.height);
   const bool reference = settings.integrator == IntegratorKind::kReference;
 
@@ -235,7 +247,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
       settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, impl_->accel->native_width()),
       wants_position,
       measures,
-      recorder};
+      recorder,
+      &aovs};
 
   std::vector<Worker> workers(threads);
   std::atomic<uint64_t> done{0};
@@ -417,12 +430,20 @@ Picture WavefrontRenderer::render(const Settings& settings, const ProgressCallba
   s.scene_bytes = scene.bytes();
   s.accelerator_bytes = impl_->accel->bytes();
   s.film_bytes = film.bytes();
-  Film::Layers layers = std::move(film).finish();
+  Film::Layers layers = std::move(film).finish(aovs.kept_names);
   s.peak_rss_bytes = peak_rss_bytes();
 
-  return {settings.width,           settings.height,          std::move(layers.beauty),
-          std::move(layers.albedo), std::move(layers.normal), std::move(layers.depth),
-          std::move(layers.samples)};
+  Picture picture{settings.width,
+                  settings.height,
+                  std::move(layers.beauty),
+                  std::move(layers.albedo),
+                  std::move(layers.normal),
+                  std::move(layers.depth),
+                  std::move(layers.samples),
+                  std::move(layers.aovs),
+                  {}};
+  picture.manifests = crypto_manifests(scene, picture.aovs);
+  return picture;
 }
 
 std::vector<uint32_t> lane_widths() {

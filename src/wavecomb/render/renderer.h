@@ -10,13 +10,20 @@
 #include <vector>
 
 #include "wavecomb/core/settings.h"
+#include "wavecomb/film/aov_film.h"
 #include "wavecomb/integrate/ray_recorder.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
 
 namespace wavecomb {
 
-/// A picture: means over the samples, row 0 at the top.
+/// Names of the ids of one Cryptomatte level that a picture holds.
+struct CryptoManifest {
+  std::string level;  ///< name of the AOV
+  std::vector<std::pair<std::string, uint32_t>> names;
+};
+
+/// A picture: means over the samples, row 0 at the top. What was not asked for is empty.
 struct Picture {
   uint32_t width = 0, height = 0;
   std::vector<float> beauty;  ///< rgb, linear Rec.709
@@ -24,6 +31,8 @@ struct Picture {
   std::vector<float> normal;  ///< xyz, world space, mean of unit vectors
   std::vector<float> depth;   ///< along the camera's axis; infinite where nothing was hit
   std::vector<uint32_t> samples;
+  std::vector<AovLayer> aovs;  ///< further layers that Settings::aovs asks for
+  std::vector<CryptoManifest> manifests;
 };
 
 /// What became of one material.

@@ -32,6 +32,7 @@ struct Light {
   /// UsdLux: divide by the area in world space (distant: by its solid angle).
   bool normalize = false;
   uint32_t texture = kNoTexture;  ///< rect (u right, v up as seen from the front), dome (latlong)
+  uint32_t group = 0;             ///< SceneBuilder::light_group
 };
 
 /// A light as lanes read it, triangles of meshes apart: 32 words. Vectors are in world space. Use

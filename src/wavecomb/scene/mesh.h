@@ -30,6 +30,8 @@ struct Mesh {
   Attribute uvs_at = Attribute::kNone;
   std::span<const uint32_t> face_materials;  ///< one per triangle, or empty
   uint32_t material = kInheritMaterial;      ///< where face_materials is empty
+  uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
+  uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
   std::shared_ptr<const void> owner;
 
   size_t triangle_count() const { return indices.size() / 3; }

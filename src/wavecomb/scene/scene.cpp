@@ -154,11 +154,11 @@ SceneBytes Scene::bytes() const {
                 m.uvs.size_bytes() + m.face_materials.size_bytes();
   for (const auto& texture : textures_) b.textures += texture->bytes();
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
-  b.records = of(meshes_) + of(instances_) + of(materials_) + of(mesh_records_) +
-              of(instance_records_) + of(geometry_mesh_) + of(emissive_lights_) +
-              of(material_program_) + of(material_records_) + of(use_records_) +
-              of(texture_views_) + of(light_set_.records) + of(light_set_.triangles) +
-              of(light_set_.triangle_uvs) + of(light_set_.pick_bins);
+  b.records =
+      of(meshes_) + of(instances_) + of(materials_) + of(mesh_records_) + of(instance_records_) +
+      of(geometry_mesh_) + of(emissive_lights_) + of(material_program_) + of(material_records_) +
+      of(use_records_) + of(texture_views_) + of(light_set_.records) + of(light_set_.triangles) +
+      of(light_set_.triangle_uvs) + of(light_set_.pick_bins) + of(placements_) + names_.bytes();
   for (const Distribution2D& d : light_set_.distributions)
     b.records += of(d.cumulative) + of(d.coarse);
   return b;
@@ -248,8 +248,8 @@ uint32_t SceneBuilder::add_mesh(Mesh mesh) {
   return static_cast<uint32_t>(meshes_.size() - 1);
 }
 
-uint32_t SceneBuilder::add_group(std::string name) {
-  groups_.push_back({std::move(name), {}});
+uint32_t SceneBuilder::add_group(std::string name, std::string root) {
+  groups_.push_back({std::move(name), {}, std::move(root)});
   children_.emplace_back();
   return static_cast<uint32_t>(groups_.size() - 1);
 }
@@ -261,14 +261,29 @@ void SceneBuilder::add_to_group(uint32_t group, uint32_t mesh) {
 }
 
 void SceneBuilder::add_instance(uint32_t parent, uint32_t child, const Affine& transform,
-                                uint32_t material) {
+                                uint32_t material, uint32_t name, uint32_t number) {
   if (parent >= groups_.size() || child >= groups_.size())
     throw Error("an instance names a group that was never added");
   if (child == 0) throw Error("the world cannot be instanced; make a group");
   if (!finite(transform))
     throw Error("an instance of " + quoted("group", groups_[child].name) +
                 " has a transform that is not finite; mend it");
-  children_[parent].push_back({child, transform, material});
+  children_[parent].push_back({child, transform, material, name, number});
+}
+
+uint32_t SceneBuilder::add_placement_name(std::string_view name, uint32_t asset_length) {
+  return names_.add(name, asset_length);
+}
+
+uint32_t SceneBuilder::light_group(const std::string& name) {
+  const std::string& known = name.empty() ? light_groups_.front() : name;
+  const auto at = std::find(light_groups_.begin(), light_groups_.end(), known);
+  if (at != light_groups_.end()) return static_cast<uint32_t>(at - light_groups_.begin());
+  if (light_groups_.size() == kMaxLightGroups)
+    throw Error("more than " + std::to_string(kMaxLightGroups) + " light groups, " +
+                quoted("group", name) + " among them; put some together");
+  light_groups_.push_back(name);
+  return static_cast<uint32_t>(light_groups_.size() - 1);
 }
 
 uint32_t SceneBuilder::add_light(Light light) {
@@ -321,14 +336,19 @@ uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
   return known = count;
 }
 
-void SceneBuilder::flatten(uint32_t group, const Affine& to_world, uint32_t material,
-                           const std::vector<uint64_t>& placements,
-                           std::vector<Instance>& out) const {
-  if (group != 0 && !groups_[group].meshes.empty()) out.push_back({group, to_world, material});
-  for (const Node& node : children_[group])
-    if (placements[node.child] != 0)
-      flatten(node.child, to_world * node.transform,
-              node.material == kInheritMaterial ? material : node.material, placements, out);
+void SceneBuilder::flatten(uint32_t group, const Instance& here,
+                           const std::vector<uint64_t>& counts, std::vector<Instance>& out,
+                           std::vector<Placement>& placements) const {
+  if (group != 0 && !groups_[group].meshes.empty()) out.push_back(here);
+  for (const Node& node : children_[group]) {
+    if (counts[node.child] == 0) continue;
+    const auto placement = static_cast<uint32_t>(placements.size());
+    placements.push_back({here.placement, node.child, node.name, node.number});
+    flatten(node.child,
+            {node.child, here.to_world * node.transform,
+             node.material == kInheritMaterial ? here.material : node.material, placement},
+            counts, out, placements);
+  }
 }
 
 std::shared_ptr<const Scene> SceneBuilder::build() {
@@ -337,7 +357,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
-  flatten(0, Affine{}, kInheritMaterial, placements, flat);
+  flatten(0, {0, Affine{}, kInheritMaterial, kNoName}, placements, flat, scene->placements_);
   size_t singular = 0;
   for (Instance& i : flat) {
     const float det = i.to_world.determinant();
@@ -374,6 +394,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   scene->materials_ = std::move(materials_);
   scene->textures_ = std::move(textures_);
   scene->lights_ = std::move(lights_);
+  scene->light_groups_ = std::move(light_groups_);
+  scene->names_ = std::move(names_);
   scene->camera_ = camera_;
   with_threads(threads_, [&] {
     make_records(*scene);

@@ -14,6 +14,7 @@
 #include "wavecomb/scene/light_data.h"
 #include "wavecomb/scene/material_data.h"
 #include "wavecomb/scene/mesh.h"
+#include "wavecomb/scene/names.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
@@ -56,6 +57,7 @@ struct Bounds {
 struct Group {
   std::string name;
   std::vector<uint32_t> meshes;
+  std::string root;  ///< prim path that its meshes' names begin with
 };
 
 /// One placement of a group.
@@ -63,7 +65,13 @@ struct Instance {
   uint32_t group = 0;
   Affine to_world;
   uint32_t material = kInheritMaterial;
+  uint32_t placement = kNoName;  ///< index into Scene::placements
 };
+
+/// Light groups that a stage may have, with that of lights without one.
+inline constexpr uint32_t kMaxLightGroups = 64;
+/// The group of lights without one, group 0.
+inline constexpr const char* kOtherLights = "other";
 
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
@@ -90,6 +98,13 @@ class Scene {
   const std::vector<Material>& materials() const { return materials_; }
   const std::vector<std::unique_ptr<Texture>>& textures() const { return textures_; }
   const std::vector<Light>& lights() const { return lights_; }
+  /// Names of light groups; the first is kOtherLights.
+  const std::vector<std::string>& light_groups() const { return light_groups_; }
+  /// Index into light_groups() of every light that kernels know, triangles last.
+  std::vector<uint32_t> groups_of_lights() const;
+  /// The ways from the world to the instances, and the names on them.
+  const std::vector<Placement>& placements() const { return placements_; }
+  const NameTable& names() const { return names_; }
   const LightSet& light_set() const { return light_set_; }
   const Camera& camera() const { return camera_; }
   const Bounds& bounds() const { return bounds_; }
@@ -110,6 +125,14 @@ class Scene {
   std::vector<Material> materials_;
   std::vector<std::unique_ptr<Texture>> textures_;
   std::vector<Light> lights_;
+  std::vector<std::string> light_groups_;
+  /// Of the triangle lights from `first` on, up to those of the next entry.
+  struct TriangleGroup {
+    uint32_t first, group;
+  };
+  std::vector<TriangleGroup> triangle_groups_;
+  std::vector<Placement> placements_;
+  NameTable names_;
   LightSet light_set_;
   Camera camera_;
   Bounds bounds_;
@@ -142,13 +165,22 @@ class SceneBuilder {
   /// without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
   /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.
-  uint32_t add_group(std::string name);
+  /// `root` is the prim path that names of its meshes and of placements in it begin with, which
+  /// each of its own placements' names takes the place of (ObjectNames).
+  uint32_t add_group(std::string name, std::string root = {});
   void add_to_group(uint32_t group, uint32_t mesh);
   /// Places `child` inside `parent`; nested to any depth without copies of geometry. `material` (or
   /// kInheritMaterial) goes to the meshes in it that have none of their own.
+  /// `name` is of add_placement_name, `number` tells those of one name apart.
   void add_instance(uint32_t parent, uint32_t child, const Affine& transform,
-                    uint32_t material = kInheritMaterial);
+                    uint32_t material = kInheritMaterial, uint32_t name = kNoName,
+                    uint32_t number = kNoName);
+  /// A name for instances; the first `asset_length` characters name the asset that they are part
+  /// of, 0 where that is not known.
+  uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
   uint32_t add_light(Light light);
+  /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
+  uint32_t light_group(const std::string& name);
   void set_camera(const Camera& camera);
 
   /// Checks everything that spans objects (cycles of groups, singular transforms, materials) and
@@ -161,11 +193,12 @@ class SceneBuilder {
     uint32_t child;
     Affine transform;
     uint32_t material;
+    uint32_t name, number;
   };
   /// Instances of groups with meshes that one placement of `group` makes; finds cycles.
   uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
-  void flatten(uint32_t group, const Affine& to_world, uint32_t material,
-               const std::vector<uint64_t>& placements, std::vector<Instance>& out) const;
+  void flatten(uint32_t group, const Instance& here, const std::vector<uint64_t>& counts,
+               std::vector<Instance>& out, std::vector<Placement>& placements) const;
   void make_records(Scene& scene) const;
   void make_lights(Scene& scene) const;
 
@@ -176,6 +209,8 @@ class SceneBuilder {
   std::vector<Material> materials_;
   std::vector<std::unique_ptr<Texture>> textures_;
   std::vector<Light> lights_;
+  std::vector<std::string> light_groups_{kOtherLights};
+  NameTable names_;
   Camera camera_;
   std::vector<std::string> warnings_;
 };

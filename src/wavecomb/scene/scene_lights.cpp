@@ -87,6 +87,7 @@ void SceneBuilder::make_lights(Scene& scene) const {
       if (!emissive) continue;
       sources.push_back(
           {triangle_count, &mesh, &record, i == 0 ? &identity : &scene.instances_[i - 1].to_world});
+      scene.triangle_groups_.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
       triangle_count += mesh.triangle_count();
     }
   }
@@ -125,6 +126,20 @@ void SceneBuilder::make_lights(Scene& scene) const {
   v.has_emissive_meshes = any_emissive;
   v.has_presence = std::any_of(scene.materials_.begin(), scene.materials_.end(),
                                [](const Material& m) { return m.needs_presence(); });
+}
+
+std::vector<uint32_t> Scene::groups_of_lights() const {
+  std::vector<uint32_t> groups(light_set_.size());
+  for (size_t i = 0; i < lights_.size(); ++i) groups[light_set_.of_input[i]] = lights_[i].group;
+  for (size_t run = 0; run < triangle_groups_.size(); ++run) {
+    const size_t first = light_set_.first_triangle() + triangle_groups_[run].first;
+    const size_t end = run + 1 < triangle_groups_.size()
+                           ? light_set_.first_triangle() + triangle_groups_[run + 1].first
+                           : groups.size();
+    std::fill(groups.begin() + static_cast<std::ptrdiff_t>(first),
+              groups.begin() + static_cast<std::ptrdiff_t>(end), triangle_groups_[run].group);
+  }
+  return groups;
 }
 
 }  // namespace wavecomb

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "wavecomb/core/rows.h"
+#include "wavecomb/integrate/light_groups.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
@@ -39,6 +40,34 @@ inline void store_depth(PathPool& pool, const CameraSetup& camera, const Vec3<F>
                         const Vec3<F>& d, const F& t, const UInt<F>& slot, const Mask<F>& active) {
   const Vec3<F> p = fma(d, t, o) - Vec3<F>(camera.to_world.t);
   scatter<F>(pool.depth, -dot(p, Vec3<F>(camera.backward)), slot, active);
+}
+
+/// What camera rays met, into the rows of AovHit.
+template <typename F>
+inline void store_hit(const PathPool& pool, const UInt<F>& slot, const Vec3<F>& p,
+                      const UInt<F>& object, const UInt<F>& material, const UInt<F>& instance,
+                      const Mask<F>& active) {
+  const F none(0.f);
+  store_rows<PathPool::kHitWords, F>(pool.hits, slot * PathPool::kHitWords,
+                                     {p.x, p.y, p.z, bits_float<F>(object), bits_float<F>(material),
+                                      bits_float<F>(instance), none, none},
+                                     active);
+}
+
+/// Splits the radiance of paths that end in lanes `missed` (the environment) or `shape` (light
+/// `light`, `c`) by light group.
+template <typename F>
+inline void add_ended_groups(const PathPool& pool, const WaveContext& context,
+                             const ShadeSettings& settings, uint32_t depth, const UInt<F>& slot,
+                             const UInt<F>& light, const Color<F>& c, const PathState<F>& path,
+                             const Mask<F>& missed, const Mask<F>& shape) {
+  const uint32_t* kept = context.aovs->kept_group.data();
+  if (any(missed))
+    split_environment<F>(context.scene, settings, depth, kept, path, missed,
+                         [&](uint32_t group, const Color<F>& share) {
+                           add_group_radiance<F>(pool, slot, UInt<F>(group), share, missed);
+                         });
+  if (any(shape)) add_group_radiance<F>(pool, slot, kept_group<F>(kept, light, shape), c, shape);
 }
 
 /// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order.
@@ -81,9 +110,17 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
                       c);
       }
       add_radiance<F>(wave.pool, slot, c, ended & not_(is_black(c)));
+      if (wave.pool.groups)
+        add_ended_groups<F>(wave.pool, context, settings, depth, slot, load<U>(hits.geom + i), c,
+                            state, missed, shape);
     }
-    if (depth == 0 && wave.pool.has_aovs)
+    const bool first_hits = depth == 0 && wave.pool.hits;
+    if (depth == 0 && wave.pool.depth)
       store_depth<F>(wave.pool, *context.camera, o, d, t, slot, active & not_(missed));
+    if (first_hits && any(shape))
+      store_hit<F>(wave.pool, slot, fma(d, t, o),
+                   context.aovs->light_object(load<U>(hits.geom + i)), U(kNothingHit),
+                   U(kNothingHit), shape);
     if (none(surface)) continue;
 
     const U prim = load<U>(hits.prim + i);
@@ -94,6 +131,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
     const U material = detail::hit_material<F>(scene, inherited, mesh, prim, surface);
     const U program = gather<U>(scene.material_program, material, Mask<U>(surface));
+    if (first_hits)
+      store_hit<F>(wave.pool, slot, fma(d, t, o),
+                   context.aovs->template object<F>(inst, geom, surface), material, inst, surface);
     if (cost_aware) {
       const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, state, surface);
       surface = surface & (cost_aware_number<F>(path.key, depth) < q);

@@ -34,7 +34,8 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     store_path<F>(pool, slot,
                   {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), F(0.f), ray.spread, key},
                   active);
-    if (pool.has_aovs) store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
+    if (pool.depth) store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
+    if (pool.centre) store(pool.centre + i, centre_distance2<F>(camera, r, active));
     store(rays.ox + i, ray.o.x);
     store(rays.oy + i, ray.o.y);
     store(rays.oz + i, ray.o.z);
@@ -45,7 +46,15 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     store(tfar + i, ray.tfar);
   }
   std::memset(pool.radiance, 0, size_t{n} * PathPool::kRadianceWords * 4);
-  if (pool.has_aovs) std::memset(pool.first, 0, size_t{n} * PathPool::kFirstWords * 4);
+  if (pool.first) std::memset(pool.first, 0, size_t{n} * PathPool::kFirstWords * 4);
+  if (pool.hits) {
+    const AovHit none;
+    for (uint32_t i = 0; i < n; ++i)
+      std::memcpy(pool.hits + size_t{i} * PathPool::kHitWords, &none, sizeof(none));
+  }
+  if (pool.groups)
+    std::memset(pool.groups, 0, size_t{n} * pool.light_groups * PathPool::kRadianceWords * 4);
+  if (pool.cost_ns) std::memset(pool.cost_ns, 0, size_t{n} * 4);
   rays.size = n;
   return camera.has_far ? tfar : nullptr;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstring>
 
 #include "wavecomb/integrate/wave.h"
 
@@ -19,6 +20,50 @@ inline void add_rows(const float* rows, size_t first, size_t end, double (&sum)[
 
 }  // namespace detail
 
+/// What slots [slot, end) found beside radiance, into the AOVs of their pixel.
+inline void resolve_aovs(const PathPool& pool, const AovTables* tables, AovFilm& film, size_t pixel,
+                         size_t slot, size_t end) {
+  using P = PathPool;
+  if (film.has_first()) {
+    AovFilm::First& first = film.first(pixel);
+    if (pool.first) {
+      double hit[P::kFirstWords] = {first.albedo[0], first.albedo[1], first.albedo[2],
+                                    first.normal[0], first.normal[1], first.normal[2]};
+      detail::add_rows(pool.first, slot, end, hit);
+      for (size_t c = 0; c < 3; ++c) {
+        first.albedo[c] = hit[c];
+        first.normal[c] = hit[3 + c];
+      }
+    }
+    for (size_t s = slot; pool.depth && s < end; ++s)
+      if (std::isfinite(pool.depth[s])) {
+        first.depth += double{pool.depth[s]};
+        ++first.depth_samples;
+      }
+  }
+  const float no_uv[2] = {0, 0};
+  for (size_t s = slot; pool.hits && s < end; ++s) {
+    AovHit hit;
+    std::memcpy(static_cast<void*>(&hit), pool.hits + s * P::kHitWords, sizeof(hit));
+    film.add_hit(pixel, hit, pool.centre ? pool.centre[s] : 0,
+                 pool.wants_uv ? pool.first + s * P::kFirstWords + 6 : no_uv,
+                 tables ? &tables->crypto : nullptr);
+  }
+  for (size_t s = slot; pool.parts[0] && s < end; ++s) {
+    const size_t row = s * P::kRadianceWords;
+    film.add_parts(pixel, pool.parts[0] + row, pool.parts[1] + row, pool.radiance + row);
+  }
+  if (pool.groups) {
+    double* sums = film.groups(pixel);
+    for (size_t s = slot; s < end; ++s)
+      for (size_t g = 0; g < pool.light_groups; ++g)
+        for (size_t c = 0; c < 3; ++c)
+          sums[3 * g + c] +=
+              double{pool.groups[(s * pool.light_groups + g) * P::kRadianceWords + c]};
+  }
+  for (size_t s = slot; pool.cost_ns && s < end; ++s) film.add_cost(pixel, double{pool.cost_ns[s]});
+}
+
 inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask& task) {
   const PathPool& pool = wave.pool;
   Film& film = *context.film;
@@ -30,21 +75,7 @@ inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask
     double sum[PathPool::kRadianceWords] = {pixel.r, pixel.g, pixel.b};
     detail::add_rows(pool.radiance, slot, end, sum);
     pixel = {sum[0], sum[1], sum[2], pixel.samples + task.samples};
-    if (pool.has_aovs) {
-      Film::AovPixel& aov = film.aov(x, y);
-      double hit[PathPool::kFirstWords] = {aov.albedo[0], aov.albedo[1], aov.albedo[2],
-                                           aov.normal[0], aov.normal[1], aov.normal[2]};
-      detail::add_rows(pool.first, slot, end, hit);
-      for (size_t c = 0; c < 3; ++c) {
-        aov.albedo[c] = hit[c];
-        aov.normal[c] = hit[3 + c];
-      }
-      for (size_t s = slot; s < end; ++s)
-        if (std::isfinite(pool.depth[s])) {
-          aov.depth += double{pool.depth[s]};
-          ++aov.depth_samples;
-        }
-    }
+    resolve_aovs(pool, context.aovs, film.aovs(), film.index(x, y), slot, end);
     slot = end;
   }
 }

@@ -2,6 +2,8 @@
 /// Stage 3c: shading, batch by batch, in lanes.
 #pragma once
 
+#include "wavecomb/integrate/light_groups.h"
+#include "wavecomb/integrate/stages/cost.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
@@ -17,7 +19,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   using Q = ShadingQueue;
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
-  const bool wants_aovs = depth == 0 && pool.has_aovs;
+  const FirstHitAovs aovs{depth == 0 && pool.first, depth == 0 && pool.wants_uv};
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
@@ -38,17 +40,21 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                              path.eta_scale,
                              fma(path.cone_spread, t, path.cone_width),
                              path.cone_spread};
-    const VertexResult<F> v =
-        shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, id(Q::kGeom), t,
-                              material, state, wants_aovs, active);
+    const VertexResult<F> v = shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit,
+                                                    id(Q::kGeom), t, material, state, aovs, active);
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
-    if (wants_aovs) {
-      const F none(0.f);
+    U lit_by(kNoGroup);
+    if (pool.groups) {
+      const uint32_t* kept = context.aovs->kept_group.data();
+      add_group_radiance<F>(pool, slot, kept_group<F>(kept, v.emitter, emits), v.emitted, emits);
+      lit_by = kept_group<F>(kept, v.lit_by, v.has_shadow);
+    }
+    if (aovs.any) {
       store_rows<PathPool::kFirstWords, F>(
           pool.first, slot * PathPool::kFirstWords,
-          {v.albedo.x, v.albedo.y, v.albedo.z, v.normal.x, v.normal.y, v.normal.z, none, none},
+          {v.albedo.x, v.albedo.y, v.albedo.z, v.normal.x, v.normal.y, v.normal.z, v.uv.x, v.uv.y},
           active);
     }
     const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
@@ -61,7 +67,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       store_rows<PathPool::kShadowWords, F>(
           pool.shadows, slot * PathPool::kShadowWords,
           {v.shadow_o.x, v.shadow_o.y, v.shadow_o.z, v.shadow_d.x, v.shadow_d.y, v.shadow_d.z,
-           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, none, none, none, none, none, none},
+           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, bits_float<F>(lit_by), none, none,
+           none, none, none},
           v.has_shadow);
     }
     if (any(v.alive))
@@ -108,6 +115,16 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
+/// Spreads a batch's time over the paths of its records, for the cost AOV.
+inline void spread_batch(Wave& wave, size_t begin, size_t end,
+                         PhaseClock::Clock::time_point start) {
+  const ShadingQueue& queue = wave.shading;
+  const auto slot = [&](size_t i) {
+    return queue.slot[queue.ordered || queue.moved ? queue.sorted_indices[begin + i] : begin + i];
+  };
+  spread_cost(wave.pool, end - begin, start, slot);
+}
+
 /// Shades the whole queue, batch by batch.
 template <typename F>
 void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
@@ -119,11 +136,12 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
     const auto program = static_cast<ProgramId>(queue.uints(ShadingQueue::kProgram)[at]);
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
-    if (timed) start = PhaseClock::Clock::now();
+    if (timed || wave.pool.cost_ns) start = PhaseClock::Clock::now();
     visit_program<F>(program, [&]<typename Bsdf>() {
       shade_batch<Bsdf, F>(wave, context, settings, depth, begin, end);
     });
     if (timed) charge_batch(wave, begin, end, start);
+    if (wave.pool.cost_ns) spread_batch(wave, begin, end, start);
     begin = end;
   }
 }

@@ -2,6 +2,7 @@
 /// Stage 2: what the rays hit. Stage 4: what the shadow rays meet.
 #pragma once
 
+#include "wavecomb/integrate/stages/cost.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
@@ -45,8 +46,11 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size};
   if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
   const HitBuffer& h = wave.hits;
+  PhaseClock::Clock::time_point start;
+  if (wave.pool.cost_ns) start = PhaseClock::Clock::now();
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
                            coherent, presence_keys(wave.pool, depth, false));
+  if (wave.pool.cost_ns) spread_cost(wave.pool, q.size, start, [&](size_t i) { return q.slot[i]; });
   wave.counts.add_rays(depth, q.size);
 }
 
@@ -58,14 +62,23 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   ShadowQueue& q = wave.shadows;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.slot, q.size};
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
+  PhaseClock::Clock::time_point start;
+  if (wave.pool.cost_ns) start = PhaseClock::Clock::now();
   context.accel->occluded(rays, q.occluded, context.traversal_width, false,
                           presence_keys(wave.pool, depth, true));
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
-    add_radiance<F>(wave.pool, slot, {load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)},
-                    active);
+    const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
+    add_radiance<F>(wave.pool, slot, c, active);
+    if (wave.pool.groups) {
+      const U group =
+          gather<U>(wave.pool.shadows, slot * PathPool::kShadowWords + PathPool::kShadowGroup,
+                    Mask<U>(active));
+      add_group_radiance<F>(wave.pool, slot, group, c, active);
+    }
   }
+  if (wave.pool.cost_ns) spread_cost(wave.pool, q.size, start, [&](size_t i) { return q.slot[i]; });
   wave.counts.add_shadow_rays(depth, q.size);
 }
 

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What the scene's indices mean to AOVs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/settings.h"
+#include "wavecomb/film/aov_film.h"
+
+namespace wavecomb {
+
+class Scene;
+
+/// Made once a render; read by all waves.
+struct AovTables {
+  AovLayout layout;
+  CryptoTables crypto;
+  /// By light: where its group is kept among the film's, or kNoGroup.
+  std::vector<uint32_t> kept_group;
+  std::vector<std::string> kept_names;  ///< of the film's groups
+
+  /// What AovHit calls geometry `geom` of instance `inst`; kNothingHit where nobody wants to know.
+  template <typename F>
+  UInt<F> object(const UInt<F>& inst, const UInt<F>& geom, const Mask<F>& active) const {
+    using U = UInt<F>;
+    if (crypto.first_object.empty()) return U(kNothingHit);
+    return gather<U>(crypto.first_object.data(), inst, Mask<U>(active)) + geom;
+  }
+  /// And light record `light`.
+  template <typename U>
+  U light_object(const U& light) const {
+    return crypto.first_object.empty() ? U(kNothingHit) : U(light + crypto.first_light);
+  }
+
+  /// Throws Error for a light group that the scene does not have.
+  AovTables(const Scene& scene, const Settings& settings);
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// AOVs: names, Cryptomatte's ids and bounded ranks, names of objects, memory of the film.
+#include <bit>
+#include <map>
+
+#include "scene_testing.h"
+#include "wavecomb/film/film.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace scene_testing;
+
+std::string numbered(std::string name, uint32_t i) {
+  name += std::to_string(i);
+  return name;
+}
+
+TEST(AovSet, NamesThereAndBack) {
+  uint32_t bits = 0;
+  for (const std::string& name : AovSet{(1u << kAovCount) - 1}.names())
+    bits |= static_cast<uint32_t>(AovSet::parse(name));
+  EXPECT_EQ(bits, (1u << kAovCount) - 1);
+  EXPECT_EQ(AovSet{}.names(), (std::vector<std::string>{"albedo", "normal", "depth"}));
+  EXPECT_THROW(AovSet::parse("albdo"), Error);
+}
+
+// Verification values of MurmurHash3_x86_32 as published with SMHasher and in common use.
+TEST(Cryptomatte, MurmurHash3) {
+  EXPECT_EQ(murmur3_32("", 0), 0u);
+  EXPECT_EQ(murmur3_32("", 1), 0x514e28b7u);
+  EXPECT_EQ(murmur3_32("", 0xffffffffu), 0x81f16f39u);
+  EXPECT_EQ(murmur3_32("test", 0), 0xba6bd213u);
+  EXPECT_EQ(murmur3_32("test", 0x9747b28cu), 0x704b81dcu);
+  EXPECT_EQ(murmur3_32("Hello, world!", 0), 0xc0363e43u);
+  EXPECT_EQ(murmur3_32("Hello, world!", 0x9747b28cu), 0x24884cbau);
+  EXPECT_EQ(murmur3_32("The quick brown fox jumps over the lazy dog", 0), 0x2e4ff723u);
+}
+
+TEST(Cryptomatte, IdsAreUsualFloats) {
+  // Names whose hashes have exponents 0 and 255 are rare: they are looked for.
+  uint32_t zero = 0, full = 0;
+  for (uint32_t i = 0; i < 4000; ++i) {
+    const std::string name = numbered("n", i);
+    const uint32_t hash = murmur3_32(name, 0), id = crypto_id(name);
+    EXPECT_TRUE(std::isnormal(std::bit_cast<float>(id))) << name;
+    const uint32_t exponent = hash >> 23 & 0xff;
+    zero += exponent == 0;
+    full += exponent == 0xff;
+    EXPECT_EQ(hash ^ id, exponent == 0 || exponent == 0xff ? 1u << 23 : 0u) << name;
+  }
+  EXPECT_GT(zero, 0u);
+  EXPECT_GT(full, 0u);
+}
+
+TEST(Cryptomatte, FewIdsAreCountedExactly) {
+  CryptoPixel p;
+  for (uint32_t i = 0; i < 3600; ++i) p.add(100 + i % 8 * (i % 8 + 1) / 2);
+  std::map<uint32_t, uint32_t> expected;
+  for (uint32_t i = 0; i < 3600; ++i) ++expected[100 + i % 8 * (i % 8 + 1) / 2];
+  ASSERT_EQ(expected.size(), 8u);
+  for (uint32_t k = 0; k < CryptoPixel::kSlots; ++k) EXPECT_EQ(p.count[k], expected[p.id[k]]);
+}
+
+TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
+  std::mt19937 rng(5);
+  for (int round = 0; round < 20; ++round) {
+    CryptoPixel p;
+    std::map<uint32_t, uint32_t> exact;
+    constexpr uint32_t kSamples = 4096;
+    for (uint32_t i = 0; i < kSamples; ++i) {
+      // Ids of falling frequency: a few large ones and a long tail.
+      const double u = std::uniform_real_distribution<double>(0, 1)(rng);
+      const auto id = static_cast<uint32_t>(300 * u * u * u * u * u) + 1;
+      p.add(id);
+      ++exact[id];
+    }
+    ASSERT_GT(exact.size(), 50u);
+    uint32_t sum = 0;
+    for (uint32_t k = 0; k < CryptoPixel::kSlots; ++k) {
+      sum += p.count[k];
+      EXPECT_GE(p.count[k], exact[p.id[k]]);
+      EXPECT_LE(p.count[k], exact[p.id[k]] + kSamples / CryptoPixel::kSlots);
+    }
+    EXPECT_EQ(sum, kSamples);
+    for (const auto& [id, count] : exact)
+      if (count > kSamples / CryptoPixel::kSlots) {
+        EXPECT_NE(std::find(p.id, p.id + CryptoPixel::kSlots, id), p.id + CryptoPixel::kSlots);
+      }
+  }
+}
+
+// The figures of docs/aovs.md.
+TEST(AovFilm, MemoryOfEveryAov) {
+  const AovLayout all{AovSet{(1u << kAovCount) - 1}, 4};
+  const Film film(16, 9, all);
+  EXPECT_EQ(film.bytes(), 16u * 9 * (32 + 64 + 32 + 3 * 64 + 72 + 4 * 24 + 8));
+  const auto bytes = [](uint32_t bits) { return Film(8, 8, {AovSet{bits}}).bytes() / 64; };
+  EXPECT_EQ(bytes(0), 32u);
+  EXPECT_EQ(bytes(AovSet::kFirst), 96u);
+  EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kCryptoAsset)), 96u);
+}
+
+TEST(AovFilm, NearestSampleWinsAndTheFirstOfEquals) {
+  Film film(1, 1, {AovSet{AovSet::kNearest}});
+  const float uv[2] = {0.25f, 0.5f};
+  AovHit hit;
+  hit.material = 4;
+  hit.position[0] = 7;
+  film.aovs().add_hit(0, AovHit{}, 0.5f, uv, nullptr);
+  film.aovs().add_hit(0, hit, 0.2f, uv, nullptr);
+  hit.material = 5;
+  film.aovs().add_hit(0, hit, 0.2f, uv, nullptr);
+  film.aovs().add_hit(0, hit, 0.3f, uv, nullptr);
+  const AovFilm::Nearest& nearest = film.aovs().nearest(0);
+  EXPECT_EQ(nearest.material, 4u);
+  EXPECT_EQ(nearest.instance, kNothingHit);
+  const std::vector<AovLayer> layers = std::move(film).finish({}).aovs;
+  ASSERT_EQ(layers.size(), 4u);
+  EXPECT_EQ(layers[0].values, (std::vector<float>{7, 0, 0}));
+  EXPECT_EQ(layers[1].values, (std::vector<float>{0.25f, 0.5f}));
+  EXPECT_EQ(layers[2].values, (std::vector<float>{5}));  // counted from 1
+  EXPECT_EQ(layers[3].values, (std::vector<float>{0}));
+}
+
+TEST(ObjectNames, SeenThroughInstances) {
+  SceneBuilder b;
+  const auto mesh = [&](const char* name, uint32_t asset_length = 0) {
+    Mesh m = make_mesh(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
+    m.name = name;
+    m.asset_length = asset_length;
+    return b.add_mesh(std::move(m));
+  };
+  b.add_to_group(0, mesh("/World/Set/Floor"));
+  b.add_to_group(0, mesh("/World/Chairs/Red/Seat", 17));
+  // A tree, placed twice by prims of their own; a nest in it that is a model.
+  const uint32_t tree = b.add_group("tree", "/World/Tree_1");
+  b.add_to_group(tree, mesh("/World/Tree_1/Leaves"));
+  b.add_to_group(tree, mesh("/World/Tree_1/Top/Nest/Egg", 22));
+  const uint32_t first = b.add_placement_name("/World/Tree_1", 13);
+  const uint32_t second = b.add_placement_name("/World/Tree_2", 0);
+  b.add_instance(0, tree, translate(1, 0, 0), kInheritMaterial, first);
+  b.add_instance(0, tree, translate(2, 0, 0), kInheritMaterial, second);
+  // A point instancer in a prototype: its numbers follow its name.
+  const uint32_t leaf = b.add_group("leaf", "/Protos/Leaf");
+  b.add_to_group(leaf, mesh("/Protos/Leaf"));
+  const uint32_t bush = b.add_group("bush", "/World/Bush_1");
+  const uint32_t points = b.add_placement_name("/World/Bush_1/Points", 0);
+  b.add_instance(bush, leaf, translate(0, 1, 0), kInheritMaterial, points, 7);
+  b.add_instance(0, bush, translate(3, 0, 0), kInheritMaterial,
+                 b.add_placement_name("/World/Bush_9", 0));
+  Light light = make_light(LightKind::kRect, {1, 1, 1});
+  light.name = "/World/Lights/Key";
+  b.add_light(light);
+  b.set_camera(make_camera({0, 0, 5}, {0, 0, 0}));
+  const ScenePtr scene = b.build();
+  const ObjectNames names(*scene);
+  const std::vector<std::pair<std::string, std::string>> expected{
+      {"/World/Set/Floor", "/World/Set"},
+      {"/World/Chairs/Red/Seat", "/World/Chairs/Red"},
+      {"/World/Tree_1/Leaves", "/World/Tree_1"},
+      {"/World/Tree_1/Top/Nest/Egg", "/World/Tree_1/Top/Nest"},
+      {"/World/Tree_2/Leaves", "/World/Tree_2"},
+      {"/World/Tree_2/Top/Nest/Egg", "/World/Tree_2/Top/Nest"},
+      {"/World/Bush_9/Points[7]", "/World/Bush_9"},
+      {"/World/Lights/Key", "/World/Lights"}};
+  ASSERT_EQ(names.count(), expected.size());
+  for (uint32_t i = 0; i < names.count(); ++i) {
+    EXPECT_EQ(names.object(i), expected[i].first);
+    EXPECT_EQ(names.asset(i), expected[i].second);
+  }
+  EXPECT_EQ(names.first_object(), (std::vector<uint32_t>{0, 2, 4, 6}));
+  // The manifest holds what is in the picture only.
+  const std::vector<uint32_t> there{crypto_id("/World/Tree_2/Leaves")};
+  const auto manifest = crypto_manifest(*scene, Aov::kCryptoObject, there);
+  ASSERT_EQ(manifest.size(), 1u);
+  EXPECT_EQ(manifest[0].first, "/World/Tree_2/Leaves");
+}
+
+TEST(LightGroups, AreBounded) {
+  SceneBuilder b;
+  EXPECT_EQ(b.light_group(""), 0u);
+  EXPECT_EQ(b.light_group("key"), 1u);
+  EXPECT_EQ(b.light_group("key"), 1u);
+  for (uint32_t i = 2; i < kMaxLightGroups; ++i) b.light_group(numbered("g", i));
+  EXPECT_THROW(b.light_group("one too many"), Error);
+}
+
+}  // namespace
+}  // namespace wavecomb
