@@ -41,6 +41,15 @@ class Scene:
     def textures(self) -> list[tuple[str, int]]:
         """(name, bytes) of every texture."""
     @property
+    def camera(self) -> dict[str, Any]:
+        """As set_camera takes it: to_world (4, 4), window, near_clip, far_clip."""
+    @property
+    def light_groups(self) -> list[str]:
+        """Names; the first, "other", is of lights without a group."""
+    @property
+    def object_names(self) -> list[tuple[str, str]]:
+        """(object, asset) as Cryptomatte names them: meshes instance by instance, then lights."""
+    @property
     def warnings(self) -> list[str]: ...
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
@@ -110,13 +119,17 @@ class SceneBuilder:
         face_materials: NDArray[np.uint32] | None = None,
         material: int = ...,
         name: str = "",
+        light_group: str = "",
+        asset_length: int = 0,
     ) -> int:
         """Positions (n, 3), triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
         vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,).
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
-        afterwards."""
-    def add_group(self, name: str = "") -> int:
-        """A new empty group; group 0, the world, is there."""
+        afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
+        names the asset that it is part of; 0: none known."""
+    def add_group(self, name: str = "", root: str = "") -> int:
+        """A new empty group; group 0, the world, is there. root: the prim path that names of what
+        is in it begin with, and that names of its instances take the place of."""
     def add_to_group(self, group: int, mesh: int) -> None: ...
     def add_instances(
         self,
@@ -124,9 +137,15 @@ class SceneBuilder:
         child: int,
         transforms: NDArray[Any],
         materials: NDArray[np.uint32] | None = None,
+        *,
+        names: list[str] | None = None,
+        numbers: NDArray[np.uint32] | None = None,
+        asset_lengths: list[int] | None = None,
     ) -> None:
         """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it
-        that have none of their own. Nested to any depth without copies of geometry."""
+        that have none of their own. Nested to any depth without copies of geometry. names: prim
+        paths, one each or one for all, with numbers (k,) to tell those apart; asset_lengths: as in
+        add_mesh, one for each name."""
     def add_light(
         self,
         kind: str,
@@ -140,6 +159,7 @@ class SceneBuilder:
         angle: float = 0.53,
         normalize: bool = False,
         texture: int | None = None,
+        group: str = "",
     ) -> int:
         """Kinds: rect, disk, sphere, distant, dome, as UsdLux. color = colour * intensity *
         2^exposure * colour temperature."""
@@ -185,6 +205,7 @@ class Settings:
     shadow_order: str  # of shadow rays, likewise
     costs: str  # "auto" | "measured" | "model"
     cost_weight: float  # of a pass in the moving average
+    aovs: list[str]  # names of AOVS; "light_NAME" for one light group
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:
         """Raises Error naming the setting and what it may be."""
@@ -197,13 +218,20 @@ class Result:
     def beauty(self) -> NDArray[np.float32]:
         """(height, width, 3), linear Rec.709."""
     @property
-    def albedo(self) -> NDArray[np.float32]: ...
+    def albedo(self) -> NDArray[np.float32] | None:
+        """(height, width, 3); like all AOVs, None where it was not asked for."""
     @property
-    def normal(self) -> NDArray[np.float32]:
+    def normal(self) -> NDArray[np.float32] | None:
         """(height, width, 3), world space."""
     @property
-    def depth(self) -> NDArray[np.float32]:
+    def depth(self) -> NDArray[np.float32] | None:
         """(height, width), along the camera's axis; infinite where nothing was hit."""
+    @property
+    def aovs(self) -> dict[str, NDArray[np.float32]]:
+        """Further AOVs that were asked for: (height, width) or (height, width, channels)."""
+    @property
+    def manifests(self) -> dict[str, dict[str, int]]:
+        """Cryptomatte level -> name -> id, of all that the picture holds."""
     @property
     def samples(self) -> NDArray[np.uint32]: ...
     @property
@@ -261,6 +289,12 @@ class RayRecording:
         width, coherent: of camera, bounce and shadow rays; None: as the render had it. Returns
         wall_s, and by kind of ray thread_s, rays and hits. Raises Error for a width that Embree
         does not have here."""
+
+AOVS: list[str]
+"""Names for Settings.aovs."""
+
+def crypto_id(name: str) -> int:
+    """A name's id in a Cryptomatte: MurmurHash3 32 with seed 0, made a usual float."""
 
 def lane_widths() -> list[int]: ...
 def policies() -> list[str]:

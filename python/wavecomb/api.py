@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb import aovs as aov_names
 from wavecomb.machine import memory_bytes
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
+    from wavecomb.exr import Compression
     from wavecomb.image import Transfer
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
@@ -24,8 +26,6 @@ Progress = Callable[[int, int], "bool | None"]
 
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
-# Film with its sums, the layers that are handed out, and a copy while a file is written.
-_BYTES_PER_PIXEL = 200
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Picture:
 
     Attributes:
         beauty: (height, width, 3), linear Rec.709.
-        albedo: (height, width, 3).
+        albedo: (height, width, 3). Like normal and depth, None where it was not asked for.
         normal: (height, width, 3), world space.
         depth: (height, width), along the camera's axis; infinite where nothing was hit.
         samples: (height, width), samples that each pixel got.
@@ -42,57 +42,100 @@ class Picture:
         cancelled: Progress asked to stop; the picture holds what was done.
         costs: What shading took, by name of material and texture: a profile that another render
             can start from.
+        aovs: Further AOVs by name, (height, width) or (height, width, channels): docs/aovs.md.
+            Cryptomatte levels are pairs of id and coverage, as `wavecomb.cryptomatte` reads them.
+        manifests: Cryptomatte level -> name -> id, of what the picture holds.
+        metadata: For the header of a file, beside what the statistics say.
+        chosen: Names of the layers that are saved; all that there are where it is empty.
     """
 
     beauty: NDArray[np.float32]
-    albedo: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    depth: NDArray[np.float32]
+    albedo: NDArray[np.float32] | None
+    normal: NDArray[np.float32] | None
+    depth: NDArray[np.float32] | None
     samples: NDArray[np.uint32]
     stats: dict[str, Any] = field(default_factory=dict, repr=False)
     cancelled: bool = False
     costs: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
+    aovs: dict[str, NDArray[np.float32]] = field(default_factory=dict, repr=False)
+    manifests: dict[str, dict[str, int]] = field(default_factory=dict, repr=False)
+    metadata: dict[str, Any] = field(default_factory=dict, repr=False)
+    chosen: tuple[str, ...] = ()
 
     def layers(self) -> dict[str, NDArray[Any]]:
-        """The layers by name, in the order of an EXR file."""
-        return {
+        """The layers of an EXR file by name and in order; a Cryptomatte is several there."""
+        from wavecomb import cryptomatte
+
+        arrays = {
             "beauty": self.beauty,
             "albedo": self.albedo,
             "normal": self.normal,
             "depth": self.depth,
             "samples": self.samples,
         }
+        out: dict[str, NDArray[Any]] = {}
+        for name, array in {**arrays, **self.aovs}.items():
+            if array is None or (self.chosen and name in arrays and name not in self.chosen):
+                continue
+            out.update(
+                cryptomatte.layers(name, array) if name in cryptomatte.LEVELS else {name: array}
+            )
+        return out
 
     def save(
         self,
         path: str | os.PathLike[str],
         *,
         half: bool = False,
+        compression: Compression = "zip",
+        tile: int = 0,
+        split: bool = False,
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
-    ) -> None:
+    ) -> list[Path]:
         """Writes all layers (.exr) or the beauty for display (.png), whole or not at all.
 
         Args:
             path: By its ending .exr or .png.
             half: EXR: 16 bit colours and normals.
+            compression: EXR: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa or dwab.
+            tile: EXR: edge of tiles in pixels, a multiple of 16; 0: scanlines.
+            split: EXR: a file for each AOV, path.NAME.exr, the beauty in ``path`` itself.
             exposure: PNG: in stops.
             tone_map: PNG: "clamp" or "neutral".
+
+        Returns:
+            The files that were written.
 
         >>> picture = wavecomb.render("mixed.usdc")  # doctest: +SKIP
         >>> picture.save("mixed.exr", half=True)  # doctest: +SKIP
         >>> picture.save("mixed.png", exposure=0.5)  # doctest: +SKIP
         """
-        from wavecomb.image import write_exr, write_png
-        from wavecomb.stats import picture_metadata
+        from wavecomb.image import write_png
+        from wavecomb.output import save_layers
 
         kind = Path(path).suffix.lower()
         if kind == ".exr":
-            write_exr(path, self.layers(), half=half, metadata=picture_metadata(self.stats))
-        elif kind == ".png":
+            return save_layers(
+                path,
+                self.layers(),
+                self.file_metadata(),
+                self.manifests,
+                half=half,
+                compression=compression,
+                tile=tile,
+                split=split,
+            )
+        if kind == ".png":
             write_png(path, self.beauty, exposure=exposure, tone_map=tone_map)
-        else:
-            raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
+            return [Path(path)]
+        raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
+
+    def file_metadata(self) -> dict[str, Any]:
+        """Attributes of an EXR file: version, stage, camera, settings, times, matrices."""
+        from wavecomb.stats import picture_metadata
+
+        return {**picture_metadata(self.stats), **self.metadata}
 
 
 def load(
@@ -143,6 +186,7 @@ def render(
     frame: float | None = None,
     policy: str | SchedulingPolicy | None = None,
     costs: str | Mapping[str, Mapping[str, float]] | None = None,
+    aovs: Iterable[str] | None = None,
     **settings: Any,
 ) -> Picture:
     """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
@@ -159,6 +203,8 @@ def render(
             policy changes the picture.
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
             from.
+        aovs: What to keep beside the beauty: names of docs/aovs.md, "light_NAME" for a light group,
+            "crypto", "all"; by default albedo, normal and depth.
         **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed ...
 
     >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
@@ -192,15 +238,32 @@ def render(
         from wavecomb.costs import check_costs
 
         profile = check_costs(costs)
-    chosen = make_settings(size, spp, **settings)
+    names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
+    chosen = make_settings(size, spp, aovs=names, **settings)
     scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
     result = _render(scene, chosen, progress, own, profile)
     stats = make_stats(result, stage=stage, loaded=loaded)
-    return picture_of(result, stats)
+    return picture_of(result, stats, scene=scene, aovs=names)
 
 
-def picture_of(result: Result, stats: dict[str, Any]) -> Picture:
-    """A result of the core as a picture."""
+def picture_of(
+    result: Result,
+    stats: dict[str, Any],
+    *,
+    scene: Scene | None = None,
+    aovs: Sequence[str] = aov_names.DEFAULT,
+) -> Picture:
+    """A result of the core as a picture.
+
+    Args:
+        result: Of ``_core.render``.
+        stats: Of ``make_stats``.
+        scene: What was rendered, for the camera's matrices.
+        aovs: Names as ``aovs.expand`` gives them.
+    """
+    from wavecomb.output import scene_metadata
+
+    height, width = result.beauty.shape[:2]
     return Picture(
         beauty=result.beauty,
         albedo=result.albedo,
@@ -210,11 +273,21 @@ def picture_of(result: Result, stats: dict[str, Any]) -> Picture:
         stats=stats,
         cancelled=result.cancelled,
         costs=result.costs,
+        aovs=result.aovs,
+        manifests=result.manifests,
+        metadata={} if scene is None else scene_metadata(scene, width, height),
+        chosen=tuple(aovs),
     )
 
 
-def make_settings(size: tuple[int, int], spp: int, **settings: Any) -> Settings:
-    """Checked settings; raises WavecombError or _core.Error in one line.
+def make_settings(
+    size: tuple[int, int],
+    spp: int,
+    *,
+    aovs: Sequence[str] = aov_names.DEFAULT,
+    **settings: Any,
+) -> Settings:
+    """Checked settings; raises WavecombError or _core.Error in one line. aovs: as expanded.
 
     Checks what the core cannot know: whether the picture fits in the memory of this machine.
     """
@@ -228,12 +301,15 @@ def make_settings(size: tuple[int, int], spp: int, **settings: Any) -> Settings:
         )
     if not 1 <= int(spp) <= MAX_SPP:
         raise WavecombError(f"{spp} samples per pixel: must be from 1 to {MAX_SPP}")
-    needed, there = width * height * _BYTES_PER_PIXEL, memory_bytes()
+    # Light groups are counted once the stage is read; a file is written a few rows at a time.
+    needed, there = width * height * aov_names.bytes_per_pixel(aovs, 4), memory_bytes()
     if there is not None and needed > 0.8 * there:
         raise WavecombError(
             f"size {width} x {height}: needs about {needed / 2**30:.0f} GiB of memory, "
             f"this machine has {there / 2**30:.0f}; choose a smaller size"
         )
+    if tuple(aovs) != aov_names.DEFAULT:
+        settings["aovs"] = aov_names.for_core(aovs)
     chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
     chosen.check()
     return chosen

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 
@@ -33,6 +33,12 @@ def _part(target: Path) -> Path:
 def reason(error: OSError) -> str:
     """Why, in words: "Permission denied"; the whole message where there is no number."""
     return error.strerror or str(error)
+
+
+def one_line(message: str, name: str) -> str:
+    """A library's message in one line, without the file's name, which the caller gives."""
+    line = " ".join(message.replace(f'"{name}"', "it").split())
+    return line.rstrip(".") or "unknown reason"
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -70,3 +76,10 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
+
+
+@contextlib.contextmanager
+def replacing_all(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+    """``replacing`` for several files: none is put in its place before all are written."""
+    with contextlib.ExitStack() as stack:
+        yield [stack.enter_context(replacing(path)) for path in paths]

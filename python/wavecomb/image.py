@@ -9,92 +9,32 @@ Errors are OSError (the file) or ValueError (the arrays), one line that names th
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.files import replacing
+from wavecomb.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
+from wavecomb.files import one_line
+
+__all__ = [
+    "channel_names",
+    "display",
+    "linear_from_srgb",
+    "read_image",
+    "read_layers",
+    "read_metadata",
+    "srgb_from_linear",
+    "write_exr",
+    "write_png",
+]
 
 Array = NDArray[np.float32]
 Transfer = Literal["clamp", "neutral"]
 
 _HALF_MAX = 65504.0
-_BAND = 64
-"""Rows that are made ready and written at once: four blocks of an EXR file."""
-_SUFFIXES = {"beauty": "RGB", "albedo": "RGB", "normal": "XYZ", "depth": "Z"}
-_ALWAYS_FLOAT = ("depth", "samples")
 _NAN_COLOUR = (255, 0, 255)
-
-
-def channel_names(layer: str, channels: int) -> list[str]:
-    """Channel names of a layer in an EXR file: beauty is R, G, B; albedo is albedo.R and so on.
-
-    >>> channel_names("normal", 3)
-    ['normal.X', 'normal.Y', 'normal.Z']
-    >>> channel_names("samples", 1)
-    ['samples']
-    """
-    prefix = "" if layer == "beauty" else f"{layer}."
-    letters = _SUFFIXES.get(layer, "")
-    if len(letters) == channels:
-        return [prefix + letter for letter in letters]
-    if channels == 1:
-        return [layer]
-    if channels in (3, 4):
-        return [prefix + letter for letter in "RGBA"[:channels]]
-    return [f"{layer}.{k}" for k in range(channels)]
-
-
-def write_exr(
-    path: str | os.PathLike[str],
-    layers: Mapping[str, NDArray[Any]],
-    *,
-    half: bool = False,
-    metadata: Mapping[str, str | int | float] | None = None,
-) -> None:
-    """Writes an OpenEXR file with one part, ZIP compressed; whole or not at all.
-
-    Args:
-        path: Ends in .exr.
-        layers: Name -> (height, width) or (height, width, channels); "beauty" becomes R, G, B.
-        half: 16 bit colours and normals; depth and samples stay 32 bit. Finite values beyond the
-            range of a half are clamped to it.
-        metadata: Attributes of the file; "Software" is set if it is not given.
-    """
-    import OpenImageIO as oiio
-
-    name = os.fspath(path)
-    if Path(name).suffix.lower() != ".exr":
-        raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
-    if not layers:
-        raise ValueError(f"{name}: there is nothing to write")
-    planes: list[tuple[NDArray[Any], bool]] = []
-    names: list[str] = []
-    formats: list[Any] = []
-    for layer, pixels in layers.items():
-        plane = np.asarray(pixels)
-        plane = plane[:, :, None] if plane.ndim == 2 else plane
-        if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0][0].shape[:2]):
-            raise ValueError(f"{name}: layer {layer!r} has the shape {np.shape(pixels)}")
-        as_half = half and layer not in _ALWAYS_FLOAT
-        planes.append((plane, as_half))
-        names += channel_names(layer, plane.shape[2])
-        formats += [oiio.TypeDesc("half" if as_half else "float")] * plane.shape[2]
-    height, width = planes[0][0].shape[:2]
-    spec = oiio.ImageSpec(width, height, len(names), "float")
-    spec.channelnames = tuple(names)
-    spec.channelformats = tuple(formats)
-    spec.attribute("compression", "zip")
-    for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
-        spec.attribute(key, value)
-    bands = (
-        np.concatenate([_float(plane[rows], as_half) for plane, as_half in planes], axis=2)
-        for rows in _bands(height)
-    )
-    _write(name, spec, bands)
 
 
 def write_png(
@@ -122,21 +62,10 @@ def write_png(
     spec = oiio.ImageSpec(width, height, channels, "uint8")
     spec.attribute("oiio:ColorSpace", "sRGB")
     spec.attribute("Software", "Wavecomb")
-    bands = (display(linear[rows], exposure=exposure, tone_map=tone_map) for rows in _bands(height))
-    _write(name, spec, bands)
-
-
-def _bands(height: int) -> Iterator[slice]:
-    """The rows of a picture, a band at a time, so that nothing of its size is held twice."""
-    return (slice(row, min(row + _BAND, height)) for row in range(0, height, _BAND))
-
-
-def _float(plane: NDArray[Any], as_half: bool) -> Array:
-    """Pixels as they are handed to the library, finite ones within the range of a half."""
-    values = np.asarray(plane, dtype=np.float32)
-    if not as_half:
-        return values
-    return np.where(np.isfinite(values), np.clip(values, -_HALF_MAX, _HALF_MAX), values)
+    bands = (
+        display(linear[rows], exposure=exposure, tone_map=tone_map) for rows in bands_of(height)
+    )
+    write_bands(name, spec, bands)
 
 
 def _colours(rgb: NDArray[Any]) -> NDArray[Any]:
@@ -221,7 +150,7 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
     order = {letter: k for k, letter in enumerate(["R", "G", "B", "A"])}
     for ids in groups.values():
         ids.sort(key=lambda k: order.get(names[k].rpartition(".")[2], len(order)))
-    known = list(_SUFFIXES)
+    known = list(LAYER_ORDER)
     names_in_order = sorted(groups, key=lambda name: known.index(name) if name in known else 99)
     return {name: np.ascontiguousarray(pixels[:, :, groups[name]]) for name in names_in_order}
 
@@ -245,7 +174,7 @@ def _open(name: str) -> Any:
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(name, hints)
     if source is None:
-        raise OSError(f"{name}: cannot be read as a picture: {_one_line(oiio.geterror(), name)}")
+        raise OSError(f"{name}: cannot be read as a picture: {one_line(oiio.geterror(), name)}")
     return source
 
 
@@ -258,7 +187,7 @@ def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
         spec = source.spec()
         pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
         if pixels is None:
-            raise OSError(f"{name}: is damaged: {_one_line(source.geterror(), name)}")
+            raise OSError(f"{name}: is damaged: {one_line(source.geterror(), name)}")
         names = list(spec.channelnames)
         encoded = spec.format.basetype not in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
         alpha = spec.alpha_channel
@@ -269,27 +198,3 @@ def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
         colour = [k for k in range(spec.nchannels) if k != alpha]
         image[:, :, colour] = linear_from_srgb(image[:, :, colour])
     return image, names
-
-
-def _write(name: str, spec: Any, bands: Iterator[NDArray[Any]]) -> None:
-    """Writes a picture, given a band of rows at a time from the top."""
-    import OpenImageIO as oiio
-
-    with replacing(name) as part:
-        output = oiio.ImageOutput.create(str(part))
-        if output is None:
-            raise OSError(f"{name}: no writer for this kind: {_one_line(oiio.geterror(), name)}")
-        ok, row = output.open(str(part), spec), 0
-        while ok and (pixels := next(bands, None)) is not None:
-            ok = output.write_scanlines(row, row + len(pixels), 0, pixels)
-            row += len(pixels)
-        problem = output.geterror()
-        if not (output.close() and ok):
-            problem = problem or output.geterror()
-            raise OSError(f"{name}: cannot be written: {_one_line(problem, name)}")
-
-
-def _one_line(message: str, name: str) -> str:
-    """A library's message in one line, without the file's name, which the caller gives."""
-    line = " ".join(message.replace(f'"{name}"', "it").split())
-    return line.rstrip(".") or "unknown reason"

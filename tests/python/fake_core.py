@@ -120,6 +120,8 @@ class Fake:
             depth=np.where(x < 1, np.inf, x + 1).astype(np.float32),
             samples=np.full((height, width), total, np.uint32),
             cancelled=cancelled,
+            aovs={},
+            manifests={},
             costs={"materials": {"Gold": 50.0, "Chalk": 25.5}, "textures": {"wood.png": 60.0}},
             stats={
                 "settings": settings.to_dict(),

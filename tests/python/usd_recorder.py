@@ -41,6 +41,8 @@ class Recorder:
         face_materials=None,
         material=INHERIT,
         name="",
+        light_group="",
+        asset_length=0,
     ):
         n, m = len(positions), len(indices)
         assert positions.dtype == np.float32 and positions.shape == (n, 3)
@@ -65,18 +67,25 @@ class Recorder:
                 "face_materials": face_materials,
                 "material": material,
                 "name": name,
+                "light_group": light_group,
+                "asset": name[:asset_length],
             }
         )
         return len(self.meshes) - 1
 
-    def add_group(self, name=""):
+    def add_group(self, name="", root=""):
         self.groups.append({"name": name, "meshes": [], "children": []})
         return len(self.groups) - 1
 
     def add_to_group(self, group, mesh):
         self.groups[group]["meshes"].append(mesh)
 
-    def add_instances(self, parent, child, transforms, materials=None):
+    def add_instances(
+        self, parent, child, transforms, materials=None, *, names, numbers=None, asset_lengths
+    ):
+        assert len(names) == len(asset_lengths) and len(names) in (1, len(transforms))
+        assert all(length <= len(name) for name, length in zip(names, asset_lengths, strict=True))
+        assert numbers is None or (numbers.dtype == np.uint32 and len(numbers) == len(transforms))
         assert transforms.dtype == np.float64 and transforms.shape == (len(transforms), 4, 4)
         assert materials.dtype == np.uint32 and materials.shape == (len(transforms),)
         assert np.isfinite(transforms).all() and child != 0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from wavecomb.cli.aovs import AovOptions, aov_options
 from wavecomb.cli.group import INTERRUPTED
 from wavecomb.cli.options import Real, StageOptions, examples, stage_options, stage_warnings, warn
 from wavecomb.cli.summary import print_summary
@@ -41,6 +42,7 @@ _INTEGERS = click.IntRange(min=0)
     metavar="FILE.exr",
     help="Picture, all layers.",
 )
+@aov_options
 @click.option("--png", type=click.Path(), metavar="FILE", help="Picture for display, too.")
 @click.option(
     "--stats",
@@ -129,7 +131,6 @@ _INTEGERS = click.IntRange(min=0)
     metavar="X",
     help="Weight of a pass in the moving average of costs, 0 to 1.  [default: 0.3]",
 )
-@click.option("--half", is_flag=True, help="16 bit colours and normals in the EXR.")
 @click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="Of the PNG, in stops.")
 @click.option(
     "--tone-map",
@@ -145,7 +146,6 @@ def render_command(
     stats_file: str | None,
     size: tuple[int, int],
     spp: int,
-    half: bool,
     exposure: float,
     tone_map: Any,
     quiet: bool,
@@ -156,15 +156,18 @@ def render_command(
 ) -> None:
     """Render STAGE to an OpenEXR file.
 
-    The file has the layers beauty (R, G, B), albedo, normal, depth and samples. Ctrl-C stops and
-    writes what is done (exit code 130). Files are written whole or not at all.
+    The file has the layers beauty (R, G, B), albedo, normal, depth and samples, or those that --aov
+    asks for. Ctrl-C stops and writes what is done (exit code 130). Files are written whole or not
+    at all.
     """
     from wavecomb.api import make_settings
     from wavecomb.progress import progress_console
 
     costs_file = costs if costs is not None and costs not in SOURCES else None
-    _check_outputs(stage, output, png, stats_file, costs_file)
     source = StageOptions.take(options)
+    layers = AovOptions.take(options)
+    _check_outputs(stage, output, png, stats_file, costs_file)
+    layers.check(output)
     chosen = {name: value for name, value in options.items() if value is not None}
     if lanes is not None:
         chosen["lanes"] = 0 if lanes == "auto" else int(lanes)
@@ -173,21 +176,21 @@ def render_command(
     if costs is not None and costs_file is None:
         chosen["costs"] = costs
     profile = _read_costs(costs_file)
-    settings = make_settings(size, spp, **chosen)
+    settings = make_settings(size, spp, aovs=layers.names, **chosen)
 
     console = progress_console(quiet=quiet)
-    picture, done, report = _render(source, stage, settings, profile, console)
+    picture, done, report = _render(source, stage, settings, layers.names, profile, console)
     if picture.cancelled and done <= 0.0:
         click.echo("stopped before the first sample; nothing was written", err=True)
         raise click.exceptions.Exit(INTERRUPTED)
     warn(_picture_warnings(picture))
-    _write(picture, output, png, stats_file, half, exposure, tone_map)
+    written = _write(picture, output, png, stats_file, layers, exposure, tone_map)
     if costs_file is not None:
         from wavecomb.costs import save_costs
 
         save_costs(costs_file, picture.costs)
     if not quiet:
-        files = [name for name in (output, png, stats_file, costs_file) if name]
+        files = [*written, *([costs_file] if costs_file else [])]
         print_summary(picture.stats, report, files)
     if picture.cancelled:
         click.echo(f"stopped at {100.0 * done:.0f} %; {output} holds what was done", err=True)
@@ -246,6 +249,7 @@ def _render(
     source: StageOptions,
     stage: str,
     settings: Any,
+    aovs: tuple[str, ...],
     profile: dict[str, dict[str, float]] | None,
     console: Console | None,
 ) -> tuple[Picture, float, LoadReport]:
@@ -268,7 +272,7 @@ def _render(
     stats = make_stats(result, stage=stage, loaded=loaded)
     total = int(settings.width) * int(settings.height) * int(settings.spp)
     done = float(stats["counts"]["samples"]) / total
-    return picture_of(result, stats), done, loaded.report
+    return picture_of(result, stats, scene=loaded.scene, aovs=aovs), done, loaded.report
 
 
 def _picture_warnings(picture: Any) -> list[str]:
@@ -283,14 +287,18 @@ def _write(
     output: str,
     png: str | None,
     stats_file: str | None,
-    half: bool,
+    layers: AovOptions,
     exposure: float,
     tone_map: Any,
-) -> None:
+) -> list[str]:
+    """Writes all files; gives their names."""
     from wavecomb.stats import write_stats
 
-    picture.save(output, half=half)
+    written = [str(name) for name in picture.save(output, **layers.file_options())]
     if png is not None:
         picture.save(png, exposure=exposure, tone_map=tone_map)
+        written.append(png)
     if stats_file is not None:
         write_stats(stats_file, picture.stats)
+        written.append(stats_file)
+    return written

@@ -13,6 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
+from wavecomb.usd.identity import Assets, light_group
 from wavecomb.usd.instancing import read_instances, sound
 from wavecomb.usd.light import Light
 from wavecomb.usd.material import (
@@ -45,11 +46,13 @@ class Group:
     Attributes:
         number: In the scene, once something is in it.
         bounds: (2, 3) in its own space.
+        root: Prim path that the names of what is in it begin with.
         lights: With their transforms (4, 4) in the group.
         children: Groups placed in it, transforms (k, 4, 4).
     """
 
     name: str
+    root: str = ""
     number: int | None = None
     bounds: NDArray[Any] | None = None
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
@@ -109,6 +112,7 @@ class GroupBuilder:
         self.meshes = MeshReader(self.time, report)
         self.assigner = Assigner(materials, self.time, report)
         self.bindings = BindingScan()
+        self.assets = Assets()
         self._groups: dict[Hashable, Group] = {}
         self._building: set[Hashable] = set()
 
@@ -189,6 +193,8 @@ class GroupBuilder:
             self.report.note("mesh without faces", draw.prim.GetPath())
             return
         material, faces = self._materials(draw, mesh, scope)
+        name = self.report.place(draw.prim.GetPath())
+        may_shine = self.materials.emits or material == INHERIT_MATERIAL
         try:
             number = self.builder.add_mesh(
                 mesh.positions,
@@ -197,7 +203,9 @@ class GroupBuilder:
                 uvs=mesh.uvs,
                 face_materials=faces,
                 material=material,
-                name=self.report.place(draw.prim.GetPath()),
+                name=name,
+                light_group=light_group(draw.prim, draw.inherited) if may_shine else "",
+                asset_length=self._asset_length(draw.prim, name),
             )
         except ValueError as error:
             self.report.warn(f"mesh left out: {error}")
@@ -214,10 +222,15 @@ class GroupBuilder:
             return INHERIT_MATERIAL, None
         return self.assigner.assign(draw, mesh, otherwise)
 
+    def _asset_length(self, prim: Usd.Prim, name: str) -> int:
+        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
+        length = self.assets.length(prim)
+        return length and length + len(name) - len(str(prim.GetPath()))
+
     def _number(self, group: Group) -> int:
         """A group's number in the scene; made when something comes into it."""
         if group.number is None:
-            group.number = self.builder.add_group(group.name)
+            group.number = self.builder.add_group(group.name, root=group.root)
             self.report.tally("groups")
         return group.number
 
@@ -225,6 +238,7 @@ class GroupBuilder:
         self,
         key: Hashable,
         name: str,
+        root: Sdf.Path,
         roots: Sequence[Usd.Prim],
         scope: Scope,
         purpose: str,
@@ -239,7 +253,7 @@ class GroupBuilder:
             return None
         self._building.add(key)
         try:
-            group = Group(name)
+            group = Group(name, self.report.place(root))
             self._fill(group, roots, scope, purpose, predicate)
         finally:
             self._building.discard(key)
@@ -248,18 +262,19 @@ class GroupBuilder:
 
     def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
         """Adds native instances, all of one prototype at a time."""
-        batches: dict[int, tuple[Group, list[Any], list[int]]] = {}
+        batches: dict[int, tuple[Group, list[Any], list[int], list[Usd.Prim]]] = {}
         for placed in instances:
             child = self._instance_group(placed, scope)
             if child is None:
                 continue
             material = self._instance_material(placed, scope)
-            batch = batches.setdefault(id(child), (child, [], []))
+            batch = batches.setdefault(id(child), (child, [], [], []))
             batch[1].append(np.array(placed.matrix))
             batch[2].append(material)
-        for child, matrices, materials in batches.values():
+            batch[3].append(placed.prim)
+        for child, matrices, materials, prims in batches.values():
             transforms = np.stack(matrices)
-            self._add(parent, child, transforms, np.array(materials, np.uint32), child.name)
+            self._add(parent, child, transforms, np.array(materials, np.uint32), prims)
         self.report.tally("instances", len(instances))
 
     def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
@@ -277,7 +292,7 @@ class GroupBuilder:
         inner = Scope(True, bound and alias is None, override, alias, path)
         key = ("native", path, inner.bound, override, placed.purpose, exact)
         roots = list(prototype.GetChildren())
-        return self._group(key, str(prim.GetPath()), roots, inner, placed.purpose)
+        return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
 
     def _proxy_bindings(self, instance: Usd.Prim) -> tuple[str, ...]:
         """Material paths of all below an instance: tells which instances may share a group."""
@@ -329,7 +344,8 @@ class GroupBuilder:
             transforms = instances.transforms[chosen]
             if outer is not None:
                 transforms = transforms @ outer
-            self._add(parent, child, transforms, materials[chosen], str(path))
+            numbers = instances.kept[chosen].astype(np.uint32)
+            self._add(parent, child, transforms, materials[chosen], [prim], numbers)
         self.report.tally("point instances", len(instances.kept))
 
     def _prototype_group(self, root: Usd.Prim, placed: Placed, scope: Scope) -> Group | None:
@@ -344,7 +360,7 @@ class GroupBuilder:
             scope.root if within else path,
         )
         key = ("point", path, inner.bound, inner.override, placed.purpose, inner.alias)
-        return self._group(key, str(path), [root], inner, placed.purpose, _ANY)
+        return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)
 
     def _instancer_materials(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
         """(count,) ids for the instances of a point instancer: by its displayColor."""
@@ -381,14 +397,19 @@ class GroupBuilder:
         child: Group,
         transforms: Matrices,
         materials: NDArray[np.uint32],
-        name: str,
+        prims: Sequence[Usd.Prim],
+        numbers: NDArray[np.uint32] | None = None,
     ) -> None:
-        """Places a group k times."""
+        """Places a group k times: as k prims, or as so numbered ones of one point instancer."""
         usable = sound(transforms)
         if not usable.all():
             what = "instances left out: transform without an inverse"
-            self.report.warn(what, name, int((~usable).sum()))
+            self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
             transforms, materials = transforms[usable], materials[usable]
+            if numbers is None:
+                prims = [prim for prim, good in zip(prims, usable, strict=True) if good]
+            else:
+                numbers = numbers[usable]
         if len(transforms) == 0:
             return
         if child.lit:
@@ -396,7 +417,17 @@ class GroupBuilder:
             parent.lit = True
         if child.number is None:
             return
-        self.builder.add_instances(self._number(parent), child.number, transforms, materials)
+        names = [self.report.place(prim.GetPath()) for prim in prims]
+        lengths = [self._asset_length(*pair) for pair in zip(prims, names, strict=True)]
+        self.builder.add_instances(
+            self._number(parent),
+            child.number,
+            transforms,
+            materials,
+            names=names,
+            numbers=numbers,
+            asset_lengths=lengths,
+        )
         if child.bounds is not None:
             lo, hi = child.bounds
             centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdLux
 
+from wavecomb.usd.identity import light_group
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import TextureTable, asset_file
@@ -64,6 +65,8 @@ class LightReader:
             self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
             radiance = (0.0, 0.0, 0.0)
         options: dict[str, Any] = {"name": self.report.place(prim.GetPath()), "color": radiance}
+        if group := light_group(prim):
+            options["group"] = group
         normalize = bool(self._get(prim, "normalize", False))
         local = np.eye(4)
         if kind == "rect":

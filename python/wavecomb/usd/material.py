@@ -87,6 +87,8 @@ class MaterialTable:
         self._plain: dict[tuple[float, ...], int] = {}
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
+        self.emits = False
+        """Whether a material is in use that emits anything."""
 
     def expect(self, material: UsdShade.Material) -> None:
         """Starts what takes long for a material that will be used: reading its images."""
@@ -115,7 +117,9 @@ class MaterialTable:
         key = surface.key()
         number = self._ids.get(key)
         if number is None:
-            self.glows = self.glows or surface.brightest() >= LAMP
+            brightest = surface.brightest()
+            self.glows = self.glows or brightest >= LAMP
+            self.emits = self.emits or brightest > 0
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names of AOVs: what may be asked for, and what the core is asked for then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from wavecomb.errors import WavecombError
+
+DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
+"""What a picture holds where nothing is asked for."""
+
+_CORE = (
+    "albedo",
+    "normal",
+    "depth",
+    "position",
+    "uv",
+    "material_id",
+    "instance_id",
+    "crypto_object",
+    "crypto_material",
+    "crypto_asset",
+    "emission",
+    "direct",
+    "indirect",
+    "light_groups",
+    "cost",
+)
+CRYPTO = ("crypto_object", "crypto_material", "crypto_asset")
+NAMES = ("beauty", *_CORE, "samples")
+"""All AOVs; "light_NAME" is a single light group."""
+GROUPS = {"all": NAMES, "crypto": CRYPTO}
+"""Names that stand for several."""
+LIGHT = "light_"
+
+
+def expand(names: Iterable[str]) -> tuple[str, ...]:
+    """AOVs in the order of ``NAMES``, each once, single light groups at the end; beauty is in.
+
+    >>> expand(["depth", "crypto", "light_key"])
+    ('beauty', 'depth', 'crypto_object', 'crypto_material', 'crypto_asset', 'light_key')
+
+    Raises:
+        WavecombError: There is no AOV of that name.
+    """
+    wanted: dict[str, None] = {"beauty": None}
+    for name in names:
+        if name not in NAMES and name not in GROUPS and not _is_light(name):
+            raise WavecombError(
+                f"AOV {name!r} is not known; there are {', '.join(NAMES)}, "
+                f"{LIGHT}NAME for the light group NAME, crypto and all"
+            )
+        wanted.update(dict.fromkeys(GROUPS.get(name, (name,))))
+    known = tuple(name for name in NAMES if name in wanted)
+    if "light_groups" in wanted:
+        return known
+    return known + tuple(name for name in wanted if name not in NAMES)
+
+
+def for_core(aovs: Iterable[str]) -> list[str]:
+    """Those that the core has to make room for."""
+    return [name for name in aovs if name in _CORE or _is_light(name)]
+
+
+def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
+    """Memory of a pixel: sums in the film, and the layers that are handed out (docs/aovs.md)."""
+    names = set(aovs)
+    total = 32 + 12 + 4
+    if names & {"albedo", "normal", "depth"}:
+        total += 64
+    if names & {"position", "uv", "material_id", "instance_id"}:
+        total += 32
+    if names & {"emission", "direct", "indirect"}:
+        total += 72
+    groups = light_groups if "light_groups" in names else sum(map(_is_light, names))
+    total += groups * (24 + 12)
+    total += len(names & set(CRYPTO)) * (64 + 48)
+    total += 4 * sum(_CHANNELS.get(name, 0) for name in names)
+    return total + (8 if "cost" in names else 0)
+
+
+_CHANNELS = {
+    "albedo": 3,
+    "normal": 3,
+    "depth": 1,
+    "position": 3,
+    "uv": 2,
+    "material_id": 1,
+    "instance_id": 1,
+    "emission": 3,
+    "direct": 3,
+    "indirect": 3,
+    "cost": 1,
+}
+
+
+def _is_light(name: str) -> bool:
+    return name.startswith(LIGHT) and name != "light_groups"

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options for the layers of a picture and the files that they go into."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import click
+
+from wavecomb import aovs as aov_names
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
+
+
+def aov_options(command: F) -> F:
+    """--aov, and ``file_options``."""
+    command = click.option(
+        "--aov",
+        "aovs",
+        multiple=True,
+        metavar="NAME",
+        help="Layer to keep, may be given again: albedo, normal, depth, position, uv, material_id, "
+        "instance_id, crypto_object, crypto_material, crypto_asset, crypto, emission, direct, "
+        "indirect, light_groups, light_NAME, cost, samples, all; beauty is always there "
+        "(docs/aovs.md).  [default: albedo, normal, depth, samples]",
+    )(file_options(command))
+    return command
+
+
+def file_options(command: F) -> F:
+    """--half, --compression, --tile and --split-aovs."""
+    for option in (
+        click.option(
+            "--split-aovs",
+            "split",
+            is_flag=True,
+            help="A file for each AOV, FILE.NAME.exr; the beauty is in FILE.exr.",
+        ),
+        click.option(
+            "--tile",
+            type=click.IntRange(min=0),
+            default=0,
+            metavar="N",
+            help="EXR in tiles of N x N pixels, a multiple of 16.  [default: scanlines]",
+        ),
+        click.option(
+            "--compression",
+            type=click.Choice(_COMPRESSIONS),
+            default="zip",
+            show_default=True,
+            help="Of the EXR.",
+        ),
+        click.option("--half", is_flag=True, help="16 bit colours and normals in the EXR."),
+    ):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True)
+class AovOptions:
+    """What ``aov_options`` gave."""
+
+    aovs: tuple[str, ...]
+    half: bool
+    compression: str
+    tile: int
+    split: bool
+
+    @classmethod
+    def take(cls, options: dict[str, Any]) -> AovOptions:
+        """Moves them out of a command's arguments; those of AOVs may not be there."""
+        options.setdefault("aovs", ())
+        return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The AOVs, expanded; raises WavecombError for one that is not known."""
+        return aov_names.expand(self.aovs) if self.aovs else aov_names.DEFAULT
+
+    def check(self, output: str) -> None:
+        """Raises, in one line, what would else come up when files are written."""
+        from wavecomb import cryptomatte
+        from wavecomb.exr import check_options
+        from wavecomb.files import check_writable
+        from wavecomb.output import split_names
+
+        layers = [cryptomatte.LEVELS.get(name, name) for name in self.names]
+        layers = [f"{name}00" if name in cryptomatte.LEVELS.values() else name for name in layers]
+        check_options(output, () if self.split else layers, self.compression, self.tile)
+        if self.split:
+            for file in split_names(output, self.names).values():
+                check_writable(file)
+
+    def file_options(self) -> dict[str, Any]:
+        """Keyword arguments of ``Picture.save``."""
+        return {
+            "half": self.half,
+            "compression": self.compression,
+            "tile": self.tile,
+            "split": self.split,
+        }

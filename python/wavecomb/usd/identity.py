@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What prims belong to: their asset, and their light group."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from pxr import Kind, Sdf, Usd, UsdGeom
+
+PRIMVAR = "wavecomb:lightGroup"
+_LIGHT_GROUPS = (
+    "wavecomb:lightGroup",
+    "inputs:ri:light:lightGroup",
+    "ri:light:lightGroup",
+    "inputs:karma:light:lpetag",
+    "karma:light:lpetag",
+    "primvars:karma:object:lpetag",
+    "primvars:arnold:aov",
+)
+"""Attributes that name a light's group, after the primvar: ours, RenderMan's, Karma's, Arnold's."""
+
+
+def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
+    """The light group of a light, or of a mesh that may shine; "" where it has none.
+
+    ``primvars:wavecomb:lightGroup`` counts on the prim and, like all primvars, on its ancestors;
+    of other renderers what they call so is read on the prim itself. What a channel's name cannot
+    hold becomes "_".
+
+    Args:
+        prim: The light or mesh.
+        inherited: Primvars of its ancestors where they are known.
+    """
+    if inherited is None:
+        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(PRIMVAR)
+        value = primvar.Get() if primvar and primvar.HasValue() else None
+    else:
+        own = prim.GetAttribute(f"primvars:{PRIMVAR}")
+        value = own.Get() if own else None
+        for primvar in inherited if value is None else ():
+            if primvar.GetPrimvarName() == PRIMVAR:
+                value = primvar.Get()
+    for name in _LIGHT_GROUPS if value is None else ():
+        attribute = prim.GetAttribute(name)
+        value = attribute.Get() if attribute else None
+        if value:
+            break
+    return re.sub(r"[^A-Za-z0-9_]", "_", str(value)) if value else ""
+
+
+class Assets:
+    """Finds the asset that a prim is part of: its nearest model of kind component."""
+
+    def __init__(self) -> None:
+        self._known: dict[Sdf.Path, int] = {Sdf.Path.absoluteRootPath: 0}
+
+    def length(self, prim: Usd.Prim) -> int:
+        """How much of the prim's path names its asset; 0 where no ancestor is a component."""
+        path = prim.GetPath()
+        known = self._known.get(path)
+        if known is None:
+            kind = Usd.ModelAPI(prim).GetKind()
+            if kind and Kind.Registry.IsA(kind, Kind.Tokens.component):
+                known = len(str(path))
+            else:
+                parent = prim.GetParent()
+                known = self.length(parent) if parent else 0
+            self._known[path] = known
+        return known
