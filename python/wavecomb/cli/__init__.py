@@ -11,6 +11,7 @@ from wavecomb.cli.bench import bench_command
 from wavecomb.cli.compare import compare_command
 from wavecomb.cli.group import Commands, print_version
 from wavecomb.cli.info import info_command
+from wavecomb.cli.merge import merge_command
 from wavecomb.cli.options import examples
 from wavecomb.cli.render import render_command
 from wavecomb.cli.scene import scene_command
@@ -50,4 +51,5 @@ main.add_command(render_command)
 main.add_command(info_command)
 main.add_command(scene_command)
 main.add_command(compare_command)
+main.add_command(merge_command)
 main.add_command(bench_command)

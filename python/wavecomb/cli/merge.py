@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb merge``."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import click
+
+from wavecomb.cli.aovs import AovOptions, file_options
+from wavecomb.cli.options import examples
+
+
+@click.command(
+    "merge",
+    epilog=examples(
+        "wavecomb render shot.usd -o a.exr --seed 1",
+        "wavecomb render shot.usd -o b.exr --seed 2",
+        "wavecomb merge a.exr b.exr -o shot.exr",
+    ),
+)
+@click.argument("pictures", nargs=-1, required=True, type=click.Path(), metavar="A B ...")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(),
+    metavar="FILE.exr",
+    help="The sum.",
+)
+@click.option("--png", type=click.Path(), metavar="FILE", help="Picture for display, too.")
+@file_options
+def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **options: Any) -> None:
+    """Add pictures of one stage that were rendered with different seeds.
+
+    Each pixel is the mean of A, B ... weighted by their samples there; sample counts add up, and
+    variances and errors become those of the sum. Pictures that do not fit (another size, stage,
+    setting or layer, or the same seed) are refused.
+    """
+    from wavecomb.errors import WavecombError
+    from wavecomb.files import check_writable
+    from wavecomb.image import write_png
+    from wavecomb.merge import merge
+    from wavecomb.output import save_layers
+
+    layers = AovOptions.take(options)
+    seen = {os.path.realpath(name) for name in pictures}
+    for name, option, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):
+        if name is None:
+            continue
+        if not name.lower().endswith(ending):
+            raise WavecombError(f"{option} {name}: the name must end in {ending}")
+        if os.path.realpath(name) in seen:
+            raise WavecombError(f"{option} {name}: is one of the pictures that are merged")
+        check_writable(name)
+    merged = merge(pictures)
+    written = save_layers(
+        output, merged.layers, merged.metadata, merged.manifests, **layers.file_options()
+    )
+    if png is not None:
+        write_png(png, merged.layers["beauty"])
+    samples = merged.layers["samples"]
+    click.echo(
+        f"{len(pictures)} pictures, seeds {', '.join(map(str, merged.seeds))}: "
+        f"{samples.mean():.0f} samples per pixel; wrote "
+        + ", ".join([*map(str, written), *([png] if png else [])])
+    )

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb merge``: weighted by samples, and what does not fit is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import wavecomb
+from wavecomb import cryptomatte
+from wavecomb.cli import main
+from wavecomb.errors import WavecombError
+from wavecomb.image import read_layers, read_metadata, write_exr
+from wavecomb.merge import merge
+
+_core = pytest.importorskip("wavecomb._core")
+
+AOVS = ["all"]
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wavecomb.scenes import write_scene
+
+    path = tmp_path_factory.mktemp("merge") / "cornell.usdc"
+    write_scene("cornell", path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def pictures(stage: Path) -> list[wavecomb.Picture]:
+    return [
+        wavecomb.render(stage, size=(32, 24), spp=spp, seed=seed, aovs=AOVS)
+        for seed, spp in ((1, 4), (2, 12))
+    ]
+
+
+@pytest.fixture
+def files(pictures: list[wavecomb.Picture], tmp_path: Path) -> list[Path]:
+    names = [tmp_path / "a.exr", tmp_path / "b.exr"]
+    for picture, name in zip(pictures, names, strict=True):
+        picture.save(name)
+    return names
+
+
+def test_means_are_weighted_by_samples(files: list[Path], tmp_path: Path) -> None:
+    output = tmp_path / "out.exr"
+    result = CliRunner().invoke(main, ["merge", *map(str, files), "-o", str(output)])
+    assert result.exit_code == 0, result.output
+    assert "seeds 1, 2: 16 samples per pixel" in result.output
+    a, b, sum_ = (read_layers(name) for name in (*files, output))
+    assert list(sum_) == list(a)
+    assert (sum_["samples"] == 16).all()
+    for layer in ("beauty", "albedo", "direct", "indirect", "light_other"):
+        expected = (a[layer] * 4.0 + b[layer] * 12.0) / 16
+        assert sum_[layer] == pytest.approx(expected, rel=1e-6, abs=1e-7), layer
+    assert sum_["cost"] == pytest.approx(a["cost"] + b["cost"])
+    assert sum_["position"].tobytes() == a["position"].tobytes()
+    both = np.isfinite(a["depth"]) & np.isfinite(b["depth"])
+    expected = (a["depth"] * 4.0 + b["depth"] * 12.0) / 16
+    assert sum_["depth"][both] == pytest.approx(expected[both], rel=1e-6)
+    one = np.isfinite(a["depth"]) != np.isfinite(b["depth"])
+    assert sum_["depth"][one] == pytest.approx(np.minimum(a["depth"], b["depth"])[one], rel=1e-6)
+    pairs = [cryptomatte.gather(layers)["crypto_object"] for layers in (a, b, sum_)]
+    manifest = cryptomatte.manifests(read_metadata(output))["crypto_object"]
+    assert len(manifest) >= 8
+    for number in manifest.values():
+        x, y, z = (cryptomatte.matte(one, number) for one in pairs)
+        assert z == pytest.approx((x * 4.0 + y * 12.0) / 16, abs=1e-6)
+    assert json.loads(read_metadata(output)["wavecomb:seeds"]) == [1, 2]
+
+
+def test_a_merged_picture_merges_on(files: list[Path], stage: Path, tmp_path: Path) -> None:
+    def save(name: str, paths: list[Path]) -> Path:
+        merged = merge(paths)
+        write_exr(tmp_path / name, merged.layers, metadata=merged.metadata)
+        return tmp_path / name
+
+    third = tmp_path / "c.exr"
+    wavecomb.render(stage, size=(32, 24), spp=4, seed=3, aovs=AOVS).save(third)
+    steps = merge([save("ab.exr", files), third])
+    whole = merge([*files, third])
+    assert steps.seeds == whole.seeds == (1, 2, 3)
+    assert steps.layers["beauty"] == pytest.approx(whole.layers["beauty"], rel=1e-5)
+    with pytest.raises(WavecombError, match=r"ab\.exr has"):
+        merge([tmp_path / "ab.exr", files[0]])
+
+
+def test_variance_is_of_the_sum(tmp_path: Path) -> None:
+    """Of pictures of white noise, known variance: what merge says is what is there."""
+    rng = np.random.default_rng(4)
+    names = []
+    for seed, samples in enumerate((4, 12, 16)):
+        names.append(tmp_path / f"{seed}.exr")
+        settings = {"seed": seed, "width": 200, "height": 200}
+        layers = {
+            "beauty": rng.normal(1, 0.5 / np.sqrt(samples), (200, 200, 3)),
+            "variance": np.full((200, 200, 3), 0.25 / samples),
+            "error": np.full((200, 200), 0.5 / np.sqrt(samples)),
+            "samples": np.full((200, 200), samples),
+        }
+        write_exr(names[-1], layers, metadata={"wavecomb:settings": json.dumps(settings)})
+    merged = merge(names).layers
+    assert merged["variance"] == pytest.approx(0.25 / 32, rel=1e-5)
+    assert merged["error"] == pytest.approx(0.5 / np.sqrt(32), rel=1e-5)
+    assert merged["beauty"].var() == pytest.approx(0.25 / 32, rel=0.03)
+
+
+def change(settings: dict[str, Any]) -> Any:
+    def edit(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
+        old = json.loads(metadata["wavecomb:settings"])
+        metadata["wavecomb:settings"] = json.dumps({**old, **settings})
+
+    return edit
+
+
+def set_(key: str, value: Any) -> Any:
+    return lambda metadata, layers: metadata.update({key: value})
+
+
+def drop_settings(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
+    del metadata["wavecomb:settings"]
+
+
+def drop_layer(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
+    del layers["albedo"]
+
+
+def drop_samples(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
+    del layers["samples"]
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (change({"seed": 1}), "b.exr: has seed 1, as "),
+        (change({"max_depth": 3}), "b.exr: max_depth is 3, that of "),
+        (change({"width": 31}), "b.exr: width is 31, that of "),
+        (set_("wavecomb:stage", "other.usd"), "b.exr: the stage is other.usd, that of "),
+        (set_("wavecomb:scene", "0123"), "b.exr: its stage is not that of "),
+        (drop_settings, "b.exr: does not say what settings made it"),
+        (drop_layer, "b.exr: has no layer albedo, which the other picture has"),
+        (drop_samples, "b.exr: has no layer samples, which merging needs"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    pictures: list[wavecomb.Picture], files: list[Path], edit: Any, message: str
+) -> None:
+    metadata, layers = pictures[1].file_metadata(), pictures[1].layers()
+    edit(metadata, layers)
+    write_exr(files[1], layers, metadata=metadata)
+    output = files[0].with_name("out.exr")
+    result = CliRunner().invoke(main, ["merge", *map(str, files), "-o", str(output)])
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1 and message in result.stderr
+    assert not output.exists()
+
+
+def test_files_are_kept_from_harm(files: list[Path]) -> None:
+    before = files[0].read_bytes()
+    for arguments, message in (
+        ([*map(str, files), "-o", str(files[0])], "is one of the pictures"),
+        ([str(files[0]), "-o", "out.exr"], "two pictures or more"),
+        ([*map(str, files), "-o", "out.png"], "must end in .exr"),
+    ):
+        result = CliRunner().invoke(main, ["merge", *arguments])
+        assert result.exit_code == 2 and message in result.stderr
+    assert files[0].read_bytes() == before
