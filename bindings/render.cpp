@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "bind.h"
+#include "watching.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/render/ray_recording.h"
@@ -87,10 +88,12 @@ constexpr const char* kAttributes[] = {"width",           "height",         "spp
                                        "max_depth",       "seed",           "sampler",
                                        "filter",          "filter_width",   "roulette",
                                        "roulette_depth",  "clamp_indirect", "fresnel",
-                                       "cosine_sampling", "integrator",     "threads",
-                                       "wave_size",       "lanes",          "traversal",
-                                       "policy",          "materialize",    "ray_order",
-                                       "shadow_order",    "costs",          "cost_weight"};
+                                       "cosine_sampling", "integrator",     "adaptive",
+                                       "noise",           "min_spp",        "time_limit",
+                                       "error",           "threads",        "wave_size",
+                                       "lanes",           "traversal",      "policy",
+                                       "materialize",     "ray_order",      "shadow_order",
+                                       "costs",           "cost_weight"};
 
 nb::dict to_dict(nb::handle settings) {
   nb::dict d;
@@ -319,42 +322,48 @@ nb::dict statistics_dict(const Result& r) {
   memory["film"] = s.film_bytes;
   const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   memory["picture"] = bytes(r.picture.beauty, r.picture.albedo, r.picture.normal, r.picture.depth,
-                            r.picture.samples);
+                            r.picture.samples, r.picture.error, r.picture.variance);
   memory["meshes"] = s.scene_bytes.meshes;
   memory["textures"] = s.scene_bytes.textures;
   memory["records"] = s.scene_bytes.records;
   d["memory_bytes"] = memory;
   d["peak_rss_bytes"] = s.peak_rss_bytes;
+  d["passes"] = s.passes;
+  d["resumed_samples"] = s.resumed_samples;
+  d["error"] = s.error;
   d["cancelled"] = s.cancelled;
   return d;
 }
 
 Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_object,
               const nb::object& progress, const nb::object& policy, const nb::object& costs,
-              RayRecording* recorder) {
+              RayRecording* recorder, const nb::object& watcher, const nb::object& state) {
   const Settings settings = nb::cast<Settings>(settings_object);
   Result result;
   result.settings = to_dict(settings_object);
-  ProgressCallback callback = [&](uint64_t done, uint64_t total) {
-    const nb::gil_scoped_acquire gil;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
-    if (progress.is_none()) return true;
-    const nb::object go_on = progress(done, total);
-    return go_on.is_none() || nb::cast<bool>(go_on);
-  };
+  RenderOptions options = watched_by(progress, watcher);
+  options.recorder = recorder;
   std::unique_ptr<PythonPolicy> own_policy;
   if (!policy.is_none()) {
     own_policy = std::make_unique<PythonPolicy>(policy, *scene);
     result.settings["policy"] = std::string(own_policy->name());
+    options.policy = own_policy.get();
   }
   CostProfile profile;
-  if (!costs.is_none()) profile = to_profile(nb::cast<nb::dict>(costs));
+  if (!costs.is_none()) {
+    profile = to_profile(nb::cast<nb::dict>(costs));
+    options.profile = &profile;
+  }
+  nb::dict resumed;
+  if (!state.is_none()) {
+    resumed = nb::cast<nb::dict>(state);
+    options.resume = resumed_from(resumed);
+  }
   {
     const nb::gil_scoped_release release;
     settings.check();
     WavefrontRenderer renderer(scene, settings.threads);
-    result.picture = renderer.render(settings, callback, own_policy.get(),
-                                     costs.is_none() ? nullptr : &profile, recorder);
+    result.picture = renderer.render(settings, options);
     result.statistics = renderer.statistics();
     result.profile = renderer.cost_profile();
   }
@@ -385,6 +394,11 @@ void bind_render(nb::module_& m) {
       .def_rw("roulette_depth", &Settings::roulette_depth)
       .def_rw("clamp_indirect", &Settings::clamp_indirect)
       .def_rw("cosine_sampling", &Settings::cosine_sampling)
+      .def_rw("adaptive", &Settings::adaptive)
+      .def_rw("noise", &Settings::noise)
+      .def_rw("min_spp", &Settings::min_spp)
+      .def_rw("time_limit", &Settings::time_limit)
+      .def_rw("error", &Settings::error)
       .def_rw("threads", &Settings::threads)
       .def_rw("wave_size", &Settings::wave_size)
       .def_rw("lanes", &Settings::lanes)
@@ -429,12 +443,24 @@ void bind_render(nb::module_& m) {
                      const Picture& p = nb::cast<const Result&>(self).picture;
                      return image(self, p.samples, p, 1);
                    })
+      .def_prop_ro("error",
+                   [](nb::handle_t<Result> self) -> nb::object {
+                     const Picture& p = nb::cast<const Result&>(self).picture;
+                     return p.error.empty() ? nb::none() : nb::cast(image(self, p.error, p, 1));
+                   })
+      .def_prop_ro("variance",
+                   [](nb::handle_t<Result> self) -> nb::object {
+                     const Picture& p = nb::cast<const Result&>(self).picture;
+                     return p.variance.empty() ? nb::none()
+                                               : nb::cast(image(self, p.variance, p, 3));
+                   })
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
       .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
       .def_prop_ro("stats", &statistics_dict);
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
-        "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none());
+        "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none(),
+        "watcher"_a = nb::none(), "state"_a = nb::none());
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);
   m.def("peak_rss_bytes", &peak_rss_bytes);

@@ -154,6 +154,10 @@ void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock&
       clock.enter(Phase::kGenerate);
       const PathResult path = tracer.trace_path(pixel, task.first_sample + s);
       clock.enter(Phase::kResolve);
+      if (film.has_error()) {
+        const F rgb[3] = {path.radiance.x, path.radiance.y, path.radiance.z};
+        film.error(x, y).add(rgb, sum.samples, {sum.r, sum.g, sum.b});
+      }
       sum.r += path.radiance.x;
       sum.g += path.radiance.y;
       sum.b += path.radiance.z;
