@@ -24,8 +24,8 @@ Transfer = Literal["clamp", "neutral"]
 _HALF_MAX = 65504.0
 _BAND = 64
 """Rows that are made ready and written at once: four blocks of an EXR file."""
-_SUFFIXES = {"beauty": "RGB", "albedo": "RGB", "normal": "XYZ", "depth": "Z"}
-_ALWAYS_FLOAT = ("depth", "samples")
+_SUFFIXES = {"beauty": "RGB", "albedo": "RGB", "normal": "XYZ", "depth": "Z", "variance": "RGB"}
+_ALWAYS_FLOAT = ("depth", "samples", "error", "variance")
 _NAN_COLOUR = (255, 0, 255)
 
 
