@@ -135,9 +135,9 @@ AdaptiveCheck check(const Film& film, const Settings& settings) {
 TEST(Adaptive, NoisyPixelsAndTheirNeighboursGoOn) {
   Settings settings;
   settings.spp = 1024;
-  settings.adaptive = 0.02f;
+  settings.adaptive = 5e-4f;
   Film film =
-      noisy_film(32, 64, [](uint32_t x, uint32_t y) { return x == 16 && y == 16 ? 4.f : 0.f; });
+      noisy_film(32, 64, [](uint32_t x, uint32_t y) { return x == 16 && y == 16 ? 1.f : 0.f; });
   AdaptiveCheck c = check(film, settings);
   const uint32_t reach = kErrorWindow + kDilation;
   for (uint32_t y = 0; y < 32; ++y)

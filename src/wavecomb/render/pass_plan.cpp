@@ -24,8 +24,8 @@ uint32_t check_step(uint32_t n) {
 }  // namespace
 
 bool is_check(uint32_t n, const PassRules& rules) {
-  if (n == rules.spp) return true;
-  return n >= first_check(rules) && n % check_step(n) == 0;
+  const uint32_t first = first_check(rules);
+  return n == first || n == rules.spp || (n > first && n % check_step(n) == 0);
 }
 
 uint32_t next_check(uint32_t done, const PassRules& rules) {
