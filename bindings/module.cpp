@@ -12,5 +12,6 @@ NB_MODULE(_core, m) {
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_scene(m);
   bind_recording(m);
+  bind_watching(m);
   bind_render(m);
 }

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "bind.h"
+#include "watching.h"
 #include "wavecomb/core/aov.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/cryptomatte.h"
@@ -85,12 +86,16 @@ void def_enum(Class& c, const char* attribute, Enum Settings::* member, const Na
       [member, &names](Settings& s, const std::string& text) { s.*member = names.parse(text); });
 }
 
-constexpr const char* kAttributes[] = {
-    "width",           "height",       "spp",         "max_depth",      "seed",           "sampler",
-    "filter",          "filter_width", "roulette",    "roulette_depth", "clamp_indirect", "fresnel",
-    "cosine_sampling", "integrator",   "aovs",        "threads",        "wave_size",      "lanes",
-    "traversal",       "policy",       "materialize", "ray_order",      "shadow_order",   "costs",
-    "cost_weight"};
+constexpr const char* kAttributes[] = {"width",           "height",         "spp",
+                                       "max_depth",       "seed",           "sampler",
+                                       "filter",          "filter_width",   "roulette",
+                                       "roulette_depth",  "clamp_indirect", "fresnel",
+                                       "cosine_sampling", "integrator",     "aovs",
+                                       "adaptive",        "noise",          "min_spp",
+                                       "time_limit",      "error",          "threads",
+                                       "wave_size",       "lanes",          "traversal",
+                                       "policy",          "materialize",    "ray_order",
+                                       "shadow_order",    "costs",          "cost_weight"};
 
 /// Before the name of a light group, in names of AOVs and of layers.
 constexpr const char* kLightPrefix = "light_";
@@ -376,7 +381,7 @@ nb::dict statistics_dict(const Result& r) {
   memory["film"] = s.film_bytes;
   const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   size_t picture = bytes(r.picture.beauty, r.picture.albedo, r.picture.normal, r.picture.depth,
-                         r.picture.samples);
+                         r.picture.samples, r.picture.error, r.picture.variance);
   for (const AovLayer& layer : r.picture.aovs) picture += bytes(layer.values);
   memory["picture"] = picture;
   memory["meshes"] = s.scene_bytes.meshes;
@@ -384,36 +389,42 @@ nb::dict statistics_dict(const Result& r) {
   memory["records"] = s.scene_bytes.records;
   d["memory_bytes"] = memory;
   d["peak_rss_bytes"] = s.peak_rss_bytes;
+  d["passes"] = s.passes;
+  d["resumed_samples"] = s.resumed_samples;
+  d["error"] = s.error;
   d["cancelled"] = s.cancelled;
   return d;
 }
 
 Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_object,
               const nb::object& progress, const nb::object& policy, const nb::object& costs,
-              RayRecording* recorder) {
+              RayRecording* recorder, const nb::object& watcher, const nb::object& state) {
   const Settings settings = nb::cast<Settings>(settings_object);
   Result result;
   result.settings = to_dict(settings_object);
-  ProgressCallback callback = [&](uint64_t done, uint64_t total) {
-    const nb::gil_scoped_acquire gil;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
-    if (progress.is_none()) return true;
-    const nb::object go_on = progress(done, total);
-    return go_on.is_none() || nb::cast<bool>(go_on);
-  };
+  RenderOptions options = watched_by(progress, watcher);
+  options.recorder = recorder;
   std::unique_ptr<PythonPolicy> own_policy;
   if (!policy.is_none()) {
     own_policy = std::make_unique<PythonPolicy>(policy, *scene);
     result.settings["policy"] = std::string(own_policy->name());
+    options.policy = own_policy.get();
   }
   CostProfile profile;
-  if (!costs.is_none()) profile = to_profile(nb::cast<nb::dict>(costs));
+  if (!costs.is_none()) {
+    profile = to_profile(nb::cast<nb::dict>(costs));
+    options.profile = &profile;
+  }
+  nb::dict resumed;
+  if (!state.is_none()) {
+    resumed = nb::cast<nb::dict>(state);
+    options.resume = resumed_from(resumed);
+  }
   {
     const nb::gil_scoped_release release;
     settings.check();
     WavefrontRenderer renderer(scene, settings.threads);
-    result.picture = renderer.render(settings, callback, own_policy.get(),
-                                     costs.is_none() ? nullptr : &profile, recorder);
+    result.picture = renderer.render(settings, options);
     result.statistics = renderer.statistics();
     result.profile = renderer.cost_profile();
   }
@@ -444,6 +455,11 @@ void bind_render(nb::module_& m) {
       .def_rw("roulette_depth", &Settings::roulette_depth)
       .def_rw("clamp_indirect", &Settings::clamp_indirect)
       .def_rw("cosine_sampling", &Settings::cosine_sampling)
+      .def_rw("adaptive", &Settings::adaptive)
+      .def_rw("noise", &Settings::noise)
+      .def_rw("min_spp", &Settings::min_spp)
+      .def_rw("time_limit", &Settings::time_limit)
+      .def_rw("error", &Settings::error)
       .def_rw("threads", &Settings::threads)
       .def_rw("wave_size", &Settings::wave_size)
       .def_rw("lanes", &Settings::lanes)
@@ -474,6 +490,10 @@ void bind_render(nb::module_& m) {
                    [](nb::handle_t<Result> self) { return layer(self, &Picture::depth, 1); })
       .def_prop_ro("samples",
                    [](nb::handle_t<Result> self) { return layer(self, &Picture::samples, 1); })
+      .def_prop_ro("error",
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::error, 1); })
+      .def_prop_ro("variance",
+                   [](nb::handle_t<Result> self) { return layer(self, &Picture::variance, 3); })
       .def_prop_ro("aovs", [](nb::handle_t<Result> self) { return aovs_dict(self); })
       .def_prop_ro("manifests", &manifests_dict)
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
@@ -481,7 +501,8 @@ void bind_render(nb::module_& m) {
       .def_prop_ro("stats", &statistics_dict);
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
-        "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none());
+        "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none(),
+        "watcher"_a = nb::none(), "state"_a = nb::none());
   m.attr("AOVS") = nb::cast(AovSet{(1u << kAovCount) - 1}.names());
   m.def("crypto_id", [](const std::string& name) { return crypto_id(name); });
   m.def("lane_widths", &lane_widths);

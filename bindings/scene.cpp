@@ -7,10 +7,13 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <cinttypes>
+#include <cstdio>
 #include <cstring>
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/fingerprint.h"
 #include "wavecomb/scene/scene.h"
 
 namespace nb = nanobind;
@@ -354,6 +357,16 @@ void bind_scene(nb::module_& m) {
                        out.emplace_back(names.object(i), names.asset(i));
                      return out;
                    })
+      .def("fingerprint",
+           [](const Scene& s) {
+             nb::dict d;
+             for (const auto& [part, hash] : fingerprint(s)) {
+               char text[17];
+               std::snprintf(text, sizeof(text), "%016" PRIx64, hash);
+               d[part.c_str()] = text;
+             }
+             return d;
+           })
       .def_prop_ro("warnings", &Scene::warnings)
       .def_prop_ro("bounds", [](const Scene& s) {
         const Bounds& b = s.bounds();

@@ -44,7 +44,7 @@ RayRecording& recording(bool large, RayOrder order) {
     settings.width = settings.height = 128;
     settings.spp = 16;
     settings.ray_order = settings.shadow_order = order;
-    WavefrontRenderer(scene).render(settings, {}, nullptr, nullptr, rays.get());
+    WavefrontRenderer(scene).render(settings, {.recorder = rays.get()});
   }
   return *rays;
 }

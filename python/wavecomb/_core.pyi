@@ -40,6 +40,10 @@ class Scene:
     @property
     def textures(self) -> list[tuple[str, int]]:
         """(name, bytes) of every texture."""
+    def fingerprint(self) -> dict[str, str]:
+        """Hashes of what decides over the picture: geometry, materials, textures, lights, camera.
+
+        Reads every array once."""
     @property
     def camera(self) -> dict[str, Any]:
         """As set_camera takes it: to_world (4, 4), window, near_clip, far_clip."""
@@ -195,6 +199,11 @@ class Settings:
     fresnel: str  # "exact" | "schlick"
     cosine_sampling: bool
     integrator: str  # "wavefront" | "reference"
+    adaptive: float  # error that a pixel may have; 0: off
+    noise: float  # mean relative error that the picture may have; 0: off
+    min_spp: int  # adaptive: before the first look at errors
+    time_limit: float  # seconds of rendering; 0: none
+    error: bool  # keep error and variance where nothing else asks for them
     threads: int  # 0: all
     wave_size: int  # 0: default
     lanes: int  # 0: widest
@@ -235,6 +244,13 @@ class Result:
     @property
     def samples(self) -> NDArray[np.uint32]: ...
     @property
+    def error(self) -> NDArray[np.float32] | None:
+        """(height, width): what adaptive sampling goes by; infinite: not known. None unless the
+        render was adaptive or had the setting ``error``."""
+    @property
+    def variance(self) -> NDArray[np.float32] | None:
+        """(height, width, 3): of each pixel's mean. None likewise."""
+    @property
     def cancelled(self) -> bool: ...
     @property
     def costs(self) -> dict[str, dict[str, float]]:
@@ -246,6 +262,23 @@ class Result:
     def stats(self) -> dict[str, Any]:
         """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
 
+class Snapshot:
+    """A render that stands still. Valid while Watcher.snapshot() runs, as are its arrays."""
+
+    @property
+    def finished(self) -> bool:
+        """There is no more to come."""
+    @property
+    def status(self) -> dict[str, Any]:
+        """samples_done (those of a checkpoint too), samples_total (as expected by now where the
+        render is adaptive or timed), resumed_samples, rays, passes, active_pixels, seconds (of this
+        run), error (mean relative error at the last look, or None)."""
+    def beauty(self) -> NDArray[np.float32]:
+        """(height, width, 3), linear; a copy."""
+    def state(self) -> dict[str, Any]:
+        """All that render(state=...) needs to go on from here: numbers, and arrays of bytes that
+        are not copied."""
+
 def render(
     scene: Scene,
     settings: Settings,
@@ -253,13 +286,18 @@ def render(
     policy: Any = None,
     costs: dict[str, dict[str, float]] | None = None,
     recorder: RayRecording | None = None,
+    watcher: Any = None,
+    state: dict[str, Any] | None = None,
 ) -> Result:
     """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling
     thread (GIL held); returning False cancels, and the result holds what was done.
     KeyboardInterrupt raised in the callback also stops the render. Raises Error.
     policy: as wavecomb.SchedulingPolicy, in place of the settings' one; what its order() raises
     comes out of here. costs: a profile to start from, as Result.costs. recorder: keeps the rays of
-    the wavefront integrator."""
+    the wavefront integrator. watcher: as wavecomb.watcher.Watcher: progress(status) is called like
+    progress and answers None, "snapshot" or "stop"; snapshot(snapshot) gets the snapshots that were
+    asked for and one at the end. state: of a snapshot of a render with the same settings, to go on
+    from."""
 
 class RayRecording:
     """The rays of one render, kept and traced again; for benchmarks/limit.py."""

@@ -28,7 +28,8 @@ _CORE = (
     "cost",
 )
 CRYPTO = ("crypto_object", "crypto_material", "crypto_asset")
-NAMES = ("beauty", *_CORE, "samples")
+ERRORS = ("error", "variance")
+NAMES = ("beauty", *_CORE, "samples", *ERRORS)
 """All AOVs; "light_NAME" is a single light group."""
 GROUPS = {"all": NAMES, "crypto": CRYPTO}
 """Names that stand for several."""
@@ -58,6 +59,19 @@ def expand(names: Iterable[str]) -> tuple[str, ...]:
     return known + tuple(name for name in wanted if name not in NAMES)
 
 
+def of_core(names: Iterable[str] | None) -> tuple[str, ...]:
+    """The AOVs of a picture that the core made room for these for; None: for the default."""
+    if names is None or list(names) == for_core(DEFAULT):
+        return DEFAULT
+    return expand([*names, "samples"])
+
+
+def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]:
+    """``aovs`` with those that a denoiser needs."""
+    missing = [name for name in guides if name not in aovs]
+    return expand([*aovs, *missing]) if missing else aovs
+
+
 def for_core(aovs: Iterable[str]) -> list[str]:
     """Those that the core has to make room for."""
     return [name for name in aovs if name in _CORE or _is_light(name)]
@@ -77,6 +91,8 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
     total += groups * (24 + 12)
     total += len(names & set(CRYPTO)) * (64 + 48)
     total += 4 * sum(_CHANNELS.get(name, 0) for name in names)
+    if names & set(ERRORS):
+        total += 48 + 4 + 12
     return total + (8 if "cost" in names else 0)
 
 

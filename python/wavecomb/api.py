@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +22,14 @@ if TYPE_CHECKING:
     from wavecomb.image import Transfer
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
+    from wavecomb.watcher import Watcher
 
 Progress = Callable[[int, int], "bool | None"]
 
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
+# Of an adaptive render: sums and layers of errors, and what measuring them takes.
+_ERROR_BYTES_PER_PIXEL = 100
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,11 @@ class Picture:
         normal: (height, width, 3), world space.
         depth: (height, width), along the camera's axis; infinite where nothing was hit.
         samples: (height, width), samples that each pixel got.
+        error: (height, width), what adaptive sampling goes by (docs/render.md); infinite where
+            there are too few samples. None unless the render was adaptive or had error=True.
+        variance: (height, width, 3), of each pixel's mean, as if its samples were independent;
+            None likewise.
+        denoised: (height, width, 3), the beauty without its noise; None unless asked for.
         stats: What was done and how long it took; docs/statistics.md has the schema.
         cancelled: Progress asked to stop; the picture holds what was done.
         costs: What shading took, by name of material and texture: a profile that another render
@@ -54,6 +63,9 @@ class Picture:
     normal: NDArray[np.float32] | None
     depth: NDArray[np.float32] | None
     samples: NDArray[np.uint32]
+    error: NDArray[np.float32] | None = None
+    variance: NDArray[np.float32] | None = None
+    denoised: NDArray[np.float32] | None = None
     stats: dict[str, Any] = field(default_factory=dict, repr=False)
     cancelled: bool = False
     costs: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
@@ -68,19 +80,41 @@ class Picture:
 
         arrays = {
             "beauty": self.beauty,
+            "denoised": self.denoised,
             "albedo": self.albedo,
             "normal": self.normal,
             "depth": self.depth,
             "samples": self.samples,
+            "error": self.error,
+            "variance": self.variance,
         }
         out: dict[str, NDArray[Any]] = {}
+        wanted = set(self.chosen or arrays) | {"denoised"}
+        if self.chosen == aov_names.DEFAULT:
+            wanted |= {"error", "variance"}
         for name, array in {**arrays, **self.aovs}.items():
-            if array is None or (self.chosen and name in arrays and name not in self.chosen):
+            if array is None or (name in arrays and name not in wanted):
                 continue
             out.update(
                 cryptomatte.layers(name, array) if name in cryptomatte.LEVELS else {name: array}
             )
         return out
+
+    def with_denoised(self, *, threads: int = 0) -> Picture:
+        """The picture with its layer ``denoised``, by Open Image Denoise; the beauty stays.
+
+        Raises:
+            WavecombError: The extra ``denoise`` is missing; says how to install it.
+        """
+        from wavecomb.denoise import denoise
+        from wavecomb.errors import WavecombError
+
+        if self.albedo is None or self.normal is None:
+            raise WavecombError("denoising needs the AOVs albedo and normal: render with them, too")
+        start = time.perf_counter()
+        denoised = denoise(self.beauty, self.albedo, self.normal, threads=threads)
+        seconds = {**self.stats.get("seconds", {}), "denoise": time.perf_counter() - start}
+        return replace(self, denoised=denoised, stats={**self.stats, "seconds": seconds})
 
     def save(
         self,
@@ -93,7 +127,9 @@ class Picture:
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
     ) -> list[Path]:
-        """Writes all layers (.exr) or the beauty for display (.png), whole or not at all.
+        """Writes all layers (.exr) or the picture for display (.png), whole or not at all.
+
+        A .png is of the denoised picture where there is one.
 
         Args:
             path: By its ending .exr or .png.
@@ -127,7 +163,8 @@ class Picture:
                 split=split,
             )
         if kind == ".png":
-            write_png(path, self.beauty, exposure=exposure, tone_map=tone_map)
+            shown = self.beauty if self.denoised is None else self.denoised
+            write_png(path, shown, exposure=exposure, tone_map=tone_map)
             return [Path(path)]
         raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
 
@@ -187,6 +224,9 @@ def render(
     policy: str | SchedulingPolicy | None = None,
     costs: str | Mapping[str, Mapping[str, float]] | None = None,
     aovs: Iterable[str] | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    every: float = 120.0,
+    resume: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> Picture:
     """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
@@ -194,7 +234,7 @@ def render(
     Args:
         source: A path, what ``load`` gave, or a ``Scene``.
         size: Width and height, pixels.
-        spp: Samples per pixel.
+        spp: Samples per pixel; with ``adaptive`` or ``noise`` the most of them.
         progress: Called as progress(samples_done, samples_total) about ten times a second; return
             False to stop and keep what is done.
         camera: As in ``load``; for a path only.
@@ -205,7 +245,12 @@ def render(
             from.
         aovs: What to keep beside the beauty: names of docs/aovs.md, "light_NAME" for a light group,
             "crypto", "all"; by default albedo, normal and depth.
-        **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed ...
+        checkpoint: File that the state of the render is saved to, now and then and at the end.
+        every: Seconds between checkpoints.
+        resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
+            is, bit for bit, that of a render that nothing stopped.
+        **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed,
+            adaptive, noise, min_spp, time_limit ...
 
     >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
     >>> picture.beauty.shape  # doctest: +SKIP
@@ -218,7 +263,8 @@ def render(
     ...     wavecomb.render(stage, spp=4, seed=seed).save(f"mixed{seed}.exr")
 
     Raises:
-        WavecombError: The stage cannot be rendered; the policy or the costs are no good.
+        WavecombError: The stage cannot be rendered; the policy, the costs or the checkpoint are no
+            good.
         wavecomb._core.Error: A setting is no good.
     """
     from wavecomb.stats import make_stats
@@ -241,7 +287,8 @@ def render(
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
     chosen = make_settings(size, spp, aovs=names, **settings)
     scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
-    result = _render(scene, chosen, progress, own, profile)
+    watcher, state = _keeping(scene, chosen, stage, checkpoint, every, resume)
+    result = _render(scene, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats, scene=scene, aovs=names)
 
@@ -270,6 +317,8 @@ def picture_of(
         normal=result.normal,
         depth=result.depth,
         samples=result.samples,
+        error=result.error,
+        variance=result.variance,
         stats=stats,
         cancelled=result.cancelled,
         costs=result.costs,
@@ -301,18 +350,54 @@ def make_settings(
         )
     if not 1 <= int(spp) <= MAX_SPP:
         raise WavecombError(f"{spp} samples per pixel: must be from 1 to {MAX_SPP}")
+    if tuple(aovs) != aov_names.DEFAULT:
+        settings["aovs"] = aov_names.for_core(aovs)
+        settings["error"] = settings.get("error", False) or bool({"error", "variance"} & {*aovs})
+    chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
     # Light groups are counted once the stage is read; a file is written a few rows at a time.
-    needed, there = width * height * aov_names.bytes_per_pixel(aovs, 4), memory_bytes()
+    each = aov_names.bytes_per_pixel(aovs, 4) + (_ERROR_BYTES_PER_PIXEL * keeps_error(chosen))
+    needed, there = width * height * each, memory_bytes()
     if there is not None and needed > 0.8 * there:
         raise WavecombError(
             f"size {width} x {height}: needs about {needed / 2**30:.0f} GiB of memory, "
             f"this machine has {there / 2**30:.0f}; choose a smaller size"
         )
-    if tuple(aovs) != aov_names.DEFAULT:
-        settings["aovs"] = aov_names.for_core(aovs)
-    chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
     chosen.check()
     return chosen
+
+
+def keeps_error(settings: Settings) -> bool:
+    """Whether a render with these settings has the layers error and variance."""
+    return bool(settings.adaptive or settings.noise or settings.error)
+
+
+def _keeping(
+    scene: Scene,
+    settings: Settings,
+    stage: str | None,
+    checkpoint: str | os.PathLike[str] | None,
+    every: float,
+    resume: str | os.PathLike[str] | None,
+) -> tuple[Watcher | None, dict[str, Any] | None]:
+    """Who saves checkpoints, and the state to go on from."""
+    if checkpoint is None and resume is None:
+        return None, None
+    from wavecomb.checkpoint import check_fits, load_checkpoint, make_header
+    from wavecomb.watcher import CheckpointSink, Watcher
+
+    header = make_header(scene, settings, stage=stage, source={})
+    before = load_checkpoint(resume) if resume is not None else None
+    if before is not None:
+        check_fits(before, header)
+    seconds = before.seconds if before is not None else 0.0
+    sinks = [CheckpointSink(checkpoint, every, header, seconds)] if checkpoint is not None else []
+    return Watcher(sinks, warn=_warn), before.state if before is not None else None
+
+
+def _warn(line: str) -> None:
+    import warnings
+
+    warnings.warn(line, RuntimeWarning, stacklevel=2)
 
 
 def _resolve(
@@ -340,7 +425,9 @@ def _render(
     progress: Progress | None,
     policy: SchedulingPolicy | None,
     costs: dict[str, dict[str, float]] | None,
+    watcher: Watcher | None,
+    state: dict[str, Any] | None,
 ) -> Result:
     from wavecomb import _core
 
-    return _core.render(scene, settings, progress, policy, costs)
+    return _core.render(scene, settings, progress, policy, costs, watcher=watcher, state=state)

@@ -32,6 +32,7 @@ _SUFFIXES = {
     "depth": "Z",
     "position": "XYZ",
     "uv": "UV",
+    "variance": "RGB",
 }
 _COLOURS = ("beauty", "albedo", "normal", "emission", "direct", "indirect", "denoised")
 """Layers that are half where halves are asked for, with all that begin with "light_"."""

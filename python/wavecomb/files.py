@@ -55,11 +55,41 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         raise OSError(f"{os.fspath(path)}: cannot be written: {reason(error)}") from error
 
 
+def _remove_leftovers(target: Path) -> None:
+    """Removes temporary files of ``target`` whose process is no more: it was killed."""
+    start, end = f".{target.stem[:100]}.", f".part{target.suffix}"
+    for other in target.parent.iterdir():
+        pid = other.name[len(start) : -len(end)]
+        if not (other.name.startswith(start) and other.name.endswith(end) and pid.isdecimal()):
+            continue
+        try:
+            os.kill(int(pid), 0)
+        except ProcessLookupError:
+            with contextlib.suppress(OSError):
+                other.unlink()
+        except (OSError, OverflowError):
+            pass  # it lives, and is another user's
+
+
+def _sync(path: Path) -> None:
+    """Waits until a file, or what a folder says of its files, is on the disk."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
 @contextlib.contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
     """Gives a temporary name beside ``path``; renames it to ``path`` if all went well.
 
-    On any exception the temporary file is removed and ``path`` is as it was.
+    On any exception the temporary file is removed and ``path`` is as it was. A process that is
+    killed leaves ``path`` as it was, too; what it left beside it goes with the next call.
+
+    Args:
+        path: The file.
+        durable: Also where the machine fails: the file is on the disk before it gets its name.
 
     >>> with replacing("/tmp/answer.txt") as part:
     ...     _ = part.write_text("42")
@@ -67,8 +97,13 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = _target(path)
     part = _part(target)
     try:
+        _remove_leftovers(target)
         yield part
+        if durable:
+            _sync(part)
         os.replace(part, target)
+        if durable:
+            _sync(target.parent)
     except OSError as error:
         if error.errno is None:
             raise

@@ -72,7 +72,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
     Sample counts and costs add up. Variances and errors become those of the sum. Cryptomatte's
     coverages are weighted like colours, and the largest are kept. A depth counts where it is
     finite. Position, texture coordinates and ids, which are of single samples, are those of the
-    first picture that has a sample in that pixel.
+    first picture that has a sample in that pixel. A denoised layer is left out.
 
     >>> merge(["a.exr", "b.exr"]).layers["samples"].max()  # doctest: +SKIP
     128.0
@@ -103,6 +103,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
     names: dict[str, dict[str, int]] = {}
     for source in sources:
         layers = read_layers(source.name)
+        layers.pop("denoised", None)  # it is the sum that is to be denoised
         _check_layers(first.name, sums, source.name, layers, pairs)
         _add(sums, pairs, layers)
         for level, manifest in cryptomatte.manifests(source.attributes).items():

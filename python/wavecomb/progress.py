@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress on a terminal, and Ctrl-C that keeps what is done."""
+"""Progress on a terminal or for programs, and Ctrl-C that keeps what is done."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
 import threading
 import time
+from collections.abc import Callable, Mapping
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress
-
 
 _FORCED = ("FORCE_COLOR", "TTY_COMPATIBLE")
 
@@ -47,19 +47,44 @@ def time_text(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-class Interrupt:
-    """While it is entered, the first Ctrl-C is only noted; a second one acts as always.
+def speed(status: Mapping[str, Any]) -> dict[str, Any]:
+    """Samples and rays per second of a run, and the seconds left at that speed.
 
-    Contract: takes the signal on the main thread only; elsewhere it does nothing.
+    Args:
+        status: The keys of ``Snapshot.status`` in _core.pyi.
+
+    Returns:
+        ``samples_per_s``, ``rays_per_s``, ``seconds_left`` (None: not known yet).
+    """
+    done, seconds = status["samples_done"], status["seconds"]
+    rate = (done - status["resumed_samples"]) / seconds if seconds > 0.0 else 0.0
+    return {
+        "samples_per_s": rate,
+        "rays_per_s": status["rays"] / seconds if seconds > 0.0 else 0.0,
+        "seconds_left": (status["samples_total"] - done) / rate if rate > 0.0 else None,
+    }
+
+
+class Interrupt:
+    """While it is entered, the first Ctrl-C or SIGTERM is only noted; the next acts as always.
+
+    Contract: takes the signals on the main thread only; elsewhere it does nothing.
     """
 
     def __init__(self) -> None:
-        self.requested = False
-        self._before: Any = None
+        self.signal: int | None = None
+        """The number of the one that came."""
+        self._before: dict[int, Any] = {}
+
+    @property
+    def requested(self) -> bool:
+        """Whether somebody wants this to end."""
+        return self.signal is not None
 
     def __enter__(self) -> Interrupt:
         if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGINT, self._note)
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._before[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(
@@ -71,13 +96,13 @@ class Interrupt:
         self._restore()
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
+        self.signal = number
         self._restore()
 
     def _restore(self) -> None:
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
-            self._before = None
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._before = {}
 
 
 def progress_console(*, quiet: bool = False) -> Console | None:
@@ -94,58 +119,90 @@ def progress_console(*, quiet: bool = False) -> Console | None:
     return console if console.is_terminal else None
 
 
-class RenderProgress:
-    """A bar with percent, samples per second and time left, on a console; silent without one.
+class Silent:
+    """No progress at all."""
 
-    Use as a context manager, and call it as the core does: progress(samples_done, samples_total).
-    Returns False, which stops the render, once ``interrupt.requested``.
+    def __enter__(self) -> Silent:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Nothing to tidy."""
+
+    def show(self, status: Mapping[str, Any]) -> None:
+        """Shows nothing."""
+
+    def wrote(self, path: str) -> None:
+        """Says nothing."""
+
+
+class ProgressBar(Silent):
+    """A bar with passes, samples and rays per second, error and time left.
+
+    Use as a context manager.
     """
 
-    def __init__(self, console: Console | None, interrupt: Interrupt) -> None:
-        self.done = 0
-        self.total = 0
-        self._interrupt = interrupt
-        self._start = time.perf_counter()
-        self._bar: Progress | None = None
-        if console is None:
-            return
+    def __init__(self, console: Console) -> None:
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
         self._bar = Progress(
             TextColumn("rendering"),
             BarColumn(),
             TaskProgressColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TextColumn("{task.fields[left]}"),
+            TextColumn("{task.fields[figures]}"),
             console=console,
             auto_refresh=False,
             transient=True,
         )
-        self._task = self._bar.add_task("", total=None, rate="", left="")
+        self._task = self._bar.add_task("", total=None, figures="")
 
-    def __enter__(self) -> RenderProgress:
-        if self._bar is not None:
-            self._bar.start()
-        self._start = time.perf_counter()
+    def __enter__(self) -> ProgressBar:
+        self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+    def __exit__(self, *error: object) -> None:
+        self._bar.stop()
 
-    def __call__(self, done: int, total: int) -> bool:
-        """Shows how far it is; False asks the core to stop."""
-        self.done, self.total = done, total
-        if self._bar is not None:
-            seconds = time.perf_counter() - self._start
-            rate = done / seconds if seconds > 0.0 else 0.0
-            left = f"{time_text((total - done) / rate)} left" if rate > 0.0 else ""
-            speed = f"{count_text(rate)}samples/s" if rate >= 1e3 else f"{rate:.0f} samples/s"
-            self._bar.update(self._task, completed=done, total=total, rate=speed, left=left)
-            self._bar.refresh()
-        return not self._interrupt.requested
+    def show(self, status: Mapping[str, Any]) -> None:
+        """Draws the bar."""
+        rates = speed(status)
+        figures = [
+            f"pass {status['passes']}",
+            f"{count_text(rates['samples_per_s'])} samples/s",
+            f"{count_text(rates['rays_per_s'])} rays/s",
+        ]
+        if status["error"] is not None:
+            figures.append(f"error {100 * status['error']:.2g} %")
+        if rates["seconds_left"] is not None:
+            figures.append(f"{time_text(rates['seconds_left'])} left")
+        self._bar.update(
+            self._task,
+            completed=status["samples_done"],
+            total=status["samples_total"],
+            figures=", ".join(figures),
+        )
+        self._bar.refresh()
+
+
+class ProgressLines(Silent):
+    """A line of JSON about once a second, and for each file: for programs that wrap this one."""
+
+    def __init__(self, write: Callable[[str], None], *, every: float = 1.0) -> None:
+        self._write = write
+        self._every = every
+        self._next = 0.0
+
+    def show(self, status: Mapping[str, Any]) -> None:
+        """A line {"event": "progress", ...}, if it is time for one."""
+        is_done = status["samples_done"] >= status["samples_total"]
+        if time.monotonic() < self._next and not is_done:
+            return
+        self._next = time.monotonic() + self._every
+        self.event("progress", **status, **speed(status))
+
+    def wrote(self, path: str) -> None:
+        """A line {"event": "wrote", "file": path}."""
+        self.event("wrote", file=path)
+
+    def event(self, name: str, **values: Any) -> None:
+        """A line of any kind."""
+        self._write(json.dumps({"event": name, **values}))

@@ -41,9 +41,15 @@ COHERENCE = ("run_length", "material_homogeneity", "texture_homogeneity")
 
 
 def make_stats(
-    result: Result, *, stage: str | None = None, loaded: LoadedStage | None = None
+    result: Result,
+    *,
+    stage: str | None = None,
+    loaded: LoadedStage | None = None,
+    resumed_s: float = 0.0,
 ) -> dict[str, Any]:
     """The statistics of a result, with what the core does not know: stage, load time, machine.
+
+    ``resumed_s`` is what was spent on rendering before this run took over.
 
     Every key of the schema is there; a figure that the core did not give is 0. What the core gives
     beyond the schema is passed on.
@@ -68,11 +74,16 @@ def make_stats(
             "build": 0.0,
             "render": 0.0,
             "first_samples": 0.0,
+            "resumed": float(resumed_s),
+            "denoise": 0.0,
             **seconds,
         },
         "phases_s": phases,
         "sort_overhead": sort_overhead(phases),
         "counts": counts,
+        "passes": core.pop("passes", 0),
+        "resumed_samples": core.pop("resumed_samples", 0),
+        "error": _finite(core.pop("error", None)),
         "mean_path_length": counts["rays"] / counts["samples"] if counts["samples"] else 0.0,
         "depths": {**{name: [] for name in DEPTHS}, **core.pop("depths", {})},
         "lane_utilisation": core.pop("lane_utilisation", 1.0),
@@ -161,6 +172,10 @@ def plain(value: Any) -> Any:
     if hasattr(value, "item"):
         return plain(value.item())
     return str(value)
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _cpu_name() -> str:

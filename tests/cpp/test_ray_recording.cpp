@@ -26,7 +26,7 @@ TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
   const Settings settings = small_settings();
   const Picture plain = renderer.render(settings);
   RayRecording recording(scene, kPlenty);
-  const Picture recorded = renderer.render(settings, {}, nullptr, nullptr, &recording);
+  const Picture recorded = renderer.render(settings, {.recorder = &recording});
   expect_same_picture(plain, recorded, "with a recorder");
 
   const RenderStatistics& s = renderer.statistics();
@@ -42,7 +42,7 @@ TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
   const ScenePtr scene = mixed();
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, kPlenty);
-  renderer.render(small_settings(), {}, nullptr, nullptr, &recording);
+  renderer.render(small_settings(), {.recorder = &recording});
   const RenderStatistics& s = renderer.statistics();
 
   const ReplayTimes expected = recording.replay({false, 1, {1, 1, 1}, {}, kAll});
@@ -74,7 +74,7 @@ TEST(RayRecording, StopsAtItsLimit) {
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, 4096);
   try {
-    renderer.render(small_settings(), {}, nullptr, nullptr, &recording);
+    renderer.render(small_settings(), {.recorder = &recording});
     FAIL() << "recorded " << recording.bytes() << " bytes";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("fewer samples"), std::string::npos) << error.what();

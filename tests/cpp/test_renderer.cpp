@@ -109,14 +109,14 @@ TEST(Renderer, ProgressEndsAtTheTotal) {
   WavefrontRenderer renderer(cornell());
   Settings s = tiny();
   uint64_t last = 0, calls = 0;
-  renderer.render(s, [&](uint64_t done, uint64_t total) {
-    EXPECT_EQ(total, 24u * 16 * 4);
-    EXPECT_LE(done, total);
-    EXPECT_GE(done, last);
-    last = done;
-    ++calls;
-    return true;
-  });
+  renderer.render(s, {.progress = [&](const RenderStatus& status) {
+                    EXPECT_EQ(status.samples_total, 24u * 16 * 4);
+                    EXPECT_LE(status.samples_done, status.samples_total);
+                    EXPECT_GE(status.samples_done, last);
+                    last = status.samples_done;
+                    ++calls;
+                    return Request::kGoOn;
+                  }});
   EXPECT_EQ(last, 24u * 16 * 4);
   EXPECT_GE(calls, 1u);
 }
@@ -131,10 +131,10 @@ TEST(Renderer, CancelKeepsWhatIsDone) {
     s.threads = 2;
     const auto start = Clock::now();
     auto asked = start;
-    const Picture p = renderer.render(s, [&](uint64_t, uint64_t) {
-      asked = Clock::now();
-      return false;
-    });
+    const Picture p = renderer.render(s, {.progress = [&](const RenderStatus&) {
+                                        asked = Clock::now();
+                                        return Request::kStop;
+                                      }});
     const double took = std::chrono::duration<double>(Clock::now() - asked).count();
     EXPECT_LT(took, kSanitized ? 20 : 2) << "seconds after the callback said stop";
     EXPECT_TRUE(renderer.statistics().cancelled);
@@ -158,7 +158,9 @@ TEST(Renderer, ExceptionsOfTheCallbackArriveAtTheCaller) {
   Settings s;
   s.width = s.height = 512;
   s.spp = 1u << 16;
-  EXPECT_THROW(renderer.render(s, [](uint64_t, uint64_t) -> bool { throw Error("stop"); }), Error);
+  EXPECT_THROW(
+      renderer.render(s, {.progress = [](const RenderStatus&) -> Request { throw Error("stop"); }}),
+      Error);
   renderer.render(tiny());
   EXPECT_FALSE(renderer.statistics().cancelled);
 }

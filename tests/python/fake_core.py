@@ -22,6 +22,9 @@ class Error(ValueError):
 
 
 class Settings:
+    adaptive = noise = time_limit = 0.0
+    error = False
+
     def __init__(self, **settings: Any) -> None:
         defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}
         self.__dict__.update({**defaults, **settings})
@@ -95,6 +98,8 @@ class Fake:
         progress: Any = None,
         policy: Any = None,
         costs: Any = None,
+        watcher: Any = None,
+        state: Any = None,
     ) -> Any:
         if self.fail is not None:
             raise self.fail
@@ -107,8 +112,21 @@ class Fake:
             done = total_samples * step // 10
             if self.interrupt_at is not None and step / 10 >= self.interrupt_at:
                 os.kill(os.getpid(), signal.SIGINT)
+            status = {
+                "samples_done": done,
+                "samples_total": total_samples,
+                "resumed_samples": 0,
+                "rays": 4 * done,
+                "passes": 1 + step // 5,
+                "active_pixels": width * height,
+                "seconds": 0.05 * step,
+                "error": None if step < 5 else 0.25,
+            }
             if progress is not None and progress(done, total_samples) is False:
                 cancelled = True
+            if watcher is not None and watcher.progress(status) == "stop":
+                cancelled = True
+            if cancelled:
                 break
         y, x = np.mgrid[0:height, 0:width].astype(np.float32)
         beauty = np.stack([x / width, y / height, np.full_like(x, 2.0)], axis=2)
@@ -118,7 +136,9 @@ class Fake:
             albedo=beauty * 0.5,
             normal=beauty - 0.5,
             depth=np.where(x < 1, np.inf, x + 1).astype(np.float32),
-            samples=np.full((height, width), total, np.uint32),
+            samples=np.full((height, width), done // (width * height), np.uint32),
+            error=None,
+            variance=None,
             cancelled=cancelled,
             aovs={},
             manifests={},

@@ -107,7 +107,7 @@ def test_names_are_expanded() -> None:
     assert aovs.expand(["uv", "beauty", "depth"]) == ("beauty", "depth", "uv")
     assert aovs.expand(["all", "light_key"]) == aovs.NAMES
     assert aovs.expand(["light_b", "light_a"]) == ("beauty", "light_b", "light_a")
-    assert set(aovs.NAMES) == {"beauty", "samples", *_core.AOVS}
+    assert set(aovs.NAMES) == {"beauty", "samples", "error", "variance", *_core.AOVS}
     with pytest.raises(WavecombError, match=r"AOV 'albdo' is not known; there are beauty, albedo"):
         aovs.expand(["albdo"])
 
@@ -121,6 +121,16 @@ def test_nothing_else_than_the_beauty(loaded: Any, picture: wavecomb.Picture) ->
 
 
 @pytest.mark.parametrize("names", [("all",), aovs.DEFAULT, ("light_key", "uv")])
+def test_errors_are_there_where_asked_for(loaded: Any, picture: wavecomb.Picture) -> None:
+    assert picture.error is not None and picture.variance is not None
+    plain = wavecomb.render(loaded, size=(16, 16), spp=16)
+    assert plain.error is plain.variance is None
+    adaptive = wavecomb.render(loaded, size=(16, 16), spp=32, adaptive=0.1)
+    assert {"error", "variance"} < set(adaptive.layers())
+    chosen = wavecomb.render(loaded, size=(16, 16), spp=32, adaptive=0.1, aovs=["uv", "error"])
+    assert set(chosen.layers()) == {"beauty", "uv", "error"}
+
+
 def test_memory_is_as_stated(loaded: Any, names: tuple[str, ...]) -> None:
     chosen = aovs.expand(names)
     memory = wavecomb.render(loaded, size=(16, 16), spp=1, aovs=chosen).stats["memory_bytes"]
@@ -208,7 +218,7 @@ def test_channels_in_a_file(picture: wavecomb.Picture, tmp_path: Path) -> None:
     source.close()
     assert {"R", "albedo.R", "normal.X", "depth.Z", "position.Z", "uv.U", "uv.V"} < names
     assert {"CryptoObject00.R", "CryptoAsset02.A", "light_key.G", "indirect.B"} < names
-    assert {"samples", "cost", "material_id", "instance_id"} < names
+    assert {"samples", "cost", "material_id", "instance_id", "error", "variance.G"} < names
     back = read_layers(tmp_path / "a.exr")
     for name, layer in picture.layers().items():
         want = layer.astype(np.float32)

@@ -139,7 +139,8 @@ def test_schema(fake: Fake, stage: Path) -> None:
     stats = wavecomb.render(stage, size=(4, 4), spp=1).stats
     assert list(stats) == [
         *("schema", "version", "stage", "camera", "cancelled", "settings", "seconds"),
-        *("phases_s", "sort_overhead", "counts", "mean_path_length", "depths", "lane_utilisation"),
+        *("phases_s", "sort_overhead", "counts", "passes", "resumed_samples", "error"),
+        *("mean_path_length", "depths", "lane_utilisation"),
         *("coherence", "programs", "materials", "cost_prediction", "policy_uses"),
         *("samples_per_s", "rays_per_s", "memory_bytes", "peak_rss_bytes", "machine"),
         *("unsupported", "warnings"),

@@ -194,10 +194,12 @@ def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
     code = """
 import json, sys
 from wavecomb import _core, api
-from wavecomb.progress import Interrupt, RenderProgress, progress_console
+from wavecomb.cli.reporting import make_reporter
+from wavecomb.progress import Interrupt
+from wavecomb.watcher import Watcher
 loaded = api.load(sys.argv[1])
-with Interrupt() as interrupt, RenderProgress(progress_console(), interrupt) as progress:
-    _core.render(loaded.scene, api.make_settings((8, 8), 1), progress, None, None)
+with Interrupt(), make_reporter(None, quiet=False).rendering() as bar:
+    _core.render(loaded.scene, api.make_settings((8, 8), 1), watcher=Watcher(reporter=bar))
 print(json.dumps([name for name in ("OpenImageIO", "rich") if name in sys.modules]))
 """
     unforced = {k: v for k, v in os.environ.items() if k not in ("FORCE_COLOR", "TTY_COMPATIBLE")}

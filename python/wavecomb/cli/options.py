@@ -94,6 +94,19 @@ class StageOptions:
         """Moves them out of a command's arguments."""
         return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
 
+    def as_dict(self) -> dict[str, Any]:
+        """For a file: what ``completed`` takes."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def completed(self, before: dict[str, Any]) -> StageOptions:
+        """With what was chosen before in place of what is not chosen here."""
+        values = {name: value or before[name] for name, value in self.as_dict().items()}
+        if self.frame is not None:
+            values["frame"] = self.frame
+        for name in ("purposes", "variants"):
+            values[name] = tuple(values[name])
+        return StageOptions(**values)
+
     def load(self, stage: str, threads: int = 0) -> LoadedStage:
         """Loads a stage as the options say, on ``threads`` threads (0: all)."""
         from wavecomb.api import load

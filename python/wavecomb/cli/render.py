@@ -4,22 +4,26 @@
 from __future__ import annotations
 
 import os
+import signal
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions, aov_options
-from wavecomb.cli.group import INTERRUPTED
 from wavecomb.cli.options import Real, StageOptions, examples, stage_options, stage_warnings, warn
-from wavecomb.cli.summary import print_summary
+from wavecomb.cli.purpose import PurposeOptions, purpose_options
+from wavecomb.cli.reporting import make_reporter
 from wavecomb.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from wavecomb.api import Picture
+    from wavecomb.checkpoint import Checkpoint
+    from wavecomb.cli.reporting import Reporter
     from wavecomb.usd import LoadedStage, LoadReport
+
+DEFAULT_SIZE = (600, 600)
 
 _INTEGERS = click.IntRange(min=0)
 
@@ -30,6 +34,10 @@ _INTEGERS = click.IntRange(min=0)
         "wavecomb render shot.usd -o shot.exr",
         "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256",
         "wavecomb render shot.usd -o shot.exr --camera /World/Cam --frame 101 --stats shot.json",
+        "wavecomb render shot.usd -o shot.exr --noise 0.02 --denoise --png shot.png",
+        "wavecomb render shot.usd -o shot.exr --time-limit 60 --preview preview.png",
+        "wavecomb render shot.usd -o shot.exr --spp 4096 --checkpoint shot.ckpt",
+        "wavecomb render shot.usd -o shot.exr --resume shot.ckpt",
         "wavecomb render shot.usd -o shot.exr --policy adaptive --costs shot-costs.json",
     ),
 )
@@ -55,13 +63,16 @@ _INTEGERS = click.IntRange(min=0)
     "--size",
     nargs=2,
     type=int,
-    default=(600, 600),
     metavar="W H",
     help="Pixels.  [default: 600 600]",
 )
 @click.option(
-    "--spp", type=int, default=64, show_default=True, metavar="N", help="Samples per pixel."
+    "--spp",
+    type=int,
+    metavar="N",
+    help="Samples per pixel; with --adaptive and --noise the most of them.  [default: 64]",
 )
+@purpose_options
 @click.option("--max-depth", type=_INTEGERS, metavar="N", help="Longest path, in scatterings.")
 @click.option(
     "--integrator",
@@ -144,8 +155,8 @@ def render_command(
     output: str,
     png: str | None,
     stats_file: str | None,
-    size: tuple[int, int],
-    spp: int,
+    size: tuple[int, int] | None,
+    spp: int | None,
     exposure: float,
     tone_map: Any,
     quiet: bool,
@@ -157,17 +168,33 @@ def render_command(
     """Render STAGE to an OpenEXR file.
 
     The file has the layers beauty (R, G, B), albedo, normal, depth and samples, or those that --aov
-    asks for. Ctrl-C stops and writes what is done (exit code 130). Files are written whole or not
-    at all.
+    asks for; error and variance where the render is adaptive; denoised with --denoise. Ctrl-C and
+    SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
+    all. docs/render.md and docs/aovs.md say more.
     """
     from wavecomb.api import make_settings
-    from wavecomb.progress import progress_console
 
-    costs_file = costs if costs is not None and costs not in SOURCES else None
     source = StageOptions.take(options)
+    purpose = PurposeOptions.take(options)
     layers = AovOptions.take(options)
-    _check_outputs(stage, output, png, stats_file, costs_file)
+    costs_file = costs if costs is not None and costs not in SOURCES else None
+    _check_outputs(
+        stage,
+        [
+            (output, "-o", ".exr"),
+            (png, "--png", ".png"),
+            (stats_file, "--stats", None),
+            (costs_file, "--costs", None),
+            (purpose.preview, "--preview", ".png"),
+            (purpose.checkpoint_file, "--checkpoint", None),
+        ],
+    )
     layers.check(output)
+    if purpose.denoise:
+        from wavecomb.denoise import check_denoiser
+
+        check_denoiser()
+    resumed = purpose.load()
     chosen = {name: value for name, value in options.items() if value is not None}
     if lanes is not None:
         chosen["lanes"] = 0 if lanes == "auto" else int(lanes)
@@ -176,49 +203,62 @@ def render_command(
     if costs is not None and costs_file is None:
         chosen["costs"] = costs
     profile = _read_costs(costs_file)
-    settings = make_settings(size, spp, aovs=layers.names, **chosen)
+    chosen |= purpose.settings(spp, resumed)
+    if size is not None:
+        chosen["width"], chosen["height"] = size
+    if resumed is not None:
+        chosen = {**resumed.settings, **chosen}
+        source = source.completed(resumed.source)
+    aovs = layers.names if layers.aovs else aov_names.of_core(chosen.pop("aovs", None))
+    chosen.pop("aovs", None)
+    size = chosen.pop("width", DEFAULT_SIZE[0]), chosen.pop("height", DEFAULT_SIZE[1])
+    guides = ("albedo", "normal") if purpose.denoise else ()
+    settings = make_settings(
+        size, chosen.pop("spp"), aovs=aov_names.with_guides(aovs, guides), **chosen
+    )
 
-    console = progress_console(quiet=quiet)
-    picture, done, report = _render(source, stage, settings, layers.names, profile, console)
-    if picture.cancelled and done <= 0.0:
+    reporter = make_reporter(purpose.progress, quiet)
+    picture, stopped, report = _render(
+        source, stage, settings, aovs, profile, purpose, resumed, reporter, exposure, tone_map
+    )
+    if stopped is not None and not picture.samples.any():
         click.echo("stopped before the first sample; nothing was written", err=True)
-        raise click.exceptions.Exit(INTERRUPTED)
+        raise click.exceptions.Exit(128 + stopped)
     warn(_picture_warnings(picture))
+    if purpose.denoise:
+        picture = picture.with_denoised(threads=settings.threads)
     written = _write(picture, output, png, stats_file, layers, exposure, tone_map)
     if costs_file is not None:
         from wavecomb.costs import save_costs
 
         save_costs(costs_file, picture.costs)
-    if not quiet:
-        files = [*written, *([costs_file] if costs_file else [])]
-        print_summary(picture.stats, report, files)
-    if picture.cancelled:
-        click.echo(f"stopped at {100.0 * done:.0f} %; {output} holds what was done", err=True)
-        raise click.exceptions.Exit(INTERRUPTED)
+    files = [*written, *([costs_file] if costs_file else [])]
+    reporter.finished(picture, report, files)
+    if stopped is not None:
+        click.echo(f"stopped {_how_far(picture)}; {output} holds what was done", err=True)
+        raise click.exceptions.Exit(128 + stopped)
 
 
-def _check_outputs(
-    stage: str, output: str, png: str | None, stats_file: str | None, costs_file: str | None
-) -> None:
-    """Everything that can be known to fail before the work begins."""
+def _check_outputs(stage: str, outputs: list[tuple[str | None, str, str | None]]) -> None:
+    """Everything that can be known to fail before the work begins.
+
+    Args:
+        stage: The stage's file.
+        outputs: Name, option, and the ending that is asked for.
+    """
     from wavecomb.errors import WavecombError
     from wavecomb.files import check_writable
 
-    for name, option, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):
-        if name is not None and not name.lower().endswith(ending):
+    for name, option, ending in outputs:
+        if name is not None and ending is not None and not name.lower().endswith(ending):
             raise WavecombError(f"{option} {name}: the name must end in {ending}")
-    if costs_file is not None and not costs_file.lower().endswith(".json"):
-        raise WavecombError(
-            f"--costs {costs_file}: must be one of {', '.join(SOURCES)}, "
-            "or a file whose name ends in .json"
-        )
+        if option == "--costs" and name is not None and not name.lower().endswith(".json"):
+            raise WavecombError(
+                f"--costs {name}: must be one of {', '.join(SOURCES)}, "
+                "or a file whose name ends in .json"
+            )
     seen = {os.path.realpath(stage): "the stage"}
-    for name, option in (
-        (output, "-o"),
-        (png, "--png"),
-        (stats_file, "--stats"),
-        (costs_file, "--costs"),
-    ):
+    for name, option, _ in outputs:
         if name is None:
             continue
         other = seen.setdefault(os.path.realpath(name), option)
@@ -236,43 +276,73 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     return load_costs(costs_file)
 
 
-def _load(source: StageOptions, stage: str, threads: int, console: Console | None) -> LoadedStage:
-    if console is None:
-        return source.load(stage, threads)
-    from rich.markup import escape
-
-    with console.status(f"loading {escape(os.path.basename(stage))}"):
-        return source.load(stage, threads)
-
-
 def _render(
     source: StageOptions,
     stage: str,
     settings: Any,
     aovs: tuple[str, ...],
     profile: dict[str, dict[str, float]] | None,
-    console: Console | None,
-) -> tuple[Picture, float, LoadReport]:
-    """The picture, how much of it was done, from 0 to 1, and what there is to say of the stage.
+    purpose: PurposeOptions,
+    resumed: Checkpoint | None,
+    reporter: Reporter,
+    exposure: float,
+    tone_map: Any,
+) -> tuple[Picture, int | None, LoadReport]:
+    """The picture, the number of the signal that stopped it, and what there is to say of the stage.
 
     The scene is freed here: nothing needs it while files are written.
     """
     from wavecomb import _core
     from wavecomb.api import picture_of
-    from wavecomb.progress import Interrupt, RenderProgress
+    from wavecomb.progress import Interrupt
     from wavecomb.stats import make_stats
+    from wavecomb.watcher import CheckpointSink, PreviewSink, Sink, Watcher
 
-    loaded = _load(source, stage, settings.threads, console)
+    with reporter.loading(stage):
+        loaded: LoadedStage = source.load(stage, settings.threads)
     warn(stage_warnings(loaded))
-    with (
-        Interrupt() as interrupt,
-        RenderProgress(console, interrupt) as progress,
-    ):
-        result = _core.render(loaded.scene, settings, progress, None, profile)
-    stats = make_stats(result, stage=stage, loaded=loaded)
-    total = int(settings.width) * int(settings.height) * int(settings.spp)
-    done = float(stats["counts"]["samples"]) / total
-    return picture_of(result, stats, scene=loaded.scene, aovs=aovs), done, loaded.report
+    sinks: list[Sink] = []
+    state, seconds = None, 0.0
+    if purpose.checkpoint_file is not None:
+        from wavecomb.checkpoint import build_note, check_fits, make_header
+
+        header = make_header(loaded.scene, settings, stage=stage, source=source.as_dict())
+        if resumed is not None:
+            check_fits(resumed, header)
+            warn([note] if (note := build_note(resumed, header)) else [])
+            state, seconds = resumed.state, resumed.seconds
+        sinks.append(CheckpointSink(purpose.checkpoint_file, purpose.every, header, seconds))
+    if purpose.preview is not None:
+        sinks.append(
+            PreviewSink(
+                purpose.preview, purpose.preview_every, exposure=exposure, tone_map=tone_map
+            )
+        )
+    with Interrupt() as interrupt, reporter.rendering() as bar:
+        watcher = Watcher(
+            sinks,
+            reporter=bar,
+            is_stopped=lambda: interrupt.requested,
+            warn=lambda line: warn([line]),
+        )
+        result = _core.render(
+            loaded.scene, settings, None, None, profile, watcher=watcher, state=state
+        )
+    stats = make_stats(result, stage=stage, loaded=loaded, resumed_s=seconds)
+    stopped = (interrupt.signal or signal.SIGINT) if result.cancelled else None
+    picture = picture_of(result, stats, scene=loaded.scene, aovs=aovs)
+    return picture, stopped, loaded.report
+
+
+def _how_far(picture: Any) -> str:
+    """How much is done, as can be said of a render without and with a fixed end."""
+    stats = picture.stats
+    settings = stats["settings"]
+    samples = stats["counts"]["samples"] + stats["resumed_samples"]
+    mean = samples / (settings["width"] * settings["height"])
+    if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
+        return f"with {mean:.3g} samples a pixel"
+    return f"at {100.0 * mean / settings['spp']:.0f} %"
 
 
 def _picture_warnings(picture: Any) -> list[str]:

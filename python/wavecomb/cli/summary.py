@@ -35,6 +35,8 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
         f"{count_text(rays)} rays, {count_text(stats['rays_per_s'])}/s; "
         f"peak memory {stats['peak_rss_bytes'] / 1e6:,.0f} MB{_memory(stats['memory_bytes'])}"
     )
+    for line in _sampling_lines(stats):
+        console.print(line)
     for line in _scheduling_lines(stats):
         console.print(escape(line))
     _phases(console, stats)
@@ -54,6 +56,29 @@ def _memory(parts: Mapping[str, int]) -> str:
     if not arrays:
         return ""
     return f" (arrays {arrays / 1e6:,.0f}, BVH {parts['accelerator'] / 1e6:,.0f})"
+
+
+def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
+    """Of adaptive, timed and resumed renders."""
+    from wavecomb.progress import count_text, time_text
+
+    lines: list[str] = []
+    settings, before = stats["settings"], stats["resumed_samples"]
+    if before:
+        lines.append(
+            f"resumed after {time_text(stats['seconds']['resumed'])} and "
+            f"{count_text(before)} samples"
+        )
+    if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
+        pixels = settings["width"] * settings["height"]
+        line = (
+            f"{stats['passes']} passes, "
+            f"{(before + stats['counts']['samples']) / pixels:.3g} samples a pixel"
+        )
+        if stats["error"] is not None:
+            line += f"; mean relative error {_percent(stats['error'])}"
+        lines.append(line)
+    return lines
 
 
 def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:

@@ -32,6 +32,15 @@ void Settings::check() const {
   check_range("filter_width", filter_width, 0.01f, 32);
   check_range("roulette_depth", roulette_depth, 0, 4096);
   check_range("clamp_indirect", clamp_indirect, 0, 1e30f);
+  check_range("adaptive", adaptive, 0, 1e6f);
+  check_range("noise", noise, 0, 1);
+  if (adaptive > 0 && noise > 0)
+    throw Error("adaptive and noise are both given; choose one to end the render by");
+  check_range("min_spp", min_spp, 1, 1 << 20);
+  if (is_adaptive() && min_spp > spp)
+    throw Error("min_spp is " + std::to_string(min_spp) + "; it must not be above spp, which is " +
+                std::to_string(spp));
+  check_range("time_limit", time_limit, 0, 1e9f);
   check_range("cost_weight", cost_weight, 0, 1);
   check_range("threads", threads, 0, 1024);
   if (wave_size != 0) check_range("wave_size", wave_size, 64, 1 << 20);

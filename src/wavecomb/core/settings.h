@@ -48,6 +48,14 @@ struct Settings {
   IntegratorKind integrator = IntegratorKind::kWavefront;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
   std::vector<std::string> light_groups;  ///< of Aov::kLightGroups, by name; empty: all
+  /// Adaptive sampling: a pixel is done when its error is no larger (ErrorMap::error); 0: off.
+  float adaptive = 0;
+  /// Adaptive sampling until the picture's mean relative error is no larger; 0: off. Not both.
+  float noise = 0;
+  uint32_t min_spp = 16;  ///< adaptive: before the first look at errors; spp is the most
+  /// The most seconds that rendering may take; 0: no limit. What is done by then is the picture.
+  float time_limit = 0;
+  bool error = false;  ///< keep errors and variances where nothing else asks for them
   // ---- below: how it is computed; never changes the picture ----
   uint32_t threads = 0;    ///< 0: all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0: default
@@ -60,6 +68,8 @@ struct Settings {
   RayOrder shadow_order = RayOrder::kAuto;       ///< of shadow rays
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
+  bool is_adaptive() const { return adaptive > 0 || noise > 0; }
+  bool keeps_error() const { return error || is_adaptive(); }
   /// Throws Error naming the option and what it may be.
   void check() const;
 };

@@ -119,6 +119,18 @@ class AovFilm {
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
                                const std::vector<std::string>& group_names) &&;
   size_t bytes() const;
+  /// Runs block(name, values) for each vector of sums, for checkpoints.
+  template <typename Block>
+  void for_each_block(const Block& block) {
+    block("aov_first", first_);
+    block("aov_nearest", nearest_);
+    block("aov_crypto_object", crypto_[0]);
+    block("aov_crypto_material", crypto_[1]);
+    block("aov_crypto_asset", crypto_[2]);
+    block("aov_parts", parts_);
+    block("aov_light_groups", groups_);
+    block("aov_cost", cost_ns_);
+  }
 
  private:
   static uint32_t level_index(Aov level) {

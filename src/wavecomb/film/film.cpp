@@ -18,11 +18,13 @@ void release(std::vector<T>& values) {
 
 }  // namespace
 
-Film::Film(uint32_t width, uint32_t height, const AovLayout& aovs)
+Film::Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error)
     : width_(width),
       height_(height),
       pixels_(size_t{width} * height),
-      aovs_(size_t{width} * height, aovs) {}
+      aovs_(size_t{width} * height, aovs) {
+  if (with_error) errors_.resize(pixels_.size());
+}
 
 std::vector<float> Film::beauty() const {
   std::vector<float> out(3 * pixels_.size());
@@ -54,10 +56,34 @@ std::vector<uint32_t> Film::samples() const {
   return out;
 }
 
+std::vector<float> Film::variance() const {
+  std::vector<float> out(3 * errors_.size());
+  for (size_t i = 0; i < errors_.size(); ++i) {
+    const double n = pixels_[i].samples;
+    for (size_t c = 0; c < 3; ++c)
+      out[3 * i + c] = n < 2 ? std::numeric_limits<float>::infinity()
+                             : static_cast<float>(errors_[i].m2[c] / (n * (n - 1)));
+  }
+  return out;
+}
+
+std::vector<Film::Block> Film::blocks() {
+  std::vector<Block> out;
+  const auto add = [&](const char* name, auto& values) {
+    if (!values.empty()) out.push_back({name, std::as_writable_bytes(std::span(values))});
+  };
+  add("pixels", pixels_);
+  aovs_.for_each_block(add);
+  add("errors", errors_);
+  return out;
+}
+
 Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
   Layers layers;
   layers.beauty = beauty();
   layers.samples = samples();
+  layers.variance = variance();
+  release(errors_);
   release(pixels_);
   const auto count = [&](size_t i) { return layers.samples[i]; };
   layers.albedo = aovs_.albedo(count);

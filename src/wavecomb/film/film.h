@@ -2,11 +2,14 @@
 /// The picture while it grows.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "wavecomb/film/aov_film.h"
+#include "wavecomb/film/error_sums.h"
 
 namespace wavecomb {
 
@@ -16,7 +19,8 @@ namespace wavecomb {
 /// pixels may be written at once. Row 0 is the top.
 class Film {
  public:
-  Film(uint32_t width, uint32_t height, const AovLayout& aovs);
+  /// `with_error`: keeps what errors and variances are told from.
+  Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error = false);
 
   /// Sums of one pixel.
   struct Pixel {
@@ -26,13 +30,20 @@ class Film {
 
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
+  bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
-  /// What AovFilm calls a pixel.
+  ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
+  /// Number of a pixel, row by row.
   size_t index(uint32_t x, uint32_t y) const { return size_t{y} * width_ + x; }
+  const Pixel& pixel(size_t i) const { return pixels_[i]; }
+  const ErrorSums& error(size_t i) const { return errors_[i]; }
+  size_t pixel_count() const { return pixels_.size(); }
   AovFilm& aovs() { return aovs_; }
   const AovFilm& aovs() const { return aovs_; }
   /// Memory of the sums.
-  size_t bytes() const { return pixels_.size() * sizeof(Pixel) + aovs_.bytes(); }
+  size_t bytes() const {
+    return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums);
+  }
 
   /// Means: rgb interleaved; black where a pixel has no samples.
   std::vector<float> beauty() const;
@@ -43,10 +54,21 @@ class Film {
   /// Mean depth of samples that hit; infinite where none did.
   std::vector<float> depth() const;
   std::vector<uint32_t> samples() const;
+  /// Variance of each pixel's mean, rgb, as if samples were independent; infinite below two
+  /// samples. Empty without error sums.
+  std::vector<float> variance() const;
+
+  /// All that the film holds, for checkpoints: what is copied out of the blocks of one film and
+  /// into those of another of the same size makes it the same.
+  struct Block {
+    std::string name;
+    std::span<std::byte> bytes;
+  };
+  std::vector<Block> blocks();
 
   /// All of these; empty where not kept.
   struct Layers {
-    std::vector<float> beauty, albedo, normal, depth;
+    std::vector<float> beauty, albedo, normal, depth, variance;
     std::vector<uint32_t> samples;
     std::vector<AovLayer> aovs;  ///< of AovFilm::finish
   };
@@ -59,6 +81,7 @@ class Film {
   uint32_t width_, height_;
   std::vector<Pixel> pixels_;
   AovFilm aovs_;
+  std::vector<ErrorSums> errors_;
 };
 
 }  // namespace wavecomb

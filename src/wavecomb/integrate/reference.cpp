@@ -250,6 +250,10 @@ void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock&
             film.index(x, y),
             std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count());
       clock.enter(Phase::kResolve);
+      if (film.has_error()) {
+        const F rgb[3] = {path.radiance.x, path.radiance.y, path.radiance.z};
+        film.error(x, y).add(rgb, sum.samples, {sum.r, sum.g, sum.b});
+      }
       sum.r += path.radiance.x;
       sum.g += path.radiance.y;
       sum.b += path.radiance.z;

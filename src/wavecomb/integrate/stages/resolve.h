@@ -18,6 +18,18 @@ inline void add_rows(const float* rows, size_t first, size_t end, double (&sum)[
     for (size_t c = 0; c < N; ++c) sum[c] += double{rows[s * N + c]};
 }
 
+/// The same rows into the error sums of `pixel`, which does not have them yet.
+inline void add_errors(const float* rows, size_t first, size_t end, const Film::Pixel& pixel,
+                       ErrorSums& errors) {
+  double sum[3] = {pixel.r, pixel.g, pixel.b};
+  uint32_t index = pixel.samples;
+  for (size_t s = first; s < end; ++s, ++index) {
+    const float* rgb = rows + s * PathPool::kRadianceWords;
+    errors.add(rgb, index, sum);
+    for (size_t c = 0; c < 3; ++c) sum[c] += double{rgb[c]};
+  }
+}
+
 }  // namespace detail
 
 /// What slots [slot, end) found beside radiance, into the AOVs of their pixel.
@@ -72,6 +84,7 @@ inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask
     const uint32_t x = task.pixels[i] & 0xffffu, y = task.pixels[i] >> 16;
     const size_t end = slot + task.samples;
     Film::Pixel& pixel = film.pixel(x, y);
+    if (film.has_error()) detail::add_errors(pool.radiance, slot, end, pixel, film.error(x, y));
     double sum[PathPool::kRadianceWords] = {pixel.r, pixel.g, pixel.b};
     detail::add_rows(pool.radiance, slot, end, sum);
     pixel = {sum[0], sum[1], sum[2], pixel.samples + task.samples};

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "watching.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "bind.h"
+#include "wavecomb/core/error.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace wavecomb;
+
+namespace {
+
+using Bytes = nb::ndarray<const uint8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+
+nb::dict status_dict(const RenderStatus& s) {
+  nb::dict d;
+  d["samples_done"] = s.samples_done;
+  d["samples_total"] = s.samples_total;
+  d["resumed_samples"] = s.resumed_samples;
+  d["rays"] = s.rays;
+  d["passes"] = s.passes;
+  d["active_pixels"] = s.active_pixels;
+  d["seconds"] = s.seconds;
+  d["error"] = std::isfinite(s.error) ? nb::cast(s.error) : nb::none();
+  return d;
+}
+
+/// A view of memory that stays for as long as the callback runs.
+nb::object view(const void* data, size_t size) {
+  return nb::cast(nb::ndarray<nb::numpy, const uint8_t>(data, {size}, nb::handle()),
+                  nb::rv_policy::reference);
+}
+
+nb::dict state_dict(const Snapshot& s) {
+  nb::dict d;
+  d["pass.target"] = s.pass.target;
+  d["pass.active"] = view(s.pass.active.data(), s.pass.active.size());
+  for (const Film::Block& block : s.film.blocks())
+    d[("film." + block.name).c_str()] = view(block.bytes.data(), block.bytes.size());
+  return d;
+}
+
+nb::object beauty(const Snapshot& s) {
+  auto* values = new std::vector<float>(s.film.beauty());
+  const nb::capsule owner(values,
+                          [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  const size_t shape[3] = {s.film.height(), s.film.width(), 3};
+  return nb::cast(nb::ndarray<nb::numpy, float>(values->data(), 3, shape, owner));
+}
+
+Request request_of(const nb::object& answer) {
+  if (answer.is_none()) return Request::kGoOn;
+  const auto text = nb::cast<std::string>(answer);
+  if (text == "snapshot") return Request::kSnapshot;
+  if (text == "stop") return Request::kStop;
+  throw Error("a watcher's progress() returned '" + text +
+              "'; it must be None, \"snapshot\" or \"stop\"");
+}
+
+/// The bytes of one entry of a state; throws unless there are `size`.
+Bytes bytes_of(const nb::dict& state, const std::string& key, size_t size) {
+  if (!state.contains(key.c_str()))
+    throw Error("the state to resume from has no '" + key + "'; it is of another build");
+  const auto bytes = nb::cast<Bytes>(state[key.c_str()]);
+  if (bytes.size() != size)
+    throw Error("the state to resume from has " + std::to_string(bytes.size()) + " bytes of '" +
+                key + "', not " + std::to_string(size) + "; it is of another picture");
+  return bytes;
+}
+
+}  // namespace
+
+RenderOptions watched_by(const nb::object& progress, const nb::object& watcher) {
+  RenderOptions options;
+  options.progress = [&](const RenderStatus& s) {
+    const nb::gil_scoped_acquire gil;
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    if (!progress.is_none()) {
+      const nb::object go_on = progress(s.samples_done, s.samples_total);
+      if (!go_on.is_none() && !nb::cast<bool>(go_on)) return Request::kStop;
+    }
+    if (watcher.is_none()) return Request::kGoOn;
+    return request_of(watcher.attr("progress")(status_dict(s)));
+  };
+  if (!watcher.is_none())
+    options.snapshot = [&](const Snapshot& s) {
+      const nb::gil_scoped_acquire gil;
+      watcher.attr("snapshot")(nb::cast(&s, nb::rv_policy::reference));
+    };
+  return options;
+}
+
+std::function<void(Film&, PassState&)> resumed_from(const nb::dict& state) {
+  return [&state](Film& film, PassState& pass) {
+    const nb::gil_scoped_acquire gil;
+    for (const Film::Block& block : film.blocks()) {
+      const Bytes bytes = bytes_of(state, "film." + block.name, block.bytes.size());
+      std::memcpy(block.bytes.data(), bytes.data(), block.bytes.size());
+    }
+    pass.target = nb::cast<uint32_t>(state["pass.target"]);
+    const auto active = nb::cast<Bytes>(state["pass.active"]);
+    if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
+    pass.active.assign(active.data(), active.data() + active.size());
+  };
+}
+
+void bind_watching(nb::module_& m) {
+  nb::class_<Snapshot>(m, "Snapshot")
+      .def_ro("finished", &Snapshot::finished)
+      .def_prop_ro("status", [](const Snapshot& s) { return status_dict(s.status); })
+      .def("beauty", &beauty)
+      .def("state", &state_dict);
+}

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Python's side of watching a render: status, snapshots, and state to resume from.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include "wavecomb/render/renderer.h"
+
+/// Options whose callbacks ask Python's `progress(done, total)` and `watcher`; either may be None.
+/// The callbacks take the GIL; both objects must outlive the render.
+wavecomb::RenderOptions watched_by(const nanobind::object& progress,
+                                   const nanobind::object& watcher);
+/// What RenderOptions::resume is to be for `state`, a Snapshot.state() of before.
+std::function<void(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
+    const nanobind::dict& state);

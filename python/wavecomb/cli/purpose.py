@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options of ``wavecomb render``: when to end, what to keep on the way, how to show it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from wavecomb.cli.options import Real
+from wavecomb.errors import WavecombError
+
+if TYPE_CHECKING:
+    from wavecomb.checkpoint import Checkpoint
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+DEFAULT_SPP = 64
+ADAPTIVE_SPP = 1024
+UNLIMITED_SPP = 1 << 20
+
+_COUNT = click.IntRange(min=1)
+
+
+def purpose_options(command: F) -> F:
+    """--adaptive, --noise, --time-limit, --checkpoint, --resume, --preview, --denoise ..."""
+    for option in reversed(
+        (
+            click.option(
+                "--adaptive",
+                type=Real(0, above=True),
+                metavar="X",
+                help="Samples go where the error of pixels is above X; 0.02 is fine.",
+            ),
+            click.option(
+                "--noise",
+                type=Real(0, above=True),
+                metavar="X",
+                help="Likewise, until the mean relative error of the picture is X: 0.02 is 2 %.",
+            ),
+            click.option(
+                "--min-spp",
+                type=_COUNT,
+                metavar="N",
+                help="With these: samples before the first look at errors.  [default: 16]",
+            ),
+            click.option(
+                "--max-spp",
+                type=_COUNT,
+                metavar="N",
+                help="With these: the most samples a pixel.  [default: 1024]",
+            ),
+            click.option(
+                "--time-limit",
+                type=Real(0, above=True),
+                metavar="S",
+                help="Seconds of rendering. Without --spp as many samples as fit.",
+            ),
+            click.option(
+                "--checkpoint",
+                type=click.Path(),
+                metavar="FILE",
+                help="Saves the state of the render, also on Ctrl-C and SIGTERM.",
+            ),
+            click.option(
+                "--every",
+                type=Real(0, above=True),
+                default=120.0,
+                metavar="S",
+                help="Seconds between checkpoints.  [default: 120]",
+            ),
+            click.option(
+                "--resume",
+                type=click.Path(),
+                metavar="FILE",
+                help="Goes on from a checkpoint, and saves to it unless --checkpoint is given.",
+            ),
+            click.option(
+                "--preview", type=click.Path(), metavar="FILE.png", help="The picture as it grows."
+            ),
+            click.option(
+                "--preview-every",
+                type=Real(0, above=True),
+                default=10.0,
+                metavar="S",
+                help="Seconds between previews.  [default: 10]",
+            ),
+            click.option(
+                "--denoise",
+                is_flag=True,
+                help="Adds the layer denoised, which PNGs then show (extra 'denoise').",
+            ),
+            click.option(
+                "--progress",
+                type=click.Choice(["bar", "json", "off"]),
+                help="json: a line a second on stdout, for programs.  [default: bar]",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True)
+class PurposeOptions:
+    """What ``purpose_options`` gave."""
+
+    adaptive: float | None
+    noise: float | None
+    min_spp: int | None
+    max_spp: int | None
+    time_limit: float | None
+    checkpoint: str | None
+    every: float
+    resume: str | None
+    preview: str | None
+    preview_every: float
+    denoise: bool
+    progress: str | None
+
+    @classmethod
+    def take(cls, options: dict[str, Any]) -> PurposeOptions:
+        """Moves them out of a command's arguments."""
+        return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
+
+    @property
+    def checkpoint_file(self) -> str | None:
+        """Where checkpoints go."""
+        return self.checkpoint if self.checkpoint is not None else self.resume
+
+    def load(self) -> Checkpoint | None:
+        """The checkpoint to resume from. Checks that no other file would be replaced by one."""
+        from wavecomb.checkpoint import check_replaceable, load_checkpoint
+
+        if self.checkpoint is not None:
+            check_replaceable(self.checkpoint)
+        return load_checkpoint(self.resume) if self.resume is not None else None
+
+    def settings(self, spp: int | None, resumed: Checkpoint | None) -> dict[str, Any]:
+        """Settings that were asked for, and the samples a pixel, as ``spp``."""
+        before = resumed.settings if resumed is not None else {}
+        chosen = {
+            name: value
+            for name in ("adaptive", "noise", "min_spp", "time_limit")
+            if (value := getattr(self, name)) is not None
+        }
+        is_adaptive = any({**before, **chosen}.get(name) for name in ("adaptive", "noise"))
+        for name in ("min_spp", "max_spp"):
+            if getattr(self, name) is not None and not is_adaptive:
+                raise WavecombError(
+                    f"--{name.replace('_', '-')} is for adaptive renders: "
+                    "give --adaptive or --noise, too"
+                )
+        if None not in (spp, self.max_spp) and spp != self.max_spp:
+            raise WavecombError(f"--spp is {spp} and --max-spp {self.max_spp}; give one of them")
+        asked = spp if spp is not None else self.max_spp
+        if asked is None and "spp" not in before:
+            if self.time_limit is not None:
+                asked = UNLIMITED_SPP
+            else:
+                asked = ADAPTIVE_SPP if is_adaptive else DEFAULT_SPP
+        if asked is not None:
+            chosen["spp"] = asked
+        return chosen

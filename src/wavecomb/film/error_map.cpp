@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/film/error_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace wavecomb {
+namespace {
+
+/// Sums over rgb: of the pixel's mean, and of its difference from the half's mean.
+struct PixelError {
+  double light = 0, difference = 0;
+  bool known = false;
+};
+
+PixelError pixel_error(const Film::Pixel& p, const ErrorSums& e) {
+  const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
+  if (in_half == n) return {};  // there is no other half
+  const double sums[3] = {p.r, p.g, p.b};
+  // Var(I - A) = var (1 / half - 1 / n), and var / n is asked for: the same where half = n / 2.
+  const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
+  PixelError out;
+  for (size_t c = 0; c < 3; ++c) {
+    const double mean = sums[c] / n;
+    out.light += mean;
+    out.difference += std::abs(mean - e.half[c] / in_half) * scale;
+  }
+  if (!std::isfinite(out.light) || !std::isfinite(out.difference)) out = {};
+  out.known = true;
+  return out;
+}
+
+/// Sums over the window along rows of `length` values that are `step` apart.
+void sum_along(std::vector<float>& values, size_t lines, size_t line_step, size_t length,
+               size_t step) {
+  std::vector<float> line(length);
+  for (size_t l = 0; l < lines; ++l) {
+    float* at = values.data() + l * line_step;
+    for (size_t i = 0; i < length; ++i) line[i] = at[i * step];
+    for (size_t i = 0; i < length; ++i) {
+      const size_t begin = i < kErrorWindow ? 0 : i - kErrorWindow;
+      const size_t end = std::min(length, i + kErrorWindow + 1);
+      float sum = 0;
+      for (size_t k = begin; k < end; ++k) sum += line[k];
+      at[i * step] = sum;
+    }
+  }
+}
+
+}  // namespace
+
+ErrorMap measure_error(const Film& film) {
+  const size_t width = film.width(), height = film.height();
+  ErrorMap map;
+  map.error.resize(width * height);
+  std::vector<float> known(width * height);
+  double light = 0, root = 0, difference = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < map.error.size(); ++i) {
+    const PixelError e = pixel_error(film.pixel(i), film.error(i));
+    if (!e.known) continue;
+    known[i] = 1;
+    ++count;
+    if (!(e.light > 0)) continue;
+    map.error[i] = static_cast<float>(e.difference / std::sqrt(e.light));
+    light += e.light;
+    root += std::sqrt(e.light);
+    difference += e.difference;
+  }
+  for (std::vector<float>* values : {&map.error, &known}) {
+    sum_along(*values, height, width, width, 1);
+    sum_along(*values, width, 1, height, width);
+  }
+  for (size_t i = 0; i < map.error.size(); ++i)
+    map.error[i] = known[i] > 0 ? map.error[i] / known[i] : std::numeric_limits<float>::infinity();
+  if (count == 0) map.mean_relative = std::numeric_limits<double>::infinity();
+  if (light > 0) {
+    map.mean_relative = difference / light;
+    map.even_error = light / root;
+  }
+  return map;
+}
+
+}  // namespace wavecomb

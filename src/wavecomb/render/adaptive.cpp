@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/adaptive.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wavecomb {
+namespace {
+
+/// Spreads marks to kDilation neighbours along lines of `length` values that are `step` apart.
+void dilate_along(std::vector<uint8_t>& marks, size_t lines, size_t line_step, size_t length,
+                  size_t step) {
+  std::vector<uint8_t> line(length);
+  for (size_t l = 0; l < lines; ++l) {
+    uint8_t* at = marks.data() + l * line_step;
+    for (size_t i = 0; i < length; ++i) line[i] = at[i * step];
+    for (size_t i = 0; i < length; ++i) {
+      if (line[i] == 0) continue;
+      const size_t begin = i < kDilation ? 0 : i - kDilation;
+      const size_t end = std::min(length, i + kDilation + 1);
+      for (size_t k = begin; k < end; ++k) at[k * step] = 1;
+    }
+  }
+}
+
+}  // namespace
+
+double error_threshold(const ErrorMap& map, const Settings& settings) {
+  return settings.adaptive > 0 ? double{settings.adaptive} : settings.noise * map.even_error;
+}
+
+AdaptiveCheck check_adaptive(const ErrorMap& map, uint32_t width, std::span<const uint32_t> samples,
+                             const Settings& settings, const PassRules& rules) {
+  const size_t count = samples.size(), height = count / width;
+  const double threshold = error_threshold(map, settings);
+  const bool done = settings.noise > 0 && map.mean_relative <= settings.noise;
+  AdaptiveCheck check;
+  check.active.resize(count);
+  if (!done) {
+    for (size_t i = 0; i < count; ++i) check.active[i] = map.error[i] > threshold;
+    dilate_along(check.active, height, width, width, 1);
+    dilate_along(check.active, width, 1, height, width);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    check.expected_samples += samples[i];
+    if (samples[i] >= rules.spp) check.active[i] = 0;
+    if (check.active[i] == 0) continue;
+    ++check.active_count;
+    const double ratio = threshold > 0 ? map.error[i] / threshold : 2.0;
+    const double needed = std::isfinite(ratio) ? ratio * ratio * samples[i] : rules.spp;
+    const auto next = static_cast<double>(next_check(samples[i], rules));
+    check.expected_samples +=
+        static_cast<uint64_t>(std::clamp(needed, next, static_cast<double>(rules.spp))) -
+        samples[i];
+  }
+  return check;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Which pixels of an adaptive render go on.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/film/error_map.h"
+#include "wavecomb/render/pass_plan.h"
+
+namespace wavecomb {
+
+/// Pixels to each side that go on with one whose error is too large.
+inline constexpr uint32_t kDilation = 2;
+
+/// The error that a pixel may have: the setting, or what a picture of this light and of the mean
+/// relative error that is asked for would have everywhere, were its noise spread evenly.
+double error_threshold(const ErrorMap& map, const Settings& settings);
+
+/// What a look at the errors says.
+struct AdaptiveCheck {
+  std::vector<uint8_t> active;  ///< by pixel; none: the render is done
+  uint64_t active_count = 0;
+  /// Samples that the picture will take in all, if errors fall with the square root of samples.
+  uint64_t expected_samples = 0;
+};
+
+/// Active are the pixels above the threshold, and those around them, that have less than the most
+/// samples. With a noise target none is once the mean relative error is within it. A pixel that
+/// was done goes on again when noise comes up beside it.
+AdaptiveCheck check_adaptive(const ErrorMap& map, uint32_t width, std::span<const uint32_t> samples,
+                             const Settings& settings, const PassRules& rules);
+
+}  // namespace wavecomb

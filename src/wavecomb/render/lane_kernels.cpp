@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/lane_kernels.h"
+
+#include <algorithm>
+#include <string>
+
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+
+LaneKernels lane_kernels(uint32_t lanes) {
+  switch (lanes) {
+#ifdef WAVECOMB_HAS_LANES_1
+    case 1:
+      return {&run_wave<1>, &time_material<1>};
+#endif
+#ifdef WAVECOMB_HAS_LANES_4
+    case 4:
+      return {&run_wave<4>, &time_material<4>};
+#endif
+#ifdef WAVECOMB_HAS_LANES_8
+    case 8:
+      return {&run_wave<8>, &time_material<8>};
+#endif
+#ifdef WAVECOMB_HAS_LANES_16
+    case 16:
+      return {&run_wave<16>, &time_material<16>};
+#endif
+    default:
+      return {};
+  }
+}
+
+std::vector<uint32_t> lane_widths() {
+  std::vector<uint32_t> widths;
+  for (uint32_t w : {1u, 4u, 8u, 16u})
+    if (lane_kernels(w).run) widths.push_back(w);
+  return widths;
+}
+
+uint32_t choose_lanes(uint32_t wanted) {
+  const std::vector<uint32_t> built = lane_widths();
+  if (wanted == 0) return built.back();
+  if (std::find(built.begin(), built.end(), wanted) != built.end()) return wanted;
+  std::string list;
+  for (uint32_t w : built) list += (list.empty() ? "" : ", ") + std::to_string(w);
+  throw Error("lanes is " + std::to_string(wanted) + ", which the " + library_name() +
+              " library has no kernels for; it has " + list);
+}
+
+const char* library_name() {
+  return WAVECOMB_LIBRARY;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The kernels of each lane width that this build has.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "wavecomb/integrate/wave.h"
+
+namespace wavecomb {
+
+/// The kernels of one width.
+struct LaneKernels {
+  void (*run)(Wave&, const WaveContext&, const WaveTask&) = nullptr;
+  double (*time_material)(Wave&, const WaveContext&, const CalibrationHits&) = nullptr;
+};
+
+/// Null pointers for a width that this build has no kernels for.
+LaneKernels lane_kernels(uint32_t lanes);
+/// Lane widths that this build has kernels for, ascending.
+std::vector<uint32_t> lane_widths();
+/// The width to use where `wanted` is asked for; 0: the widest. Throws Error for one that is not
+/// there.
+uint32_t choose_lanes(uint32_t wanted);
+/// The -march that this library is compiled with: "native", "x86-64-v3" ...; "default" without one.
+const char* library_name();
+
+}  // namespace wavecomb

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pass_loop.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "wavecomb/render/adaptive.h"
+#include "wavecomb/render/pixel_order.h"
+
+namespace wavecomb {
+
+PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film& film,
+                   PassRunner& runner, RenderCosts& costs, Watch& watch)
+    : settings_(settings),
+      rules_{settings.spp, settings.min_spp, settings.is_adaptive(), settings.time_limit > 0, step},
+      pass_(std::move(pass)),
+      film_(film),
+      runner_(runner),
+      costs_(costs),
+      watch_(watch),
+      order_(morton_pixel_order(settings.width, settings.height)) {
+  const std::vector<uint32_t> samples = film.samples();
+  resumed_samples_ = std::accumulate(samples.begin(), samples.end(), uint64_t{0});
+  for (size_t i = 0; i < samples.size(); ++i) active_pixels_ += pass_.is_active(i) ? 1 : 0;
+  expected_samples_ =
+      uint64_t{rules_.adaptive ? next_check(0, rules_) : rules_.spp} * samples.size();
+}
+
+void PassLoop::run() {
+  for (;;) {
+    const std::vector<uint32_t> samples = film_.samples();
+    const PassPlan plan = plan_pass(order_, film_.width(), samples, pass_);
+    if (plan.batches.empty()) {
+      if (!begin_pass(samples)) return;
+      continue;
+    }
+    const uint64_t before = runner_.samples_done();
+    const double begin = seconds();
+    runner_.run(plan, [this] { return watch_.halted() || is_late(); });
+    samples_per_s_ =
+        static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
+    for (Worker& worker : runner_.workers())
+      if (worker.wave) costs_.take(worker.wave->costs);
+    costs_.merge();
+    if (watch_.stopped() || is_late()) return;
+    watch_.rest();
+  }
+}
+
+bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
+  const uint32_t done = pass_.target;
+  if (done > 0 && film_.has_error()) {
+    const ErrorMap map = measure_error(film_);
+    error_ = map.mean_relative;
+    if (rules_.adaptive && is_check(done, rules_)) {
+      AdaptiveCheck check = check_adaptive(map, film_.width(), samples, settings_, rules_);
+      pass_.active = std::move(check.active);
+      active_pixels_ = check.active_count;
+      expected_samples_ = check.expected_samples;
+    }
+  }
+  const uint64_t active = active_pixels_;
+  if (active == 0 || (done >= rules_.spp && !rules_.adaptive)) return false;
+  const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
+  // Pixels of an adaptive render that go on late catch up.
+  pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
+  may_be_cut_ = done > 0;
+  ++passes_;
+  return true;
+}
+
+bool PassLoop::is_late() const {
+  return rules_.timed && may_be_cut_ && seconds() >= settings_.time_limit;
+}
+
+double PassLoop::seconds() const {
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+RenderStatus PassLoop::status() const {
+  RenderStatus s;
+  s.resumed_samples = resumed_samples_;
+  s.samples_done = resumed_samples_ + runner_.samples_done();
+  s.samples_total = std::max(expected_samples_.load(), s.samples_done);
+  s.rays = runner_.rays_done();
+  s.passes = passes_;
+  s.active_pixels = active_pixels_;
+  s.seconds = seconds();
+  s.error = error_;
+  if (rules_.timed && s.seconds > 0) {
+    const double left = std::max(0.0, settings_.time_limit - s.seconds);
+    const double more = static_cast<double>(runner_.samples_done()) * left / s.seconds;
+    s.samples_total = std::min(s.samples_total, s.samples_done + static_cast<uint64_t>(more));
+  }
+  return s;
+}
+
+}  // namespace wavecomb

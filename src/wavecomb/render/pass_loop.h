@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Pass after pass, until the picture is what the settings ask for.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "wavecomb/film/film.h"
+#include "wavecomb/render/pass_plan.h"
+#include "wavecomb/render/pass_runner.h"
+#include "wavecomb/render/render_costs.h"
+#include "wavecomb/render/watch.h"
+
+namespace wavecomb {
+
+/// Where a render stands.
+struct RenderStatus {
+  uint64_t samples_done = 0;  ///< those of a checkpoint too
+  uint64_t resumed_samples = 0;
+  uint64_t samples_total = 0;  ///< in all; adaptive or timed: as expected by now
+  uint64_t rays = 0;           ///< of all kinds, since the render began or was resumed
+  uint32_t passes = 0;         ///< begun
+  uint64_t active_pixels = 0;  ///< of the pass
+  double seconds = 0;          ///< since the render began or was resumed
+  /// Mean relative error of the picture at the last look; infinite: not known.
+  double error = std::numeric_limits<double>::infinity();
+};
+
+/// Contract: run() on one thread, within the runner's arena; status() on any. What is rendered
+/// depends on film, settings and pass alone, but where there is a time limit.
+class PassLoop {
+ public:
+  /// `pass`: of the film, where it comes from a checkpoint. `step`: samples a pixel that a pass of
+  /// a render that is not adaptive adds.
+  PassLoop(const Settings& settings, uint32_t step, PassState pass, Film& film, PassRunner& runner,
+           RenderCosts& costs, Watch& watch);
+
+  void run();
+  RenderStatus status() const;
+  /// While the work stands still.
+  const PassState& pass() const { return pass_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// Decides on the next pass. False: the picture is done.
+  bool begin_pass(std::span<const uint32_t> samples);
+  bool is_late() const;
+  double seconds() const;
+
+  const Settings& settings_;
+  PassRules rules_;
+  PassState pass_;
+  Film& film_;
+  PassRunner& runner_;
+  RenderCosts& costs_;
+  Watch& watch_;
+  std::vector<uint32_t> order_;
+  Clock::time_point start_ = Clock::now();
+  uint64_t resumed_samples_ = 0;
+  double samples_per_s_ = 0;  ///< of the last pass
+  std::atomic<bool> may_be_cut_{false};
+  std::atomic<uint32_t> passes_{0};
+  std::atomic<uint64_t> expected_samples_{0}, active_pixels_{0};
+  std::atomic<double> error_{std::numeric_limits<double>::infinity()};
+};
+
+}  // namespace wavecomb

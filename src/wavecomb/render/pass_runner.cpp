@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pass_runner.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "wavecomb/core/denormals.h"
+#include "wavecomb/integrate/reference.h"
+
+namespace wavecomb {
+
+std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uint32_t threads) {
+  std::vector<WaveGroup> groups;
+  // What is left near the end may be few pixels with many samples each: share them out.
+  const size_t most = (plan.pixels.size() + size_t{threads} * 4 - 1) / (size_t{threads} * 4);
+  for (const PassBatch& batch : plan.batches) {
+    const size_t fill = std::max(1u, wave_size / std::min(batch.samples, wave_size));
+    const auto count = static_cast<uint32_t>(std::max<size_t>(1, std::min(fill, most)));
+    const uint32_t wave_samples = std::min(batch.samples, wave_size / count);
+    for (size_t p = batch.begin; p < batch.end; p += count)
+      groups.push_back({plan.pixels.data() + p,
+                        static_cast<uint32_t>(std::min<size_t>(count, batch.end - p)),
+                        batch.first_sample, batch.samples, wave_samples});
+  }
+  return groups;
+}
+
+PassRunner::PassRunner(const WaveContext& context, const LaneKernels& kernels, bool reference,
+                       uint32_t threads, uint32_t wave_size)
+    : context_(context),
+      kernels_(kernels),
+      reference_(reference),
+      wave_size_(wave_size),
+      workers_(threads) {}
+
+void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) {
+  const std::vector<WaveGroup> groups = wave_groups(plan, wave_size_, threads());
+  tbb::parallel_for(
+      tbb::blocked_range<size_t>(0, groups.size(), 1),
+      [&](const tbb::blocked_range<size_t>& range) {
+        for (size_t g = range.begin(); g != range.end(); ++g) {
+          const WaveGroup& group = groups[g];
+          for (uint32_t done = 0; done < group.samples && !halted(); done += group.wave_samples)
+            run_wave({group.pixels, group.pixel_count, group.first_sample + done,
+                      std::min(group.wave_samples, group.samples - done)});
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+void PassRunner::run_wave(const WaveTask& task) {
+  Worker& worker = workers_[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
+  const DenormalsOff denormals_off;
+  const auto rays = [](const Counts& counts) { return counts.rays + counts.shadow_rays; };
+  if (!reference_ && !worker.wave) worker.wave = std::make_unique<Wave>(wave_size_, context_);
+  const Counts& counts = reference_ ? worker.counts : worker.wave->counts;
+  const uint64_t before = rays(counts);
+  if (reference_)
+    run_reference(context_, task, worker.clock, worker.counts);
+  else
+    kernels_.run(*worker.wave, context_, task);
+  rays_ += rays(counts) - before;
+  if (samples_.fetch_add(task.path_count()) == 0)
+    first_samples_s_ =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+}  // namespace wavecomb

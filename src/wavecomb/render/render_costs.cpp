@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/render_costs.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "wavecomb/core/denormals.h"
+
+namespace wavecomb {
+namespace {
+
+/// Costs measured on synthetic hits: the quickest of three runs each.
+CostSnapshot calibrate(const Scene& scene, const WaveContext& context, const LaneKernels& kernels) {
+  constexpr uint32_t kRecords = 256;
+  Wave wave(kRecords, context);
+  CostSnapshot costs = model_costs(scene);
+  CostTracker tracker(context.traits.size());
+  for (CalibrationHits& hits : find_calibration_hits(scene)) {
+    hits.count = kRecords;
+    double ns = kernels.time_material(wave, context, hits);
+    for (int repeat = 0; repeat < 2; ++repeat)
+      ns = std::min(ns, kernels.time_material(wave, context, hits));
+    const std::vector<uint32_t> materials(hits.count, hits.material);
+    tracker.charge(materials, ns);
+  }
+  std::fill(costs.texture_ns.begin(), costs.texture_ns.end(), 0.f);
+  merge_costs(tracker, context.traits, 1.f, costs);
+  return costs;
+}
+
+}  // namespace
+
+RenderCosts::RenderCosts(const Scene& scene, std::span<const MaterialTraits> traits,
+                         const Settings& settings)
+    : order(model_costs(scene)),
+      roulette(order),
+      scene_(scene),
+      traits_(traits),
+      settings_(settings),
+      measures_(settings.costs != CostSource::kModel &&
+                settings.integrator == IntegratorKind::kWavefront),
+      measured_(traits.size()),
+      total_ns_(traits.size()),
+      total_timed_(traits.size()),
+      calibrated_(order) {}
+
+void RenderCosts::start(const WaveContext& context, const LaneKernels& kernels,
+                        const CostProfile* profile) {
+  if (measures_) {
+    const DenormalsOff denormals_off;
+    const auto begin = std::chrono::steady_clock::now();
+    order = calibrate(scene_, context, kernels);
+    calibration_s_ =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+  if (profile) apply(*profile);
+  calibrated_ = order;
+  // Roulette decides over the picture: it keeps to costs that do not vary, unless told otherwise.
+  if (settings_.costs == CostSource::kMeasured || profile) roulette = order;
+}
+
+void RenderCosts::merge() {
+  for (size_t m = 0; m < total_ns_.size(); ++m) {
+    total_ns_[m] += measured_.ns()[m];
+    total_timed_[m] += measured_.timed()[m];
+  }
+  if (!measures_) return;
+  const CostPrediction p = merge_costs(measured_, traits_, settings_.cost_weight, order);
+  if (p.materials > 0) prediction_ = p;
+  if (settings_.costs == CostSource::kMeasured) roulette = order;
+  measured_ = CostTracker(traits_.size());
+}
+
+CostProfile RenderCosts::profile() const {
+  CostProfile profile;
+  for (size_t m = 0; m < order.material_ns.size(); ++m)
+    profile.materials.emplace_back(scene_.materials()[m].name, order.material_ns[m]);
+  for (size_t t = 0; t < order.texture_ns.size(); ++t)
+    profile.textures.emplace_back(scene_.textures()[t]->name(), order.texture_ns[t]);
+  return profile;
+}
+
+void RenderCosts::apply(const CostProfile& profile) {
+  const auto find = [](const auto& entries, const std::string& name) {
+    for (const auto& [entry, ns] : entries)
+      if (entry == name) return ns;
+    return 0.f;
+  };
+  for (size_t m = 0; m < order.material_ns.size(); ++m)
+    if (const float ns = find(profile.materials, scene_.materials()[m].name); ns > 0)
+      order.material_ns[m] = ns;
+  for (size_t t = 0; t < order.texture_ns.size(); ++t)
+    if (const float ns = find(profile.textures, scene_.textures()[t]->name()); ns > 0)
+      order.texture_ns[t] = ns;
+  double sum = 0;
+  for (float ns : order.material_ns) sum += ns;
+  order.mean_ns = static_cast<float>(sum / static_cast<double>(order.material_ns.size()));
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/render_statistics.h"
+
+#include <cstddef>
+
+namespace wavecomb {
+namespace {
+
+/// Counts by depth, without the depths that nothing reached.
+template <typename Counts>
+std::vector<uint64_t> reached(const Counts& at) {
+  size_t n = at.size();
+  while (n > 0 && at[n - 1] == 0) --n;
+  return {at.begin(), at.begin() + static_cast<std::ptrdiff_t>(n)};
+}
+
+std::vector<MaterialStatistics> material_statistics(const std::vector<Worker>& workers,
+                                                    const WaveContext& context, const Scene& scene,
+                                                    const RenderCosts& costs) {
+  std::vector<MaterialStatistics> out;
+  for (size_t m = 0; m < context.traits.size(); ++m) {
+    MaterialStatistics material;
+    material.name = scene.materials()[m].name;
+    material.program = kProgramNames[context.traits[m].program];
+    for (const Worker& worker : workers)
+      if (worker.wave) material.records += worker.wave->costs.seen()[m];
+    material.timed_records = costs.total_timed()[m];
+    if (material.timed_records > 0)
+      material.measured_ns = costs.total_ns()[m] / static_cast<double>(material.timed_records);
+    material.calibrated_ns = costs.calibrated().material_ns[m];
+    material.predicted_ns = costs.order.material_ns[m];
+    out.push_back(std::move(material));
+  }
+  return out;
+}
+
+}  // namespace
+
+void add_up(const std::vector<Worker>& workers, const WaveContext& context, const Scene& scene,
+            const RenderCosts& costs, RenderStatistics& s) {
+  PhaseClock clock;
+  Counts counts;
+  CoherenceCounts coherence;
+  std::vector<uint64_t> uses(context.policies.size());
+  for (const Worker& worker : workers) {
+    clock.add(worker.clock);
+    counts.add(worker.counts);
+    if (!worker.wave) continue;
+    const Wave& wave = *worker.wave;
+    clock.add(wave.clock);
+    counts.add(wave.counts);
+    coherence.add(wave.coherence);
+    s.wave_bytes += wave.bytes();
+    for (size_t p = 0; p < uses.size(); ++p) uses[p] += wave.policy_chooser.used()[p];
+  }
+  for (size_t i = 0; i < kPhaseCount; ++i)
+    s.phases_s.emplace_back(kPhaseNames[i], 1e-9 * static_cast<double>(clock.ns()[i]));
+  s.samples = counts.samples;
+  s.rays = counts.rays;
+  s.shadow_rays = counts.shadow_rays;
+  s.records = counts.records;
+  s.packets = counts.packets;
+  s.packet_lanes = counts.packet_lanes;
+  s.rays_at = reached(counts.rays_at);
+  s.shadow_rays_at = reached(counts.shadow_rays_at);
+  s.records_at = reached(counts.records_at);
+  s.run_length = coherence.run_length();
+  s.material_homogeneity = coherence.material_homogeneity();
+  s.texture_homogeneity = coherence.texture_homogeneity();
+  s.materials = material_statistics(workers, context, scene, costs);
+  s.cost_r2 = costs.prediction().r2;
+  s.cost_mean_error = costs.prediction().mean_error;
+  s.cost_materials = costs.prediction().materials;
+  s.calibration_s = costs.calibration_s();
+  if (uses.size() > 1)
+    for (size_t p = 0; p < uses.size(); ++p)
+      s.policy_uses.emplace_back(std::string(context.policies[p]->name()), uses[p]);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What a render took.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "wavecomb/render/pass_runner.h"
+#include "wavecomb/render/render_costs.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// What became of one material.
+struct MaterialStatistics {
+  std::string name, program;
+  uint64_t records = 0;  ///< shading hits
+  uint64_t timed_records = 0;
+  double measured_ns = 0;    ///< per record, over the timed ones; 0 where none was timed
+  double calibrated_ns = 0;  ///< before the first pass
+  double predicted_ns = 0;   ///< by the costs that the next pass would be scheduled by
+};
+
+/// What a render took. Phase times are sums over workers.
+struct RenderStatistics {
+  double build_s = 0, render_s = 0;
+  double first_samples_s = 0;  ///< of render_s, until the first wave was done
+  std::vector<std::pair<std::string, double>> phases_s;
+  uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
+  uint64_t packets = 0, packet_lanes = 0;
+  uint32_t threads = 0, wave_size = 0, lanes = 0;
+  uint32_t passes = 0;           ///< begun
+  uint64_t resumed_samples = 0;  ///< that a checkpoint brought; not in `samples`
+  double error = 0;              ///< mean relative error of the picture; infinite: not known
+  SceneBytes scene_bytes;
+  uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
+  bool cancelled = false;  ///< by whoever watched; not by a time limit
+  // Per depth; the last entry holds all deeper ones.
+  std::vector<uint64_t> rays_at, shadow_rays_at, records_at;
+  double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
+  std::vector<MaterialStatistics> materials;
+  double cost_r2 = 0, cost_mean_error = 0;  ///< of predictions for the last pass that had any
+  uint64_t cost_materials = 0;              ///< how many materials that compares; 0: no prediction
+  std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
+  double calibration_s = 0;
+};
+
+/// Adds up what the workers counted, by phase, depth, policy and material, into `statistics`.
+void add_up(const std::vector<Worker>& workers, const WaveContext& context, const Scene& scene,
+            const RenderCosts& costs, RenderStatistics& statistics);
+
+}  // namespace wavecomb

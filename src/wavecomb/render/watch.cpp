@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/watch.h"
+
+#include <chrono>
+#include <exception>
+#include <thread>
+
+namespace wavecomb {
+
+void Watch::run(const std::function<void()>& work, const std::function<Request()>& look,
+                const std::function<void()>& snapshot) {
+  std::exception_ptr failure, thrown;
+  std::thread runner([&] {
+    std::exception_ptr error;
+    try {
+      work();
+    } catch (...) {
+      error = std::current_exception();
+    }
+    const std::lock_guard lock(mutex_);
+    failure = error;
+    finished_ = true;
+    changed_.notify_all();
+  });
+  std::unique_lock lock(mutex_);
+  while (!finished_) {
+    const bool is_called = changed_.wait_for(lock, std::chrono::milliseconds(100),
+                                             [&] { return finished_ || resting_; });
+    if (finished_) break;
+    if (!is_called && wanted_) continue;  // it has been asked to come to rest
+    const bool takes_snapshot = resting_;
+    lock.unlock();
+    Request request = Request::kGoOn;
+    try {
+      if (takes_snapshot)
+        snapshot();
+      else if (!thrown)
+        request = look();
+    } catch (...) {
+      thrown = std::current_exception();
+      request = Request::kStop;
+    }
+    lock.lock();
+    if (request == Request::kStop) stop();
+    if (takes_snapshot) {
+      wanted_ = resting_ = false;
+      halted_ = stopped_.load();
+      changed_.notify_all();
+    } else if (request == Request::kSnapshot && snapshot) {
+      wanted_ = halted_ = true;
+    }
+  }
+  lock.unlock();
+  runner.join();
+  if (thrown) std::rethrow_exception(thrown);
+  if (failure) std::rethrow_exception(failure);
+}
+
+void Watch::rest() {
+  std::unique_lock lock(mutex_);
+  if (!wanted_) return;
+  resting_ = true;
+  changed_.notify_all();
+  changed_.wait(lock, [&] { return !resting_; });
+}
+
+void Watch::stop() {
+  stopped_ = halted_ = true;
+}
+
+}  // namespace wavecomb

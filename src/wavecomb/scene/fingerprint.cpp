@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/fingerprint.h"
+
+#include <cstring>
+#include <span>
+#include <string_view>
+#include <type_traits>
+
+namespace wavecomb {
+namespace {
+
+/// FNV-1a over words of eight bytes, finished by MurmurHash3's 64-bit mix. No defence against
+/// somebody who wants two scenes to look alike.
+class Hash {
+ public:
+  void add_bytes(const void* data, size_t size) {
+    add_word(size);
+    const auto* p = static_cast<const char*>(data);
+    for (; size >= 8; p += 8, size -= 8) {
+      uint64_t word;
+      std::memcpy(&word, p, 8);
+      add_word(word);
+    }
+    uint64_t rest = 0;
+    std::memcpy(&rest, p, size);
+    add_word(rest);
+  }
+  template <typename T>
+  void add_array(std::span<const T> values) {
+    static_assert(std::is_arithmetic_v<T>);
+    add_bytes(values.data(), values.size_bytes());
+  }
+  template <typename... T>
+  void add(const T&... values) {
+    (add_one(values), ...);
+  }
+  uint64_t value() const {
+    uint64_t h = state_;
+    h = (h ^ (h >> 33)) * 0xff51afd7ed558ccdull;
+    h = (h ^ (h >> 33)) * 0xc4ceb9fe1a85ec53ull;
+    return h ^ (h >> 33);
+  }
+
+ private:
+  template <typename T>
+  void add_one(const T& value) {
+    if constexpr (std::is_enum_v<T>)
+      add_word(static_cast<uint64_t>(value));
+    else if constexpr (std::is_arithmetic_v<T>)
+      add_bytes(&value, sizeof(T));
+    else
+      add_array(std::span<const float>(&value.x, 3));
+  }
+  void add_one(const Affine& m) { add(m.row[0], m.row[1], m.row[2], m.t); }
+  void add_word(uint64_t word) {
+    state_ = (state_ ^ word) * 0x100000001b3ull;
+    state_ ^= state_ >> 32;  // so that high bits come down to low ones
+  }
+
+  uint64_t state_ = 0xcbf29ce484222325ull;
+};
+
+uint64_t hash_geometry(const Scene& scene) {
+  Hash h;
+  for (const Mesh& m : scene.meshes()) {
+    h.add_array(m.positions);
+    h.add_array(m.indices);
+    h.add_array(m.normals);
+    h.add_array(m.uvs);
+    h.add_array(m.face_materials);
+    h.add(m.normals_at, m.uvs_at, m.material);
+  }
+  for (const Group& group : scene.groups()) h.add_array(std::span<const uint32_t>(group.meshes));
+  for (const Instance& i : scene.instances()) h.add(i.group, i.to_world, i.material);
+  return h.value();
+}
+
+uint64_t hash_materials(const Scene& scene) {
+  Hash h;
+  for (const Material& m : scene.materials()) {
+    h.add(m.program, m.base_color, m.specular_color, m.emission, m.roughness, m.metallic,
+          m.clearcoat, m.clearcoat_roughness, m.opacity, m.ior, m.opacity_threshold,
+          m.conductor_eta, m.conductor_k, m.specular_workflow, m.presence);
+    for (const TextureUse& use : m.textures) {
+      h.add(use.texture, use.channel);
+      h.add_array(std::span<const float>(use.scale));
+      h.add_array(std::span<const float>(use.bias));
+      h.add_array(std::span<const float>(use.uv));
+    }
+  }
+  return h.value();
+}
+
+uint64_t hash_textures(const Scene& scene) {
+  Hash h;
+  for (const auto& texture : scene.textures()) {
+    const TextureView& v = texture->view();
+    h.add(v.format, v.channels, v.srgb, v.has_alpha, v.wrap_s, v.wrap_t, v.level_count);
+    for (uint32_t l = 0; l < v.level_count; ++l) h.add(v.levels[l].width, v.levels[l].height);
+    h.add_bytes(v.texels, texture->bytes());
+  }
+  return h.value();
+}
+
+uint64_t hash_lights(const Scene& scene) {
+  Hash h;
+  for (const Light& l : scene.lights())
+    h.add(l.kind, l.to_world, l.color, l.width, l.height, l.radius, l.angle, l.normalize, l.texture,
+          l.group);
+  for (const Mesh& m : scene.meshes()) h.add(m.light_group);
+  return h.value();
+}
+
+/// What AOVs call things: meshes, the ways to their instances, materials, lights, light groups.
+uint64_t hash_names(const Scene& scene) {
+  Hash h;
+  const auto add = [&](std::string_view text) { h.add_bytes(text.data(), text.size()); };
+  for (const Mesh& m : scene.meshes()) {
+    add(m.name);
+    h.add(m.asset_length);
+  }
+  for (const Group& group : scene.groups()) add(group.root);
+  for (const Placement& p : scene.placements()) {
+    h.add(p.parent, p.group, p.number);
+    if (p.name == kNoName) continue;
+    const PlacementName name = scene.names()[p.name];
+    add(name.text);
+    h.add(name.asset_length);
+  }
+  for (const Material& m : scene.materials()) add(m.name);
+  for (const Light& l : scene.lights()) add(l.name);
+  for (const std::string& group : scene.light_groups()) add(group);
+  return h.value();
+}
+
+uint64_t hash_camera(const Scene& scene) {
+  Hash h;
+  const Camera& c = scene.camera();
+  h.add(c.to_world, c.lens_radius, c.focus_distance, c.near_clip, c.far_clip);
+  h.add_array(std::span<const float>(c.window));
+  return h.value();
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene) {
+  return {{"geometry", hash_geometry(scene)}, {"materials", hash_materials(scene)},
+          {"textures", hash_textures(scene)}, {"lights", hash_lights(scene)},
+          {"camera", hash_camera(scene)},     {"names", hash_names(scene)}};
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Tells one scene from another, part by part.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Hashes of what decides over the picture: "geometry", "materials", "textures", "lights",
+/// "camera". Names are not part of it. Reads every array of the scene once.
+std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene);
+
+}  // namespace wavecomb

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/watch.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+namespace wavecomb {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(Watch, WorkThatIsQuickIsNotLookedAt) {
+  int looks = 0;
+  bool done = false;
+  Watch watch;
+  watch.run([&] { done = true; }, [&] { return ++looks, Request::kGoOn; }, {});
+  EXPECT_TRUE(done);
+  EXPECT_EQ(looks, 0);
+  EXPECT_FALSE(watch.stopped());
+}
+
+TEST(Watch, StopsWork) {
+  Watch watch;
+  watch.run(
+      [&] {
+        while (!watch.halted()) std::this_thread::sleep_for(1ms);
+        EXPECT_TRUE(watch.stopped());
+      },
+      [] { return Request::kStop; }, {});
+  EXPECT_TRUE(watch.stopped());
+}
+
+TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
+  Watch watch;
+  uint64_t steps = 0;  // no atomic: the snapshot may read it
+  uint64_t last = 0;
+  int snapshots = 0;
+  watch.run(
+      [&] {
+        while (snapshots < 3) {
+          while (!watch.halted()) {
+            ++steps;
+            std::this_thread::sleep_for(100us);
+          }
+          EXPECT_FALSE(watch.stopped());
+          watch.rest();
+          EXPECT_FALSE(watch.halted());
+        }
+      },
+      [] { return Request::kSnapshot; },
+      [&] {
+        const uint64_t before = steps;
+        std::this_thread::sleep_for(10ms);
+        EXPECT_EQ(steps, before);
+        EXPECT_GT(steps, last);
+        last = steps;
+        ++snapshots;
+      });
+  EXPECT_EQ(snapshots, 3);
+}
+
+TEST(Watch, RestReturnsWhereNothingIsWanted) {
+  Watch watch;
+  watch.run([&] { watch.rest(); }, [] { return Request::kGoOn; }, {});
+}
+
+TEST(Watch, WhatIsThrownComesOut) {
+  const auto until_halted = [](Watch& watch) {
+    while (!watch.halted()) std::this_thread::sleep_for(1ms);
+    watch.rest();
+    while (!watch.stopped()) std::this_thread::sleep_for(1ms);
+  };
+  Watch work, look, snapshot;
+  EXPECT_THROW(
+      work.run([] { throw std::runtime_error("work"); }, [] { return Request::kGoOn; }, {}),
+      std::runtime_error);
+  EXPECT_THROW(look.run([&] { until_halted(look); },
+                        []() -> Request { throw std::logic_error("look"); }, {}),
+               std::logic_error);
+  EXPECT_THROW(snapshot.run([&] { until_halted(snapshot); }, [] { return Request::kSnapshot; },
+                            [] { throw std::logic_error("snapshot"); }),
+               std::logic_error);
+}
+
+}  // namespace
+}  // namespace wavecomb

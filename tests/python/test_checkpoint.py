@@ -1,0 +1,357 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checkpoints: whatever stops a render, it goes on as if nothing had."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wavecomb
+from wavecomb.checkpoint import load_checkpoint, save_checkpoint
+from wavecomb.errors import WavecombError
+from wavecomb.image import read_layers
+
+_core = pytest.importorskip("wavecomb._core")
+
+LAYERS = ("beauty", "albedo", "normal", "depth", "samples")
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wavecomb.scenes import write_scene
+
+    path: Path = tmp_path_factory.mktemp("stages") / "cornell.usdc"
+    write_scene("cornell", path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cornell(stage: Path) -> Any:
+    return wavecomb.load(stage)
+
+
+class StopAt:
+    """Stops a render after so many snapshots, and keeps the state of the last."""
+
+    def __init__(self, snapshots: int) -> None:
+        self._left = snapshots
+        self.state: dict[str, Any] = {}
+
+    def progress(self, status: dict[str, Any]) -> str:
+        return "snapshot" if self._left > 0 else "stop"
+
+    def snapshot(self, snapshot: Any) -> None:
+        self._left -= 1
+        self.state = {
+            name: value.copy() if hasattr(value, "copy") else value
+            for name, value in snapshot.state().items()
+        }
+
+
+@pytest.mark.parametrize(
+    "ending", [{"spp": 700}, {"noise": 0.015, "spp": 4096}, {"adaptive": 0.02, "spp": 4096}]
+)
+def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
+    settings = _core.Settings(width=48, height=40, error=True, aovs=_core.AOVS, **ending)
+    whole = _core.render(cornell.scene, settings)
+    state: dict[str, Any] | None = None
+    runs = 0
+    for _ in range(200):
+        watcher = StopAt(random.Random(runs).randrange(2))
+        changed = _core.Settings(
+            width=48, height=40, error=True, aovs=_core.AOVS, **ending,
+            threads=1 + runs % 2, wave_size=(64, 4096, 1000)[runs % 3],
+        )  # fmt: skip
+        result = _core.render(cornell.scene, changed, watcher=watcher, state=state)
+        state = watcher.state
+        runs += 1
+        if not result.cancelled:
+            break
+    assert not result.cancelled
+    assert runs > 1, "or nothing was resumed"
+    for layer in (*LAYERS, "error", "variance"):
+        assert getattr(result, layer).tobytes() == getattr(whole, layer).tobytes(), layer
+    assert len(whole.aovs) >= 12
+    for name, aov in whole.aovs.items():
+        if name != "cost":  # is a time
+            assert result.aovs[name].tobytes() == aov.tobytes(), name
+    assert result.stats["resumed_samples"] > 0
+
+
+def test_snapshots_change_nothing(cornell: Any) -> None:
+    class Often:
+        taken = 0
+
+        def progress(self, status: dict[str, Any]) -> str:
+            assert 0 <= status["samples_done"] <= status["samples_total"]
+            return "snapshot"
+
+        def snapshot(self, snapshot: Any) -> None:
+            assert np.isfinite(snapshot.beauty()).all()
+            self.taken += 1
+
+    settings = _core.Settings(width=64, height=64, spp=800)
+    watcher = Often()
+    watched = _core.render(cornell.scene, settings, watcher=watcher)
+    assert watcher.taken > 2
+    assert watched.beauty.tobytes() == _core.render(cornell.scene, settings).beauty.tobytes()
+
+
+def test_what_a_watcher_throws_comes_out(cornell: Any) -> None:
+    class Broken:
+        def __init__(self, where: str) -> None:
+            self.where = where
+
+        def progress(self, status: dict[str, Any]) -> str:
+            if self.where == "progress":
+                raise RuntimeError("no more")
+            return "snapshot" if self.where == "snapshot" else "dance"
+
+        def snapshot(self, snapshot: Any) -> None:
+            raise RuntimeError("no more")
+
+    settings = _core.Settings(width=64, height=64, spp=1 << 20)
+    for where, says in (("progress", "no more"), ("snapshot", "no more"), ("answer", "dance")):
+        with pytest.raises((RuntimeError, _core.Error), match=says):
+            _core.render(cornell.scene, settings, watcher=Broken(where))
+
+
+def test_checkpoint_and_resume_from_python(cornell: Any, tmp_path: Path) -> None:
+    file = tmp_path / "a.ckpt"
+    settings: dict[str, Any] = {"size": (24, 24), "error": True}
+    half = wavecomb.render(cornell, spp=64, checkpoint=file, **settings)
+    assert file.exists()
+    # A render that is not adaptive may go on to more samples.
+    more = wavecomb.render(cornell, spp=128, resume=file, **settings)
+    whole = wavecomb.render(cornell, spp=128, **settings)
+    assert more.beauty.tobytes() == whole.beauty.tobytes()
+    assert more.stats["resumed_samples"] == half.samples.sum()
+    # What is done is done.
+    again = wavecomb.render(cornell, spp=64, resume=file, **settings)
+    assert again.beauty.tobytes() == half.beauty.tobytes()
+    assert again.stats["counts"]["samples"] == 0
+    with pytest.raises(WavecombError, match="was made with spp 64, and this render has 32"):
+        wavecomb.render(cornell, spp=32, resume=file, **settings)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"size": (24, 23)}, "size 24 x 24, and this render has 24 x 23"),
+    ({"seed": 1}, "seed 0, and this render has 1"),
+    ({"max_depth": 3}, "max-depth 8, and this render has 3"),
+    ({"filter_width": 2.0}, "filter-width 3.0, and this render has 2.0"),
+    ({"noise": 0.1}, "noise 0.0, and this render has"),
+    ({"error": True}, "error False, and this render has True"),
+]
+
+
+def test_refusals_name_the_difference(cornell: Any, tmp_path: Path) -> None:
+    file = tmp_path / "a.ckpt"
+    plain: dict[str, Any] = {"size": (24, 24), "spp": 16}
+    wavecomb.render(cornell, checkpoint=file, **plain)
+    for settings, says in REFUSED:
+        with pytest.raises(WavecombError, match=says):
+            wavecomb.render(cornell, resume=file, **{**plain, **settings})
+    wavecomb.render(cornell, resume=file, threads=1, wave_size=64, policy="none", **plain)
+
+
+def test_fingerprint_knows_the_parts() -> None:
+    def build(**other: Any) -> dict[str, str]:
+        builder = wavecomb.SceneBuilder()
+        pixels = np.full((4, 4, 3), other.get("texel", 100), np.uint8)
+        texture = builder.add_texture(pixels, srgb=True)
+        material = builder.add_material(
+            "diffuse",
+            roughness=other.get("roughness", 0.5),
+            textures={"base_color": {"texture": texture, "channel": "rgb"}},
+            name=other.get("name", "paint"),
+        )
+        points = np.array([[0, 0, -2], [1, 0, -2], [0, other.get("y", 1), -2]], np.float32)
+        mesh = builder.add_mesh(points, np.array([[0, 1, 2]], np.uint32), material=material)
+        builder.add_to_group(0, mesh)
+        builder.add_light("dome", np.eye(4), color=(other.get("light", 1.0), 1, 1))
+        width = other.get("width", 0.5)
+        builder.set_camera(np.eye(4), window=(-width, width, -0.5, 0.5))
+        fingerprint: dict[str, str] = builder.build().fingerprint()
+        return fingerprint
+
+    plain = build()
+    assert build() == plain
+    for change, part in (
+        ({"y": 2}, "geometry"),
+        ({"roughness": 0.25}, "materials"),
+        ({"texel": 101}, "textures"),
+        ({"light": 2.0}, "lights"),
+        ({"width": 0.6}, "camera"),
+        ({"name": "varnish"}, "names"),
+    ):
+        other = build(**change)
+        assert {name for name in plain if other[name] != plain[name]} == {part}
+
+
+def test_damaged_files_are_refused(cornell: Any, tmp_path: Path) -> None:
+    file = tmp_path / "a.ckpt"
+    wavecomb.render(cornell, size=(24, 24), spp=16, checkpoint=file)
+    whole = file.read_bytes()
+    checkpoint = load_checkpoint(file)
+    for name, content in {
+        "cut": whole[: len(whole) // 2],
+        "empty": b"",
+        "other": b"PK\x03\x04 but no archive",
+        "text": b"hello",
+        "flipped": whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:],
+    }.items():
+        broken = tmp_path / f"{name}.ckpt"
+        broken.write_bytes(content)
+        with pytest.raises(WavecombError, match=f"{name}.ckpt: is no checkpoint, or is damaged"):
+            load_checkpoint(broken)
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        load_checkpoint(tmp_path / "none.ckpt")
+    save_checkpoint(file, {**checkpoint.header, "format": 99}, checkpoint.state)
+    with pytest.raises(WavecombError, match="format 99, by Wavecomb"):
+        load_checkpoint(file)
+
+
+def test_state_of_another_film_is_refused(cornell: Any) -> None:
+    watcher = StopAt(0)
+    _core.render(cornell.scene, _core.Settings(width=8, height=8, spp=1), watcher=watcher)
+    with pytest.raises(_core.Error, match="of another picture"):
+        _core.render(cornell.scene, _core.Settings(width=8, height=9, spp=1), state=watcher.state)
+    with pytest.raises(_core.Error, match=r"no 'film\.errors'"):
+        _core.render(
+            cornell.scene,
+            _core.Settings(width=8, height=8, spp=1, error=True),
+            state=watcher.state,
+        )
+
+
+# ---- the command line ----------------------------------------------------------------------------
+
+
+def command(stage: Path, *arguments: Any) -> list[str]:
+    words = ("render", stage, *arguments, "--size", 64, 64, "--threads", 1)
+    return [sys.executable, "-m", "wavecomb", *map(str, words)]
+
+
+def run(*words: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(*words), capture_output=True, text=True, timeout=300)
+
+
+def test_signals_save(stage: Path, tmp_path: Path) -> None:
+    out, file = tmp_path / "a.exr", tmp_path / "a.ckpt"
+    for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        file.unlink(missing_ok=True)
+        process = subprocess.Popen(
+            command(stage, "-o", out, "--spp", 100_000, "--checkpoint", file, "--progress", "json"),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout is not None
+        first = json.loads(process.stdout.readline())
+        assert first["event"] == "progress"
+        process.send_signal(number)
+        rest, errors = process.communicate(timeout=60)
+        assert process.returncode == code, errors
+        events = [json.loads(line) for line in rest.splitlines()]
+        assert {"event": "wrote", "file": str(file)} in events
+        assert events[-1]["event"] == "done"
+        assert events[-1]["cancelled"] is True
+        samples = read_layers(out)["samples"]
+        assert load_checkpoint(file).state["pass.target"] >= samples.max() > 0
+        assert "a.exr holds what was done" in errors
+
+
+def test_resume_takes_settings_from_the_checkpoint(stage: Path, tmp_path: Path) -> None:
+    one, two, file = tmp_path / "1.exr", tmp_path / "2.exr", tmp_path / "a.ckpt"
+    done = run(stage, "-o", one, "--noise", 0.08, "--seed", 9, "--checkpoint", file)
+    assert done.returncode == 0, done.stderr
+    done = run(stage, "-o", two, "--resume", file)
+    assert done.returncode == 0, done.stderr
+    assert "resumed after" in done.stdout
+    assert "mean relative error" in done.stdout
+    first, second = read_layers(one), read_layers(two)
+    assert list(first) == list(second)
+    assert {"error", "variance"} < set(first)
+    for layer, pixels in first.items():
+        assert pixels.tobytes() == second[layer].tobytes(), layer
+    refused = run(stage, "-o", two, "--resume", file, "--seed", 8)
+    assert refused.returncode == 2
+    assert refused.stderr == (
+        f"error: {file}: was made with seed 9, and this render has 8; give that, or start anew\n"
+    )
+
+
+def kill_and_resume(stage: Path, folder: Path, kills: int, seed: int) -> None:
+    """Kills a render again and again, then lets it end."""
+    rng = random.Random(seed)
+    out, whole, file = folder / "a.exr", folder / "whole.exr", folder / "a.ckpt"
+    settings: list[Any] = ["--noise", 0.004, "--max-spp", 2048]
+    assert run(stage, "-o", whole, *settings).returncode == 0
+    killed = 0
+    while killed < kills:
+        start = ["--resume", file] if file.exists() else ["--checkpoint", file]
+        process = subprocess.Popen(
+            command(stage, "-o", out, *settings, *start, "--every", 0.01, "--quiet"),
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        time.sleep(rng.uniform(0.3, 1.5))
+        process.kill()
+        _, errors = process.communicate()
+        if process.returncode == 0:  # it was done before
+            out.unlink()
+            file.unlink()
+            continue
+        assert process.returncode == -signal.SIGKILL, errors
+        killed += 1
+        if file.exists():
+            load_checkpoint(file)
+        assert not out.exists()
+    start = ["--resume", file] if file.exists() else ["--checkpoint", file]
+    done = run(stage, "-o", out, *settings, *start)
+    assert done.returncode == 0, done.stderr
+    first, second = read_layers(whole), read_layers(out)
+    for layer, pixels in first.items():
+        assert pixels.tobytes() == second[layer].tobytes(), layer
+    assert sorted(os.listdir(folder)) == ["a.ckpt", "a.exr", "whole.exr"], "nothing is left over"
+
+
+def test_kill(stage: Path, tmp_path: Path) -> None:
+    kill_and_resume(stage, tmp_path, 4, seed=1)
+
+
+@pytest.mark.slow
+def test_kill_a_hundred_times(stage: Path, tmp_path: Path) -> None:
+    kill_and_resume(stage, tmp_path, 100, seed=2)
+
+
+def test_a_disk_that_is_full_does_not_end_a_render(cornell: Any, tmp_path: Path) -> None:
+    from wavecomb.watcher import CheckpointSink, Watcher
+
+    warnings: list[str] = []
+    sink = CheckpointSink(tmp_path / "gone" / "a.ckpt", 0.0, {})
+    watcher = Watcher([sink], warn=warnings.append)
+    settings = _core.Settings(width=64, height=64, spp=400)
+    result = _core.render(cornell.scene, settings, watcher=watcher)
+    assert not result.cancelled
+    assert len(warnings) == 1, "once, however often it fails"
+    assert "gone" in warnings[0]
+
+
+def test_a_file_that_is_no_checkpoint_is_kept(stage: Path, tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("mine")
+    refused = run(stage, "-o", tmp_path / "a.exr", "--checkpoint", file)
+    assert refused.returncode == 2
+    assert "notes.txt: is there and is no checkpoint" in refused.stderr
+    assert file.read_text() == "mine"

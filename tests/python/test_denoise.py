@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from fake_core import install
+
+import wavecomb
+from wavecomb.cli import main
+from wavecomb.errors import WavecombError
+from wavecomb.image import read_image, read_layers
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Noisy and clean pictures of one stage."""
+    pytest.importorskip("wavecomb._core")
+    pytest.importorskip("pyoidn")
+    from wavecomb.scenes import write_scene
+
+    path: Path = tmp_path_factory.mktemp("stages") / "cornell.usdc"
+    write_scene("cornell", path)
+    stage = wavecomb.load(path)
+    return [wavecomb.render(stage, size=(64, 64), spp=spp, seed=spp) for spp in (8, 512)]
+
+
+def rmse(a: Any, b: Any) -> float:
+    """Of what a display shows."""
+    return float(np.sqrt(((np.minimum(a, 1) - np.minimum(b, 1)) ** 2).mean()))
+
+
+def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
+    noisy, clean = pictures
+    picture = noisy.with_denoised(threads=1)
+    assert picture.denoised.shape == noisy.beauty.shape
+    np.testing.assert_array_equal(picture.beauty, noisy.beauty)
+    assert rmse(picture.denoised, clean.beauty) < 0.5 * rmse(noisy.beauty, clean.beauty)
+    assert picture.denoised.mean() == pytest.approx(noisy.beauty.mean(), rel=0.02)
+    assert picture.stats["seconds"]["denoise"] > 0
+    assert noisy.denoised is None
+
+
+def test_guides_keep_detail(pictures: Any) -> None:
+    """A pattern that only the albedo shows comes through."""
+    from wavecomb.denoise import denoise
+
+    rng = np.random.default_rng(1)
+    y, x = np.mgrid[0:96, 0:96]
+    pattern = np.where(((x // 2 + y // 2) % 2 == 0)[:, :, None], 0.8, 0.2).astype(np.float32)
+    albedo = np.repeat(pattern, 3, axis=2)
+    normal = np.zeros_like(albedo)
+    normal[:, :, 2] = 1
+    noisy = (albedo * rng.exponential(1.0, albedo.shape)).astype(np.float32)
+    guided = denoise(noisy, albedo, normal)
+    blind = denoise(noisy, np.full_like(albedo, 0.5), normal)
+    assert rmse(guided, albedo) < 0.5 * rmse(blind, albedo)
+
+
+def test_broken_pixels_are_filled_in(pictures: Any) -> None:
+    from wavecomb.denoise import denoise
+
+    noisy, clean = pictures
+    beauty = noisy.beauty.copy()
+    beauty[40, 40] = np.nan
+    beauty[50, 60] = np.inf
+    denoised = denoise(beauty, noisy.albedo, noisy.normal)
+    assert np.isfinite(denoised).all()
+    assert rmse(denoised, clean.beauty) < rmse(noisy.beauty, clean.beauty)
+
+
+def test_files_have_both(pictures: Any, tmp_path: Path) -> None:
+    picture = pictures[0].with_denoised()
+    picture.save(tmp_path / "a.exr")
+    picture.save(tmp_path / "a.png")
+    pictures[0].save(tmp_path / "noisy.png")
+    layers = read_layers(tmp_path / "a.exr")
+    np.testing.assert_array_equal(layers["beauty"], picture.beauty)
+    np.testing.assert_array_equal(layers["denoised"], picture.denoised)
+    a, b = read_image(tmp_path / "a.png"), read_image(tmp_path / "noisy.png")
+    assert not np.array_equal(a, b), "the PNG is of the denoised picture"
+
+
+def test_a_missing_extra_is_said_before_anything(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    fake = install(monkeypatch)
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    stage = tmp_path / "a.usda"
+    stage.write_text("#usda 1.0\n")
+    result = CliRunner().invoke(
+        main, ["render", str(stage), "-o", str(tmp_path / "a.exr"), "--denoise"]
+    )
+    assert result.exit_code == 2
+    assert "pip install 'wavecomb[denoise]'" in result.stderr
+    assert not fake.loaded
+    with pytest.raises(WavecombError, match=r"denoising needs pyoidn"):
+        from wavecomb.denoise import check_denoiser
+
+        check_denoiser()
