@@ -10,6 +10,8 @@ from wavecomb.errors import WavecombError
 DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 """What a picture holds where nothing is asked for."""
 
+GUIDES = ("guide_albedo", "guide_normal")
+"""For denoisers: of what is seen, also in mirrors and through clear glass."""
 _CORE = (
     "albedo",
     "normal",
@@ -26,6 +28,7 @@ _CORE = (
     "indirect",
     "light_groups",
     "cost",
+    *GUIDES,
 )
 CRYPTO = ("crypto_object", "crypto_material", "crypto_asset")
 ERRORS = ("error", "variance")
@@ -87,6 +90,8 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
         total += 32
     if names & {"emission", "direct", "indirect"}:
         total += 72
+    if names & set(GUIDES):
+        total += 48
     groups = light_groups if "light_groups" in names else sum(map(_is_light, names))
     total += groups * (24 + 12)
     total += len(names & set(CRYPTO)) * (64 + 48)
@@ -108,6 +113,8 @@ _CHANNELS = {
     "direct": 3,
     "indirect": 3,
     "cost": 1,
+    "guide_albedo": 3,
+    "guide_normal": 3,
 }
 
 

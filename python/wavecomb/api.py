@@ -89,11 +89,12 @@ class Picture:
             "variance": self.variance,
         }
         out: dict[str, NDArray[Any]] = {}
-        wanted = set(self.chosen or arrays) | {"denoised"}
+        wanted = set(self.chosen or {**arrays, **self.aovs}) | {"denoised"}
         if self.chosen == aov_names.DEFAULT:
             wanted |= {"error", "variance"}
         for name, array in {**arrays, **self.aovs}.items():
-            if array is None or (name in arrays and name not in wanted):
+            may_be_kept_only = name in arrays or name in aov_names.GUIDES
+            if array is None or (may_be_kept_only and name not in wanted):
                 continue
             out.update(
                 cryptomatte.layers(name, array) if name in cryptomatte.LEVELS else {name: array}
@@ -103,16 +104,23 @@ class Picture:
     def with_denoised(self, *, threads: int = 0) -> Picture:
         """The picture with its layer ``denoised``, by Open Image Denoise; the beauty stays.
 
+        Guided by the AOVs guide_albedo and guide_normal, which see through mirrors and clear glass,
+        or else by albedo and normal.
+
         Raises:
             WavecombError: The extra ``denoise`` is missing; says how to install it.
         """
         from wavecomb.denoise import denoise
         from wavecomb.errors import WavecombError
 
-        if self.albedo is None or self.normal is None:
-            raise WavecombError("denoising needs the AOVs albedo and normal: render with them, too")
+        albedo = self.aovs.get("guide_albedo", self.albedo)
+        normal = self.aovs.get("guide_normal", self.normal)
+        if albedo is None or normal is None:
+            raise WavecombError(
+                "denoising needs the AOVs guide_albedo and guide_normal: render with them, too"
+            )
         start = time.perf_counter()
-        denoised = denoise(self.beauty, self.albedo, self.normal, threads=threads)
+        denoised = denoise(self.beauty, albedo, normal, threads=threads)
         seconds = {**self.stats.get("seconds", {}), "denoise": time.perf_counter() - start}
         return replace(self, denoised=denoised, stats={**self.stats, "seconds": seconds})
 

@@ -27,7 +27,7 @@ def denoise(beauty: Array, albedo: Array, normal: Array, *, threads: int = 0) ->
 
     Args:
         beauty: (height, width, 3), linear; values that are not finite are filled in.
-        albedo: (height, width, 3), of the first hit.
+        albedo: (height, width, 3), of what is seen.
         normal: (height, width, 3), means of unit vectors.
         threads: 0: all.
 

@@ -33,8 +33,20 @@ _SUFFIXES = {
     "position": "XYZ",
     "uv": "UV",
     "variance": "RGB",
+    "guide_albedo": "RGB",
+    "guide_normal": "XYZ",
 }
-_COLOURS = ("beauty", "albedo", "normal", "emission", "direct", "indirect", "denoised")
+_COLOURS = (
+    "beauty",
+    "albedo",
+    "normal",
+    "emission",
+    "direct",
+    "indirect",
+    "denoised",
+    "guide_albedo",
+    "guide_normal",
+)
 """Layers that are half where halves are asked for, with all that begin with "light_"."""
 _IDS = ("material_id", "instance_id")
 BAND = 64

@@ -94,7 +94,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
 TEST(AovFilm, MemoryOfEveryAov) {
   const AovLayout all{AovSet{(1u << kAovCount) - 1}, 4};
   const Film film(16, 9, all);
-  EXPECT_EQ(film.bytes(), 16u * 9 * (32 + 64 + 32 + 3 * 64 + 72 + 4 * 24 + 8));
+  EXPECT_EQ(film.bytes(), 16u * 9 * (32 + 64 + 32 + 3 * 64 + 72 + 4 * 24 + 8 + 48));
   const auto bytes = [](uint32_t bits) { return Film(8, 8, {AovSet{bits}}).bytes() / 64; };
   EXPECT_EQ(bytes(0), 32u);
   EXPECT_EQ(bytes(AovSet::kFirst), 96u);

@@ -209,10 +209,11 @@ def render_command(
     if resumed is not None:
         chosen = {**resumed.settings, **chosen}
         source = source.completed(resumed.source)
-    aovs = layers.names if layers.aovs else aov_names.of_core(chosen.pop("aovs", None))
-    chosen.pop("aovs", None)
+    kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
+    shown = [name for name in kept if name not in aov_names.GUIDES]
+    aovs = layers.names if layers.aovs else aov_names.of_core(shown)
     size = chosen.pop("width", DEFAULT_SIZE[0]), chosen.pop("height", DEFAULT_SIZE[1])
-    guides = ("albedo", "normal") if purpose.denoise else ()
+    guides = aov_names.GUIDES if purpose.denoise or len(shown) < len(kept) else ()
     settings = make_settings(
         size, chosen.pop("spp"), aovs=aov_names.with_guides(aovs, guides), **chosen
     )

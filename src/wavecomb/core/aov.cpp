@@ -8,9 +8,10 @@
 namespace wavecomb {
 
 const char* const kAovNames[kAovCount] = {
-    "albedo",      "normal",      "depth",         "position",        "uv",
-    "material_id", "instance_id", "crypto_object", "crypto_material", "crypto_asset",
-    "emission",    "direct",      "indirect",      "light_groups",    "cost"};
+    "albedo",       "normal",      "depth",         "position",        "uv",
+    "material_id",  "instance_id", "crypto_object", "crypto_material", "crypto_asset",
+    "emission",     "direct",      "indirect",      "light_groups",    "cost",
+    "guide_albedo", "guide_normal"};
 
 const char* aov_name(Aov aov) {
   return kAovNames[std::countr_zero(static_cast<uint32_t>(aov))];

@@ -31,10 +31,13 @@ enum class Aov : uint32_t {
   kLightGroups = 1u << 13,
   // Measured.
   kCost = 1u << 14,
+  // For denoisers: means of what is seen, also in mirrors and through clear glass.
+  kGuideAlbedo = 1u << 15,
+  kGuideNormal = 1u << 16,
 };
-inline constexpr uint32_t kAovCount = 15;
+inline constexpr uint32_t kAovCount = 17;
 
-/// Names in the order of the bits: "albedo", "normal" ... "cost".
+/// Names in the order of the bits: "albedo", "normal" ... "guide_normal".
 extern const char* const kAovNames[kAovCount];
 /// That of one.
 const char* aov_name(Aov aov);
@@ -52,6 +55,7 @@ struct AovSet {
   static constexpr uint32_t kNearest =
       Aov::kPosition | Aov::kUv | Aov::kMaterialId | Aov::kInstanceId;
   static constexpr uint32_t kCrypto = Aov::kCryptoObject | Aov::kCryptoMaterial | Aov::kCryptoAsset;
+  static constexpr uint32_t kGuides = Aov::kGuideAlbedo | Aov::kGuideNormal;
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
 
   uint32_t bits = kFirst;
@@ -64,6 +68,7 @@ struct AovSet {
   bool nearest() const { return any(kNearest); }
   bool crypto() const { return any(kCrypto); }
   bool parts() const { return any(kParts); }
+  bool guides() const { return any(kGuides); }
 
   std::vector<std::string> names() const;
   /// Throws Error that lists what there is.

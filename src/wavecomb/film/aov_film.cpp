@@ -46,11 +46,12 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixe
   if (set.parts()) parts_.resize(pixels);
   if (set.has(Aov::kLightGroups)) groups_.resize(pixels * 3 * layout.light_groups);
   if (set.has(Aov::kCost)) cost_ns_.resize(pixels);
+  if (set.guides()) guides_.resize(pixels);
 }
 
 size_t AovFilm::bytes() const {
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
-  size_t n = of(first_) + of(nearest_) + of(parts_) + of(groups_) + of(cost_ns_);
+  size_t n = of(first_) + of(nearest_) + of(parts_) + of(groups_) + of(cost_ns_) + of(guides_);
   for (const auto& level : crypto_) n += of(level);
   return n;
 }
@@ -115,6 +116,9 @@ std::vector<AovLayer> AovFilm::finish(const std::vector<uint32_t>& samples,
   release(groups_);
   add(Aov::kCost, 1, [&](size_t i, float* v) { *v = static_cast<float>(cost_ns_[i]); });
   release(cost_ns_);
+  add(Aov::kGuideAlbedo, 3, [&](size_t i, float* v) { mean(i, guides_[i].albedo, v); });
+  add(Aov::kGuideNormal, 3, [&](size_t i, float* v) { mean(i, guides_[i].normal, v); });
+  release(guides_);
   return out;
 }
 

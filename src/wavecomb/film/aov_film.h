@@ -59,6 +59,10 @@ class AovFilm {
   struct Parts {
     double emission[3] = {0, 0, 0}, direct[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
   };
+  /// Sums over samples of what guides a denoiser: albedo and normal.
+  struct Guides {
+    double albedo[3] = {0, 0, 0}, normal[3] = {0, 0, 0};
+  };
   static constexpr uint32_t kCryptoLevels = 3;
   /// Ids given for each pixel, of those that CryptoPixel holds: three layers of a file.
   static constexpr uint32_t kCryptoRanks = 6;
@@ -100,6 +104,14 @@ class AovFilm {
       p.indirect[c] += double{all[c]} - double{with_direct[c]};
     }
   }
+  /// One sample's albedo and normal, side by side.
+  void add_guides(size_t pixel, const float* guides) {
+    Guides& g = guides_[pixel];
+    for (size_t c = 0; c < 3; ++c) {
+      g.albedo[c] += double{guides[c]};
+      g.normal[c] += double{guides[3 + c]};
+    }
+  }
   void add_cost(size_t pixel, double ns) { cost_ns_[pixel] += ns; }
 
   /// Means, where pixel i has count(i) samples; empty where not asked for.
@@ -130,6 +142,7 @@ class AovFilm {
     block("aov_parts", parts_);
     block("aov_light_groups", groups_);
     block("aov_cost", cost_ns_);
+    block("aov_guides", guides_);
   }
 
  private:
@@ -155,6 +168,7 @@ class AovFilm {
   std::vector<Parts> parts_;
   std::vector<double> groups_;
   std::vector<double> cost_ns_;
+  std::vector<Guides> guides_;
 };
 
 /// Sorted ids in a Cryptomatte's layer.

@@ -25,6 +25,7 @@ class PathPool {
   /// And 8 for what was hit first: albedo, normal, uv.
   static constexpr uint32_t kFirstWords = 8;
   static constexpr uint32_t kHitWords = 8;      ///< of AovHit
+  static constexpr uint32_t kGuideWords = 8;    ///< 7: albedo, normal, 1 once they are final
   static constexpr uint32_t kShadowGroup = 10;  ///< word of a shadow ray's row
 
   PathPool() = default;
@@ -48,6 +49,7 @@ class PathPool {
     block(aov_blocks_[5], parts[1], set.parts(), kRadianceWords);
     block(aov_blocks_[6], groups, light_groups > 0, kRadianceWords * light_groups);
     block(aov_blocks_[7], cost_ns, set.has(Aov::kCost), 1);
+    block(aov_blocks_[8], guides, set.guides(), kGuideWords);
     wants_uv = set.has(Aov::kUv);
   }
 
@@ -63,6 +65,7 @@ class PathPool {
   float* groups = nullptr;               ///< radiance by light group: rows of r, g, b, a slot's
                                          ///< groups side by side
   float* cost_ns = nullptr;              ///< time spent on the path
+  float* guides = nullptr;  ///< albedo and normal of the last vertex that is seen, see store_guides
   uint32_t light_groups = 0;
   bool wants_uv = false;
   size_t bytes() const {
@@ -73,7 +76,7 @@ class PathPool {
 
  private:
   SoaBlock rows_;
-  std::array<SoaBlock, 8> aov_blocks_;
+  std::array<SoaBlock, 9> aov_blocks_;
 };
 
 /// A path between two vertices, as its row holds it.

@@ -22,6 +22,7 @@ struct PathResult {
   F depth = INFINITY;
   AovHit hit;
   F centre2 = 0.f;
+  std::array<F, 6> guides{};  ///< albedo, normal
 };
 
 class PathTracer {
@@ -31,6 +32,7 @@ class PathTracer {
         settings_(*context.settings),
         clock_(clock),
         counts_(counts),
+        wants_guides_(context.film->aovs().layout().set.guides()),
         groups_(size_t{3} * context.film->aovs().layout().light_groups) {}
 
   /// Radiance of the last path by light group, rgb side by side; valid until the next one.
@@ -51,6 +53,7 @@ class PathTracer {
     };
     Vec3<F> o = ray.o;
     F cone_at_origin = 0.f;
+    bool is_seen = true;  // only clear surfaces so far
     PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread};
     ++counts_.samples;
 
@@ -98,6 +101,10 @@ class PathTracer {
         result.uv[1] = v.uv.y;
         result.albedo = v.albedo;
         result.normal = v.normal;
+      }
+      if (wants_guides_ && is_seen) {
+        result.guides = guides_of<F>(v, path);
+        is_seen = v.is_clear;
       }
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
@@ -183,11 +190,12 @@ class PathTracer {
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v};
     VertexResult<F> v{};
-    visit_program<F>(
-        static_cast<ProgramId>(scene.material_program[material]), [&]<typename Bsdf>() {
-          v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom, hit.t,
-                                    material, path, {depth == 0, depth == 0}, true);
-        });
+    visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
+                     [&]<typename Bsdf>() {
+                       v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom,
+                                                 hit.t, material, path,
+                                                 {depth == 0 || wants_guides_, depth == 0}, true);
+                     });
     return v;
   }
 
@@ -203,6 +211,7 @@ class PathTracer {
   PhaseClock& clock_;
   Counts& counts_;
   PresenceKeys keys_;
+  bool wants_guides_;
   std::vector<F> groups_;
 };
 
@@ -228,6 +237,7 @@ void add_aovs(AovFilm& film, size_t pixel, const PathResult& path, const std::ve
   if (set.parts())
     film.add_parts(pixel, rgb(path.parts[0]).data(), rgb(path.parts[1]).data(),
                    rgb(path.radiance).data());
+  if (set.guides()) film.add_guides(pixel, path.guides.data());
   for (size_t i = 0; i < groups.size(); ++i) film.groups(pixel)[i] += double{groups[i]};
 }
 

@@ -11,6 +11,8 @@
 /// 1997, 9.2).
 #pragma once
 
+#include <array>
+
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/integrate/surface.h"
@@ -65,16 +67,33 @@ struct VertexResult {
   Mask<F> alive;    ///< the path goes on
   Vec3<F> o;        ///< of the next ray; its direction and the rest is in `next`
   PathState<F> next;
-  Color<F> albedo;  ///< first-hit AOVs
+  Color<F> albedo;  ///< AOVs, where asked for
   Vec3<F> normal;
   Vec2<F> uv;
+  Mask<F> is_clear;         ///< nothing but what is mirrored or refracted is seen here
   UInt<F> emitter, lit_by;  ///< light records behind `emitted` and `direct`, or kNoLight
 };
 
-/// First-hit AOVs that shading is to give.
-struct FirstHitAovs {
+/// AOVs that shading is to give.
+struct VertexAovs {
   bool any = false, uv = false;
 };
+
+/// What guides a denoiser, of a path that has reached a vertex: albedo, tinted by the mirrors and
+/// glass before it, and normal. Both are replaced by the next vertex where this one is clear.
+template <typename F>
+inline std::array<F, 6> guides_of(const VertexResult<F>& v, const PathState<F>& path) {
+  const auto tinted = [&](const F& albedo, const F& throughput) {
+    // Without the scaling of radiance by indices of refraction; roulette may have made it larger.
+    return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
+  };
+  return {tinted(v.albedo.x, path.throughput.x),
+          tinted(v.albedo.y, path.throughput.y),
+          tinted(v.albedo.z, path.throughput.z),
+          v.normal.x,
+          v.normal.y,
+          v.normal.z};
+}
 
 /// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
 /// NaN-free: a contribution that is not finite is dropped.
@@ -167,7 +186,7 @@ template <typename Bsdf, typename F>
 inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings& settings,
                                     const SampleKey<F>& key, uint32_t depth, const MeshHit<F>& hit,
                                     const UInt<F>& geom, const F& t, const UInt<F>& material,
-                                    const PathState<F>& path, FirstHitAovs aovs,
+                                    const PathState<F>& path, VertexAovs aovs,
                                     const Mask<F>& active) {
   using U = UInt<F>;
   VertexResult<F> out;
@@ -248,6 +267,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     out.uv = s.uv;
     out.albedo = bsdf.albedo();
     out.normal = select<F>(dot(path.dir, s.ng) > 0.f, -frame.n, frame.n);
+    out.is_clear = not_(bsdf.has_non_delta());
   }
   if (depth >= settings.max_depth) return out;
 

@@ -54,6 +54,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   }
   if (pool.groups)
     std::memset(pool.groups, 0, size_t{n} * pool.light_groups * PathPool::kRadianceWords * 4);
+  if (pool.guides) std::memset(pool.guides, 0, size_t{n} * PathPool::kGuideWords * 4);
   if (pool.cost_ns) std::memset(pool.cost_ns, 0, size_t{n} * 4);
   rays.size = n;
   return camera.has_far ? tfar : nullptr;

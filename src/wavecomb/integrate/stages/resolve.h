@@ -73,6 +73,8 @@ inline void resolve_aovs(const PathPool& pool, const AovTables* tables, AovFilm&
           sums[3 * g + c] +=
               double{pool.groups[(s * pool.light_groups + g) * P::kRadianceWords + c]};
   }
+  for (size_t s = slot; pool.guides && s < end; ++s)
+    film.add_guides(pixel, pool.guides + s * P::kGuideWords);
   for (size_t s = slot; pool.cost_ns && s < end; ++s) film.add_cost(pixel, double{pool.cost_ns[s]});
 }
 

@@ -10,6 +10,21 @@
 
 namespace wavecomb {
 
+/// Notes what guides a denoiser, of paths that have met clear surfaces only so far.
+template <typename F>
+void store_guides(const PathPool& pool, const UInt<F>& slot, const VertexResult<F>& v,
+                  const PathState<F>& path, const Mask<F>& active) {
+  constexpr uint32_t kWords = PathPool::kGuideWords;
+  const UInt<F> word = slot * kWords;
+  const auto row = load_rows<kWords, F>(pool.guides, word, active);
+  const Mask<F> seen = active & (row[6] == 0.f);
+  if (none(seen)) return;
+  const std::array<F, 6> g = guides_of<F>(v, path);
+  store_rows<kWords, F>(
+      pool.guides, word,
+      {g[0], g[1], g[2], g[3], g[4], g[5], select(v.is_clear, F(0.f), F(1.f)), F(0.f)}, seen);
+}
+
 /// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. A path's
 /// next ray takes the place of its last in the pool; what became of it is noted by arrival.
 template <typename Bsdf, typename F>
@@ -19,7 +34,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   using Q = ShadingQueue;
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
-  const FirstHitAovs aovs{depth == 0 && pool.first, depth == 0 && pool.wants_uv};
+  const bool wants_first = depth == 0 && pool.first;
+  const VertexAovs aovs{wants_first || pool.guides, depth == 0 && pool.wants_uv};
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
@@ -51,12 +67,13 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       add_group_radiance<F>(pool, slot, kept_group<F>(kept, v.emitter, emits), v.emitted, emits);
       lit_by = kept_group<F>(kept, v.lit_by, v.has_shadow);
     }
-    if (aovs.any) {
+    if (wants_first) {
       store_rows<PathPool::kFirstWords, F>(
           pool.first, slot * PathPool::kFirstWords,
           {v.albedo.x, v.albedo.y, v.albedo.z, v.normal.x, v.normal.y, v.normal.z, v.uv.x, v.uv.y},
           active);
     }
+    if (pool.guides) store_guides<F>(pool, slot, v, state, active);
     const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
                       select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
                       (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |
