@@ -25,8 +25,9 @@ Matrix = NDArray[np.float64]
 _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 """Half a turn about y: between what looks or shines along -z and what does along +z."""
 
-MOST_PATHS = 1 << 24
-"""Of one pass: the vectorized variants hold all paths of a pass in memory, some 100 bytes each."""
+MOST_PATHS = 1 << 25
+"""Of one pass: the vectorized variants hold all paths of a pass in memory, some 100 bytes each.
+A timed picture must be one pass (600 x 600 x 64 is): each further seed is compiled anew."""
 
 _FAR = 1e4
 """Distance of the sphere that stands for a distant light, in sizes of the scene."""

@@ -26,7 +26,8 @@ def aov_options(command: F) -> F:
         help="Layer to keep, may be given again: albedo, normal, depth, position, uv, material_id, "
         "instance_id, crypto_object, crypto_material, crypto_asset, crypto, emission, direct, "
         "indirect, light_groups, light_NAME, cost, samples, error, variance, guide_albedo, "
-        "guide_normal, all; beauty is always there (docs/aovs.md).  [default: albedo, normal, depth, samples]",
+        "guide_normal, all; beauty is always there (docs/aovs.md).  "
+        "[default: albedo, normal, depth, samples]",
     )(file_options(command))
     return command
 
