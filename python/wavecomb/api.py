@@ -295,6 +295,8 @@ def render(
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
     chosen = make_settings(size, spp, aovs=names, **settings)
     scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
+    if "light_groups" in names:
+        check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, stage, checkpoint, every, resume)
     result = _render(scene, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
@@ -362,16 +364,30 @@ def make_settings(
         settings["aovs"] = aov_names.for_core(aovs)
         settings["error"] = settings.get("error", False) or bool({"error", "variance"} & {*aovs})
     chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
-    # Light groups are counted once the stage is read; a file is written a few rows at a time.
-    each = aov_names.bytes_per_pixel(aovs, 4) + (_ERROR_BYTES_PER_PIXEL * keeps_error(chosen))
-    needed, there = width * height * each, memory_bytes()
-    if there is not None and needed > 0.8 * there:
-        raise WavecombError(
-            f"size {width} x {height}: needs about {needed / 2**30:.0f} GiB of memory, "
-            f"this machine has {there / 2**30:.0f}; choose a smaller size"
-        )
+    check_memory(chosen, aovs)
     chosen.check()
     return chosen
+
+
+def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> None:
+    """Raises WavecombError unless the film and the picture fit in the memory of this machine.
+
+    Args:
+        settings: Of the render.
+        aovs: As expanded.
+        light_groups: Of the scene; to be checked again once that is known.
+    """
+    from wavecomb.errors import WavecombError
+
+    others = [name for name in aovs if name not in aov_names.ERRORS]
+    each = aov_names.bytes_per_pixel(others, light_groups)
+    each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
+    needed, there = settings.width * settings.height * each, memory_bytes()
+    if there is not None and needed > 0.8 * there:
+        raise WavecombError(
+            f"size {settings.width} x {settings.height}: needs about {needed / 2**30:.0f} GiB of "
+            f"memory, this machine has {there / 2**30:.0f}; choose a smaller size or fewer AOVs"
+        )
 
 
 def keeps_error(settings: Settings) -> bool:

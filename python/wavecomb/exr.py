@@ -88,6 +88,7 @@ def write_exr(
     compression: Compression = "zip",
     tile: int = 0,
     metadata: Mapping[str, Any] | None = None,
+    called: str | os.PathLike[str] | None = None,
 ) -> None:
     """Writes an OpenEXR file with one part; whole or not at all.
 
@@ -101,8 +102,9 @@ def write_exr(
         tile: Edge of square tiles, pixels, a multiple of 16; 0: scanlines.
         metadata: Attributes of the file: str, int, float, or (4, 4) arrays. "Software" is set if
             it is not given.
+        called: The file in messages, where ``path`` is to be renamed to it.
     """
-    name = os.fspath(path)
+    name = os.fspath(path if called is None else called)
     if Path(name).suffix.lower() != ".exr":
         raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
     if not layers:
@@ -128,7 +130,7 @@ def write_exr(
         np.concatenate([_values(plane[rows], as_half) for plane, as_half in both], axis=2)
         for rows in bands_of(spec.height, tile or BAND)
     )
-    write_bands(name, spec, bands)
+    write_bands(path, spec, bands, called=name)
 
 
 def check_options(name: str, layers: Any, compression: str, tile: int) -> None:
@@ -180,11 +182,18 @@ def bands_of(height: int, rows: int = BAND) -> Iterator[slice]:
     return (slice(row, min(row + rows, height)) for row in range(0, height, rows))
 
 
-def write_bands(name: str, spec: Any, bands: Iterator[NDArray[Any]]) -> None:
+def write_bands(
+    path: str | os.PathLike[str],
+    spec: Any,
+    bands: Iterator[NDArray[Any]],
+    *,
+    called: str | None = None,
+) -> None:
     """Writes a picture, given a band of rows at a time from the top; of tiles, a row of them."""
     import OpenImageIO as oiio
 
-    with replacing(name) as part:
+    name = called or os.fspath(path)
+    with replacing(path) as part:
         output = oiio.ImageOutput.create(str(part))
         if output is None:
             raise OSError(f"{name}: no writer for this kind: {one_line(oiio.geterror(), name)}")

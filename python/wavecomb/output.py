@@ -140,5 +140,6 @@ def save_layers(
                 compression="zip" if exact else compression,
                 tile=tile,
                 metadata={**metadata, **cryptomatte.metadata(own)},
+                called=files[aov],
             )
     return list(files.values())

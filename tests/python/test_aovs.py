@@ -137,6 +137,16 @@ def test_memory_is_as_stated(loaded: Any, names: tuple[str, ...]) -> None:
     assert memory["film"] + memory["picture"] == 256 * aovs.bytes_per_pixel(chosen, len(GROUPS))
 
 
+def test_many_light_groups_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    from wavecomb.api import check_memory
+
+    monkeypatch.setattr("wavecomb.api.memory_bytes", lambda: 2**30)
+    settings = _core.Settings(width=1500, height=1500, spp=1)
+    check_memory(settings, aovs.expand(["light_groups"]), 4)
+    with pytest.raises(WavecombError, match=r"needs about 5 GiB .*smaller size or fewer AOVs"):
+        check_memory(settings, aovs.expand(["light_groups"]), 64)
+
+
 def test_light_groups_of_a_stage(loaded: Any, picture: wavecomb.Picture) -> None:
     assert sorted(loaded.scene.light_groups) == sorted(GROUPS)
     lights = {name: picture.aovs[f"light_{name}"] for name in GROUPS}

@@ -294,7 +294,7 @@ def _render(
     The scene is freed here: nothing needs it while files are written.
     """
     from wavecomb import _core
-    from wavecomb.api import picture_of
+    from wavecomb.api import check_memory, picture_of
     from wavecomb.progress import Interrupt
     from wavecomb.stats import make_stats
     from wavecomb.watcher import CheckpointSink, PreviewSink, Sink, Watcher
@@ -302,6 +302,8 @@ def _render(
     with reporter.loading(stage):
         loaded: LoadedStage = source.load(stage, settings.threads)
     warn(stage_warnings(loaded))
+    if "light_groups" in aovs:
+        check_memory(settings, aovs, len(loaded.scene.light_groups))
     sinks: list[Sink] = []
     state, seconds = None, 0.0
     if purpose.checkpoint_file is not None:
