@@ -61,6 +61,74 @@ def test_guides_keep_detail(pictures: Any) -> None:
     assert rmse(guided, albedo) < 0.5 * rmse(blind, albedo)
 
 
+def looking_at(program: str, z: float, wall_z: float, **material: Any) -> wavecomb.Picture:
+    """A camera before a surface, and a wall of albedo (0.2, 0.6, 0.4) at `wall_z`."""
+    builder = wavecomb.SceneBuilder()
+
+    def add(at: float, faces_camera: bool, material: int) -> None:
+        corners = [[-9, -9, at], [9, -9, at], [9, 9, at], [-9, 9, at]]
+        order = [[0, 1, 2], [0, 2, 3]] if faces_camera else [[0, 2, 1], [0, 3, 2]]
+        mesh = builder.add_mesh(
+            np.array(corners, np.float32), np.array(order, np.uint32), material=material
+        )
+        builder.add_to_group(0, mesh)
+
+    add(z, True, builder.add_material(program, **material))
+    paint = builder.add_material("diffuse", base_color=(0.2, 0.6, 0.4))
+    add(wall_z, wall_z < 0, paint)
+    builder.add_light("dome", np.eye(4))
+    builder.set_camera(np.eye(4), window=(-0.1, 0.1, -0.1, 0.1))
+    names = ["albedo", "normal", "guide_albedo", "guide_normal"]
+    return wavecomb.render(builder.build(), size=(8, 8), spp=256, aovs=names, max_depth=4)
+
+
+WALL = np.array([0.2, 0.6, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("program", "wall_z", "material", "albedo", "normal_z"),
+    [
+        # The mirror shows the wall behind the camera, in its own tint.
+        ("metal", 2.0, {"roughness": 0.0, "base_color": (0.9, 0.5, 0.8)}, (0.18, 0.3, 0.32), -1.0),
+        # A rough one guides by itself, and so does paint.
+        ("metal", 2.0, {"roughness": 0.4, "base_color": (0.9, 0.5, 0.8)}, (0.9, 0.5, 0.8), 1.0),
+        ("diffuse", 2.0, {"base_color": (0.1, 0.2, 0.3)}, (0.1, 0.2, 0.3), 1.0),
+        # 4 % of glass reflects the sky, and guides by itself there.
+        ("dielectric", -3.0, {"roughness": 0.0}, 0.96 * WALL + 0.04, 1.0),
+    ],
+)
+def test_guides_see_through_mirrors_and_glass(
+    program: str, wall_z: float, material: dict[str, Any], albedo: Any, normal_z: float
+) -> None:
+    pytest.importorskip("wavecomb._core")
+    if program == "dielectric":
+        material = {**material, "base_color": (1.0, 1.0, 1.0), "ior": 1.5}
+    picture = looking_at(program, -2.0, wall_z, **material)
+    guide = picture.aovs["guide_albedo"].mean(axis=(0, 1))
+    np.testing.assert_allclose(guide, albedo, atol=0.02)
+    normal = picture.aovs["guide_normal"].mean(axis=(0, 1))
+    np.testing.assert_allclose(normal, (0, 0, normal_z), atol=0.02)
+    assert picture.normal is not None
+    np.testing.assert_allclose(picture.normal[..., 2], 1.0, atol=1e-5)
+
+
+def test_guides_are_kept_from_files_unless_asked_for(tmp_path: Path) -> None:
+    pytest.importorskip("wavecomb._core")
+    pytest.importorskip("pyoidn")
+    from wavecomb.scenes import write_scene
+
+    write_scene("cornell", tmp_path / "a.usdc")
+    shared = ["render", tmp_path / "a.usdc", "-o", tmp_path / "a.exr", "--size", 16, 16]
+    for options, there in (([], False), (["--aov", "guide_albedo"], True)):
+        words = [str(word) for word in (*shared, "--spp", 4, "--denoise", *options)]
+        result = CliRunner().invoke(main, words)
+        assert result.exit_code == 0, result.output
+        layers = read_layers(tmp_path / "a.exr")
+        assert "denoised" in layers
+        assert ("guide_albedo" in layers) is there
+        assert "guide_normal" not in layers
+
+
 def test_broken_pixels_are_filled_in(pictures: Any) -> None:
     from wavecomb.denoise import denoise
 

@@ -4,24 +4,21 @@
 from __future__ import annotations
 
 import os
-import signal
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions, aov_options
-from wavecomb.cli.options import Real, StageOptions, examples, stage_options, stage_warnings, warn
+from wavecomb.cli.options import Real, StageOptions, examples, stage_options, warn
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
+from wavecomb.cli.run import how_far, run
 from wavecomb.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 if TYPE_CHECKING:
-    from wavecomb.api import Picture
-    from wavecomb.checkpoint import Checkpoint
-    from wavecomb.cli.reporting import Reporter
-    from wavecomb.usd import LoadedStage, LoadReport
+    pass
 
 DEFAULT_SIZE = (600, 600)
 
@@ -219,7 +216,7 @@ def render_command(
     )
 
     reporter = make_reporter(purpose.progress, quiet)
-    picture, stopped, report = _render(
+    picture, stopped, report = run(
         source, stage, settings, aovs, profile, purpose, resumed, reporter, exposure, tone_map
     )
     if stopped is not None and not picture.samples.any():
@@ -236,7 +233,7 @@ def render_command(
     files = [*written, *([costs_file] if costs_file else [])]
     reporter.finished(picture, report, files)
     if stopped is not None:
-        click.echo(f"stopped {_how_far(picture)}; {output} holds what was done", err=True)
+        click.echo(f"stopped {how_far(picture)}; {output} holds what was done", err=True)
         raise click.exceptions.Exit(128 + stopped)
 
 
@@ -275,77 +272,6 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     from wavecomb.costs import load_costs
 
     return load_costs(costs_file)
-
-
-def _render(
-    source: StageOptions,
-    stage: str,
-    settings: Any,
-    aovs: tuple[str, ...],
-    profile: dict[str, dict[str, float]] | None,
-    purpose: PurposeOptions,
-    resumed: Checkpoint | None,
-    reporter: Reporter,
-    exposure: float,
-    tone_map: Any,
-) -> tuple[Picture, int | None, LoadReport]:
-    """The picture, the number of the signal that stopped it, and what there is to say of the stage.
-
-    The scene is freed here: nothing needs it while files are written.
-    """
-    from wavecomb import _core
-    from wavecomb.api import check_memory, picture_of
-    from wavecomb.progress import Interrupt
-    from wavecomb.stats import make_stats
-    from wavecomb.watcher import CheckpointSink, PreviewSink, Sink, Watcher
-
-    with reporter.loading(stage):
-        loaded: LoadedStage = source.load(stage, settings.threads)
-    warn(stage_warnings(loaded))
-    if "light_groups" in aovs:
-        check_memory(settings, aovs, len(loaded.scene.light_groups))
-    sinks: list[Sink] = []
-    state, seconds = None, 0.0
-    if purpose.checkpoint_file is not None:
-        from wavecomb.checkpoint import build_note, check_fits, make_header
-
-        header = make_header(loaded.scene, settings, stage=stage, source=source.as_dict())
-        if resumed is not None:
-            check_fits(resumed, header)
-            warn([note] if (note := build_note(resumed, header)) else [])
-            state, seconds = resumed.state, resumed.seconds
-        sinks.append(CheckpointSink(purpose.checkpoint_file, purpose.every, header, seconds))
-    if purpose.preview is not None:
-        sinks.append(
-            PreviewSink(
-                purpose.preview, purpose.preview_every, exposure=exposure, tone_map=tone_map
-            )
-        )
-    with Interrupt() as interrupt, reporter.rendering() as bar:
-        watcher = Watcher(
-            sinks,
-            reporter=bar,
-            is_stopped=lambda: interrupt.requested,
-            warn=lambda line: warn([line]),
-        )
-        result = _core.render(
-            loaded.scene, settings, None, None, profile, watcher=watcher, state=state
-        )
-    stats = make_stats(result, stage=stage, loaded=loaded, resumed_s=seconds)
-    stopped = (interrupt.signal or signal.SIGINT) if result.cancelled else None
-    picture = picture_of(result, stats, scene=loaded.scene, aovs=aovs)
-    return picture, stopped, loaded.report
-
-
-def _how_far(picture: Any) -> str:
-    """How much is done, as can be said of a render without and with a fixed end."""
-    stats = picture.stats
-    settings = stats["settings"]
-    samples = stats["counts"]["samples"] + stats["resumed_samples"]
-    mean = samples / (settings["width"] * settings["height"])
-    if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
-        return f"with {mean:.3g} samples a pixel"
-    return f"at {100.0 * mean / settings['spp']:.0f} %"
 
 
 def _picture_warnings(picture: Any) -> list[str]:
