@@ -70,11 +70,7 @@ class AovFilm {
   const AovLayout& layout() const { return layout_; }
   bool has_first() const { return !first_.empty(); }
   First& first(size_t pixel) { return first_[pixel]; }
-  const First& first(size_t pixel) const { return first_[pixel]; }
   const Nearest& nearest(size_t pixel) const { return nearest_[pixel]; }
-  const CryptoPixel& crypto(size_t pixel, Aov level) const {
-    return crypto_[level_index(level)][pixel];
-  }
   /// Sums of rgb of light group 0, 1 ... of the layout, side by side.
   double* groups(size_t pixel) { return groups_.data() + pixel * 3 * layout_.light_groups; }
 

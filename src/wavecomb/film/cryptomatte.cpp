@@ -56,10 +56,6 @@ CryptoTables::CryptoTables(const Scene& scene, AovSet aovs) {
     for (const Material& m : scene.materials()) material_id.push_back(crypto_id(m.name));
 }
 
-uint64_t CryptoTables::bytes() const {
-  return 4 * (first_object.size() + object_id.size() + asset_id.size() + material_id.size());
-}
-
 std::vector<std::pair<std::string, uint32_t>> crypto_manifest(const Scene& scene, Aov level,
                                                               const std::vector<uint32_t>& ids) {
   std::vector<std::pair<std::string, uint32_t>> out;

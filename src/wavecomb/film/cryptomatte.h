@@ -65,7 +65,6 @@ struct CryptoTables {
 
   CryptoTables() = default;
   CryptoTables(const Scene& scene, AovSet aovs);
-  uint64_t bytes() const;
 };
 
 /// (name, id) of all of `level` whose ids are in `ids`, which is sorted; by name. Several names of
