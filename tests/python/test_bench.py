@@ -86,6 +86,16 @@ def test_suites_are_as_large_as_they_should_be() -> None:
     assert len(load_suite(find_suite("scenes")).stages) >= 12
 
 
+def test_variants_of_a_renderer_share_a_golden_picture() -> None:
+    configs = configurations(load_suite(find_suite("peers")), LIMITS)
+    keys = {
+        renderer: {c.golden_key() for c in configs if c.renderer == renderer and c.golden}
+        for renderer in {c.renderer for c in configs}
+    }
+    assert keys["mitsuba-scalar"] == keys["mitsuba-llvm"]
+    assert not keys["mitsuba-llvm"] & (keys["cycles"] | keys["wavecomb"])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

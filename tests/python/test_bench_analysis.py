@@ -260,6 +260,21 @@ def test_incomplete_factorials_use_matched_pairs(tmp_path: Path) -> None:
     assert "policy material × lanes 16" not in table.index
 
 
+def test_interactions_do_not_take_in_what_differs_besides(tmp_path: Path) -> None:
+    # Large waves at one lane too, small ones at 16 only: an order pays at 16 lanes, whatever the
+    # wave, so waves and order do not interact.
+    def time(wave_size: int, lanes: int, policy: str) -> float:
+        gain = 0.5 if policy == "material" and lanes == 16 else 1.0
+        return gain * 16 / lanes * (1.2 if wave_size == 65536 else 1.0)
+
+    vary = {"wave_size": [4096, 65536], "lanes": [1, 16], "policy": ["none", "material"]}
+    rows = runs_of(vary, time, noise=0.0, shake=0.0)
+    rows = [r for r in rows if (r["wave_size"], r["lanes"]) != (4096, 1)]
+    table = effects(results(tmp_path, rows).runs, "shade_and_order_s").set_index("name")
+    assert table.loc["policy material × waves 64 K"].ratio == pytest.approx(1.0)
+    assert table.loc["policy material × lanes 16"].ratio == pytest.approx(0.5)
+
+
 # ---- costs ---------------------------------------------------------------------------------------
 
 

@@ -43,6 +43,9 @@ def effects(runs: pd.DataFrame, metric: str, *, interactions: bool = True) -> pd
 
         effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
 
+    over those combinations of the rest in which all four were run: in a suite that is no full
+    factorial, what differs besides must not count as interaction.
+
     With T the mean over rounds; intervals by resampling rounds, p by the same figures of single
     rounds, corrected after Holm over all effects of the table.
 
@@ -66,17 +69,26 @@ def effects(runs: pd.DataFrame, metric: str, *, interactions: bool = True) -> pd
     terms: list[dict[str, Any]] = []
     contrasts: list[NDArray[np.float64]] = []
 
-    def pairs(factor: str, level: Any, where: dict[str, Any]) -> NDArray[np.float64]:
-        """Sum of log T(level) - log T(baseline) over pairs, as weights of the points."""
+    def contrast(of: dict[str, Any]) -> NDArray[np.float64]:
+        """Weights of the points that give the mean contrast of log T over one or two factors.
+
+        A difference for one factor, a difference of differences for two; all 0 where no
+        combination of the others has all the points that it takes.
+        """
         weights = np.zeros(len(points))
         count = 0
-        for k, point in enumerate(points):
-            if point[factor] != level or any(point[f] != v for f, v in where.items()):
+        for point in points:
+            if any(point[factor] != level for factor, level in of.items()):
                 continue
-            other = place.get(tuple({**point, factor: base[factor]}[key] for key in keys))
-            if other is not None:
-                weights[k] += 1.0
-                weights[other] -= 1.0
+            corners = [
+                ({**point, **{f: base[f] for f in at_base}}, (-1.0) ** len(at_base))
+                for n in range(len(of) + 1)
+                for at_base in itertools.combinations(of, n)
+            ]
+            found = [place.get(tuple(corner[key] for key in keys)) for corner, _ in corners]
+            if None not in found:
+                for where, (_, sign) in zip(found, corners, strict=True):
+                    weights[where] += sign
                 count += 1
         return weights / count if count else weights
 
@@ -84,7 +96,7 @@ def effects(runs: pd.DataFrame, metric: str, *, interactions: bool = True) -> pd
         for level in levels[factor]:
             if base[factor] is None or level == base[factor]:
                 continue
-            main = pairs(factor, level, {})
+            main = contrast({factor: level})
             if main.any():
                 terms.append(_term("main", factor, level, base[factor]))
                 contrasts.append(main)
@@ -94,11 +106,10 @@ def effects(runs: pd.DataFrame, metric: str, *, interactions: bool = True) -> pd
                 continue
             if level == base[factor] or other_level == base[other]:
                 continue
-            there = pairs(factor, level, {other: other_level})
-            here = pairs(factor, level, {other: base[other]})
-            if there.any() and here.any():
+            both = contrast({factor: level, other: other_level})
+            if both.any():
                 terms.append(_term("interaction", factor, level, base[factor], other, other_level))
-                contrasts.append(there - here)
+                contrasts.append(both)
     return pandas.DataFrame(_rows(terms, np.array(contrasts), table.to_numpy(np.float64)))
 
 
@@ -137,7 +148,7 @@ def _rows(terms: list[dict[str, Any]], contrasts: Array, values: Array) -> list[
     return [
         {
             **term,
-            "cells": int((contrast > 0).sum()),
+            "cells": int((weights > 0).sum()),
             "n": estimate.n,
             "ratio": estimate.value,
             "low": estimate.low,
@@ -145,7 +156,7 @@ def _rows(terms: list[dict[str, Any]], contrasts: Array, values: Array) -> list[
             "p": p,
             "verdict": verdict(estimate, p, ("less", "more")),
         }
-        for term, contrast, estimate, p in zip(terms, contrasts, found, p_values, strict=True)
+        for term, weights, estimate, p in zip(terms, contrasts, found, p_values, strict=True)
     ]
 
 

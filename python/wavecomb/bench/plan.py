@@ -74,7 +74,8 @@ class Config:
         """Equal for configurations that converge to the same picture; fit for file names."""
         width, height = self.settings["size"]
         of = {key: self.settings[key] for key in _FOR_PICTURE if key in self.settings}
-        stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{self.renderer}"
+        family = self.renderer.split("-")[0]  # variants of a renderer converge alike
+        stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{family}"
         return f"{stage}-{width}x{height}-{digest(of)}"
 
     def recording_key(self) -> str:

@@ -155,7 +155,9 @@ def _about(out: Writer, results: Results) -> None:
         for sitting in results.machine.get("sittings", ())
         if isinstance(sitting, dict) and sitting.get("command")
     ]
-    commands.append(f"wavecomb bench report {shlex.quote(results.folder.name)}")
+    words = shlex.split(commands[-1]) if commands else []
+    folder = words[words.index("-o") + 1] if "-o" in words[:-1] else results.folder.name
+    commands.append(f"wavecomb bench report {shlex.quote(folder)}")
     out.add(f"<pre><code>{escape(chr(10).join(dict.fromkeys(commands)))}</code></pre>")
     if results.suite_text:
         suite_text = f"<pre><code>{escape(results.suite_text)}</code></pre>"
