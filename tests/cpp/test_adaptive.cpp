@@ -176,7 +176,7 @@ TEST(Adaptive, NoiseTargetEndsByTheMean) {
   EXPECT_GT(c.active_count, 32u * 13);
   EXPECT_LT(c.active_count, 32u * 24) << "the quiet half does not go on";
   // A picture twice as bright of the same relative noise has the same pixels to go on with.
-  Film bright(32, 32, false, true);
+  Film bright(32, 32, {AovSet{0}}, true);
   for (uint32_t y = 0; y < 32; ++y)
     for (uint32_t x = 0; x < 32; ++x) {
       const Film::Pixel p = film.pixel(size_t{y} * 32 + x);

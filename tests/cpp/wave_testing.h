@@ -94,9 +94,16 @@ class WaveRun {
 
   Picture picture() const {
     Film::Layers layers = Film(film_).finish(aovs_.kept_names);
-    return {case_.settings.width, case_.settings.height, layers.beauty,
-            layers.albedo,        layers.normal,         layers.depth,
-            layers.samples,       layers.aovs,           {}};
+    Picture picture;
+    picture.width = case_.settings.width;
+    picture.height = case_.settings.height;
+    picture.beauty = std::move(layers.beauty);
+    picture.albedo = std::move(layers.albedo);
+    picture.normal = std::move(layers.normal);
+    picture.depth = std::move(layers.depth);
+    picture.samples = std::move(layers.samples);
+    picture.aovs = std::move(layers.aovs);
+    return picture;
   }
   const Wave& wave() const { return *wave_; }
   const Counts& reference_counts() const { return counts_; }
