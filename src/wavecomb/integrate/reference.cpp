@@ -192,9 +192,9 @@ class PathTracer {
     VertexResult<F> v{};
     visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
                      [&]<typename Bsdf>() {
-                       v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom,
-                                                 hit.t, material, path,
-                                                 {depth == 0 || wants_guides_, depth == 0}, true);
+                       v = shade_vertex<Bsdf, F>(
+                           scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path,
+                           {depth == 0 || wants_guides_, depth == 0, !groups_.empty()}, true);
                      });
     return v;
   }

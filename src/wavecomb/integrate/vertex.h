@@ -71,12 +71,12 @@ struct VertexResult {
   Vec3<F> normal;
   Vec2<F> uv;
   Mask<F> is_clear;         ///< nothing but what is mirrored or refracted is seen here
-  UInt<F> emitter, lit_by;  ///< light records behind `emitted` and `direct`, or kNoLight
+  UInt<F> emitter, lit_by;  ///< lights behind `emitted` and `direct`, or kNoLight; where asked for
 };
 
 /// AOVs that shading is to give.
 struct VertexAovs {
-  bool any = false, uv = false;
+  bool any = false, uv = false, lights = false;
 };
 
 /// What guides a denoiser, of a path that has reached a vertex: albedo, tinted by the mirrors and
@@ -194,7 +194,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.direct = Color<F>(F(0.f));
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
-  out.emitter = out.lit_by = U(kNoLight);
+  if (aovs.lights) out.emitter = out.lit_by = U(kNoLight);
 
   // Programs that emit read one slot more than their BSDF does.
   constexpr bool kEmits =
@@ -230,7 +230,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
             hit.inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
             Mask<U>(emits));
         const U base = gather<U>(scene.emissive_lights, first + geom, Mask<U>(emits));
-        out.emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
+        if (aovs.lights)
+          out.emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
         const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
         if (any(sampled))
           light_pdf = select(
@@ -294,7 +295,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
-    out.lit_by = l.light;
+    if (aovs.lights) out.lit_by = chosen_light<F>(scene.lights, rl.x, lit);
     out.shadow_o = spawn_origin<F>(s, l.wi);
     out.shadow_d = l.wi;
     out.shadow_tfar = l.distance * 0.9999f;

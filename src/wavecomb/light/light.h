@@ -29,7 +29,6 @@ struct LightSample {
   F pdf;
   Mask<F> is_delta;
   Mask<F> valid;  ///< false: no light arrives; weight and pdf are 0, wi is finite
-  UInt<F> light;  ///< record that was chosen
 };
 
 /// Balance heuristic (E. Veach, "Robust Monte Carlo Methods", 1997, eq. 9.8): a / (a + b), 0 where
@@ -91,6 +90,13 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const Li
 
 }  // namespace detail
 
+/// The light that sample_light chooses for u_pick, where there is one.
+template <typename F>
+inline UInt<F> chosen_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
+  if (view.count == 0 || none(active)) return UInt<F>(kNoLight);
+  return detail::pick_light<F>(view, u_pick, active);
+}
+
 /// Chooses a light by power and a point on it as seen from p. Numbers in [0, 1); u_pick is a
 /// multiple of 2^-24, as samplers give it.
 template <typename F>
@@ -102,11 +108,9 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
                         Color<F>(zero),
                         zero,
                         Mask<F>(false),
-                        Mask<F>(false),
-                        UInt<F>(kNoLight)};
+                        Mask<F>(false)};
   if (view.count == 0 || none(active)) return result;
   const UInt<F> index = detail::pick_light<F>(view, u_pick, active);
-  result.light = index;
   const auto put = [&](const detail::KindSample<F>& s, const F& pick_pdf, const Mask<F>& lanes) {
     const F pdf = s.pdf * pick_pdf;
     const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));

@@ -35,7 +35,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
   const bool wants_first = depth == 0 && pool.first;
-  const VertexAovs aovs{wants_first || pool.guides, depth == 0 && pool.wants_uv};
+  const bool wants_groups = pool.groups;
+  const VertexAovs aovs{wants_first || pool.guides, depth == 0 && pool.wants_uv, wants_groups};
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
@@ -61,11 +62,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
-    U lit_by(kNoGroup);
-    if (pool.groups) {
+    F lit_by(0.f);
+    if (wants_groups) {
       const uint32_t* kept = context.aovs->kept_group.data();
       add_group_radiance<F>(pool, slot, kept_group<F>(kept, v.emitter, emits), v.emitted, emits);
-      lit_by = kept_group<F>(kept, v.lit_by, v.has_shadow);
+      lit_by = bits_float<F>(kept_group<F>(kept, v.lit_by, v.has_shadow));
     }
     if (wants_first) {
       store_rows<PathPool::kFirstWords, F>(
@@ -84,8 +85,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       store_rows<PathPool::kShadowWords, F>(
           pool.shadows, slot * PathPool::kShadowWords,
           {v.shadow_o.x, v.shadow_o.y, v.shadow_o.z, v.shadow_d.x, v.shadow_d.y, v.shadow_d.z,
-           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, bits_float<F>(lit_by), none, none,
-           none, none, none},
+           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, lit_by, none, none, none, none, none},
           v.has_shadow);
     }
     if (any(v.alive))
