@@ -4,7 +4,7 @@
 Arrays are NumPy arrays and are not copied where said so.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -341,9 +341,9 @@ class Renderer:
     def edit(
         self,
         *,
-        camera: Mapping[str, Any] | None = None,
-        materials: Mapping[int, Mapping[str, Any]] = {},
-        lights: Mapping[int, Mapping[str, Any]] = {},
+        camera: dict[str, Any] | None = None,
+        materials: dict[int, dict[str, Any]] = {},
+        lights: dict[int, dict[str, Any]] = {},
     ) -> None:
         """Changes the scene, all at once or nothing. Parameters that are not given stay.
 
