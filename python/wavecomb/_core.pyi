@@ -40,10 +40,11 @@ class Scene:
     @property
     def textures(self) -> list[tuple[str, int]]:
         """(name, bytes) of every texture."""
-    def fingerprint(self) -> dict[str, str]:
-        """Hashes of what decides over the picture: geometry, materials, textures, lights, camera.
+    def fingerprint(self, arrays: bool = True) -> dict[str, str]:
+        """Hashes of what decides over the picture, and of names: geometry, materials, textures,
+        lights, camera, names.
 
-        Reads every array once."""
+        arrays: geometry and textures, too, of which every byte is read."""
     @property
     def camera(self) -> dict[str, Any]:
         """As set_camera takes it: to_world (4, 4), window, lens_radius, focus_distance, near_clip,

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.usd.materialx import MaterialXReader, model_of
@@ -87,8 +89,7 @@ class MaterialTable:
         self._plain: dict[tuple[float, ...], int] = {}
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
-        self.emits = False
-        """Whether a material is in use that emits anything."""
+        self._emitting: set[int] = set()
 
     def expect(self, material: UsdShade.Material) -> None:
         """Starts what takes long for a material that will be used: reading its images."""
@@ -119,7 +120,6 @@ class MaterialTable:
         if number is None:
             brightest = surface.brightest()
             self.glows = self.glows or brightest >= LAMP
-            self.emits = self.emits or brightest > 0
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,
@@ -127,9 +127,17 @@ class MaterialTable:
                 textures=surface.textures,
             )
             self._ids[key] = number
+            if brightest > 0:
+                self._emitting.add(number)
         # Holding the surface keeps its address from being used again.
         self._surface_ids[id(surface)] = (surface, number)
         return number
+
+    def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
+        """Whether a mesh with this material, or with these of its faces, emits anything."""
+        if faces is None or not self._emitting:
+            return material in self._emitting
+        return bool(np.isin(faces, list(self._emitting)).any())
 
     def plain(self, colour: Iterable[float] = DEFAULT_COLOUR, opacity: float = 1.0) -> int:
         """Material id of a display colour."""

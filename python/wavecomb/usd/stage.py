@@ -16,6 +16,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.usd.camera import all_cameras, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured, commentary
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
+from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
@@ -191,9 +192,10 @@ def _read(
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = find_camera(stage, camera)
     materials = MaterialTable(builder, textures, time, report)
-    lights = LightReader(time, up_axis, textures, report)
+    groups = LightGroups(report)
+    lights = LightReader(time, up_axis, textures, groups, report)
     traversal = Traversal(time, purposes, lights, report)
-    world = GroupBuilder(stage, traversal, builder, materials, report).world()
+    world = GroupBuilder(stage, traversal, builder, materials, groups, report).world()
     lit = materials.glows or _has_lights(stage)
     _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):
