@@ -65,13 +65,15 @@ def open_stage(
     if not Usd.Stage.IsSupportedFile(str(file)):
         raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
     try:
-        stage = Usd.Stage.Open(str(file), Usd.Stage.LoadAll)
+        session = Sdf.Layer.CreateAnonymous("session.usda")
+        if overrides is not None:
+            session.TransferContent(overrides)
+        root = Sdf.Layer.FindOrOpen(str(file))
+        stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll) if root else None
     except Tf.ErrorException as error:
         raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
     if not stage:
         raise WavecombError(f"{file}: cannot be read as USD")
-    if overrides is not None:
-        stage.GetSessionLayer().TransferContent(overrides)
     select_variants(stage, variants or {})
     return stage
 
