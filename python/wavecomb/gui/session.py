@@ -289,8 +289,8 @@ class Session(QObject):
         from pxr import Sdf, UsdGeom
 
         from wavecomb.usd.camera import read_camera
-        from wavecomb.usd.report import LoadReport
         from wavecomb.usd.opening import time_code
+        from wavecomb.usd.report import LoadReport
 
         if self.usd is None or self._request is None or not Sdf.Path.IsValidPathString(path):
             return None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader
@@ -53,8 +53,9 @@ class Parameter:
     def authored(self, value: Any) -> Any:
         """What the attribute must hold for the parameter to be so."""
         if isinstance(value, (tuple, list)):
-            return Gf.Vec3f(*(float(v) / self.factor for v in value))
-        return float(value) / self.factor
+            make = self.type_name.type.pythonClass
+            return make(*(float(v) / self.factor for v in value))
+        return as_stored(float(value) / self.factor)
 
 
 def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
