@@ -33,7 +33,7 @@ class Parameter:
 
     Attributes:
         slot: Keyword argument of ``SceneBuilder.add_material``.
-        value: As the loader reads it; None: the default of the program, or driven.
+        value: As the loader reads it; None where it is driven.
         attribute: To author for another value, there already or not; None: there is none.
         type_name: Of that attribute.
         factor: The value is the attribute's times this.
@@ -85,7 +85,9 @@ class _Tracer:
         for name, (slot, default) in INPUTS.items():
             if slot == "normal" or (wanted is not None and slot not in wanted):
                 continue
-            out[slot] = self._input(slot, name, default, isinstance(default, tuple))
+            if slot == "base_color" and program == "dielectric":
+                default = (1.0, 1.0, 1.0)
+            out[slot] = self._input(slot, name, default)
         for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
             attribute = self._prim.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
@@ -121,8 +123,7 @@ class _Tracer:
         out: dict[str, Parameter] = {}
         for slot, (name, default), factor in specs:
             if name:
-                wide = isinstance(default, tuple)
-                out[slot] = self._input(slot, name, default, wide, factor)
+                out[slot] = self._input(slot, name, default, factor, clamped=False)
         return out
 
     def _weight(self, spec: tuple[str, Any]) -> float:
@@ -131,7 +132,7 @@ class _Tracer:
         return number(value, default)
 
     def _input(
-        self, slot: str, name: str, default: Any, wide: bool, factor: float = 1.0
+        self, slot: str, name: str, default: Any, factor: float = 1.0, *, clamped: bool = True
     ) -> Parameter:
         source = source_of(self._shader, name, self._time)
         if source is not None and not source.is_value:
@@ -141,9 +142,15 @@ class _Tracer:
         attribute = None if source is None else source.attribute
         own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
         path = own if attribute is None else attribute.GetPath()
-        value = None if source is None else constant(slot, source.value, default)
-        if value is not None and factor != 1.0:
-            value = tuple(v * factor for v in value) if wide else value * factor
+        value = default if source is None else source.value
+        if clamped:
+            value = constant(slot, value, default)
+        elif isinstance(default, tuple):
+            value = colour(value, default)
+        else:
+            value = number(value, default)
+        if factor != 1.0:
+            value = tuple(v * factor for v in value)
         return self._constant(slot, value, path, attribute, factor)
 
     def _constant(
