@@ -464,7 +464,7 @@ def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.flo
     """
     from pxr import Sdf, UsdGeom
 
-    from wavecomb.usd.stage import time_code
+    from wavecomb.usd.opening import time_code
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):
