@@ -278,7 +278,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   with_threads(threads_, [&] {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(std::move(materials_));
-    lights = std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials);
+    lights =
+        std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
   });
   std::shared_ptr<const Scene> scene(
       new Scene(std::move(geometry), std::move(materials), std::move(lights), camera_));
