@@ -156,8 +156,7 @@ class LightsPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(splitter)
-        self._session.opened.connect(lambda stage: self._fill())
-        edits.reset.connect(self._fill)
+        edits.scene_changed.connect(self._fill)
         edits.changed.connect(self._on_changed)
         self._fill()
 

@@ -183,10 +183,9 @@ class MaterialsPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(splitter)
-        self._session.opened.connect(lambda stage: self._fill())
+        edits.scene_changed.connect(self._fill)
         self._session.statistics.connect(lambda figures: self.model.count(figures["materials"]))
         edits.changed.connect(self._on_changed)
-        edits.reset.connect(self._fill)
         self._fill()
 
     def _make_view(self) -> None:

@@ -38,6 +38,7 @@ class SceneEdits(QObject):
     Signals:
         reset(): Another stage is open, or none: prims known before are no more.
         structure_changed(): Prims may have come and gone.
+        scene_changed(): The stage was read (again): materials and lights have other numbers.
         changed(): Something was edited, undone or done again.
 
     Attributes:
@@ -47,6 +48,7 @@ class SceneEdits(QObject):
 
     reset = Signal()
     structure_changed = Signal()
+    scene_changed = Signal()
     changed = Signal()
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
@@ -364,8 +366,10 @@ class SceneEdits(QObject):
             self.edits = StageEdits(usd, time)
             self._end_solo()
             self.reset.emit()
+            self.scene_changed.emit()
             self.changed.emit()
             return
+        self.scene_changed.emit()
         # What was edited while the stage was read is not in the scene yet.
         for prim in {path for path, _ in self.edits.edited()}:
             self._show(Step("", {}, {(prim, ""): None}))
@@ -374,6 +378,7 @@ class SceneEdits(QObject):
     def _on_closing(self) -> None:
         self.edits = None
         self.reset.emit()
+        self.scene_changed.emit()
 
 
 def _word(word: str) -> Opinion:

@@ -201,8 +201,10 @@ class StageEdits:
         self._apply(step.after)
         moment = self.now()
         last = self._done[-1] if self._done else None
-        quick = moment - self._last < MERGE_S and not step.structural
-        if quick and last is not None and last.after.keys() == step.after.keys():
+        # A value that is taken back is a step of its own, however fast it comes.
+        drag = not step.structural and None not in step.after.values()
+        quick = moment - self._last < MERGE_S
+        if drag and quick and last is not None and last.after.keys() == step.after.keys():
             self._done[-1] = Step(label, last.before, step.after)
         else:
             self._done.append(step)

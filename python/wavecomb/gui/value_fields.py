@@ -152,6 +152,7 @@ class NumberField(Field):
         self.row.addWidget(self.slider, 1)
         self.row.addWidget(self.spin)
         self.finish()
+        self._place(self.spin.value())
         self.slider.valueChanged.connect(self._on_slider)
         self.spin.valueChanged.connect(self._on_spin)
 
