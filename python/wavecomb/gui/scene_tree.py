@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 
 from pxr import Sdf, UsdGeom
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, Qt, QTimer
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent, QPainter, QPainterPath, QPen
+from PySide6.QtGui import (
+    QAction,
+    QGuiApplication,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPen,
+)
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -132,7 +140,8 @@ class _View(QTreeView):
         for one in sets:
             menu.addSection(one.name)
             for choice in one.choices:
-                action = menu.addAction(choice)
+                action = QAction(choice, menu)
+                menu.addAction(action)
                 action.setCheckable(True)
                 action.setChecked(choice == one.choice)
                 select = partial(self._edits.select_variant, path, one.name, choice)
