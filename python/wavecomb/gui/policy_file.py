@@ -41,6 +41,29 @@ def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
     return [_made(kind, path) for kind in dict.fromkeys(classes)]
 
 
+class OwnPolicy(SchedulingPolicy):
+    """A loaded policy for a live render: what its ``order`` raises is told in one line.
+
+    Attributes:
+        path: Its file.
+        policy: What was loaded.
+    """
+
+    def __init__(self, policy: SchedulingPolicy, path: str | os.PathLike[str], name: str) -> None:
+        self.policy = policy
+        self.path = os.fspath(path)
+        self.name = name
+        self.columns = policy.columns  # type: ignore[misc]
+
+    def order(self, queue: Any, costs: Any, keys: Any) -> bool | None:
+        """Passes on to the policy."""
+        try:
+            return self.policy.order(queue, costs, keys)
+        except Exception as error:
+            message = describe_failure(error, self.path)
+            raise WavecombError(f"{message}; mend it and load it again") from error
+
+
 def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
     """One line that says what went wrong in a policy, and where in its file if it was there."""
     name = os.fspath(path)

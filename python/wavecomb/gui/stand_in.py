@@ -45,9 +45,14 @@ class Renderer:
     def edit(self, **edits: Any) -> None:
         self.version += 1
 
-    def render(self, settings: Any, watcher: Any = None, interval: float = 0.1) -> Any:
+    def render(
+        self, settings: Any, policy: Any = None, costs: Any = None, watcher: Any = None,
+        interval: float = 0.1,
+    ) -> Any:  # fmt: skip
         self.stopped = False
-        return _core.render(self.scene, settings, watcher=_Watch(self, watcher))
+        return _core.render(
+            self.scene, settings, policy=policy, costs=costs, watcher=_Watch(self, watcher)
+        )
 
     def stop(self) -> None:
         self.stopped = True
