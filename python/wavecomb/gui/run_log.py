@@ -139,6 +139,8 @@ class Series:
     changed: str
     """What is different from the series before."""
     runs: list[Run] = field(default_factory=list)
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+    """What to set to have these settings again."""
 
     @property
     def run(self) -> Run:
@@ -172,10 +174,12 @@ class RunLog:
         settings: Mapping[str, Any],
         picture: Hashable,
         finished: bool = False,
+        recipe: Mapping[str, Any] | None = None,
     ) -> Series:
         """Takes one statistics dict; gives the series that it went into.
 
         ``settings``: those of ``FIELDS`` that are known. ``finished``: the render is at its end.
+        ``recipe``: what to set to have them again.
         """
         known = {name: settings[name] for name in FIELDS if name in settings}
         look = take_look(stats)
@@ -183,6 +187,7 @@ class RunLog:
         if series is None or series.settings != known or series.picture != picture:
             self._end_run()
             series = self._series_of(known, picture)
+            series.recipe = recipe or known
             series.runs.append(Run())
         elif not series.run.continues(look):
             if series.run.finished and look.samples == series.run.last.samples:

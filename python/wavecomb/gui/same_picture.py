@@ -58,8 +58,9 @@ def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable,
     if setup.get("roulette") == "cost-aware":
         if setup.get("costs") == "measured":
             return None
-        # A profile of costs decides over the survival of paths.
-        return (revision, setup.get("costs"), *(_plain(setup.get(name)) for name in BITS))
+        # Costs decide over the survival of paths.
+        costs = (setup.get("costs"), repr(setup.get("profile")))
+        return (revision, costs, *(_plain(setup.get(name)) for name in BITS))
     return (revision, *(_plain(setup.get(name)) for name in BITS))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from wavecomb.gui.run_log import FIELDS
 from wavecomb.gui.setup import Setup
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
@@ -132,6 +133,7 @@ ADAPTIVE_MODES = {
     "pixel": "Pixels stop when their own error is small enough.",
     "noise": "The render ends when the picture's mean error is small enough; samples go where "
     "the noise is.",
+    "both": "Whichever of the two is met first.",
 }
 PIXEL_ERROR = Number(
     "adaptive", "Pixel error", "Error that a pixel may have, as a share of its brightness.",
@@ -155,15 +157,30 @@ ORDER_FIELDS = (*(choice.field for choice in ORDER_CHOICES), THREADS.field, COST
 WORK_FIELDS = ("roulette", "roulette_depth", "adaptive", "noise", "min_spp", "spp", "time_limit")
 
 
+def scheduling_of(setup: Setup) -> dict[str, Any]:
+    """The settings by which series are told apart, with names for what was loaded."""
+    values = {name: getattr(setup, name) for name in FIELDS}
+    if setup.own_policy is not None:
+        values["policy"] = setup.own_policy.name
+    if setup.profile is not None:
+        values["costs"] = "profile"
+    return values
+
+
+def recipe_of(setup: Setup) -> dict[str, Any]:
+    """What to set to have these settings again."""
+    return {name: getattr(setup, name) for name in (*FIELDS, "own_policy", "profile")}
+
+
 def defaults(names: tuple[str, ...]) -> dict[str, Any]:
     """The default values of settings."""
     known = {one.name: one.default for one in fields(Setup)}
-    return {name: known[name] for name in names if name in known}
+    return {name: known[name] for name in names}
 
 
 def presets() -> dict[str, tuple[str, dict[str, Any]]]:
     """Name -> (what it is for, settings); all but the first are of order only."""
-    order = defaults(ORDER_FIELDS)
+    order = defaults((*ORDER_FIELDS, "own_policy", "profile"))
     return {
         "Default": ("What a render does unless told otherwise.", order),
         "Reference: none, 1 lane": (
