@@ -201,6 +201,13 @@ class RunLog:
         series.run.finished = finished
         return series
 
+    def finish(self) -> bool:
+        """The render that goes on came to its end; False where that was known."""
+        if self._current is None or self._current.run.finished:
+            return False
+        self._current.run.finished = True
+        return True
+
     def hold(self, seconds: float) -> None:
         """The render that goes on stood still for so long since the last look."""
         if self._current is not None and not self._current.run.finished:

@@ -15,19 +15,19 @@ from wavecomb.gui.run_rates import Ratio, compare, rate
 
 COLUMNS = (
     "settings",
-    "changed",
-    "runs",
     "samples/s",
     "spread",
-    "rays/s",
-    "ns/record",
-    "lanes used",
-    "run length",
     "speed",
     "95 %",
     "verdict",
+    "ns/record",
+    "lanes used",
+    "run length",
+    "rays/s",
+    "runs",
+    "changed",
 )
-TIPS = {
+_TIPS = {
     "settings": "Those that are not the same in all rows.",
     "changed": "What is different from the series before.",
     "runs": "Renders with these settings; figures are of the longest.",
@@ -42,6 +42,9 @@ TIPS = {
     "95 %": "Interval of the speed: over repeats, or over stretches where there is one pair only.",
     "verdict": "A difference holds where three repeats agree that there is one.",
 }
+TIPS = {name: _TIPS[name] for name in COLUMNS}
+LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))
+"""Columns of text."""
 
 
 @dataclass(frozen=True)
@@ -76,15 +79,15 @@ def _row(series: Series, label: str, base: Series | None) -> Row:
     waves = series.settings.get("integrator") != "reference"
     texts = (
         label,
-        series.changed,
-        str(len(series.runs)),
         known(amount(samples.value)),
         f"{100 * samples.spread:.0f} %" if samples.stretches >= 2 else "",
-        known(amount(rays.value)),
+        *(("1", "", "base") if is_base else _ratio_texts(ratio)),
         f"{run.shading_ns():.0f}" if waves and run.last.records else "",
         f"{100 * run.lane_utilisation():.0f} %" if waves and run.last.packet_lanes else "",
         f"{run.run_length():.1f}" if waves and run.run_length() else "",
-        *(("1", "", "base") if is_base else _ratio_texts(ratio)),
+        known(amount(rays.value)),
+        str(len(series.runs)),
+        series.changed,
     )
     return Row(series, label, texts, ratio, is_base)
 
@@ -115,10 +118,9 @@ def as_text(table: Sequence[Row]) -> str:
     """Columns in line, for a mail or a notebook."""
     cells = [COLUMNS, *(row.texts for row in table)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(COLUMNS))]
-    left = (0, 1)
     return "\n".join(
         "  ".join(
-            text.ljust(width) if i in left else text.rjust(width)
+            text.ljust(width) if i in LEFT else text.rjust(width)
             for i, (text, width) in enumerate(zip(line, widths, strict=True))
         ).rstrip()
         for line in cells

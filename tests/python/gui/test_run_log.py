@@ -279,7 +279,7 @@ def test_text_and_csv() -> None:
     table = rows(log)
     lines = as_text(table).splitlines()
     assert len(lines) == 3 and "verdict" in lines[0]
-    assert lines[1].endswith("base") and lines[2].endswith("faster")
+    assert " base " in lines[1] and " faster " in lines[2]
     assert "50 %" in lines[1] and "1.5" in lines[2]
     records = list(csv.DictReader(io.StringIO(as_csv(table))))
     assert len(records) == 6, "a line for each run"
