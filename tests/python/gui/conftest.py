@@ -8,13 +8,8 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_LOGGING_RULES", "qt.qpa.*=false")
 
-try:
-    import PySide6.QtWidgets
-    import pytestqt
-except ImportError as error:  # the extra `gui` is not there
-    reason = f"the window needs PySide6 and pytest-qt ({error}): tools/setup test installs them"
-    collect_ignore_glob = ["test_*.py"]
-    print(f"tests/python/gui skipped: {reason}")
+pytest.importorskip("PySide6.QtWidgets", reason="the window needs the extra gui")
+pytest.importorskip("pytestqt", reason="tests of the window need pytest-qt")
 
 
 @pytest.fixture(scope="session")
@@ -43,6 +38,36 @@ def new_session(qtbot):
     yield make
     for session in made:
         session.shutdown()
+
+
+@pytest.fixture
+def window(qtbot, qapp, tmp_path):
+    """An empty window with settings of its own, 96 x 96 pixels and 4 samples."""
+    from PySide6.QtCore import QSettings
+
+    from wavecomb.gui import theme
+    from wavecomb.gui.main_window import MainWindow
+    from wavecomb.gui.setup import Setup
+
+    theme.apply("dark")
+    settings = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
+    made = MainWindow(Setup(width=96, height=96, spp=4), settings)
+    made.resize(900, 600)
+    made.show()
+    qtbot.waitExposed(made)
+    yield made
+    made.close()
+    made.deleteLater()
+
+
+@pytest.fixture
+def cornell_window(window, qtbot, cornell):
+    """The window with the Cornell box, rendered and on the screen."""
+    with qtbot.waitSignal(window.session.opened, timeout=10000):
+        window.open(cornell)
+    wait_final(qtbot, window.session)
+    qtbot.waitUntil(lambda: window.viewport.image() is not None)
+    return window
 
 
 @pytest.fixture
