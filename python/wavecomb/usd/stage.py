@@ -60,6 +60,7 @@ def load_stage(
     purposes: Sequence[str] = ("default", "render"),
     variants: Mapping[str, str] | None = None,
     threads: int = 0,
+    overrides: Sdf.Layer | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -73,6 +74,7 @@ def load_stage(
         variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
             prim's.
         threads: For images and textures; 0: all.
+        overrides: Opinions stronger than the file's, such as another stage's session layer; copied.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -91,7 +93,13 @@ def load_stage(
         textures = TextureTable(builder, report, threads)
         try:
             camera_path, cameras = _fill(
-                builder, file, frame, camera, purposes, variants or {}, textures, report
+                builder,
+                open_stage(file, variants, overrides),
+                frame,
+                camera,
+                purposes,
+                textures,
+                report,
             )
         finally:
             textures.release()
@@ -103,19 +111,15 @@ def load_stage(
 
 def _fill(
     builder: _core.SceneBuilder,
-    file: Path,
+    stage: Usd.Stage,
     frame: float | None,
     camera: str | None,
     purposes: Sequence[str],
-    variants: Mapping[str, str],
     textures: TextureTable,
     report: LoadReport,
 ) -> tuple[str | None, tuple[str, ...]]:
     """Fills the builder; gives the camera's path and those of all. The stage is closed then."""
-    stage = _open(file)
-    if variants:
-        _select(stage, variants)
-    chosen = _read(stage, _time(stage, frame), camera, purposes, builder, textures, report)
+    chosen = _read(stage, time_code(stage, frame), camera, purposes, builder, textures, report)
     return chosen, tuple(str(prim.GetPath()) for prim in all_cameras(stage))
 
 
@@ -131,8 +135,21 @@ def _give_back_memory() -> None:
     _core.give_back_memory()
 
 
-def _open(file: Path) -> Usd.Stage:
-    """The stage of a file, with all payloads."""
+def open_stage(
+    file: Path,
+    variants: Mapping[str, str] | None = None,
+    overrides: Sdf.Layer | None = None,
+) -> Usd.Stage:
+    """The stage of a file, with all payloads.
+
+    Args:
+        file: .usd, .usda, .usdc or .usdz.
+        variants: Selections as in ``load_stage``, made in the session layer.
+        overrides: Copied into the session layer first.
+
+    Raises:
+        WavecombError: The file or a selection is no good.
+    """
     if not file.exists():
         raise WavecombError(f"{file}: no such file")
     if file.is_dir():
@@ -140,11 +157,17 @@ def _open(file: Path) -> Usd.Stage:
     if not Usd.Stage.IsSupportedFile(str(file)):
         raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
     try:
-        stage = Usd.Stage.Open(str(file), Usd.Stage.LoadAll)
+        session = Sdf.Layer.CreateAnonymous("session.usda")
+        if overrides is not None:
+            session.TransferContent(overrides)
+        root = Sdf.Layer.FindOrOpen(str(file))
+        stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll) if root else None
     except Tf.ErrorException as error:
         raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
     if not stage:
         raise WavecombError(f"{file}: cannot be read as USD")
+    if variants:
+        _select(stage, variants)
     return stage
 
 
@@ -170,7 +193,8 @@ def _select(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
         variant_set.SetVariantSelection(choice)
 
 
-def _time(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
+def time_code(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
+    """The time to read a stage at: as asked, else its start, else default values."""
     if frame is not None:
         return Usd.TimeCode(frame)
     if stage.HasAuthoredTimeCodeRange():

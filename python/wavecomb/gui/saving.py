@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames as the files that `wavecomb render` writes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.api import Picture
+from wavecomb.gui.frames import Frame
+from wavecomb.output import scene_metadata
+
+if TYPE_CHECKING:
+    from wavecomb._core import Scene
+    from wavecomb.usd import LoadedStage
+
+_NAMED = ("albedo", "normal", "depth", "samples", "error", "variance")
+
+
+def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> Picture:
+    """What `wavecomb.render` would return, of a frame as it is."""
+    if frame.picture is not None:
+        return replace(frame.picture, denoised=frame.denoised)
+    stats: dict[str, Any] = {
+        "cancelled": True,
+        "settings": frame.setup.settings().to_dict(),
+        "seconds": {"render": frame.status.get("seconds", 0.0)},
+    }
+    if loaded is not None:
+        stats |= {"stage": str(loaded.stage_path), "camera": loaded.camera_path}
+    named = {name: frame.layers.get(name) for name in _NAMED}
+    others = {name: array for name, array in frame.layers.items() if name not in _NAMED}
+    return Picture(
+        beauty=frame.beauty,
+        denoised=frame.denoised,
+        stats=stats,
+        cancelled=True,
+        aovs=others,
+        metadata=scene_metadata(scene, frame.width, frame.height),
+        chosen=frame.setup.aovs,
+        **named,
+    )
+
+
+def save_frame(
+    frame: Frame, path: str, scene: Scene, loaded: LoadedStage | None, options: dict[str, Any]
+) -> None:
+    """Writes a frame as .exr or .png, whole or not at all.
+
+    Raises:
+        OSError, ValueError: The file or an option is no good; one line.
+    """
+    picture_of_frame(frame, scene, loaded).save(path, **options)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Windows without a screen. QT_QPA_PLATFORM chooses another platform than offscreen."""
+
+import os
+
+import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+os.environ.setdefault("QT_LOGGING_RULES", "qt.qpa.*=false")
+
+try:
+    import PySide6.QtWidgets
+    import pytestqt
+except ImportError as error:  # the extra `gui` is not there
+    reason = f"the window needs PySide6 and pytest-qt ({error}): tools/setup test installs them"
+    collect_ignore_glob = ["test_*.py"]
+    print(f"tests/python/gui skipped: {reason}")
+
+
+@pytest.fixture(scope="session")
+def cornell(tmp_path_factory):
+    """The Cornell box as a file."""
+    from wavecomb.scenes import write_scene
+
+    path = tmp_path_factory.mktemp("gui") / "cornell.usda"
+    write_scene("cornell", path)
+    return path
+
+
+@pytest.fixture
+def new_session(qtbot):
+    """Makes sessions that are ended with the test: new_session(width=96, ...)."""
+    from wavecomb.gui.session import Session
+    from wavecomb.gui.setup import Setup
+
+    made = []
+
+    def make(**values):
+        session = Session(Setup(**values))
+        made.append(session)
+        return session
+
+    yield make
+    for session in made:
+        session.shutdown()
+
+
+@pytest.fixture
+def session(new_session, qtbot, cornell):
+    """Cornell at 96 x 96 with 4 samples, opened and shown to the end."""
+    made = new_session(width=96, height=96, spp=4)
+    with qtbot.waitSignal(made.opened, timeout=10000):
+        made.open(cornell)
+    wait_final(qtbot, made)
+    return made
+
+
+def wait_final(qtbot, session, timeout=20000):
+    """Waits for the last frame of the session's present version; returns it."""
+
+    def is_final():
+        frame = session.last_frame
+        return frame is not None and frame.final and frame.version == session.version
+
+    qtbot.waitUntil(is_final, timeout=timeout)
+    return session.last_frame
+
+
+@pytest.fixture
+def final(qtbot):
+    """wait_final(session) without the bot."""
+    return lambda session, timeout=20000: wait_final(qtbot, session, timeout)
