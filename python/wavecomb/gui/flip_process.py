@@ -46,7 +46,7 @@ class FlipProcess:
                 stderr=subprocess.PIPE,
             )
             process = self._process
-        out, err = process.communicate(job.getbuffer())
+        out, err = process.communicate(job.getvalue())
         if process.returncode != 0:
             said = err.decode(errors="replace").strip().splitlines()
             raise WavecombError(said[-1] if said else "FLIP was stopped")
