@@ -272,12 +272,11 @@ class CompareView(QWidget):
         painter.save()
         painter.setClipRect(right)
         painter.fillRect(right, theme.surround())
-        size = QSizeF(self._images[B].size()) if self._images[B] is not None else None
-        if size is not None:
-            image = self._images[B]
+        image = self._images[B]
+        if image is not None:
             smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-            painter.drawImage(self._target(pane, size), image)
+            painter.drawImage(self._target(pane, QSizeF(image.size())), image)
         painter.restore()
         for width, colour in ((3.0, Qt.GlobalColor.black), (1.0, Qt.GlobalColor.white)):
             painter.setPen(QPen(colour, width))
