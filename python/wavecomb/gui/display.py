@@ -29,6 +29,8 @@ _UNITS = {
     "depth": "depth, scene units",
 }
 _LOGARITHMIC = ("cost", "error", "variance")
+SCALARS = tuple(_UNITS)
+"""Shown in false colours."""
 NOT_FINITE = (0, 255, 255)
 _NAN = (255, 0, 255)
 

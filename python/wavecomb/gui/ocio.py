@@ -80,8 +80,7 @@ def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
         raise WavecombError(
             f"no view {view!r}; there are {', '.join(['Linear', 'Neutral', *views()])}"
         )
-    config, display, linear = current
-    # Not as it is named: OpenImageIO would look the file up again.
+    _, display, linear = current
     source = oiio.ImageBuf(np.ascontiguousarray(rgb, dtype=np.float32))
     shown = oiio.ImageBufAlgo.ociodisplay(source, display, view, linear, colorconfig=_name())
     if shown.has_error:

@@ -7,7 +7,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.api import Picture
+from wavecomb.errors import WavecombError
+from wavecomb.gui.developer import develop_frame
+from wavecomb.gui.display import LINEAR, NEUTRAL, Look
 from wavecomb.gui.frames import Frame
+from wavecomb.image import write_png_codes
 from wavecomb.output import scene_metadata
 
 if TYPE_CHECKING:
@@ -43,11 +47,36 @@ def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> 
 
 
 def save_frame(
-    frame: Frame, path: str, scene: Scene, loaded: LoadedStage | None, options: dict[str, Any]
+    frame: Frame,
+    path: str,
+    scene: Scene,
+    loaded: LoadedStage | None,
+    look: Look,
+    options: dict[str, Any],
 ) -> None:
-    """Writes a frame as .exr or .png, whole or not at all.
+    """Writes a frame, all layers (.exr) or what is shown (.png), whole or not at all.
+
+    Args:
+        frame: At full size.
+        path: Ends in .exr or .png.
+        scene: For the camera's matrices.
+        loaded: For the header.
+        look: Of the .png.
+        options: As ``Picture.save`` has them.
 
     Raises:
         OSError, ValueError: The file or an option is no good; one line.
+        WavecombError: There is only a preview yet.
     """
-    picture_of_frame(frame, scene, loaded).save(path, **options)
+    if frame.scale != 1:
+        raise WavecombError("there is only a preview yet: save again when the picture is there")
+    picture = picture_of_frame(frame, scene, loaded)
+    as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)
+    if not path.lower().endswith(".png"):
+        picture.save(path, **options)
+    elif as_rendered:
+        shown = picture if look.layer == "denoised" else replace(picture, denoised=None)
+        transfer = "clamp" if look.view == LINEAR else "neutral"
+        shown.save(path, exposure=look.exposure, tone_map=transfer)
+    else:
+        write_png_codes(path, develop_frame(frame, look).pixels)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stage that is open and its live render: what all panels of the window share.
 
-Contract: lives on the UI thread; no method waits. Reading, rendering, denoising and saving happen on
-other threads, and what they have to say arrives as signals.
+Contract: lives on the UI thread; no method waits. Reading, rendering, denoising and saving happen
+on other threads, and what they have to say arrives as signals.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, Signal
 
 from wavecomb.cli.group import describe
 from wavecomb.gui.camera import Pose, pose_of_scene
+from wavecomb.gui.display import Look
 from wavecomb.gui.engine import Edit
 from wavecomb.gui.frames import Frame
 from wavecomb.gui.live import Live
@@ -51,6 +53,7 @@ class Session(QObject):
         failed(str): One line that says what to do.
         warned(str): One line.
         camera_changed(Pose): The camera moved, or another was chosen.
+        selected(str | None): Path of the prim that was chosen, in the picture or elsewhere.
         saved(str): A file was written.
 
     Attributes:
@@ -58,6 +61,7 @@ class Session(QObject):
         usd: The stage as USD has it, or None; edits go to its session layer, then ``rebuild``.
         up_axis: "X", "Y" or "Z".
         pose: The camera, or None.
+        selection: What ``selected`` gave last.
         material_edits: What ``edit_material`` changed, by the material's name.
         light_edits: What ``edit_light`` changed, by the light's name and its number among those of
             that name.
@@ -74,6 +78,7 @@ class Session(QObject):
     failed = Signal(str)
     warned = Signal(str)
     camera_changed = Signal(object)
+    selected = Signal(object)
     saved = Signal(str)
     _call = Signal(object)
 
@@ -85,6 +90,7 @@ class Session(QObject):
         self.pose: Pose | None = None
         self.material_edits: dict[str, dict[str, Any]] = {}
         self.light_edits: dict[tuple[str, int], dict[str, Any]] = {}
+        self.selection: str | None = None
         self._live = Live(setup, self)
         for name in ("frame", "statistics", "setup_changed", "edited", "state_changed"):
             getattr(self._live, name).connect(getattr(self, name))
@@ -201,6 +207,8 @@ class Session(QObject):
             self.material_edits.clear()
             self.light_edits.clear()
         self._request, self.usd, self.stage = request, usd, loaded
+        if not again:
+            self.select(None)
         usd.SetEditTarget(usd.GetSessionLayer())
         self.up_axis = str(UsdGeom.GetStageUpAxis(usd))
         read = pose_of_scene(loaded.scene.camera, loaded.camera_path)
@@ -329,6 +337,18 @@ class Session(QObject):
             return None
         return renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
 
+    def select(self, path: str | None) -> None:
+        """Chooses a prim by its path; None: nothing."""
+        if path != self.selection:
+            self.selection = path
+            self.selected.emit(path)
+
+    def selected_bounds(self) -> NDArray[np.float64] | None:
+        """Least and greatest corner of the selected prim in world space, (2, 3), or None."""
+        if self.selection is None or self.usd is None or self._request is None:
+            return None
+        return prim_bounds(self.usd, self.selection, self._request.source.time)
+
     def pause(self) -> None:
         """The render stands still."""
         self._live.pause()
@@ -346,11 +366,12 @@ class Session(QObject):
         if self.stage is not None:
             self._live.restart()
 
-    def save(self, path: str | os.PathLike[str], **options: Any) -> None:
-        """Writes what is shown as EXR (all layers) or PNG; ``saved`` or ``failed`` follows.
+    def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
+        """Writes all layers (.exr) or what is shown (.png); ``saved`` or ``failed`` follows.
 
         Args:
             path: Ends in .exr or .png.
+            look: How it is shown; None: the beauty as it is.
             **options: As ``Picture.save`` has them.
         """
         frame = self.last_frame
@@ -360,7 +381,7 @@ class Session(QObject):
         scene, stage, name = self.scene, self.stage, os.fspath(path)
 
         def work() -> None:
-            save_frame(frame, name, scene, stage, options)
+            save_frame(frame, name, scene, stage, look or Look(), options)
             self._call.emit(lambda: self.saved.emit(name))
 
         self.run(f"writing {Path(name).name}", work)
@@ -429,6 +450,33 @@ class Session(QObject):
         self._twins.clear()
         self._loader.close()
         self.stage = self.usd = None
+
+
+def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.float64] | None:
+    """World bounds of a prim, (2, 3); None where it has none.
+
+    Args:
+        usd: The stage.
+        path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
+            "/World/Forest".
+        time: Time code; None: the stage's start.
+    """
+    from pxr import Sdf, UsdGeom
+
+    from wavecomb.usd.stage import time_code
+
+    plain = path.partition("[")[0]
+    if not Sdf.Path.IsValidPathString(plain):
+        return None
+    prim = usd.GetPrimAtPath(plain)
+    if not prim:
+        return None
+    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+    box = UsdGeom.BBoxCache(time_code(usd, time), purposes).ComputeWorldBound(prim)
+    aligned = box.ComputeAlignedRange()
+    if aligned.IsEmpty():
+        return None
+    return np.array([aligned.GetMin(), aligned.GetMax()], np.float64)
 
 
 def light_key(scene: Scene, index: int) -> tuple[str, int]:

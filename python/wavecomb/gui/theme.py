@@ -12,11 +12,16 @@ from PySide6.QtWidgets import QApplication
 SYSTEM, DARK, LIGHT = "system", "dark", "light"
 CHOICES = (SYSTEM, DARK, LIGHT)
 
-_GROUPS = QPalette.ColorRole
 # Window, base, alternate base, button, text, dimmed text, lines, highlight, link.
 _COLOURS = {
-    DARK: ("#2b2d31", "#1f2124", "#26282c", "#383b40", "#e4e6ea", "#8d939c", "#17181a", "#3d7ede", "#7db0ff"),
-    LIGHT: ("#f2f3f5", "#ffffff", "#f6f7f9", "#e6e8ec", "#1b1d21", "#767c86", "#b9bec7", "#2f6fd6", "#1a5cc8"),
+    DARK: (
+        "#2b2d31", "#1f2124", "#26282c", "#383b40", "#e4e6ea", "#8d939c", "#17181a", "#3d7ede",
+        "#7db0ff",
+    ),
+    LIGHT: (
+        "#f2f3f5", "#ffffff", "#f6f7f9", "#e6e8ec", "#1b1d21", "#767c86", "#b9bec7", "#2f6fd6",
+        "#1a5cc8",
+    ),
 }  # fmt: skip
 # Told apart in greyscale and with the common colour deficiencies (Okabe and Ito 2008, adapted).
 _SERIES = {
@@ -93,12 +98,14 @@ def palette(dark: bool) -> QPalette:
     out = QPalette()
     role = QPalette.ColorRole
     for which, colour in (
-        (role.Window, window), (role.WindowText, text), (role.Base, base), (role.AlternateBase, alternate),
-        (role.Text, text), (role.Button, button), (role.ButtonText, text), (role.BrightText, QColor("white")),
-        (role.ToolTipBase, base), (role.ToolTipText, text), (role.PlaceholderText, dim),
-        (role.Highlight, highlight), (role.HighlightedText, QColor("white")), (role.Link, link),
-        (role.Light, button.lighter(115)), (role.Midlight, button.lighter(107)), (role.Mid, line),
-        (role.Dark, line), (role.Shadow, QColor("black")), (role.Accent, highlight),
+        (role.Window, window), (role.WindowText, text), (role.Base, base),
+        (role.AlternateBase, alternate), (role.Text, text), (role.Button, button),
+        (role.ButtonText, text), (role.BrightText, QColor("white")), (role.ToolTipBase, base),
+        (role.ToolTipText, text), (role.PlaceholderText, dim), (role.Highlight, highlight),
+        (role.HighlightedText, QColor("white")), (role.Link, link),
+        (role.Light, button.lighter(115)), (role.Midlight, button.lighter(107)),
+        (role.Mid, line), (role.Dark, line), (role.Shadow, QColor("black")),
+        (role.Accent, highlight),
     ):  # fmt: skip
         out.setColor(which, colour)
     disabled = QPalette.ColorGroup.Disabled
@@ -109,9 +116,9 @@ def palette(dark: bool) -> QPalette:
 
 
 def _style_sheet() -> str:
-    colours = _COLOURS[_name()]
+    _, base, _, _, text, _, line, _, _ = _COLOURS[_name()]
     return (
-        f"QToolTip {{ color: {colours[4]}; background: {colours[1]}; border: 1px solid {colours[6]}; }}"
+        f"QToolTip {{ color: {text}; background: {base}; border: 1px solid {line}; }}"
         "QDockWidget::title { padding: 0.3em; }"
     )
 

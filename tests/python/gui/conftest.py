@@ -8,13 +8,8 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_LOGGING_RULES", "qt.qpa.*=false")
 
-try:
-    import PySide6.QtWidgets
-    import pytestqt
-except ImportError as error:  # the extra `gui` is not there
-    reason = f"the window needs PySide6 and pytest-qt ({error}): tools/setup test installs them"
-    collect_ignore_glob = ["test_*.py"]
-    print(f"tests/python/gui skipped: {reason}")
+pytest.importorskip("PySide6.QtWidgets", reason="the window needs the extra gui")
+pytest.importorskip("pytestqt", reason="tests of the window need pytest-qt")
 
 
 @pytest.fixture(scope="session")
