@@ -33,7 +33,7 @@ from wavecomb.progress import time_text
 Say = Callable[[str], None]
 
 
-def _no_event(name: str, **values: Any) -> None:
+def _no_event(name: str, /, **values: Any) -> None:
     """Nobody listens."""
 
 

@@ -127,7 +127,7 @@ def run_command(
         click.echo(f"results are in {output}; `wavecomb bench report {output}` shows them")
 
 
-def _event(name: str, **values: object) -> None:
+def _event(name: str, /, **values: object) -> None:
     """A line of JSON on stdout."""
     click.echo(json.dumps({"event": name, **values}))
 

@@ -73,7 +73,6 @@ class BenchBrowser(QWidget):
         self.shots.itemActivated.connect(self._compare)
         self.facts = RunsTable("facts", self)
         self.two = TwoFolders(self)
-        self.two.failed.connect(self._fail)
         self.tabs = QTabWidget(self)
         self.tabs.setObjectName("benchTabs")
         self._lay_out()

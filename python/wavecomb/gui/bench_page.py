@@ -69,9 +69,8 @@ class _Filter(HTMLParser):
                 self.out.append(f"<i>{html.escape(values.get('alt', 'a picture'))}</i>")
                 return
             values = {"src": values.get("src", ""), "width": "100%"}
-        kept = {
-            key: values[key] for key in ("id", "href", "src", "rowspan", "width") if key in values
-        }
+        names = ("id", "href", "src", "rowspan", "width")
+        kept = {key: value for key, value in values.items() if key in names}
         if tag == "table":
             kept |= {"border": "1", "cellpadding": "4", "cellspacing": "0"}
         written = "".join(f' {key}="{html.escape(value)}"' for key, value in kept.items())

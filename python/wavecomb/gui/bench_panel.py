@@ -64,7 +64,4 @@ class BenchPanel(QWidget):
         return QSize(theme.em(64), theme.em(44))
 
     def _open_new(self, folder: Path) -> None:
-        """A stopped benchmark is not opened in front of what is being read."""
-        if self.runner.running:
-            return
         self.open(folder)

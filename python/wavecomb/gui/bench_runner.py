@@ -51,7 +51,6 @@ class BenchRunner(QWidget):
         super().__init__(parent)
         self.setObjectName("benchRunner")
         self._session = session
-        self._paused = False
         self._measuring = False
         self._runs = 0
         self._warnings: list[str] = []
@@ -146,7 +145,7 @@ class BenchRunner(QWidget):
         self.bar.setRange(0, 0)
         self._enable(False)
         self._measuring = True
-        self._keep_still(self._session.state)
+        self._still()
         words = choice.arguments()
         self._log_line("wavecomb " + " ".join(words))
         self.command.start(words)
@@ -222,7 +221,7 @@ class BenchRunner(QWidget):
         else:
             self._say("Done." if not self._warnings else "Done, but: " + "; ".join(self._warnings))
         self._show_choice()
-        if (self._folder / "runs.csv").is_file() and not error:
+        if code == 0:
             self.done.emit(self._folder)
 
     def _estimated(self, code: int, text: str, error: str) -> None:
@@ -242,13 +241,15 @@ class BenchRunner(QWidget):
     def _keep_still(self, state: str) -> None:
         """The viewport does not render while it is measured."""
         if self._measuring and state == "rendering":
-            self._paused = True
-            self._session.pause()
+            self._still()
+
+    def _still(self) -> None:
+        if self._session.state == "rendering":
             self._log_line("The viewport is paused: it would disturb the measurement.")
+        self._session.pause()
 
     def _let_go(self) -> None:
-        if self._paused:
-            self._paused = False
+        if self._session.state != "stopped":  # that was the user's wish
             self._session.resume()
 
     def _enable(self, idle: bool) -> None:

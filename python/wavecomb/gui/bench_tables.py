@@ -118,9 +118,8 @@ class RunsProxy(QSortFilterProxyModel):
 
     def set_words(self, text: str) -> None:
         """Upper and lower case are alike; a word with a dash before it must not be there."""
-        self.beginFilterChange()
         self._words = text.lower().split()
-        self.endFilterChange(QSortFilterProxyModel.Direction.Rows)
+        self.invalidateRowsFilter()
 
     def filterAcceptsRow(self, row: int, parent: Any) -> bool:
         """Qt's."""

@@ -57,12 +57,12 @@ class TwoFolders(QWidget):
         self.before.setObjectName("twoBefore")
         self.before.setToolTip("The folder that this one is compared with")
         self.before.clicked.connect(self.ask)
-        self.metric = QComboBox(self)
-        self.metric.setObjectName("twoMetric")
-        self.metric.setAccessibleName("What is compared")
-        self.metric.setToolTip("The column of runs.csv that is compared")
-        self.metric.addItems(METRICS)
-        self.metric.currentIndexChanged.connect(self._run)
+        self.choice = QComboBox(self)
+        self.choice.setObjectName("twoMetric")
+        self.choice.setAccessibleName("What is compared")
+        self.choice.setToolTip("The column of runs.csv that is compared")
+        self.choice.addItems(METRICS)
+        self.choice.currentIndexChanged.connect(self._run)
         self.words = QLabel(self)
         self.words.setObjectName("twoWords")
         self.words.setWordWrap(True)
@@ -70,7 +70,7 @@ class TwoFolders(QWidget):
         self.table = RunsTable("two", self)
         row = QHBoxLayout()
         row.addWidget(self.before, 1)
-        row.addWidget(self.metric)
+        row.addWidget(self.choice)
         column = QVBoxLayout(self)
         column.addLayout(row)
         column.addWidget(self.words)
@@ -114,7 +114,7 @@ class TwoFolders(QWidget):
             return
         self._say("Comparing ...")
         words = ["bench", "compare", str(self._before), str(self._after)]
-        self._command.start([*words, "--metric", self.metric.currentText(), "--json"])
+        self._command.start([*words, "--metric", self.choice.currentText(), "--json"])
 
     def _take(self, code: int, text: str, error: str) -> None:
         if self._again:

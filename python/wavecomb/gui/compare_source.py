@@ -49,7 +49,6 @@ class SideSource(QObject):
         self._reader.done.connect(lambda key, side: self.set_side(side))
         self._reader.failed.connect(lambda key, line: self.failed.emit(line))
         session.frame.connect(self._on_viewport)
-        session.state_changed.connect(self._follow_state)
 
     @property
     def loading(self) -> bool:
@@ -94,7 +93,8 @@ class SideSource(QObject):
         self.live = self._session.twin(setup)
         self.live.frame.connect(self._on_live)
         self.live.failed.connect(self.failed)
-        self._follow_state(self._session.state)
+        if self._session.state == "paused":
+            self.live.pause()
         self.changed.emit()
 
     def change(self, **values: Any) -> None:
@@ -139,14 +139,6 @@ class SideSource(QObject):
         name = f"live ({setup_text(frame.setup, self._session.setup)})"
         self.side = side_of_frame(frame, name, live=True)
         self.changed.emit()
-
-    def _follow_state(self, state: str) -> None:
-        """A render that is paused for a measurement has no twin that goes on."""
-        if self.live is not None:
-            if state == "paused":
-                self.live.pause()
-            elif self.live.state == "paused":
-                self.live.resume()
 
 
 def setup_text(setup: Setup, beside: Setup | None = None) -> str:

@@ -64,7 +64,8 @@ class CompareWindow(QWidget):
         self._error.setWordWrap(True)
         self._error.hide()
         self.setStyleSheet(
-            "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text) }"
+            "QToolButton:checked { background: palette(highlight);"
+            " color: palette(highlighted-text) }"
         )
         self._lay_out()
         for name, source in self.sources.items():

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QSettings
 
@@ -13,7 +14,7 @@ MOST = 10
 
 def recent_folders() -> list[Path]:
     """Those that are still there, newest first."""
-    stored = QSettings("Wavecomb", "view").value(_KEY, [])
+    stored: Any = QSettings("Wavecomb", "view").value(_KEY, [])
     names = [stored] if isinstance(stored, str) else list(stored or [])
     return [Path(name) for name in names if (Path(name) / "runs.csv").is_file()]
 
