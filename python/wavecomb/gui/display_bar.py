@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QHBoxLayout, QLabel, QSlider, QWidget
@@ -210,7 +211,7 @@ class DisplayBar(QWidget):
             self.view.setCurrentIndex(index)
             self._apply(view=name)
 
-    def _apply(self, **values: object) -> None:
+    def _apply(self, **values: Any) -> None:
         look = replace(self._viewport.look, **values)
         if look != self._viewport.look:
             self._viewport.set_look(look)

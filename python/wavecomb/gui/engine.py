@@ -98,6 +98,7 @@ class Engine:
         self._renderer: Renderer | None = None
         self._loaded: LoadedStage | None = None
         self._superseded = False
+        self._working = False
         self._closing = False
         self._going = threading.Event()
         self._going.set()
@@ -140,6 +141,11 @@ class Engine:
         """Goes on."""
         self._going.set()
 
+    def is_busy(self) -> bool:
+        """Whether a task is under way or waits."""
+        with self._condition:
+            return self._working or self._task is not None
+
     @property
     def paused(self) -> bool:
         """Whether pause() was called last."""
@@ -161,12 +167,14 @@ class Engine:
     def _run(self) -> None:
         while True:
             with self._condition:
+                self._working = False
                 while self._task is None and not self._closing:
                     self._condition.wait()
                 if self._closing:
                     return
                 task, self._task = self._task, None
                 self._superseded = False
+                self._working = True
             assert task is not None
             try:
                 self._do(task)
@@ -202,7 +210,7 @@ class Engine:
     def _preview(self, renderer: Renderer, task: Task, scale: int) -> Frame | None:
         settings = task.setup.settings(scale, preview=True)
         start = time.perf_counter()
-        result = renderer.render(settings, watcher=_Watch(self, task, None), interval=LOOK_S)
+        result = renderer.render(settings, watcher=_Stopper(self), interval=LOOK_S)
         if result.cancelled:
             return None
         self._learn(time.perf_counter() - start, int(result.samples.sum()))
@@ -301,6 +309,20 @@ def filled(beauty: Any, samples: Any, preview: Frame | None) -> Any:
     return np.where(holes[:, :, None], enlarged(preview.beauty, width, height), beauty)
 
 
+class _Stopper:
+    """Ends a render that is not wanted any more."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+
+    def progress(self, status: Mapping[str, Any]) -> str | None:
+        """Asks for a stop, or for nothing."""
+        return "stop" if self._engine._superseded else None
+
+    def snapshot(self, snapshot: Snapshot) -> None:
+        """Nobody asked for it."""
+
+
 class _Watch:
     """What the core asks while it renders: takes frames, stands still, stops."""
 
@@ -317,7 +339,7 @@ class _Watch:
         engine = self._engine
         if engine._superseded:
             return "stop"
-        if engine.paused or (not self._task.moving and time.perf_counter() >= self._next):
+        if engine.paused or time.perf_counter() >= self._next:
             return "snapshot" if status["samples_done"] else None
         return None
 

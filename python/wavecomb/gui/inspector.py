@@ -47,7 +47,7 @@ def value_text(value: Any) -> str:
     numbers = np.asarray(value).reshape(-1)
     if numbers.dtype.kind in "iub":
         return "  ".join(str(int(n)) for n in numbers)
-    return "  ".join(f"{float(n):.5g}" for n in numbers)
+    return "  ".join(f"{float(n):.4g}" for n in numbers)
 
 
 def pixel_rows(frame: Frame, x: int, y: int) -> list[tuple[str, str]]:
@@ -146,13 +146,12 @@ class Inspector(QWidget):
         if self.tree.topLevelItemCount() != len(groups):
             self.tree.clear()
             for title, _ in groups:
-                group = QTreeWidgetItem([title, ""])
-                self.tree.addTopLevelItem(group)
-                group.setFirstColumnSpanned(True)
-                group.setExpanded(True)
+                top = QTreeWidgetItem([title, ""])
+                self.tree.addTopLevelItem(top)
+                top.setFirstColumnSpanned(True)
+                top.setExpanded(True)
         for i, (title, rows) in enumerate(groups):
-            group = self.tree.topLevelItem(i)
-            assert group is not None
+            group: Any = self.tree.topLevelItem(i)
             group.setText(0, title)
             while group.childCount() > len(rows):
                 group.takeChild(group.childCount() - 1)

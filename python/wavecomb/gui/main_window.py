@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QByteArray, QSettings, Qt
 from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
@@ -152,6 +153,7 @@ class MainWindow(QMainWindow):
         viewport.picked.connect(self.inspector.pick)
         viewport.region_mode_changed.connect(self.actions_by_name["region"].setChecked)
         self._state_changed(session.state)
+        self._setup_changed(session.setup)
 
     # ---- stages ----------------------------------------------------------------------------------
 
@@ -182,7 +184,7 @@ class MainWindow(QMainWindow):
 
     def recent(self) -> list[str]:
         """Files that were opened, the last first."""
-        value = self.settings.value("recent", [])
+        value: Any = self.settings.value("recent", [])
         return [value] if isinstance(value, str) else [str(path) for path in value or []]
 
     def _opened(self) -> None:

@@ -11,7 +11,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.developer import develop_frame
 from wavecomb.gui.display import LINEAR, NEUTRAL, Look
 from wavecomb.gui.frames import Frame
-from wavecomb.image import write_png_codes
+from wavecomb.image import Transfer, write_png_codes
 from wavecomb.output import scene_metadata
 
 if TYPE_CHECKING:
@@ -32,14 +32,14 @@ def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> 
     }
     if loaded is not None:
         stats |= {"stage": str(loaded.stage_path), "camera": loaded.camera_path}
-    named = {name: frame.layers.get(name) for name in _NAMED}
-    others = {name: array for name, array in frame.layers.items() if name not in _NAMED}
+    layers = dict(frame.layers)
+    named: dict[str, Any] = {name: layers.pop(name, None) for name in _NAMED}
     return Picture(
         beauty=frame.beauty,
         denoised=frame.denoised,
         stats=stats,
         cancelled=True,
-        aovs=others,
+        aovs=layers,
         metadata=scene_metadata(scene, frame.width, frame.height),
         chosen=frame.setup.aovs,
         **named,
@@ -76,7 +76,7 @@ def save_frame(
         picture.save(path, **options)
     elif as_rendered:
         shown = picture if look.layer == "denoised" else replace(picture, denoised=None)
-        transfer = "clamp" if look.view == LINEAR else "neutral"
+        transfer: Transfer = "clamp" if look.view == LINEAR else "neutral"
         shown.save(path, exposure=look.exposure, tone_map=transfer)
     else:
         write_png_codes(path, develop_frame(frame, look).pixels)

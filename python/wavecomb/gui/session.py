@@ -491,8 +491,4 @@ def make_renderer(scene: Scene, threads: int) -> Renderer:
     """The core's renderer."""
     from wavecomb import _core
 
-    if hasattr(_core, "Renderer"):
-        return _core.Renderer(scene, threads)
-    from wavecomb.gui import stand_in
-
-    return stand_in.Renderer(scene, threads)
+    return _core.Renderer(scene, threads)

@@ -92,7 +92,6 @@ class Setup:
         Raises:
             WavecombError, wavecomb._core.Error: A value is no good; one line.
         """
-        from wavecomb import _core
         from wavecomb.api import make_settings
 
         own = {"width", "height", "spp", "aovs", "denoise", "region"}
@@ -100,16 +99,18 @@ class Setup:
         if self.region is not None:
             values["region"] = scaled_region(self.region, scale, self.width, self.height)
         if preview:
-            values |= {"adaptive": 0.0, "noise": 0.0, "time_limit": 0.0}
+            # Measuring what materials cost would take longer than the picture.
+            values |= {"adaptive": 0.0, "noise": 0.0, "time_limit": 0.0, "costs": "model"}
         else:
             values["progressive"] = True
-        values = {k: v for k, v in values.items() if hasattr(_core.Settings, k)}
         size = scaled_size(self.width, self.height, scale)
         return make_settings(size, 1 if preview else self.spp, aovs=self.layers(), **values)
 
 
 def scaled_size(width: int, height: int, scale: int) -> tuple[int, int]:
     """The size of a picture at 1 / scale, at least one pixel."""
+    if scale == 1:
+        return width, height
     return max(1, width // scale), max(1, height // scale)
 
 

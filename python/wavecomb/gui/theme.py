@@ -15,7 +15,7 @@ CHOICES = (SYSTEM, DARK, LIGHT)
 # Window, base, alternate base, button, text, dimmed text, lines, highlight, link.
 _COLOURS = {
     DARK: (
-        "#2b2d31", "#1f2124", "#26282c", "#383b40", "#e4e6ea", "#8d939c", "#17181a", "#3d7ede",
+        "#34373c", "#1e2023", "#25272b", "#45494f", "#e4e6ea", "#8d939c", "#17181a", "#3d7ede",
         "#7db0ff",
     ),
     LIGHT: (

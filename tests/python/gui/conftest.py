@@ -41,6 +41,36 @@ def new_session(qtbot):
 
 
 @pytest.fixture
+def window(qtbot, qapp, tmp_path):
+    """An empty window with settings of its own, 96 x 96 pixels and 4 samples."""
+    from PySide6.QtCore import QSettings
+
+    from wavecomb.gui import theme
+    from wavecomb.gui.main_window import MainWindow
+    from wavecomb.gui.setup import Setup
+
+    theme.apply("dark")
+    settings = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
+    made = MainWindow(Setup(width=96, height=96, spp=4), settings)
+    made.resize(900, 600)
+    made.show()
+    qtbot.waitExposed(made)
+    yield made
+    made.close()
+    made.deleteLater()
+
+
+@pytest.fixture
+def cornell_window(window, qtbot, cornell):
+    """The window with the Cornell box, rendered and on the screen."""
+    with qtbot.waitSignal(window.session.opened, timeout=10000):
+        window.open(cornell)
+    wait_final(qtbot, window.session)
+    qtbot.waitUntil(lambda: window.viewport.image() is not None)
+    return window
+
+
+@pytest.fixture
 def session(new_session, qtbot, cornell):
     """Cornell at 96 x 96 with 4 samples, opened and shown to the end."""
     made = new_session(width=96, height=96, spp=4)
