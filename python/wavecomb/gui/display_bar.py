@@ -7,7 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QSettings, Qt
-from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QHBoxLayout, QLabel, QSlider, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QHBoxLayout,
+    QLabel,
+    QSlider,
+    QWidget,
+)
 
 from wavecomb import aovs as aov_names
 from wavecomb.gui import display, ocio, theme
@@ -77,7 +85,7 @@ class DisplayBar(QWidget):
         )  # fmt: skip
         self.slider.setRange(round(-EXPOSURE * 20), round(EXPOSURE * 20))
         self.slider.setPageStep(20)
-        self.slider.setMinimumWidth(theme.em(5))
+        self.slider.setMinimumWidth(theme.em(3))
         self.slider.valueChanged.connect(lambda value: self.set_exposure(value / 20))
         self.view = choice(
             "display.view",
@@ -87,6 +95,12 @@ class DisplayBar(QWidget):
             display.views(),
             self.set_view,
         )
+        for box, letters in ((self.layer, 10), (self.view, 8)):
+            box.setSizeAdjustPolicy(
+                QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            )
+            box.setMinimumContentsLength(letters)
+            box.view().setTextElideMode(Qt.TextElideMode.ElideNone)
         self.automatic = named(
             QCheckBox("Auto range"), "display.auto", "Automatic range",
             "False colours from the picture's least to its greatest value",

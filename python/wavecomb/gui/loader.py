@@ -109,9 +109,11 @@ class Loader:
             try:
                 usd, loaded = read(request)
             except Exception as error:
-                self._failed(request, describe(error))
+                if not self._closing:
+                    self._failed(request, describe(error))
             else:
-                self._done(request, usd, loaded)
+                if not self._closing:
+                    self._done(request, usd, loaded)
 
 
 def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:

@@ -351,12 +351,14 @@ class Session(QObject):
         return prim_bounds(self.usd, self.selection, self._request.source.time)
 
     def pause(self) -> None:
-        """The render stands still."""
-        self._live.pause()
+        """The render and its twins stand still."""
+        for live in (self._live, *self._twins):
+            live.pause()
 
     def resume(self) -> None:
-        """Goes on, or begins again where it was stopped."""
-        self._live.resume()
+        """Goes on, or begins again where it was stopped; so do twins."""
+        for live in (self._live, *self._twins):
+            live.resume()
 
     def stop(self) -> None:
         """Ends the render; the picture stays."""

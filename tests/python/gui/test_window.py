@@ -220,13 +220,14 @@ def test_the_state_is_kept(window, qtbot):
 
     window.display.set_view("Neutral")
     window.docks["inspector"].hide()
-    window.resize(801, 577)
+    window.resize(780, 577)
+    size = window.size()
     window.close()
     other = MainWindow(settings=window.settings)
     other.show()
     assert other.viewport.look.view == "Neutral"
     assert not other.docks["inspector"].isVisible()
-    assert (other.width(), other.height()) == (801, 577)
+    assert other.size() == size
     other.reset_layout()
     assert other.docks["inspector"].isVisible()
     other.close()
