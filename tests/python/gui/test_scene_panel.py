@@ -108,11 +108,10 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
     hidden = same_as_saved(panel)
     before = picture(stage_path)
     assert (hidden != before).any()
-    # The eye shows it again; Ctrl+Z takes that back.
+    # The eye shows it again; undo takes that back.
     with qtbot.waitSignal(panel.session.opened, timeout=20000):
         click(view, row(panel, "/World/Things/Ball", VISIBILITY))
     assert (same_as_saved(panel) == before).all()
-    panel.activateWindow()
     with qtbot.waitSignal(panel.session.opened, timeout=20000):
         panel.undo_action.trigger()
     assert (same_as_saved(panel) == hidden).all()
@@ -120,6 +119,34 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
     assert view.isExpanded(row(panel, "/World/Things"))
     assert model.data(row(panel, "/World/Things/Ball", VISIBILITY), Qt.ItemDataRole.ToolTipRole)
     assert panel.state.text() == "1 edited"
+
+
+def test_keys_of_the_window(qtbot, stage_path, tmp_path):
+    """F in the tree frames, Ctrl+Z undoes, wherever the focus is in the window."""
+    from PySide6.QtCore import QSettings
+
+    from wavecomb.gui.main_window import MainWindow
+    from wavecomb.gui.setup import Setup
+
+    settings = QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+    window = MainWindow(Setup(width=SIZE, height=SIZE, spp=1), settings)
+    qtbot.addWidget(window)
+    window.show()
+    with qtbot.waitSignal(window.session.opened, timeout=20000):
+        window.open(stage_path)
+    view = window.scene.tree.view
+    window.session.select("/World/Sign")
+    view.setFocus()
+    before = window.session.pose
+    QTest.keyClick(view, Qt.Key.Key_F)
+    assert (window.session.pose.transform != before.transform).any()
+    window.scene.edits.set_light("/World/Lights/Key", "exposure", 2.0)
+    QTest.keyClick(view, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert window.scene.edits.lines() == []
+    with qtbot.waitSignal(window.session.opened, timeout=20000):
+        QTest.keyClick(view, Qt.Key.Key_Space)
+    assert window.scene.edits.is_hidden("/World/Sign") and window.session.state != "paused"
+    window.close()
 
 
 def test_instances_are_shown_and_say_why_not(panel):
