@@ -66,7 +66,7 @@ def entries(window: MainWindow) -> list[Entry]:
             "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
             "Write what was edited as a small USD layer over the stage",
         ),
-        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Take back the last edit of the scene"),
+        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Take the last edit back"),
         Entry(
             "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
             "Make the edit again that was taken back",

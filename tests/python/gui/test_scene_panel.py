@@ -139,7 +139,7 @@ def test_keys_of_the_window(qtbot, stage_path, tmp_path):
     view.setFocus()
     before = window.session.pose
     QTest.keyClick(view, Qt.Key.Key_F)
-    assert (window.session.pose.transform != before.transform).any()
+    assert (window.session.pose.to_world != before.to_world).any()
     window.scene.edits.set_light("/World/Lights/Key", "exposure", 2.0)
     QTest.keyClick(view, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert window.scene.edits.lines() == []
