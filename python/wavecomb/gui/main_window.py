@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.about import make_about
 from wavecomb.gui.actions import make_action
+from wavecomb.gui.compare_window import CompareWindow
 from wavecomb.gui.display_bar import DisplayBar
 from wavecomb.gui.inspector import Inspector
 from wavecomb.gui.menus import CHECKED, MENUS, entries
@@ -60,6 +61,7 @@ class MainWindow(QMainWindow):
         self.docks: dict[str, QDockWidget] = {}
         self._save_path: str | None = None
         self._dialog: QWidget | None = None
+        self.compare: CompareWindow | None = None
         self._lay_out()
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
@@ -312,6 +314,15 @@ class MainWindow(QMainWindow):
     def _dialog_gone(self) -> None:
         self._dialog = None
 
+    def show_compare(self) -> None:
+        """The window in which pictures and settings are compared."""
+        if self.compare is None:
+            self.compare = CompareWindow(self.session)
+            self.compare.setObjectName("compare")
+        self.compare.show()
+        self.compare.raise_()
+        self.compare.activateWindow()
+
     def toggle_full_screen(self) -> None:
         """All of the screen, or not."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
@@ -340,6 +351,9 @@ class MainWindow(QMainWindow):
             close = getattr(dock.widget(), "shutdown", None)
             if close is not None:
                 close()
+        if self.compare is not None:
+            self.compare.shutdown()
+            self.compare.close()
         self.viewport.close_threads()
         self.session.shutdown()
         super().closeEvent(event)
