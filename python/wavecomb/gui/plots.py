@@ -150,7 +150,8 @@ class Bars(Plot):
         metrics = QFontMetricsF(QApplication.font())
         room = min(0.42 * self.width(), theme.em(17.0))
         shown = [
-            metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room - theme.em()) for name in rows
+            metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room - theme.em())
+            for name in rows
         ]
         left.setTicks([list(enumerate(shown))])
         widest = max((metrics.horizontalAdvance(name) for name in shown), default=0.0)

@@ -152,8 +152,7 @@ def compare(series: Series, base: Series) -> Ratio | None:
     if not series.does_the_work_of(base):
         return None
     pairs = [
-        compare_runs(a, b)
-        for a, b in zip(_whole(series.runs), _whole(base.runs), strict=False)
+        compare_runs(a, b) for a, b in zip(_whole(series.runs), _whole(base.runs), strict=False)
     ]
     known = [one for one in pairs if math.isfinite(one.value)]
     if len(known) < 2:
