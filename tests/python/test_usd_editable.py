@@ -96,14 +96,15 @@ def test_where_materials_and_lights_come_from(path):
 
 
 def test_materials_in_instances_are_named_by_the_instance(tmp_path):
+    inside = (material("Red", "float inputs:roughness = 0.3") + mesh("Red")).replace("</W/", "</P/")
     text = """
-    class "P" { %s }
+    class "P" { INSIDE }
     def Xform "A" ( instanceable = true
         prepend inherits = </P> ) { }
     def Xform "B" ( instanceable = true
         prepend inherits = </P> ) { }
-    """ % (material("Red", "float inputs:roughness = 0.3") + mesh("Red")).replace("</W/", "</P/")
-    loaded = load_stage(write(tmp_path, text), editable=True)
+    """
+    loaded = load_stage(write(tmp_path, text.replace("INSIDE", inside)), editable=True)
     assert loaded.material_paths[0] == "/A/Red"
 
 

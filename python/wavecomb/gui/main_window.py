@@ -29,6 +29,7 @@ from wavecomb.gui.menus import CHECKED, MENUS, entries
 from wavecomb.gui.messages import MessageBar
 from wavecomb.gui.panels import make_panels
 from wavecomb.gui.render_bar import RenderBar
+from wavecomb.gui.scene_panel import ScenePanel
 from wavecomb.gui.session import Session, Setup
 from wavecomb.gui.shortcuts import ShortcutsDialog
 from wavecomb.gui.status import StatusLine
@@ -159,8 +160,16 @@ class MainWindow(QMainWindow):
             action.triggered.connect(lambda checked=False, choice=choice: self.set_theme(choice))
             group.addAction(action)
 
+    @property
+    def scene(self) -> ScenePanel:
+        """The scene panel."""
+        panel = self.docks["scene"].widget()
+        assert isinstance(panel, ScenePanel)
+        return panel
+
     def _connect(self) -> None:
         session, viewport = self.session, self.viewport
+        self.scene.frame_wanted.connect(viewport.frame_selected)
         for told in (session.failed, viewport.failed):
             told.connect(self.message.show_error)
         session.warned.connect(self.message.show_warning)

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from wavecomb.gui.main_window import MainWindow
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    ("&File", ("open", "recent", "reload", "-", "save", "save_as", "-", "quit")),
+    (
+        "&File",
+        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_edits", "-", "quit"),
+    ),
+    ("&Edit", ("undo", "redo")),
     (
         "&Render",
         ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise"),
@@ -37,6 +41,7 @@ CHECKED = ("region",)
 def entries(window: MainWindow) -> list[Entry]:
     """All actions."""
     viewport, display, session = window.viewport, window.display, window.session
+    scene = window.scene
 
     def view(name: str, digit: int) -> Entry:
         return Entry(
@@ -56,6 +61,15 @@ def entries(window: MainWindow) -> list[Entry]:
         Entry(
             "save_as", "Save &as\u2026", window.save_as, ["Ctrl+Shift+S"],
             "Write all layers (EXR) or what is shown (PNG)",
+        ),
+        Entry(
+            "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
+            "Write what was edited as a small USD layer over the stage",
+        ),
+        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Take the last edit back"),
+        Entry(
+            "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
+            "Make the edit again that was taken back",
         ),
         Entry("quit", "&Quit", window.close, ["Ctrl+Q"]),
         Entry(

@@ -25,17 +25,21 @@ StateRole = Qt.ItemDataRole.UserRole + 1
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 ROOT = QModelIndex()
 
+CHUNK = 500
+"""Children that a view gets at once; it asks for more when it comes to their end."""
+
 
 class _Node:
     """A row. Names of its children are None until they were asked for; rows are made one by one."""
 
-    __slots__ = ("made", "names", "parent", "path", "row")
+    __slots__ = ("made", "names", "parent", "path", "row", "shown")
 
     def __init__(self, path: Sdf.Path, parent: _Node | None, row: int) -> None:
         self.path = path
         self.parent = parent
         self.row = row
         self.names: list[str] | None = None
+        self.shown = 0
         self.made: dict[int, _Node] = {}
 
 
@@ -69,9 +73,12 @@ class SceneModel(QAbstractItemModel):
         node = self._root
         for prefix in path.GetPrefixes():
             try:
-                node = self._child(node, self._names(node).index(prefix.name))
+                row = self._names(node).index(prefix.name)
             except ValueError:
                 return QModelIndex()
+            if row >= node.shown:
+                self._show_more(node, row + 1)
+            node = self._child(node, row)
         return QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
 
     def refresh(self) -> None:
@@ -95,7 +102,27 @@ class SceneModel(QAbstractItemModel):
             if self._filter is not None:
                 names = [name for name in names if node.path.AppendChild(name) in self._filter]
             node.names = names
+            node.shown = min(len(names), CHUNK)
         return node.names
+
+    def _show_more(self, node: _Node, count: int) -> None:
+        """Lets the view have so many children."""
+        at = QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
+        self.beginInsertRows(at, node.shown, count - 1)
+        node.shown = count
+        self.endInsertRows()
+
+    def canFetchMore(self, parent: QModelIndex = ROOT) -> bool:
+        """As Qt has it."""
+        node = self._node(parent)
+        return node.shown < len(self._names(node))
+
+    def fetchMore(self, parent: QModelIndex = ROOT) -> None:
+        """As Qt has it."""
+        node = self._node(parent)
+        count = min(len(self._names(node)), node.shown + CHUNK)
+        if count > node.shown:
+            self._show_more(node, count)
 
     def _child(self, node: _Node, row: int) -> _Node:
         made = node.made.get(row)
@@ -124,7 +151,11 @@ class SceneModel(QAbstractItemModel):
 
     def rowCount(self, parent: QModelIndex = ROOT) -> int:
         """As Qt has it."""
-        return 0 if parent.column() > 0 else len(self._names(self._node(parent)))
+        if parent.column() > 0:
+            return 0
+        node = self._node(parent)
+        self._names(node)
+        return node.shown
 
     def columnCount(self, parent: QModelIndex = ROOT) -> int:
         """As Qt has it."""

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pxr import Sdf, UsdShade
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QComboBox,
     QFileDialog,
@@ -91,9 +92,11 @@ class ScenePanel(QWidget):
 
     Signals:
         selected(str): Prim that was chosen, in any panel or in the picture.
+        frame_wanted(): F was pressed in the tree: what is selected is to fill the picture.
     """
 
     selected = Signal(str)
+    frame_wanted = Signal()
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -134,6 +137,7 @@ class ScenePanel(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.tabs, 1)
         layout.addLayout(bottom)
+        self.tree.view.frame_wanted.connect(self.frame_wanted)
         self.edits.changed.connect(self._on_changed)
         session.selected.connect(self._on_selected)
         session.opened.connect(self._on_opened)
@@ -141,20 +145,16 @@ class ScenePanel(QWidget):
         self._count_notes()
 
     def _make_actions(self) -> None:
-        self.undo_action = self._action("Undo", QKeySequence.StandardKey.Undo, self.edits.undo)
-        self.redo_action = self._action("Redo", QKeySequence.StandardKey.Redo, self.edits.redo)
-        self.save_action = self._action("Save edits as layer...", None, self.ask_save)
+        # Without keys: the menus of the window have them.
+        self.undo_action = self._action("Undo", self.edits.undo)
+        self.redo_action = self._action("Redo", self.edits.redo)
+        self.save_action = self._action("Save edits as layer\u2026", self.ask_save)
         self.save_action.setToolTip("Writes the edits as a small .usda file over the stage")
 
-    def _action(self, name: str, keys: QKeySequence.StandardKey | None, call: Any) -> QAction:
-        """An action for the menus of the window."""
+    def _action(self, name: str, call: Callable[[], None]) -> QAction:
         action = QAction(name, self)
-        action.setObjectName(name.rstrip(".").lower().replace(" ", "-"))
-        if keys is not None:
-            action.setShortcut(QKeySequence(keys))
-            action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+        action.setObjectName(name.rstrip("\u2026").lower().replace(" ", "-"))
         action.triggered.connect(lambda checked=False: call())
-        self.addAction(action)
         return action
 
     # ---- edits ---------------------------------------------------------------------------------

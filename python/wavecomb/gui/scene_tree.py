@@ -8,8 +8,25 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from pxr import Sdf, UsdGeom
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, Qt, QTimer
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QMouseEvent, QPainter, QPainterPath, QPen
+from PySide6.QtCore import (
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    QRectF,
+    QSize,
+    Qt,
+    QTimer,
+    Signal,
+)
+from PySide6.QtGui import (
+    QAction,
+    QGuiApplication,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPen,
+)
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -50,6 +67,12 @@ MAX_EXPANDED = 300
 class EyeDelegate(QStyledItemDelegate):
     """Paints an eye: open, crossed out, or faint where something above hides the prim."""
 
+    def sizeHint(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> QSize:
+        """As Qt has it: rows are high enough to be hit."""
+        return QSize(theme.em(2), theme.em(1.5))
+
     def paint(
         self,
         painter: QPainter,
@@ -85,7 +108,13 @@ class EyeDelegate(QStyledItemDelegate):
 
 
 class _View(QTreeView):
-    """The view; Space and a click on the eye toggle what is visible."""
+    """The view; Space and a click on the eye toggle what is visible.
+
+    Signals:
+        frame_wanted(): F was pressed.
+    """
+
+    frame_wanted = Signal()
 
     def __init__(self, edits: SceneEdits, model: SceneModel) -> None:
         super().__init__()
@@ -98,12 +127,15 @@ class _View(QTreeView):
         return [index.data(PathRole) for index in self.selectionModel().selectedRows(NAME)]
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Space toggles; the rest as in any tree."""
-        if event.key() == Qt.Key.Key_Space and not event.modifiers():
-            self._edits.toggle_visible(self.chosen())
-            event.accept()
+        """Space toggles, F frames; the rest as in any tree."""
+        if event.modifiers() or event.key() not in (Qt.Key.Key_Space, Qt.Key.Key_F):
+            super().keyPressEvent(event)
             return
-        super().keyPressEvent(event)
+        if event.key() == Qt.Key.Key_F:
+            self.frame_wanted.emit()
+        else:
+            self._edits.toggle_visible(self.chosen())
+        event.accept()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """A click on an eye toggles it, or all that is selected where it is among that."""
@@ -132,7 +164,8 @@ class _View(QTreeView):
         for one in sets:
             menu.addSection(one.name)
             for choice in one.choices:
-                action = menu.addAction(choice)
+                action = QAction(choice, menu)
+                menu.addAction(action)
                 action.setCheckable(True)
                 action.setChecked(choice == one.choice)
                 select = partial(self._edits.select_variant, path, one.name, choice)
@@ -191,8 +224,10 @@ class SceneTree(QWidget):
         header = view.header()
         header.setStretchLastSection(True)
         header.setMinimumSectionSize(theme.em(2))
-        for column, wide in ((NAME, 14), (TYPE, 9), (VISIBILITY, 3.6)):
+        for column, wide in ((NAME, 11), (TYPE, 8), (VISIBILITY, 3.6)):
             header.resizeSection(column, theme.em(wide))
+        # The eye next to the name: it is seen in a narrow panel, too.
+        header.moveSection(VISIBILITY, 1)
         header.setSectionResizeMode(VISIBILITY, QHeaderView.ResizeMode.Fixed)
         assert view.model().columnCount() == len(HEADERS)
         view.customContextMenuRequested.connect(self._menu)
