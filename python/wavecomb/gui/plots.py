@@ -63,6 +63,7 @@ class Plot(pg.PlotWidget):
             axis.setPen(theme.dim())
             axis.setTextPen(theme.text())
             axis.setTickPen(theme.grid())
+            axis.setZValue(-1000)  # lines behind bars and curves
         colour = theme.text().name()
         self.getPlotItem().setTitle(html.escape(self._title), color=colour, size=_points())
 
@@ -84,6 +85,7 @@ class Curves(Plot):
     def __init__(self, name: str, title: str) -> None:
         super().__init__(name, title)
         self.getAxis("left").setWidth(theme.em(3.4))
+        self.setMinimumHeight(theme.em(8))
         self.showGrid(x=False, y=True, alpha=0.25)
 
     def show_curves(

@@ -39,12 +39,15 @@ class Rate:
     spread: float
     """Standard deviation of the stretches over the mean; 0 where there are fewer than two."""
     stretches: int
+    """Or runs; what the spread is over."""
     seconds: float
+
+    least: int = MIN_STRETCHES
 
     @property
     def is_short(self) -> bool:
         """Too little was measured to mean anything."""
-        return self.stretches < MIN_STRETCHES or self.seconds < MIN_SECONDS
+        return self.stretches < self.least or self.seconds < MIN_SECONDS
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,19 @@ def rate(run: Run, counter: str) -> Rate:
     )
     deviation = math.sqrt(squares / total * n / (n - 1))
     return Rate(value, deviation / value, n, last.seconds)
+
+
+def rate_of(series: Series, counter: str) -> Rate:
+    """Over all whole runs of a series; its spread is that of the runs, where there are several."""
+    runs = _whole(series.runs)
+    if len(runs) == 1:
+        return rate(runs[0], counter)
+    seconds = sum(run.last.seconds for run in runs)
+    value = ratio(sum(getattr(run.last, counter) for run in runs), seconds)
+    rates = [ratio(getattr(run.last, counter), run.last.seconds) for run in runs]
+    mean = sum(rates) / len(rates)
+    deviation = math.sqrt(sum((one - mean) ** 2 for one in rates) / (len(rates) - 1))
+    return Rate(value, ratio(deviation, mean), len(runs), seconds, 2)
 
 
 def moments(run: Run, counter: str) -> tuple[list[float], list[float]]:
