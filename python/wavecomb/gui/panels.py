@@ -20,6 +20,7 @@ _PARTS = (
     ("scene", "Scene", "scene_panel", "ScenePanel", _LEFT, False),
     ("scheduling", "Scheduling", "scheduling_panel", "SchedulingPanel", _RIGHT, False),
     ("plots", "Plots", "plots_panel", "PlotsPanel", _BOTTOM, True),
+    ("compare", "Compare", "compare_window", "CompareWindow", _BOTTOM, True),
     ("bench", "Bench", "bench_panel", "BenchPanel", _BOTTOM, True),
 )
 
@@ -45,10 +46,13 @@ class Panel:
 
 def make_panels(session: Session) -> list[Panel]:
     """All of them."""
-    panels = []
+    panels: list[Panel] = []
     for name, title, module, kind, area, hidden in _PARTS:
         if importlib.util.find_spec(f"wavecomb.gui.{module}") is None:
             continue
         widget = getattr(importlib.import_module(f"wavecomb.gui.{module}"), kind)(session)
         panels.append(Panel(name, title, widget, area, hidden))
+    widgets = {panel.name: panel.widget for panel in panels}
+    if "bench" in widgets and "compare" in widgets:
+        widgets["bench"].compare.connect(widgets["compare"].compare)
     return panels
