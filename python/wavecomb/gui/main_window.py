@@ -22,7 +22,6 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.about import make_about
 from wavecomb.gui.actions import make_action
-from wavecomb.gui.compare_window import CompareWindow
 from wavecomb.gui.display_bar import DisplayBar
 from wavecomb.gui.inspector import Inspector
 from wavecomb.gui.menus import CHECKED, MENUS, entries
@@ -63,7 +62,6 @@ class MainWindow(QMainWindow):
         self._save_path: str | None = None
         self._bottom_sized = False
         self._dialog: QWidget | None = None
-        self.compare: CompareWindow | None = None
         self._lay_out()
         self.actions_by_name: dict[str, QAction] = {}
         self._make_menus()
@@ -116,10 +114,10 @@ class MainWindow(QMainWindow):
         return dock
 
     def _size_bottom(self, visible: bool) -> None:
-        """A panel below the picture gets room when it is shown first, not all that it would like."""
+        """A panel below the picture gets room when shown first, not all that it would like."""
         if visible and not self._bottom_sized:
             self._bottom_sized = True
-            shown = [d for d in self.docks.values() if d is self.sender()]
+            shown = [dock for dock in self.docks.values() if dock is self.sender()]
             high = round(0.42 * self.height())
             QTimer.singleShot(
                 0, self, lambda: self.resizeDocks(shown, [high], Qt.Orientation.Vertical)
@@ -343,12 +341,13 @@ class MainWindow(QMainWindow):
 
     def show_compare(self) -> None:
         """The window in which pictures and settings are compared."""
-        if self.compare is None:
-            self.compare = CompareWindow(self.session)
-            self.compare.setObjectName("compare")
-        self.compare.show()
-        self.compare.raise_()
-        self.compare.activateWindow()
+        dock = self.docks["compare"]
+        if not self._bottom_sized and dock.isHidden():
+            dock.setFloating(True)
+            dock.resize(round(0.8 * self.width()), round(0.8 * self.height()))
+        dock.show()
+        dock.raise_()
+        dock.activateWindow()
 
     def toggle_full_screen(self) -> None:
         """All of the screen, or not."""
@@ -379,9 +378,6 @@ class MainWindow(QMainWindow):
             close = getattr(dock.widget(), "shutdown", None)
             if close is not None:
                 close()
-        if self.compare is not None:
-            self.compare.shutdown()
-            self.compare.close()
         self.viewport.close_threads()
         self.session.shutdown()
         super().closeEvent(event)

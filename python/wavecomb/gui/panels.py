@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from wavecomb.gui.bench_panel import BenchPanel
+from wavecomb.gui.compare_window import CompareWindow
 from wavecomb.gui.plots_panel import PlotsPanel
 from wavecomb.gui.scene_panel import ScenePanel
 from wavecomb.gui.scheduling_panel import SchedulingPanel
@@ -40,9 +41,12 @@ class Panel:
 
 def make_panels(session: Session) -> list[Panel]:
     """All of them."""
+    compare, bench = CompareWindow(session), BenchPanel(session)
+    bench.compare.connect(compare.compare)
     return [
         Panel("scene", "Scene", ScenePanel(session), _LEFT),
         Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),
         Panel("plots", "Plots", PlotsPanel(session), _BOTTOM, hidden=True),
-        Panel("bench", "Bench", BenchPanel(session), _BOTTOM, hidden=True),
+        Panel("bench", "Bench", bench, _BOTTOM, hidden=True),
+        Panel("compare", "Compare", compare, _BOTTOM, hidden=True),
     ]

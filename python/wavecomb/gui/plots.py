@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plots in the colours of the window: curves, stacked bars, grouped bars, and legends beside them."""
+"""Plots in the colours of the window: curves, stacked and grouped bars, legends beside them."""
 
 from __future__ import annotations
 

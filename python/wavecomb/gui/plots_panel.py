@@ -143,9 +143,9 @@ class PlotsPanel(QWidget):
         self.refresh()
 
     def _finish(self, frame: Frame) -> None:
-        if frame.final and frame.scale == 1 and not frame.status.get("cancelled"):
-            if self.log.finish():
-                self.refresh()
+        whole = frame.final and frame.scale == 1 and not frame.status.get("cancelled")
+        if whole and self.log.finish():
+            self.refresh()
 
     def _look_at_state(self, state: str) -> None:
         if state == "paused":
@@ -157,7 +157,7 @@ class PlotsPanel(QWidget):
     # ---- what is shown --------------------------------------------------------------------------
 
     def shown(self) -> list[Series]:
-        """Series of the picture that is looked at, the newest few, and what they are compared with."""
+        """Series of the picture shown, the newest few, and what they are compared with."""
         current = self.log.current
         if current is None:
             return []

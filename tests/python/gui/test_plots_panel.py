@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ def test_restarts_with_other_settings_are_series(
     for row in (0, 1):
         mine = [bar for bar in bars if bar.y == row]
         assert mine[-1].end == pytest.approx(100.0), "shares of all phases"
-        assert all(a.end == b.start for a, b in zip(mine, mine[1:], strict=False))
+        assert all(a.end == b.start for a, b in itertools.pairwise(mine))
     assert {bar.tip.splitlines()[1].split(":")[0] for bar in bars} <= set(PHASES)
     assert panel.phases.plot.bar_at(50.0, 1.0).y == 1
     assert "samples/s" in panel._line.text()
