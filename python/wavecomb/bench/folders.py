@@ -202,7 +202,7 @@ def _words(metric: str) -> tuple[str, str]:
 
 
 def _pictures(a: Results, b: Results) -> tuple[int, int]:
-    key = ["config", "seed", "width", "height", "spp"]
+    key = ["config", "repetition", "seed", "width", "height", "spp"]
     one, two = (r.runs[r.runs["picture_sha256"] != ""][[*key, "picture_sha256"]] for r in (a, b))
     both = one.merge(two, on=key, suffixes=("_a", "_b"))
     return len(both), int((both["picture_sha256_a"] != both["picture_sha256_b"]).sum())

@@ -55,6 +55,9 @@ class _Filter(HTMLParser):
             if tag == "svg":
                 self._put_figure()
             return
+        if tag == "a" and values.get("class") == "skip":
+            self._dropping.append(tag)
+            return
         if tag in ("input", "label", "button", "meta", "link"):
             return
         if tag == "figure":

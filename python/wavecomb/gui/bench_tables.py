@@ -119,7 +119,7 @@ class RunsProxy(QSortFilterProxyModel):
     def set_words(self, text: str) -> None:
         """Upper and lower case are alike; a word with a dash before it must not be there."""
         self._words = text.lower().split()
-        self.invalidateRowsFilter()
+        self.invalidate()
 
     def filterAcceptsRow(self, row: int, parent: Any) -> bool:
         """Qt's."""

@@ -10,6 +10,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import (
     QComboBox,
+    QDockWidget,
     QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
@@ -177,13 +178,19 @@ class CompareWindow(QWidget):
         else:
             self.sources[which].open(Path(paths[0]))
 
-    def compare(self, a: Side | Path, b: Side | Path) -> None:
-        """Shows two pictures."""
+    def compare(self, a: Side | Path | None, b: Side | Path | None) -> None:
+        """Shows two pictures, in front of other panels; None: what is there stays."""
         for source, side in ((self.a, a), (self.b, b)):
             if isinstance(side, Side):
                 source.set_side(side)
-            else:
+            elif side is not None:
                 source.open(side)
+        dock = self.parentWidget()
+        while dock is not None and not isinstance(dock, QDockWidget):
+            dock = dock.parentWidget()
+        if dock is not None:
+            dock.show()
+            dock.raise_()
 
     def set_mode(self, mode: str) -> None:
         """One of ``compare_view.MODES``."""

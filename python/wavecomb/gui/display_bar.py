@@ -11,9 +11,10 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
-    QHBoxLayout,
     QLabel,
+    QSizePolicy,
     QSlider,
+    QToolBar,
     QWidget,
 )
 
@@ -50,7 +51,7 @@ _TITLES = {
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 
 
-class DisplayBar(QWidget):
+class DisplayBar(QToolBar):
     """Controls of what the viewport shows. Choosing a layer that is not kept restarts the render.
 
     Attributes:
@@ -134,22 +135,17 @@ class DisplayBar(QWidget):
         return real(name, title, title, -1e9, 1e9, 0.1, 0.0, changed, decimals=4)
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout(self)
-        margin = theme.em(0.3)
-        row.setContentsMargins(margin, margin, margin, margin)
-        row.setSpacing(theme.em(0.4))
-        row.addWidget(self.layer)
-        row.addWidget(caption("&Exposure", self.exposure))
-        row.addWidget(self.slider, 1)
-        row.addWidget(self.exposure)
-        row.addWidget(self.view)
-        row.addWidget(self.automatic)
-        row.addWidget(self.low)
-        self._to = QLabel("to")
-        row.addWidget(self._to)
-        row.addWidget(self.high)
-        row.addStretch(1)
-        row.addWidget(self.zoom)
+        self._to = QLabel(" to ")
+        self._stops = caption(" &Exposure ", self.exposure)
+        gap = QWidget()
+        gap.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._places = {
+            widget: self.addWidget(widget)
+            for widget in (
+                self.layer, self._stops, self.slider, self.exposure,
+                self.view, self.automatic, self.low, self._to, self.high, gap, self.zoom,
+            )
+        }  # fmt: skip
 
     # ---- layers ----------------------------------------------------------------------------------
 
@@ -242,11 +238,11 @@ class DisplayBar(QWidget):
     def _update_range(self) -> None:
         light = display.is_light(self._viewport.look.layer)
         coloured = self._viewport.look.layer in display.SCALARS
-        for widget in (self.exposure, self.slider, self.view):
-            widget.setEnabled(light)
-        self.automatic.setVisible(coloured)
+        for widget in (self._stops, self.exposure, self.slider, self.view):
+            self._places[widget].setVisible(light)
+        self._places[self.automatic].setVisible(coloured)
         for widget in (self.low, self._to, self.high):
-            widget.setVisible(coloured and not self.automatic.isChecked())
+            self._places[widget].setVisible(coloured and not self.automatic.isChecked())
 
     def _shown(self, frame: Frame, look: display.Look) -> None:
         legend = self._viewport.legend()

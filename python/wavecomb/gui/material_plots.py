@@ -170,8 +170,10 @@ class MaterialsTab(QWidget):
         prediction = stats.get("cost_prediction", {})
         text = f"{len(self._rows)} materials were shaded."
         if prediction.get("materials"):
+            r2 = prediction["r2"]
+            worth = f"{r2:.2f}" if r2 >= 0.0 else "below 0, worse than one mean for all"
             text += (
-                f" Prediction of the last pass: r² {prediction['r2']:.2f}, mean error "
+                f" Prediction of the last pass: r² {worth}, mean error "
                 f"{100 * prediction['mean_error']:.0f} %, over {prediction['materials']} materials."
             )
         self.note.setText(text)

@@ -31,7 +31,7 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
             "fit", "full", "zoom_in", "zoom_out",
         ),
     ),
-    ("&View", ("panels", "-", "theme", "full_screen", "reset_layout")),
+    ("&View", ("panels", "-", "compare", "-", "theme", "full_screen", "reset_layout")),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
 """Title and names; "-": a line."""
@@ -118,6 +118,10 @@ def entries(window: MainWindow) -> list[Entry]:
         ),
         Entry(
             "zoom_out", "Zoom &out", lambda: viewport.set_zoom(0.5 * viewport.zoom()), ["Ctrl+-"]
+        ),
+        Entry(
+            "compare", "&Compare\u2026", window.show_compare, ["Ctrl+D"],
+            "Two pictures or two live settings, side by side or with a wipe",
         ),
         Entry("full_screen", "F&ull screen", window.toggle_full_screen, ["F11"]),
         Entry("reset_layout", "&Reset the panels", window.reset_layout),

@@ -100,7 +100,9 @@ class PictureLight(QWidget):
         if not shiboken6.isValid(self):
             return
         verdict = self.book.add(key, place, mark, settings)
-        if version == self._session.version or verdict.kind == "different":
+        # More samples that nobody had before take back nothing of what fewer have shown.
+        weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
+        if verdict.kind == "different" or (version == self._session.version and not weaker):
             self._show(verdict)
 
     def _show(self, verdict: Verdict) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plots in the colours of the window: curves, stacked bars, grouped bars, and legends beside them."""
+"""Plots in the colours of the window: curves, stacked and grouped bars, legends beside them."""
 
 from __future__ import annotations
 
@@ -63,6 +63,7 @@ class Plot(pg.PlotWidget):
             axis.setPen(theme.dim())
             axis.setTextPen(theme.text())
             axis.setTickPen(theme.grid())
+            axis.setZValue(-1000)  # lines behind bars and curves
         colour = theme.text().name()
         self.getPlotItem().setTitle(html.escape(self._title), color=colour, size=_points())
 
@@ -84,6 +85,7 @@ class Curves(Plot):
     def __init__(self, name: str, title: str) -> None:
         super().__init__(name, title)
         self.getAxis("left").setWidth(theme.em(3.4))
+        self.setMinimumHeight(theme.em(8))
         self.showGrid(x=False, y=True, alpha=0.25)
 
     def show_curves(
@@ -150,7 +152,8 @@ class Bars(Plot):
         metrics = QFontMetricsF(QApplication.font())
         room = min(0.42 * self.width(), theme.em(17.0))
         shown = [
-            metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room - theme.em()) for name in rows
+            metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room - theme.em())
+            for name in rows
         ]
         left.setTicks([list(enumerate(shown))])
         widest = max((metrics.horizontalAdvance(name) for name in shown), default=0.0)

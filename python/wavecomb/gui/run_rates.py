@@ -11,6 +11,7 @@ is *held* only where repeats agree.
 
 from __future__ import annotations
 
+import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -39,12 +40,15 @@ class Rate:
     spread: float
     """Standard deviation of the stretches over the mean; 0 where there are fewer than two."""
     stretches: int
+    """Or runs; what the spread is over."""
     seconds: float
+
+    least: int = MIN_STRETCHES
 
     @property
     def is_short(self) -> bool:
         """Too little was measured to mean anything."""
-        return self.stretches < MIN_STRETCHES or self.seconds < MIN_SECONDS
+        return self.stretches < self.least or self.seconds < MIN_SECONDS
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,19 @@ def rate(run: Run, counter: str) -> Rate:
     return Rate(value, deviation / value, n, last.seconds)
 
 
+def rate_of(series: Series, counter: str) -> Rate:
+    """Over all whole runs of a series; its spread is that of the runs, where there are several."""
+    runs = _whole(series.runs)
+    if len(runs) == 1:
+        return rate(runs[0], counter)
+    seconds = sum(run.last.seconds for run in runs)
+    value = ratio(sum(getattr(run.last, counter) for run in runs), seconds)
+    rates = [ratio(getattr(run.last, counter), run.last.seconds) for run in runs]
+    mean = sum(rates) / len(rates)
+    deviation = math.sqrt(sum((one - mean) ** 2 for one in rates) / (len(rates) - 1))
+    return Rate(value, ratio(deviation, mean), len(runs), seconds, 2)
+
+
 def moments(run: Run, counter: str) -> tuple[list[float], list[float]]:
     """For a curve: times (the middle of each stretch) and the rate in it."""
     pairs = stretches(run)
@@ -135,8 +152,8 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     if n < MIN_STRETCHES or seconds < MIN_SECONDS:
         return Ratio(value, 0.0, math.inf, 1, short=True)
     ends = [samples * k / n for k in range(n + 1)]
-    mine = [time_of(run, b) - time_of(run, a) for a, b in zip(ends, ends[1:], strict=False)]
-    theirs = [time_of(base, b) - time_of(base, a) for a, b in zip(ends, ends[1:], strict=False)]
+    mine = [time_of(run, b) - time_of(run, a) for a, b in itertools.pairwise(ends)]
+    theirs = [time_of(base, b) - time_of(base, a) for a, b in itertools.pairwise(ends)]
     # The ratio estimator sum(theirs) / sum(mine); its variance is that of theirs - value * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)
@@ -152,8 +169,7 @@ def compare(series: Series, base: Series) -> Ratio | None:
     if not series.does_the_work_of(base):
         return None
     pairs = [
-        compare_runs(a, b)
-        for a, b in zip(_whole(series.runs), _whole(base.runs), strict=False)
+        compare_runs(a, b) for a, b in zip(_whole(series.runs), _whole(base.runs), strict=False)
     ]
     known = [one for one in pairs if math.isfinite(one.value)]
     if len(known) < 2:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.gui.run_log import FIELDS, RunLog, Series, labels, last_of
-from wavecomb.gui.run_rates import Ratio, compare, rate
+from wavecomb.gui.run_rates import Ratio, compare, rate, rate_of
 
 COLUMNS = (
     "settings",
@@ -30,10 +30,10 @@ COLUMNS = (
 _TIPS = {
     "settings": "Those that are not the same in all rows.",
     "changed": "What is different from the series before.",
-    "runs": "Renders with these settings; figures are of the longest.",
-    "samples/s": "Over the whole run, in which the settings held. In brackets where the run was "
-    "too short to mean anything.",
-    "spread": "Standard deviation of samples/s over the stretches of the run.",
+    "runs": "Renders with these settings. What is no rate is of the longest.",
+    "samples/s": "Over all time in which the settings held. In brackets where that was too short "
+    "to mean anything.",
+    "spread": "Standard deviation of samples/s: over runs, or over the stretches of a single one.",
     "rays/s": "Camera, bounce and shadow rays.",
     "ns/record": "Thread time of keys, sort, materialize and shade, for each record.",
     "lanes used": "Records / (packets x lanes).",
@@ -69,7 +69,7 @@ def rows(log: RunLog, count: int = 20) -> list[Row]:
 
 def _row(series: Series, label: str, base: Series | None) -> Row:
     run = series.best
-    samples, rays = rate(run, "samples"), rate(run, "rays")
+    samples, rays = rate_of(series, "samples"), rate_of(series, "rays")
     is_base = series is base
     ratio = None if base is None or is_base else compare(series, base)
 

@@ -95,7 +95,8 @@ class PictureBook:
         changes = describe(differences(before, settings)) or "the same settings"
         if mark == other:
             self.checked += 1
-            return Verdict("same", f"Same picture, bit for bit, with {changes}")
+            at = f"{samples} samples" if isinstance(samples, int) else samples
+            return Verdict("same", f"Same picture, bit for bit ({at}), with {changes}")
         self.checked = 0
         return Verdict("different", f"DIFFERENT picture with {changes}: please report this")
 

@@ -167,6 +167,21 @@ def scheduling_of(setup: Setup) -> dict[str, Any]:
     return values
 
 
+def promise(setup: Setup) -> str:
+    """What the settings of order do to the picture: nothing, with two exceptions."""
+    if setup.time_limit:
+        return (
+            "Nothing in this group changes a bit of a sample, but the time limit ends the render "
+            "by the clock: how many there are differs."
+        )
+    if setup.roulette == "cost-aware":
+        return (
+            "Nothing in this group but Costs changes a bit of the picture: cost-aware roulette "
+            "goes by them."
+        )
+    return "Nothing in this group changes a bit of the picture."
+
+
 def recipe_of(setup: Setup) -> dict[str, Any]:
     """What to set to have these settings again."""
     return {name: getattr(setup, name) for name in (*FIELDS, "own_policy", "profile")}

@@ -28,10 +28,9 @@ from wavecomb.gui.picture_light import PictureLight
 from wavecomb.gui.policy_file import OwnPolicy, first_line, load_policies
 from wavecomb.gui.rounds import Rounds
 from wavecomb.gui.session import Session, Setup
-from wavecomb.gui.setting_controls import ChoiceBox, number_box
+from wavecomb.gui.setting_controls import ChoiceBox, number_box, show_number
 from wavecomb.gui.work_group import WorkGroup
 
-PROMISE = "Nothing in this group changes a bit of the picture."
 _POLICY_FILTER = "Python (*.py);;All files (*)"
 _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
 
@@ -99,10 +98,10 @@ class SchedulingPanel(QScrollArea):
         group = QGroupBox("Order of work")
         form = QFormLayout(group)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        promise = QLabel(PROMISE)
-        promise.setWordWrap(True)
-        promise.setObjectName("promise")
-        form.addRow(promise)
+        self._promise = QLabel()
+        self._promise.setWordWrap(True)
+        self._promise.setObjectName("promise")
+        form.addRow(self._promise)
         form.addRow(self.light)
         self._try = QPushButton("Try every policy")
         self._try.setObjectName("try_every_policy")
@@ -186,9 +185,8 @@ class SchedulingPanel(QScrollArea):
                 value = setup.profile
             box.show_value(value)
         for spin, field in ((self._threads, "threads"), (self._cost_weight, "cost_weight")):
-            blocked = spin.blockSignals(True)
-            spin.setValue(getattr(setup, field))
-            spin.blockSignals(blocked)
+            show_number(spin, getattr(setup, field))
+        self._promise.setText(choices.promise(setup))
         self._find("reload_policy").setEnabled(self._policy_file is not None)
         presets = list(choices.presets().values())
         self._preset.setCurrentIndex(

@@ -20,10 +20,10 @@ class _CalmWheel(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Passes the wheel on."""
-        if event.type() == QEvent.Type.Wheel and isinstance(watched, QWidget):
-            if not watched.hasFocus():
-                event.ignore()
-                return True
+        wheel = event.type() == QEvent.Type.Wheel and isinstance(watched, QWidget)
+        if wheel and not watched.hasFocus():
+            event.ignore()
+            return True
         return False
 
 
@@ -42,9 +42,7 @@ class ChoiceBox(QComboBox):
         self._tip = choice.tip
         self.setObjectName(choice.field)
         self.setAccessibleName(choice.label)
-        self.setSizeAdjustPolicy(
-            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
-        )
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(10)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         calm(self)

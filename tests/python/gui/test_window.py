@@ -120,7 +120,7 @@ def test_layers_and_their_legend(cornell_window, qtbot):
     display.choose_layer("depth")
     assert window.session.version == version, "a layer that is kept needs no new render"
     qtbot.waitUntil(lambda: window.viewport.legend() is not None, timeout=5000)
-    assert not display.exposure.isEnabled()
+    assert not display.exposure.isVisible()
     display.choose_layer("cost")
     qtbot.waitUntil(lambda: shows("cost"), timeout=20000)
     qtbot.waitUntil(lambda: "ns per pixel" in window.viewport.legend().title, timeout=5000)
