@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from wavecomb.compare import Comparison
     from wavecomb.errors import WavecombError
     from wavecomb.scheduling import SchedulingPolicy
+    from wavecomb.sequence import render_frames
 
     __version__: str
 
@@ -40,6 +41,7 @@ __all__ = [
     "compare",
     "load",
     "render",
+    "render_frames",
 ]
 
 _HOMES = {
@@ -52,6 +54,7 @@ _HOMES = {
     "WavecombError": "wavecomb.errors",
     "load": "wavecomb.api",
     "render": "wavecomb.api",
+    "render_frames": "wavecomb.sequence",
 }
 
 

@@ -191,7 +191,10 @@ def load(
     frame: float | None = None,
     purposes: Sequence[str] | None = None,
     variants: Mapping[str, str] | None = None,
+    mask: Sequence[str] = (),
+    session_layer: str | os.PathLike[str] | None = None,
     threads: int = 0,
+    progress: Callable[[int, int], None] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -202,7 +205,10 @@ def load(
         frame: Time code; by default the stage's start.
         purposes: Of the geometry, as in USD; by default "default" and "render".
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
+        mask: Prims to draw with all below them, and what they need; by default all.
+        session_layer: File with opinions that are stronger than the stage's.
         threads: For images and textures; 0: all.
+        progress: Called now and then as progress(prims read, prims found so far).
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -214,18 +220,35 @@ def load(
     Raises:
         WavecombError: The stage cannot be rendered; one line that names the file or prim.
     """
-    from wavecomb.progress import Interrupt
-
-    # USD's module loader swallows what a Ctrl-C raises within it, and leaves half a library.
-    with Interrupt() as interrupt:
-        from wavecomb.usd import load_stage
-    if interrupt.signal is not None:
-        signal.raise_signal(interrupt.signal)
+    import_usd()
+    from wavecomb.usd import load_stage
 
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
     return load_stage(
-        Path(path), camera=camera, frame=frame, variants=variants, threads=threads, **options
+        Path(path),
+        camera=camera,
+        frame=frame,
+        variants=variants,
+        mask=tuple(mask),
+        session_layer=None if session_layer is None else Path(session_layer),
+        threads=threads,
+        progress=progress,
+        **options,
     )
+
+
+def import_usd() -> None:
+    """Loads USD's modules.
+
+    A Ctrl-C meanwhile comes when they are loaded: their loader swallows what it raises within it,
+    and leaves half a library.
+    """
+    from wavecomb.progress import Interrupt
+
+    with Interrupt() as interrupt:
+        import wavecomb.usd  # noqa: F401
+    if interrupt.signal is not None:
+        signal.raise_signal(interrupt.signal)
 
 
 def render(
@@ -284,6 +307,25 @@ def render(
     """
     from wavecomb.stats import make_stats
 
+    own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
+    scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
+    if "light_groups" in names:
+        check_memory(chosen, names, len(scene.light_groups))
+    watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
+    result = _render(scene, chosen, progress, own, profile, watcher, state)
+    stats = make_stats(result, stage=stage, loaded=loaded)
+    return picture_of(result, stats, scene=scene, aovs=names)
+
+
+def prepare(
+    size: tuple[int, int],
+    spp: int,
+    policy: str | SchedulingPolicy | None,
+    costs: str | Mapping[str, Mapping[str, float]] | None,
+    aovs: Iterable[str] | None,
+    settings: dict[str, Any],
+) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
+    """Checked arguments of ``render``: a policy of the caller's, a profile, AOVs, settings."""
     own: Any = None
     if isinstance(policy, str):
         settings["policy"] = policy
@@ -301,13 +343,7 @@ def render(
         profile = check_costs(costs)
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
     chosen = make_settings(size, spp, aovs=names, **settings)
-    scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
-    if "light_groups" in names:
-        check_memory(chosen, names, len(scene.light_groups))
-    watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
-    result = _render(scene, chosen, progress, own, profile, watcher, state)
-    stats = make_stats(result, stage=stage, loaded=loaded)
-    return picture_of(result, stats, scene=scene, aovs=names)
+    return own, profile, tuple(names), chosen
 
 
 def picture_of(

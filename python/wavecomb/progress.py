@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -141,11 +142,11 @@ class ProgressBar(Silent):
     Use as a context manager.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, title: str = "rendering") -> None:
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
         self._bar = Progress(
-            TextColumn("rendering"),
+            TextColumn(title, markup=False),
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("{task.fields[figures]}"),
@@ -181,6 +182,31 @@ class ProgressBar(Silent):
             figures=", ".join(figures),
         )
         self._bar.refresh()
+
+
+LoadProgress = Callable[[int, int], None]
+"""Called as progress(prims read, prims found so far)."""
+
+
+@contextlib.contextmanager
+def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
+    """A bar while a stage is read; it pulses until the first call, so small stages show no more."""
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    with Progress(
+        TextColumn(title, markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[figures]}"),
+        console=console,
+        transient=True,
+    ) as bar:
+        task = bar.add_task("", total=None, figures="")
+
+        def show(done: int, found: int) -> None:
+            figures = f"{done:,} of {found:,} prims"
+            bar.update(task, completed=done, total=found, figures=figures)
+
+        yield show
 
 
 class ProgressLines(Silent):

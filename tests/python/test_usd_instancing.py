@@ -237,3 +237,97 @@ def test_lights_in_instances_are_placed(tmp_path):
     scene, _ = load(tmp_path, text)
     assert [light["transform"][3, 0] for light in scene.lights] == [1, 2]
     assert len(scene.groups) == 1
+
+
+def nested(depth):
+    """A prototype in so many instancers and instances by turns, each of which places it twice."""
+    text = f'class "L0" {{ def Mesh "M" {{ {QUAD} }} }}\n'
+    for level in range(1, depth + 1):
+        step, below = 2 ** (level - 1), f"L{level - 1}"
+        if level % 2:
+            inside = f"""def PointInstancer "P" {{
+                rel prototypes = </L{level}/P/Proto>
+                int[] protoIndices = [0, 0, 0, 0]
+                point3f[] positions = [(0,0,0), (9,9,9), ({step},0,0), (9,9,9)]
+                int64[] ids = [1, 2, 3, 4]
+                int64[] invisibleIds = [4, 2]
+                def Xform "Proto" (references = </{below}>
+                    instanceable = true) {{ }} }}"""
+        else:
+            inside = instance("A", 0, target=f"/{below}") + instance("B", step, target=f"/{below}")
+        text += f'class "L{level}" {{ {inside} }}\n'
+    return text + f'def Xform "World" (references = </L{depth}>) {{ }}'
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3, 7, 8])
+def test_instancers_and_instances_nest_to_any_depth(tmp_path, depth):
+    scene, loaded = load(tmp_path, nested(depth))
+    assert len(scene.meshes) == 1
+    assert [x for x, _, _ in origins(scene)] == list(range(2**depth))
+    assert not loaded.report.warnings
+
+
+def test_colours_of_instances_reach_through_nested_ones(tmp_path):
+    """The innermost instancer with a colour wins; indexed colours, and those of what is hidden."""
+    text = f"""
+    def PointInstancer "Outer" {{
+        rel prototypes = [</Outer/Plain>, </Outer/Own>]
+        int[] protoIndices = [0, 0, 1]
+        point3f[] positions = [(0,0,0), (10,0,0), (20,0,0)]
+        int64[] invisibleIds = [0]
+        color3f[] primvars:displayColor = [(1,0,0), (0,1,0)] ( interpolation = "vertex" )
+        int[] primvars:displayColor:indices = [0, 1, 0]
+        def PointInstancer "Plain" {{
+            rel prototypes = </Outer/Plain/M>
+            int[] protoIndices = [0, 0]
+            point3f[] positions = [(0,0,0), (1,0,0)]
+            def Mesh "M" {{ {QUAD} }} }}
+        def PointInstancer "Own" {{
+            rel prototypes = </Outer/Own/M>
+            int[] protoIndices = [0]
+            point3f[] positions = [(0,0,0)]
+            color3f[] primvars:displayColor = [(0,0,1)] ( interpolation = "vertex" )
+            def Mesh "M" {{ {QUAD} }} }} }}
+    """
+    scene, _ = load(tmp_path, text)
+    colours = {
+        float(matrix[3, 0]): scene.materials[material]["base_color"]
+        for _, matrix, material in scene.world_meshes()
+    }
+    assert colours == {10: (0, 1, 0), 11: (0, 1, 0), 20: (0, 0, 1)}
+
+
+def test_many_instances_take_no_step_each(tmp_path):
+    """What Python does for a point instancer does not grow with its instances."""
+    import sys
+
+    from pxr import Usd, UsdGeom, Vt
+    from usd_recorder import Recorder
+
+    from wavecomb.usd import load_stage
+
+    def calls(count):
+        path = tmp_path / f"many{count}.usdc"
+        stage = Usd.Stage.CreateNew(str(path))
+        instancer = UsdGeom.PointInstancer.Define(stage, "/P")
+        mesh = UsdGeom.Mesh.Define(stage, "/P/M")
+        mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+        mesh.CreateFaceVertexCountsAttr([3])
+        mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
+        instancer.CreatePrototypesRel().SetTargets(["/P/M"])
+        instancer.CreateProtoIndicesAttr(Vt.IntArray(count, 0))
+        places = np.arange(3 * count, dtype=np.float32).reshape(-1, 3)
+        instancer.CreatePositionsAttr(Vt.Vec3fArray.FromNumpy(places))
+        stage.Save()
+        made = []
+        sys.setprofile(lambda frame, event, argument: made.append(event))
+        try:
+            scene = load_stage(path, builder_factory=Recorder).scene
+        finally:
+            sys.setprofile(None)
+        assert len(scene.world_meshes()) == count
+        return len(made)
+
+    calls(10)
+    few, many = calls(10), calls(1000)
+    assert many < few + 200

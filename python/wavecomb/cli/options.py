@@ -47,8 +47,21 @@ def examples(*lines: str) -> str:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant and --purpose."""
+    """STAGE, --camera, --frame, --variant, --purpose, --mask and --session-layer."""
     for option in (
+        click.option(
+            "--session-layer",
+            type=click.Path(),
+            metavar="FILE",
+            help="Layer with opinions stronger than the stage's.",
+        ),
+        click.option(
+            "--mask",
+            multiple=True,
+            metavar="PATH",
+            help="Prim to draw, with all below it and what it needs; may be given again.  "
+            "[default: all]",
+        ),
         click.option(
             "--variant",
             "variants",
@@ -88,6 +101,8 @@ class StageOptions:
     frame: float | None
     purposes: tuple[str, ...]
     variants: tuple[str, ...]
+    mask: tuple[str, ...] = ()
+    session_layer: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -100,28 +115,36 @@ class StageOptions:
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
         """With what was chosen before in place of what is not chosen here."""
-        values = {name: value or before[name] for name, value in self.as_dict().items()}
+        mine = self.as_dict()
+        values: dict[str, Any] = {name: mine[name] or before.get(name) for name in mine}
         if self.frame is not None:
             values["frame"] = self.frame
-        for name in ("purposes", "variants"):
-            values[name] = tuple(values[name])
+        for name in ("purposes", "variants", "mask"):
+            values[name] = tuple(values[name] or ())
         return StageOptions(**values)
 
-    def load(self, stage: str, threads: int = 0) -> LoadedStage:
+    def load(
+        self, stage: str, threads: int = 0, progress: Callable[[int, int], None] | None = None
+    ) -> LoadedStage:
         """Loads a stage as the options say, on ``threads`` threads (0: all)."""
         from wavecomb.api import load
+
+        options = self.for_load()
+        return load(stage, frame=self.frame, threads=threads, progress=progress, **options)
+
+    def for_load(self) -> dict[str, Any]:
+        """Arguments of ``wavecomb.load``, but for the frame."""
         from wavecomb.errors import WavecombError
 
         if self.camera == "":
             raise WavecombError("--camera is empty: give the path of a camera prim")
-        return load(
-            stage,
-            camera=self.camera,
-            frame=self.frame,
-            purposes=self.all_purposes(),
-            variants=self.selections() or None,
-            threads=threads,
-        )
+        return {
+            "camera": self.camera,
+            "purposes": self.all_purposes(),
+            "variants": self.selections() or None,
+            "mask": self.mask,
+            "session_layer": self.session_layer,
+        }
 
     def selections(self) -> dict[str, str]:
         """Variants as ``wavecomb.load`` takes them."""

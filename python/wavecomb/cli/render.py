@@ -10,10 +10,11 @@ import click
 
 from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions, aov_options
-from wavecomb.cli.options import Real, StageOptions, examples, stage_options, warn
+from wavecomb.cli.frames import check_frames, frame_options, render_sequence
+from wavecomb.cli.job import Job, Names, Still, how_far, purpose_at
+from wavecomb.cli.options import Real, StageOptions, examples, stage_options
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
-from wavecomb.cli.run import how_far, run
 from wavecomb.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
@@ -28,6 +29,7 @@ _INTEGERS = click.IntRange(min=0)
         "wavecomb render shot.usd -o shot.exr",
         "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256",
         "wavecomb render shot.usd -o shot.exr --camera /World/Cam --frame 101 --stats shot.json",
+        "wavecomb render shot.usd -o shot.####.exr --frames 1-48 --skip-existing",
         "wavecomb render shot.usd -o shot.exr --noise 0.02 --denoise --png shot.png",
         "wavecomb render shot.usd -o shot.exr --time-limit 60 --preview preview.png",
         "wavecomb render shot.usd -o shot.exr --spp 4096 --checkpoint shot.ckpt",
@@ -36,6 +38,7 @@ _INTEGERS = click.IntRange(min=0)
     ),
 )
 @stage_options
+@frame_options
 @click.option(
     "-o",
     "--output",
@@ -164,9 +167,11 @@ def render_command(
     lanes: str | None,
     filter_: str | None,
     costs: str | None,
+    frames: str | None,
+    skip_existing: bool,
     **options: Any,
 ) -> None:
-    """Render STAGE to an OpenEXR file.
+    """Render STAGE to an OpenEXR file, or its frames to one each.
 
     The file has the layers beauty (R, G, B), albedo, normal, depth and samples, or those that --aov
     asks for; error and variance where the render is adaptive; denoised with --denoise. Ctrl-C and
@@ -179,17 +184,15 @@ def render_command(
     purpose = PurposeOptions.take(options)
     layers = AovOptions.take(options)
     costs_file = costs if costs is not None and costs not in SOURCES else None
-    _check_outputs(
-        stage,
-        [
-            (output, "-o", ".exr"),
-            (png, "--png", ".png"),
-            (stats_file, "--stats", None),
-            (costs_file, "--costs", None),
-            (purpose.preview, "--preview", ".png"),
-            (purpose.checkpoint_file, "--checkpoint", None),
-        ],
-    )
+    names = Names(output, png, stats_file)
+    numbers = check_frames(frames, skip_existing, source, names, purpose)
+    for frame in (None,) if numbers is None else numbers:
+        _check_outputs(
+            stage,
+            names if frame is None else names.at(frame),
+            purpose if frame is None else purpose_at(purpose, frame),
+            costs_file,
+        )
     if purpose.denoise:
         from wavecomb.denoise import check_denoiser
 
@@ -221,37 +224,49 @@ def render_command(
     layers.check(output, (*aovs, *further))
 
     reporter = make_reporter(purpose.progress, quiet)
-    picture, stopped, report = run(
-        source, stage, settings, aovs, profile, purpose, resumed, reporter, exposure, tone_map
-    )
+    job = Job(stage, settings, aovs, profile, layers, reporter, exposure, tone_map)
+    if numbers is not None:
+        last, _ = render_sequence(job, numbers, names, source, purpose, skip_existing)
+        if last is not None and costs_file is not None:
+            _save_costs(costs_file, last)
+        return
+    shot = Still(source, stage, settings.threads)
+    picture, stopped, report = job.run(shot, source, purpose, resumed)
+    del shot  # the scene: nothing needs it while files are written
     if stopped is not None and not picture.samples.any():
         click.echo("stopped before the first sample; nothing was written", err=True)
         raise click.exceptions.Exit(128 + stopped)
-    warn(_picture_warnings(picture))
-    if purpose.denoise:
-        picture = picture.with_denoised(threads=settings.threads)
-    written = _write(picture, output, png, stats_file, layers, exposure, tone_map)
+    picture, files = job.write(picture, names, denoise=purpose.denoise)
     if costs_file is not None:
-        from wavecomb.costs import save_costs
-
-        save_costs(costs_file, picture.costs)
-    files = [*written, *([costs_file] if costs_file else [])]
+        _save_costs(costs_file, picture)
+        files.append(costs_file)
     reporter.finished(picture, report, files)
     if stopped is not None:
         click.echo(f"stopped {how_far(picture)}; {output} holds what was done", err=True)
         raise click.exceptions.Exit(128 + stopped)
 
 
-def _check_outputs(stage: str, outputs: list[tuple[str | None, str, str | None]]) -> None:
-    """Everything that can be known to fail before the work begins.
+def _save_costs(costs_file: str, picture: Any) -> None:
+    from wavecomb.costs import save_costs
 
-    Args:
-        stage: The stage's file.
-        outputs: Name, option, and the ending that is asked for.
-    """
+    save_costs(costs_file, picture.costs)
+
+
+def _check_outputs(
+    stage: str, names: Names, purpose: PurposeOptions, costs_file: str | None
+) -> None:
+    """Everything that can be known to fail before the work begins."""
     from wavecomb.errors import WavecombError
     from wavecomb.files import check_writable
 
+    outputs = [
+        (names.output, "-o", ".exr"),
+        (names.png, "--png", ".png"),
+        (names.stats, "--stats", None),
+        (costs_file, "--costs", None),
+        (purpose.preview, "--preview", ".png"),
+        (purpose.checkpoint_file, "--checkpoint", None),
+    ]
     for name, option, ending in outputs:
         if name is not None and ending is not None and not name.lower().endswith(ending):
             raise WavecombError(f"{option} {name}: the name must end in {ending}")
@@ -277,32 +292,3 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     from wavecomb.costs import load_costs
 
     return load_costs(costs_file)
-
-
-def _picture_warnings(picture: Any) -> list[str]:
-    import numpy as np
-
-    broken = int((~np.isfinite(picture.beauty).all(axis=2)).sum())
-    return [f"{broken} pixels of the picture are not finite"] if broken else []
-
-
-def _write(
-    picture: Any,
-    output: str,
-    png: str | None,
-    stats_file: str | None,
-    layers: AovOptions,
-    exposure: float,
-    tone_map: Any,
-) -> list[str]:
-    """Writes all files; gives their names."""
-    from wavecomb.stats import write_stats
-
-    written = [str(name) for name in picture.save(output, **layers.file_options())]
-    if png is not None:
-        picture.save(png, exposure=exposure, tone_map=tone_map)
-        written.append(png)
-    if stats_file is not None:
-        write_stats(stats_file, picture.stats)
-        written.append(stats_file)
-    return written

@@ -11,20 +11,39 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wavecomb.cli.summary import print_summary
-from wavecomb.progress import ProgressBar, ProgressLines, Silent, progress_console
+from wavecomb.progress import (
+    LoadProgress,
+    ProgressBar,
+    ProgressLines,
+    Silent,
+    loading_bar,
+    progress_console,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from wavecomb.usd import LoadReport
 
+TIMES = ("load", "build", "render")
+"""Seconds that are said of a frame."""
+
 
 class Reporter:
     """Says nothing, but for warnings and errors."""
 
-    def loading(self, stage: str) -> contextlib.AbstractContextManager[Any]:
-        """Shows that the stage is being read."""
+    def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
+        """Shows that the stage is being read; gives what to tell of it."""
         return contextlib.nullcontext()
+
+    def begins(self, frame: str, number: int, count: int) -> None:
+        """A frame of a sequence begins, the number-th of so many."""
+
+    def ended(self, picture: Any, files: Sequence[str]) -> None:
+        """A frame of a sequence is written."""
+
+    def said(self, line: str) -> None:
+        """Something about a sequence."""
 
     def rendering(self) -> Silent:
         """What shows the progress of the render, as a context manager."""
@@ -39,21 +58,42 @@ class Summary(Reporter):
 
     def __init__(self, console: Console | None) -> None:
         self._console = console
+        self._frame = self._place = ""
 
-    def loading(self, stage: str) -> contextlib.AbstractContextManager[Any]:
-        """The name of the file."""
+    def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
+        """The name of the file, and a bar where there is much to read."""
         if self._console is None:
             return super().loading(stage)
-        from rich.markup import escape
-
-        return self._console.status(f"loading {escape(os.path.basename(stage))}")
+        return loading_bar(self._console, f"{self._place}loading {os.path.basename(stage)}")
 
     def rendering(self) -> Silent:
         """The bar."""
-        return Silent() if self._console is None else ProgressBar(self._console)
+        if self._console is None:
+            return Silent()
+        return ProgressBar(self._console, f"{self._place}rendering")
+
+    def begins(self, frame: str, number: int, count: int) -> None:
+        """Makes bars name the frame."""
+        self._frame = f"frame {frame} ({number} of {count})"
+        self._place = f"{self._frame}: "
+
+    def ended(self, picture: Any, files: Sequence[str]) -> None:
+        """A line."""
+        from wavecomb.progress import time_text
+
+        seconds = picture.stats["seconds"]
+        times = ", ".join(f"{name} {time_text(seconds[name])}" for name in TIMES)
+        click.echo(f"{self._frame}: {times}; wrote {', '.join(files)}")
+
+    def said(self, line: str) -> None:
+        """The line."""
+        click.echo(line)
 
     def finished(self, picture: Any, report: LoadReport, files: Sequence[str]) -> None:
-        """The summary."""
+        """The summary; of a sequence, that of its last frame."""
+        if self._frame:
+            click.echo(f"{self._frame}:")
+            files = [f"{len(files)} files"]
         print_summary(picture.stats, report, files)
 
 
@@ -67,8 +107,17 @@ class Lines(Reporter):
         """A line about once a second."""
         return self._lines
 
+    def begins(self, frame: str, number: int, count: int) -> None:
+        """A line {"event": "frame", ...}."""
+        self._lines.event("frame", frame=float(frame), number=number, count=count)
+
+    def ended(self, picture: Any, files: Sequence[str]) -> None:
+        """A line {"event": "wrote", ...} for each file."""
+        for name in files:
+            self._lines.wrote(name)
+
     def finished(self, picture: Any, report: LoadReport, files: Sequence[str]) -> None:
-        """A line {"event": "done", ...}."""
+        """A line {"event": "done", ...}; the figures of a sequence are those of its last frame."""
         stats = picture.stats
         self._lines.event(
             "done",

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from wavecomb.usd.mesh import IDENTITY, UV_NAMES, MeshArrays, MeshReader
 from wavecomb.usd.network import colour
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.stock import MeshStock
 from wavecomb.usd.traverse import Gathered, Placed, Traversal
 from wavecomb.usd.triangulate import MeshError
 
@@ -34,6 +35,10 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 Matrices = NDArray[np.float64]
+LoadProgress = Callable[[int, int], None]
+"""Called as progress(prims drawn, prims found so far), now and then."""
+STEP = 512
+"""Prims between calls."""
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
@@ -103,7 +108,10 @@ class GroupBuilder:
         materials: MaterialTable,
         light_groups: LightGroups,
         report: LoadReport,
+        stock: MeshStock | None = None,
+        progress: LoadProgress | None = None,
     ) -> None:
+        """``stock``: arrays of meshes to take from and leave there; ``progress``: is told."""
         self.stage = stage
         self.traversal = traversal
         self.time = traversal.time
@@ -111,7 +119,9 @@ class GroupBuilder:
         self.materials = materials
         self.light_groups = light_groups
         self.report = report
-        self.meshes = MeshReader(self.time, report)
+        self.stock = stock
+        self.progress = progress
+        self.found, self.drawn = 0, 0
         self.assigner = Assigner(materials, self.time, report)
         self.bindings = BindingScan()
         self.assets = Assets()
@@ -137,8 +147,12 @@ class GroupBuilder:
         group.lights += found.lights
         group.lit = group.lit or bool(found.lights)
         self._bind(found, scope)
+        self.found += len(found.draws)
         for draw in found.draws:
             self._draw(group, draw, scope)
+            self.drawn += 1
+            if self.progress is not None and self.drawn % STEP == 0:
+                self.progress(self.drawn, self.found)
         self._place_instances(group, found.instances, scope)
         for placed in found.instancers:
             self._place_instancer(group, placed, scope)
@@ -179,11 +193,7 @@ class GroupBuilder:
             names = UV_NAMES
         kind = self.traversal.kind(draw.prim)
         try:
-            mesh: MeshArrays | None
-            if kind == "shape":
-                mesh = self.meshes.shape(draw.prim, draw.matrix)
-            else:
-                mesh = self.meshes.mesh(draw.prim, draw.matrix, names, draw.inherited)
+            mesh = self._arrays(kind, draw, names)
         except MeshError as error:
             self.report.warn(f"mesh left out: {error}", draw.prim.GetPath())
             return
@@ -215,6 +225,20 @@ class GroupBuilder:
         self.builder.add_to_group(self._number(group), number)
         group.grow(mesh.bounds)
         self.report.tally("meshes" if kind == "mesh" else "shapes")
+
+    def _arrays(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | None:
+        """The arrays of a gprim, of the frame before where they are the same."""
+
+        def read(report: LoadReport) -> MeshArrays | None:
+            reader = MeshReader(self.time, report)
+            if kind == "shape":
+                return reader.shape(draw.prim, draw.matrix)
+            return reader.mesh(draw.prim, draw.matrix, names, draw.inherited)
+
+        if self.stock is None:
+            return read(self.report)
+        options = (tuple(names), names is UV_NAMES)
+        return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
 
     def _materials(self, draw: Draw, mesh: MeshArrays, scope: Scope) -> tuple[int, Any]:
         if scope.override:

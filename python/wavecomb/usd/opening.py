@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from wavecomb.errors import WavecombError
 from wavecomb.usd.diagnostics import commentary
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.population import populate
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ def open_stage(
     file: Path,
     variants: Mapping[str, str] | None = None,
     overrides: Sdf.Layer | None = None,
+    mask: Sequence[str] = (),
+    session_layer: Path | None = None,
 ) -> Usd.Stage:
     """The stage of a file, with all payloads.
 
@@ -54,20 +57,22 @@ def open_stage(
         file: .usd, .usda, .usdc or .usdz.
         variants: Selections, as ``select_variants`` makes them.
         overrides: Such as another stage's session layer; copied into this one's.
+        mask: Paths of prims to keep, with what they need; none: all (``populate``).
+        session_layer: File with opinions that are stronger than the stage's; variants that are
+            selected here are stronger still.
 
     Raises:
-        WavecombError: It is none, or cannot be read, or has no such variants.
+        WavecombError: A file is none, or cannot be read; there are no such variants or prims.
     """
-    if not file.exists():
-        raise WavecombError(f"{file}: no such file")
-    if file.is_dir():
-        raise WavecombError(f"{file}: is a folder; name the stage in it")
-    if not Usd.Stage.IsSupportedFile(str(file)):
-        raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
+    _check_file(file)
+    if session_layer is not None:
+        _check_file(session_layer)
     try:
         session = Sdf.Layer.CreateAnonymous("session.usda")
         if overrides is not None:
             session.TransferContent(overrides)
+        if session_layer is not None:
+            session.subLayerPaths.append(_session(session_layer).identifier)
         root = Sdf.Layer.FindOrOpen(str(file))
         stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll) if root else None
     except Tf.ErrorException as error:
@@ -75,7 +80,29 @@ def open_stage(
     if not stage:
         raise WavecombError(f"{file}: cannot be read as USD")
     select_variants(stage, variants or {})
+    if mask:
+        populate(stage, mask)
     return stage
+
+
+def _check_file(file: Path) -> None:
+    if not file.exists():
+        raise WavecombError(f"{file}: no such file")
+    if file.is_dir():
+        raise WavecombError(f"{file}: is a folder; name the stage in it")
+    if not Usd.Stage.IsSupportedFile(str(file)):
+        raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
+
+
+def _session(file: Path) -> Sdf.Layer:
+    """The layer of a file, which a stage that names it keeps open."""
+    try:
+        layer = Sdf.Layer.FindOrOpen(str(file))
+    except Tf.ErrorException as error:
+        raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
+    if not layer:
+        raise WavecombError(f"{file}: cannot be read as USD")
+    return layer
 
 
 def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:

@@ -94,6 +94,21 @@ class LoadReport:
         """Adds something that is not supported."""
         self._unsupported.setdefault(what, Finding(what)).add(self.place(place), count)
 
+    def absorb(self, other: LoadReport) -> None:
+        """Adds all that another report was told, its prototypes named as here."""
+        for add, findings in (
+            (self.note, other.notes),
+            (self.warn, other.warnings),
+            (self.missing, other.unsupported),
+        ):
+            for finding in findings:
+                first, *others = finding.all_places or [""]
+                add(finding.what, first, finding.count - len(others))
+                for place in others:
+                    add(finding.what, place)
+        for kind, count in other.counts.items():
+            self.tally(kind, count)
+
     def tally(self, kind: str, count: int = 1) -> None:
         """Counts prims of a kind."""
         if count:

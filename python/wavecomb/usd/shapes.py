@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeom's implicit shapes as triangles with exact normals."""
+"""UsdGeom's implicit shapes as triangles with exact normals.
+
+Sizes that are negative count as positive. Both sides of all surfaces are drawn, so ``doubleSided``
+is not asked for; ``orientation`` says which of them is the outside.
+"""
 
 from __future__ import annotations
 
@@ -41,14 +45,18 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
     def number(name: str, default: float) -> float:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
-        return float(value) if value is not None else default
+        return abs(float(value)) if value is not None else default
 
     def token(name: str, default: str) -> str:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
         return str(value) if value in ("X", "Y", "Z") else default
 
-    return _READERS[kind](number, token)
+    shape = _READERS[kind](number, token)
+    if prim.GetAttribute("orientation").Get(time) == "leftHanded":
+        inward = np.ascontiguousarray(shape.triangles[:, ::-1])
+        return Shape(shape.positions, -shape.normals, shape.uvs, inward)
+    return shape
 
 
 Number = Callable[[str, float], float]
@@ -138,14 +146,13 @@ def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> 
     elif kind == "capsule":
         low, n_low = _arc(bottom, -90, 0, -half, RINGS // 2)
         high, n_high = _arc(top, 0, 90, half, RINGS // 2)
-        pieces.append((np.concatenate([low, high]), np.concatenate([n_low, n_high])))
+        if bottom == top:
+            pieces.append((np.concatenate([low, high]), np.concatenate([n_low, n_high])))
+        else:
+            pieces += [(low, n_low), _side(bottom, top, height), (high, n_high)]
     else:
-        slope = np.array([height, bottom - top]) / (math.hypot(height, bottom - top) or 1.0)
         pieces.append((np.array([[0, -half], [bottom, -half]]), np.array([[0.0, -1], [0, -1]])))
-        # A cone needs rows towards its tip for the normals to stay smooth.
-        s = np.linspace(0.0, 1.0, 9 if kind == "cone" else 2)[:, None]
-        side = (1 - s) * (bottom, -half) + s * (top, half)
-        pieces.append((side, np.tile(slope, (len(s), 1))))
+        pieces.append(_side(bottom, top, height))
         if kind == "cylinder":
             pieces.append((np.array([[top, half], [0, half]]), np.array([[0.0, 1], [0, 1]])))
     angle = np.linspace(0.0, 2.0 * math.pi, AROUND + 1)
@@ -161,8 +168,9 @@ def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> 
         uvs.append(np.stack([u, v], axis=-1).reshape(-1, 2))
         a = (np.arange(rows - 1)[:, None] * (AROUND + 1) + np.arange(AROUND)).ravel() + base
         d = a + AROUND + 1
-        lower = np.repeat(profile[:-1, 0] > 1e-9 * abs(bottom), AROUND)
-        upper = np.repeat(profile[1:, 0] > 1e-9 * abs(bottom), AROUND)
+        least = 1e-9 * max(bottom, top)
+        lower = np.repeat(profile[:-1, 0] > least, AROUND)
+        upper = np.repeat(profile[1:, 0] > least, AROUND)
         triangles.append(np.stack([a, a + 1, d + 1], axis=1)[lower])
         triangles.append(np.stack([a, d + 1, d], axis=1)[upper])
         base += rows * (AROUND + 1)
@@ -172,6 +180,15 @@ def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> 
         np.ascontiguousarray(np.concatenate(uvs), np.float32),
         np.ascontiguousarray(np.concatenate(triangles), np.uint32),
     )
+
+
+def _side(bottom: float, top: float, height: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The profile of a cylinder's, or a truncated cone's, side, and its normals."""
+    half = 0.5 * height
+    slope = np.array([height, bottom - top]) / (math.hypot(height, bottom - top) or 1.0)
+    # What ends in a tip needs rows towards it for the normals to stay smooth.
+    s = np.linspace(0.0, 1.0, 2 if bottom and top else 9)[:, None]
+    return (1 - s) * (bottom, -half) + s * (top, half), np.tile(slope, (len(s), 1))
 
 
 def _arc(

@@ -15,12 +15,13 @@ from pxr import Usd, UsdGeom
 from wavecomb.errors import WavecombError
 from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured
-from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
+from wavecomb.usd.groups import Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
 
@@ -76,6 +77,17 @@ class _Filled:
     frame: float | None
 
 
+@dataclass(frozen=True)
+class _Choice:
+    """What is read, and how."""
+
+    opened: Callable[[], Usd.Stage]
+    frame: float | None
+    camera: str | None
+    purposes: Sequence[str]
+    editable: bool
+
+
 def load_stage(
     source: str | Path | Usd.Stage,
     *,
@@ -83,9 +95,13 @@ def load_stage(
     camera: str | None = None,
     purposes: Sequence[str] = ("default", "render"),
     variants: Mapping[str, str] | None = None,
+    mask: Sequence[str] = (),
+    session_layer: str | Path | None = None,
     threads: int = 0,
     editable: bool = False,
     reuse: TextureStock | None = None,
+    stock: FrameStock | None = None,
+    progress: LoadProgress | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -99,10 +115,16 @@ def load_stage(
         purposes: Of the geometry to draw: default, render, proxy, guide.
         variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
             prim's.
+        mask: Prims to draw, with all below them; with what they need, all lights and cameras. None:
+            all prims. Of files only.
+        session_layer: File with opinions that are stronger than the stage's. Of files only.
         threads: For images and textures; 0: all.
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
+        stock: Of a stage that is open and was read at another frame: what did not change is
+            shared. Changes nothing else.
+        progress: Is told how many of the prims found so far are read.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -114,18 +136,26 @@ def load_stage(
         raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
+    if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
+        raise WavecombError("mask and session_layer are chosen when the stage is opened")
     report = LoadReport()
     file = _file_of(source)
+    if stock is not None:
+        reuse = stock.textures
+    opened = _opener(source, variants or {}, mask, session_layer)
     with captured(report):
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
         textures = TextureTable(builder, report, threads, reuse)
         try:
-            filled = _fill(
-                builder, source, frame, camera, purposes, variants or {}, textures, report, editable
-            )
+            choice = _Choice(opened, frame, camera, purposes, editable)
+            filled = _fill(builder, choice, textures, report, stock, progress)
         finally:
             textures.release()
         scene = _build(builder, file)
+    if stock is not None:
+        stock.textures = textures.stock(scene)
+        stock.meshes.end_frame()
+        report.absorb(stock.opening)
     if builder_factory is None:
         _give_back_memory()
     return LoadedStage(
@@ -151,28 +181,51 @@ def _file_of(source: str | Path | Usd.Stage) -> Path:
     return Path(layer.realPath or layer.identifier)
 
 
-def _fill(
-    builder: _core.SceneBuilder,
+def _opener(
     source: str | Path | Usd.Stage,
-    frame: float | None,
-    camera: str | None,
-    purposes: Sequence[str],
     variants: Mapping[str, str],
-    textures: TextureTable,
-    report: LoadReport,
-    editable: bool,
-) -> _Filled:
-    """Fills the builder. A stage that was opened here is closed then."""
+    mask: Sequence[str],
+    session_layer: str | Path | None,
+) -> Callable[[], Usd.Stage]:
+    """Gives the stage; one that is opened by it is closed when nobody holds it any more."""
     if isinstance(source, Usd.Stage):
         stage = source
-        select_variants(stage, variants)
-    else:
-        stage = open_stage(Path(source), variants)
-    time = time_code(stage, frame)
+
+        def choose() -> Usd.Stage:
+            select_variants(stage, variants)
+            return stage
+
+        return choose
+    file = Path(source)
+    layer = None if session_layer is None else Path(session_layer)
+    return lambda: open_stage(file, variants, mask=mask, session_layer=layer)
+
+
+def _fill(
+    builder: _core.SceneBuilder,
+    choice: _Choice,
+    textures: TextureTable,
+    report: LoadReport,
+    stock: FrameStock | None,
+    progress: LoadProgress | None,
+) -> _Filled:
+    """Fills the builder. A stage that was opened here is closed then."""
+    stage = choice.opened()
+    time = time_code(stage, choice.frame)
     found = survey(stage)
-    materials = MaterialTable(builder, textures, time, report, apart=editable)
+    materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
     chosen, lights = _read(
-        stage, time, camera, purposes, builder, textures, materials, bool(found.lights), report
+        stage,
+        time,
+        choice.camera,
+        choice.purposes,
+        builder,
+        textures,
+        materials,
+        bool(found.lights),
+        report,
+        stock,
+        progress,
     )
     used = None if time.IsDefault() else float(time.GetValue())
     return _Filled(chosen, found, materials.paths(), lights, used)
@@ -200,6 +253,8 @@ def _read(
     materials: MaterialTable,
     has_lights: bool,
     report: LoadReport,
+    stock: FrameStock | None,
+    progress: LoadProgress | None,
 ) -> tuple[str | None, tuple[str, ...]]:
     """Fills the builder; gives the paths of the camera and of the lights."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
@@ -207,7 +262,10 @@ def _read(
     groups = LightGroups(report)
     lights = LightReader(time, up_axis, textures, groups, report)
     traversal = Traversal(time, purposes, lights, report)
-    world = GroupBuilder(stage, traversal, builder, materials, groups, report).world()
+    meshes = None if stock is None else stock.meshes
+    world = GroupBuilder(
+        stage, traversal, builder, materials, groups, report, meshes, progress
+    ).world()
     lit = materials.glows or has_lights
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):

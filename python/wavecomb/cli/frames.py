@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sequences of ``wavecomb render``: --frames and --skip-existing."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from wavecomb.cli.group import describe
+from wavecomb.cli.job import FrameShot, Job, Names, how_far, purpose_at
+from wavecomb.cli.options import StageOptions
+from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.errors import WavecombError
+from wavecomb.frame_names import frame_text, has_place, parse_frames
+
+if TYPE_CHECKING:
+    from wavecomb.api import Picture
+    from wavecomb.sequence import Frames
+    from wavecomb.usd import LoadReport
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def frame_options(command: F) -> F:
+    """--frames and --skip-existing."""
+    for option in (
+        click.option(
+            "--skip-existing",
+            is_flag=True,
+            help="With --frames: leave frames out whose files are there.",
+        ),
+        click.option(
+            "--frames",
+            metavar="RANGE",
+            help="Frames: 1-48, 1-48x2, 1,5,9. Names of files say where the frame goes: "
+            "shot.####.exr, shot.%04d.exr or shot.<frame>.exr.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def check_frames(
+    text: str | None, skip: bool, source: StageOptions, names: Names, purpose: PurposeOptions
+) -> tuple[float, ...] | None:
+    """The frames; None where no sequence is asked for. Raises WavecombError."""
+    if text is None:
+        if skip:
+            raise WavecombError("--skip-existing is for sequences: give --frames, too")
+        return None
+    if source.frame is not None:
+        raise WavecombError("--frame is one frame and --frames are several; give one of them")
+    if purpose.resume is not None:
+        raise WavecombError(
+            "--resume goes on with one picture: give its --frame, and then the other --frames "
+            "with --skip-existing"
+        )
+    frames = parse_frames(text)
+    if len(frames) > 1:
+        for option, name in (
+            ("-o", names.output),
+            ("--png", names.png),
+            ("--stats", names.stats),
+            ("--checkpoint", purpose.checkpoint),
+        ):
+            if name is not None and not has_place(name):
+                stem, ending = os.path.splitext(name)
+                raise WavecombError(
+                    f"{option} {name}: would be written {len(frames)} times; "
+                    f"say where the frame goes: {stem}.####{ending}"
+                )
+    return frames
+
+
+def render_sequence(
+    job: Job,
+    frames: Sequence[float],
+    names: Names,
+    source: StageOptions,
+    purpose: PurposeOptions,
+    skip: bool,
+) -> tuple[Picture | None, list[str]]:
+    """Renders frames one after another; the last picture, and all files that were written.
+
+    Raises:
+        WavecombError: A frame failed; it is named, and those before it are written.
+        click.exceptions.Exit: Somebody stopped it; whole frames are written.
+    """
+    wanted = list(frames)
+    if skip:
+        wanted = [f for f in frames if not all(map(os.path.exists, names.at(f).all()))]
+        if len(wanted) < len(frames):
+            job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames are there")
+    picture: Picture | None = None
+    report: LoadReport | None = None
+    stock: Frames | None = None
+    files: list[str] = []
+    for number, frame in enumerate(wanted, 1):
+        place = f"frame {frame_text(frame)}"
+        job.reporter.begins(frame_text(frame), number, len(wanted))
+        try:
+            if stock is None:
+                stock = _open(job, source)
+            here = purpose_at(purpose, frame)
+            picture, stopped, report = job.run(
+                FrameShot(stock, frame), replace(source, frame=frame), here
+            )
+            if stopped is not None:
+                done = f"{number - 1} of {len(wanted)} frames are written"
+                kept = f"; {here.checkpoint} goes on with it" if here.checkpoint else ""
+                click.echo(
+                    f"stopped in {place} {how_far(picture)}, which is not written{kept}; {done}, "
+                    "and --skip-existing goes on after them",
+                    err=True,
+                )
+                raise click.exceptions.Exit(128 + stopped)
+            picture, written = job.write(picture, names.at(frame), denoise=purpose.denoise)
+        except click.exceptions.Exit:
+            raise
+        except Exception as error:
+            if os.environ.get("WAVECOMB_DEBUG"):
+                raise
+            raise WavecombError(f"{place}: {describe(error)}") from error
+        files += written
+        job.reporter.ended(picture, written)
+    if picture is not None and report is not None:
+        job.reporter.finished(picture, report, files)
+    return picture, files
+
+
+def _open(job: Job, source: StageOptions) -> Frames:
+    from wavecomb.api import import_usd
+
+    import_usd()
+    from wavecomb.sequence import Frames
+
+    options = source.for_load()
+    if options["purposes"] is None:
+        del options["purposes"]
+    return Frames(job.stage, threads=job.settings.threads, **options)

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One picture of ``wavecomb render``: a stage is loaded, rendered, watched and written."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+from wavecomb.cli.aovs import AovOptions
+from wavecomb.cli.options import StageOptions, stage_warnings, warn
+from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.frame_names import fill
+
+if TYPE_CHECKING:
+    from wavecomb.api import Picture
+    from wavecomb.checkpoint import Checkpoint
+    from wavecomb.cli.reporting import Reporter
+    from wavecomb.sequence import Frames
+    from wavecomb.usd import LoadedStage, LoadReport
+
+
+@dataclass(frozen=True)
+class Names:
+    """Files of one picture; with places for the frame in a sequence."""
+
+    output: str
+    png: str | None
+    stats: str | None
+
+    def at(self, frame: float) -> Names:
+        """Those of a frame."""
+        png = None if self.png is None else fill(self.png, frame)
+        stats = None if self.stats is None else fill(self.stats, frame)
+        return Names(fill(self.output, frame), png, stats)
+
+    def all(self) -> list[str]:
+        """Those that there are, in the order in which they are written."""
+        return [name for name in (self.output, self.png, self.stats) if name is not None]
+
+
+class Shot(Protocol):
+    """Where a scene comes from, and what renders it."""
+
+    def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
+        """Reads the stage."""
+
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders it; the arguments are those of ``_core.render`` after the scene."""
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """``make_stats`` of that."""
+
+
+class Still:
+    """A stage at one frame."""
+
+    def __init__(self, source: StageOptions, stage: str, threads: int) -> None:
+        self._source = source
+        self._stage = stage
+        self._threads = threads
+        self._loaded: LoadedStage | None = None
+
+    def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
+        """Reads the stage."""
+        self._loaded = self._source.load(self._stage, self._threads, progress)
+        return self._loaded
+
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders it, and frees what only that needed."""
+        from wavecomb import _core
+
+        assert self._loaded is not None
+        return _core.render(self._loaded.scene, *arguments, **named)
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """Those of the picture."""
+        from wavecomb.stats import make_stats
+
+        return make_stats(result, stage=self._stage, loaded=self._loaded, resumed_s=resumed_s)
+
+
+class FrameShot:
+    """One frame of a stage that stays open."""
+
+    def __init__(self, frames: Frames, frame: float) -> None:
+        self._frames = frames
+        self._frame = frame
+
+    def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
+        """Reads what is other in this frame."""
+        return self._frames.load(self._frame, progress=progress)
+
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders it."""
+        return self._frames.render(*arguments, **named)
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """Those of the picture."""
+        return self._frames.stats(result, resumed_s=resumed_s)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all pictures of one command share."""
+
+    stage: str
+    settings: Any
+    aovs: tuple[str, ...]
+    profile: dict[str, dict[str, float]] | None
+    layers: AovOptions
+    reporter: Reporter
+    exposure: float
+    tone_map: Any
+
+    def run(
+        self,
+        shot: Shot,
+        source: StageOptions,
+        purpose: PurposeOptions,
+        resumed: Checkpoint | None = None,
+    ) -> tuple[Picture, int | None, LoadReport]:
+        """The picture, the number of the signal that stopped it, and what to say of the stage."""
+        from wavecomb.api import check_memory, picture_of
+        from wavecomb.progress import Interrupt
+        from wavecomb.watcher import Watcher
+
+        with self.reporter.loading(self.stage) as progress:
+            loaded = shot.load(progress)
+        warn(stage_warnings(loaded))
+        if "light_groups" in self.aovs:
+            check_memory(self.settings, self.aovs, len(loaded.scene.light_groups))
+        sinks, state, seconds = self._sinks(loaded, source, purpose, resumed)
+        with Interrupt() as interrupt, self.reporter.rendering() as bar:
+            watcher = Watcher(
+                sinks,
+                reporter=bar,
+                is_stopped=lambda: interrupt.requested,
+                warn=lambda line: warn([line]),
+            )
+            result = shot.render(
+                self.settings, None, None, self.profile, watcher=watcher, state=state
+            )
+        stats = shot.stats(result, seconds)
+        stopped = (interrupt.signal or signal.SIGINT) if result.cancelled else None
+        picture = picture_of(result, stats, scene=loaded.scene, aovs=self.aovs)
+        return picture, stopped, loaded.report
+
+    def _sinks(
+        self,
+        loaded: LoadedStage,
+        source: StageOptions,
+        purpose: PurposeOptions,
+        resumed: Checkpoint | None,
+    ) -> tuple[list[Any], dict[str, Any] | None, float]:
+        """Who saves checkpoints and previews; the state to go on from, and its seconds."""
+        from wavecomb.watcher import CheckpointSink, PreviewSink, Sink
+
+        sinks: list[Sink] = []
+        state, seconds = None, 0.0
+        if purpose.checkpoint_file is not None:
+            from wavecomb.checkpoint import build_note, check_fits, make_header
+
+            header = make_header(
+                loaded.scene,
+                self.settings,
+                stage=self.stage,
+                source=source.as_dict(),
+                aovs=self.aovs,
+            )
+            if resumed is not None:
+                check_fits(resumed, header)
+                warn([note] if (note := build_note(resumed, header)) else [])
+                state, seconds = resumed.state, resumed.seconds
+            sinks.append(CheckpointSink(purpose.checkpoint_file, purpose.every, header, seconds))
+        if purpose.preview is not None:
+            sinks.append(
+                PreviewSink(
+                    purpose.preview,
+                    purpose.preview_every,
+                    exposure=self.exposure,
+                    tone_map=self.tone_map,
+                )
+            )
+        return sinks, state, seconds
+
+    def write(self, picture: Picture, names: Names, *, denoise: bool) -> tuple[Picture, list[str]]:
+        """Writes all files of a picture; gives it as written, and their names."""
+        import numpy as np
+
+        from wavecomb.stats import write_stats
+
+        broken = int((~np.isfinite(picture.beauty).all(axis=2)).sum())
+        warn([f"{broken} pixels of the picture are not finite"] if broken else [])
+        if denoise:
+            picture = picture.with_denoised(threads=self.settings.threads)
+        written = [str(name) for name in picture.save(names.output, **self.layers.file_options())]
+        if names.png is not None:
+            picture.save(names.png, exposure=self.exposure, tone_map=self.tone_map)
+            written.append(names.png)
+        if names.stats is not None:
+            write_stats(names.stats, picture.stats)
+            written.append(names.stats)
+        return picture, written
+
+
+def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
+    """The names of checkpoint and preview for a frame."""
+    return replace(
+        purpose,
+        checkpoint=None if purpose.checkpoint is None else fill(purpose.checkpoint, frame),
+        preview=None if purpose.preview is None else fill(purpose.preview, frame),
+    )
+
+
+def how_far(picture: Any) -> str:
+    """How much is done, as can be said of a render without and with a fixed end."""
+    from wavecomb.stats import rendered_pixels
+
+    stats = picture.stats
+    settings = stats["settings"]
+    samples = stats["counts"]["samples"] + stats["resumed_samples"]
+    mean = samples / rendered_pixels(settings)
+    if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
+        return f"with {mean:.3g} samples a pixel"
+    return f"at {100.0 * mean / settings['spp']:.0f} %"

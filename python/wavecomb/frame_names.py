@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames as people write them, and names of files for each."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from decimal import Decimal, InvalidOperation
+
+from wavecomb.errors import WavecombError
+
+MAX_FRAMES = 1_000_000
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
+_RANGE = re.compile(rf"({_NUMBER})(?:-({_NUMBER}))?(?:x({_NUMBER}))?")
+_PRINTF = re.compile(r"%(0?)(\d*)d")
+_HASHES = re.compile(r"#+")
+
+
+def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
+    """Frames in the order they are named, each once.
+
+    Args:
+        text: Frames and ranges, with commas between them: ``1-48``, ``1-48x2`` (every second),
+            ``48-1`` (backwards), ``1,5,9``, ``-10--2``, ``1-2x0.25``; or numbers.
+
+    >>> parse_frames("1-7x3,-2--1,0.5")
+    (1.0, 4.0, 7.0, -2.0, -1.0, 0.5)
+
+    Raises:
+        WavecombError: It is none of these.
+    """
+    if not isinstance(text, str):
+        text = ",".join(f"{float(frame):f}" for frame in text)
+    frames: dict[float, None] = {}
+    for part in text.split(","):
+        for frame in _range(part.strip(), text):
+            frames[float(frame)] = None
+            if len(frames) > MAX_FRAMES:
+                raise WavecombError(f"frames {text}: more than {MAX_FRAMES:,} frames")
+    return tuple(frames)
+
+
+def _range(part: str, text: str) -> Iterable[Decimal]:
+    """The frames of one part, exact to the last decimal."""
+    match = _RANGE.fullmatch(part)
+    if match is None:
+        raise WavecombError(
+            f"frames {text}: {part!r} is no frame or range; write 1-48, 1-48x2, 1,5,9 or -2--1"
+        )
+    try:
+        first, *others = (None if group is None else Decimal(group) for group in match.groups())
+    except InvalidOperation:
+        raise WavecombError(f"frames {text}: {part!r} has too many digits") from None
+    assert first is not None
+    last, step = others
+    if last is None:
+        if step is not None:
+            raise WavecombError(f"frames {text}: {part!r} has a step and no end; write 1-48x2")
+        yield first
+        return
+    step = Decimal(1) if step is None else step
+    if step <= 0:
+        raise WavecombError(f"frames {text}: the step of {part!r} must be above 0")
+    count = int(abs(last - first) / step)
+    if count >= MAX_FRAMES:
+        raise WavecombError(f"frames {text}: more than {MAX_FRAMES:,} frames")
+    sign = 1 if last >= first else -1
+    for i in range(count + 1):
+        yield first + sign * i * step
+
+
+def frame_text(frame: float) -> str:
+    """A frame as people write it.
+
+    >>> frame_text(7.0), frame_text(-0.25)
+    ('7', '-0.25')
+    """
+    text = f"{Decimal(repr(float(frame))):f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def has_place(pattern: str) -> bool:
+    """Whether a file name says where its frame goes."""
+    name = os.path.basename(pattern)
+    return "<frame>" in name or bool(_HASHES.search(name) or _PRINTF.search(name))
+
+
+def fill(pattern: str, frame: float) -> str:
+    """The name of the file of a frame.
+
+    In the last part of the name, ``####`` is the frame with at least so many digits, ``%04d`` with
+    at least so many characters, ``<frame>`` without zeros before it. What is not whole has its
+    decimals behind it.
+
+    >>> fill("out/a.####.exr", 7), fill("a%04d.png", -7), fill("a_<frame>.exr", 1.5)
+    ('out/a.0007.exr', 'a-007.png', 'a_1.5.exr')
+    """
+    folder, name = os.path.split(pattern)
+    whole, point, decimals = frame_text(abs(frame)).partition(".")
+    sign = "-" if frame < 0 else ""
+
+    def hashes(match: re.Match[str]) -> str:
+        return sign + whole.zfill(len(match[0])) + point + decimals
+
+    def printf(match: re.Match[str]) -> str:
+        width = int(match[2] or 0)
+        padded = (sign + whole).zfill(width) if match[1] else (sign + whole).rjust(width)
+        return padded + point + decimals
+
+    name = _PRINTF.sub(printf, _HASHES.sub(hashes, name))
+    return os.path.join(folder, name.replace("<frame>", sign + whole + point + decimals))

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of one stage, which stays open between them."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pxr import UsdGeom
+
+from wavecomb import _core
+from wavecomb.api import check_memory, picture_of, prepare
+from wavecomb.frame_names import parse_frames
+from wavecomb.stats import make_stats
+from wavecomb.usd import LoadReport, load_stage, open_stage
+from wavecomb.usd.camera import find_camera, read_camera
+from wavecomb.usd.diagnostics import captured
+from wavecomb.usd.opening import time_code
+from wavecomb.usd.stock import FrameStock
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+    from wavecomb._core import Result, Settings
+    from wavecomb.api import Picture
+    from wavecomb.usd import LoadedStage
+
+_CAMERA = {"lens_radius": 0.0, "focus_distance": 1.0, "near_clip": 0.0, "far_clip": 1e30}
+"""What ``SceneBuilder.set_camera`` takes where a camera says nothing."""
+
+
+class Frames:
+    """Reads and renders frames of a stage; each is, bit for bit, what it is alone.
+
+    Where only views change, the scene and its hierarchy stay and the camera is read. Else the stage
+    is walked again; meshes that do not change, and textures, are those of the frame before.
+
+    Contract: files of the stage must not change meanwhile, but for images.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        variants: Mapping[str, str] | None = None,
+        mask: Iterable[str] = (),
+        session_layer: str | os.PathLike[str] | None = None,
+        threads: int = 0,
+        **options: Any,
+    ) -> None:
+        """Opens the stage; options: of ``load_stage``. Raises WavecombError."""
+        self._path = Path(path)
+        self._threads = threads
+        self._options = options
+        opening = LoadReport()
+        started = time.perf_counter()
+        layer = None if session_layer is None else Path(session_layer)
+        with captured(opening):
+            self._stage: Usd.Stage = open_stage(
+                self._path, variants, mask=tuple(mask), session_layer=layer
+            )
+            self._stock = FrameStock(self._stage, opening)
+        self._opening_s = time.perf_counter() - started
+        self._renderer: _core.Renderer | None = None
+        self._loaded: LoadedStage | None = None
+        self._is_built = False
+
+    def load(self, frame: float, **options: Any) -> LoadedStage:
+        """The stage at a frame; options: of ``load_stage`` that change no scene, such as progress.
+
+        Raises:
+            WavecombError: It cannot be rendered.
+        """
+        started = time.perf_counter()
+        loaded = self._seen_anew(frame)
+        if loaded is None:
+            # Let go of first: two hierarchies at a time would be twice the memory.
+            self._renderer, self._loaded = None, None
+            loaded = load_stage(
+                self._stage,
+                frame=frame,
+                threads=self._threads,
+                stock=self._stock,
+                **self._options,
+                **options,
+            )
+        seconds = time.perf_counter() - started + self._opening_s
+        self._opening_s = 0.0
+        self._loaded = replace(loaded, seconds=seconds, stage_path=self._path, frame=frame)
+        return self._loaded
+
+    def _seen_anew(self, frame: float) -> LoadedStage | None:
+        """The scene that is there with its camera at a frame; None where more may be other."""
+        before, renderer = self._loaded, self._renderer
+        if before is None or renderer is None or not self._stock.varying.is_view_only:
+            return None
+        if before.camera_path is None:
+            return before if self._is_camera_missing() else None
+        prim = self._stage.GetPrimAtPath(before.camera_path)
+        when = time_code(self._stage, frame)
+        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(prim))
+        told = LoadReport()
+        view = read_camera(prim, to_world, when, told)
+        if view is None or not {*told.lines()} <= {*before.report.lines()}:
+            return None
+        renderer.edit(camera={"transform": view.transform, **_CAMERA, **view.options})
+        return replace(before, scene=renderer.scene)
+
+    def _is_camera_missing(self) -> bool:
+        """Whether the bounds are framed for want of a camera, not because one is no good."""
+        return find_camera(self._stage, self._options.get("camera")) is None
+
+    def render(
+        self,
+        settings: Settings,
+        progress: Any = None,
+        policy: Any = None,
+        costs: Any = None,
+        *,
+        watcher: Any = None,
+        state: Any = None,
+    ) -> Result:
+        """Renders what was loaded last; the arguments are those of ``_core.render``."""
+        assert self._loaded is not None
+        self._is_built = self._renderer is None
+        if self._renderer is None:
+            self._renderer = _core.Renderer(self._loaded.scene, settings.threads)
+        return self._renderer.render(settings, progress, policy, costs, watcher, state)
+
+    def stats(self, result: Result, **options: Any) -> dict[str, Any]:
+        """``make_stats`` of what was rendered last; options: further ones of it."""
+        stats = make_stats(result, stage=os.fspath(self._path), loaded=self._loaded, **options)
+        if not self._is_built:
+            stats["seconds"]["build"] = 0.0
+        return stats
+
+
+def render_frames(
+    path: str | os.PathLike[str],
+    frames: str | Iterable[float],
+    *,
+    size: tuple[int, int] = (600, 600),
+    spp: int = 64,
+    camera: str | None = None,
+    purposes: Iterable[str] | None = None,
+    variants: Mapping[str, str] | None = None,
+    mask: Iterable[str] = (),
+    session_layer: str | os.PathLike[str] | None = None,
+    progress: Any = None,
+    policy: Any = None,
+    costs: Any = None,
+    aovs: Iterable[str] | None = None,
+    **settings: Any,
+) -> Iterator[tuple[float, Picture]]:
+    """Renders frames of a stage one after another, and shares between them what does not change.
+
+    Each picture is, bit for bit, what ``render(path, frame=...)`` gives.
+
+    Args:
+        path: .usd, .usda, .usdc or .usdz.
+        frames: "1-48", "1-48x2", "1,5,9", or numbers.
+        size: As in ``render``, like spp, progress, policy, costs, aovs and settings.
+        spp: Likewise.
+        camera: As in ``load``, like purposes, variants, mask and session_layer.
+        purposes: Likewise.
+        variants: Likewise.
+        mask: Likewise.
+        session_layer: Likewise.
+        progress: As in ``render``, for each frame.
+        policy: Likewise.
+        costs: Likewise; every frame starts from the same.
+        aovs: Likewise.
+        **settings: Likewise.
+
+    Returns:
+        An iterator of (frame, picture); each is rendered when it is asked for.
+
+    >>> for frame, picture in wavecomb.render_frames("shot.usd", "1-48"):  # doctest: +SKIP
+    ...     picture.save(f"shot.{int(frame):04d}.exr")
+
+    Raises:
+        WavecombError: Frames, options or the stage are no good.
+    """
+    numbers = parse_frames(frames)
+    own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
+    options: dict[str, Any] = {} if purposes is None else {"purposes": tuple(purposes)}
+    shots = Frames(
+        path,
+        camera=camera,
+        variants=variants,
+        mask=mask,
+        session_layer=session_layer,
+        threads=chosen.threads,
+        **options,
+    )
+    return _pictures(shots, numbers, chosen, names, progress, own, profile)
+
+
+def _pictures(
+    shots: Frames,
+    frames: Iterable[float],
+    settings: Settings,
+    names: tuple[str, ...],
+    progress: Any,
+    policy: Any,
+    profile: Any,
+) -> Iterator[tuple[float, Picture]]:
+    for frame in frames:
+        scene = shots.load(frame).scene
+        if "light_groups" in names:
+            check_memory(settings, names, len(scene.light_groups))
+        result = shots.render(settings, progress, policy, profile)
+        yield frame, picture_of(result, shots.stats(result), scene=scene, aovs=names)

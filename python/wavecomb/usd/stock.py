@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the frames of a stage that stays open share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from pxr import Gf, Usd
+
+from wavecomb.usd.report import LoadReport
+from wavecomb.usd.texture import TextureStock
+from wavecomb.usd.varying import Varying
+
+if TYPE_CHECKING:
+    from wavecomb.usd.mesh import MeshArrays
+
+
+class MeshStock:
+    """Arrays of meshes that no frame changes, with what there was to say of them.
+
+    Those that a frame does not ask for are forgotten at its end.
+    """
+
+    def __init__(self, varying: Varying) -> None:
+        self._varying = varying
+        self._kept: dict[Any, tuple[MeshArrays | None, LoadReport]] = {}
+        self._used: dict[Any, tuple[MeshArrays | None, LoadReport]] = {}
+
+    def get(
+        self,
+        read: Callable[[LoadReport], MeshArrays | None],
+        prim: Usd.Prim,
+        matrix: Gf.Matrix4d,
+        options: tuple[Any, ...],
+        inherited: Sequence[Any],
+        report: LoadReport,
+    ) -> MeshArrays | None:
+        """The arrays of a mesh: those of the frame before where they are the same.
+
+        Args:
+            read: Makes them, and tells a report.
+            prim: The mesh.
+            matrix: From it to its group.
+            options: What else decides over the arrays; hashable.
+            inherited: Primvars of its ancestors.
+            report: Is told the same in every frame.
+        """
+        if self._varying.of(prim, inherited):
+            return read(report)
+        key = (prim.GetPath(), tuple(map(tuple, matrix)), options)
+        known = self._kept.get(key)
+        if known is None:
+            told = LoadReport()
+            known = read(told), told
+        self._used[key] = known
+        report.absorb(known[1])
+        return known[0]
+
+    def end_frame(self) -> None:
+        """Forgets what the frame did not use."""
+        self._kept, self._used = self._used, {}
+
+
+class FrameStock:
+    """For ``load_stage``: what it may take from the frame before, and leaves for the next one.
+
+    Contract: for one open stage, which does not change but in time.
+    """
+
+    def __init__(self, stage: Usd.Stage, opening: LoadReport) -> None:
+        """``opening``: what there was to say when the stage was opened."""
+        self.varying = Varying(stage)
+        self.meshes = MeshStock(self.varying)
+        self.textures: TextureStock | None = None
+        self.opening = opening
