@@ -93,7 +93,8 @@ def test_a_mask_into_an_instance_keeps_the_instance(tmp_path):
 
 
 def test_a_collection_binding_asks_for_its_material_only(tmp_path):
-    text = f"""def Xform "World" (prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:all"]) {{
+    text = f"""def Xform "World" (
+        prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:all"]) {{
         uniform token collection:all:expansionRule = "expandPrims"
         rel collection:all:includes = </World>
         rel material:binding:collection:all = [</World.collection:all>, </Look>]
@@ -130,11 +131,11 @@ def Mesh "M" ( variants = {{ string c = "one" }}
     assert colour() == (1, 0, 0)
     assert colour(session_layer=session) == (0, 1, 0)
     assert colour(session_layer=session, variants={"c": "three"}) == (0, 0, 1)
-    with pytest.raises(WavecombError, match="gone.usda: no such file"):
+    with pytest.raises(WavecombError, match=r"gone\.usda: no such file"):
         colour(session_layer=tmp_path / "gone.usda")
     broken = tmp_path / "broken.usda"
     broken.write_text("#usda 1.0\ndef {")
-    with pytest.raises(WavecombError, match="broken.usda: cannot be read"):
+    with pytest.raises(WavecombError, match=r"broken\.usda: cannot be read"):
         colour(session_layer=broken)
 
 
