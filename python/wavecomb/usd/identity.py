@@ -90,7 +90,7 @@ class Assets:
         path = prim.GetPath()
         known = self._known.get(path)
         if known is None:
-            kind = Usd.ModelAPI(prim).GetKind()
+            kind = prim.GetKind()
             if kind and Kind.Registry.IsA(kind, Kind.Tokens.component):
                 known = len(str(path))
             else:
