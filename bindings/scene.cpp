@@ -332,16 +332,18 @@ void bind_scene(nb::module_& m) {
                        out.emplace_back(names.object(i), names.asset(i));
                      return out;
                    })
-      .def("fingerprint",
-           [](const Scene& s) {
-             nb::dict d;
-             for (const auto& [part, hash] : fingerprint(s)) {
-               char text[17];
-               std::snprintf(text, sizeof(text), "%016" PRIx64, hash);
-               d[part.c_str()] = text;
-             }
-             return d;
-           })
+      .def(
+          "fingerprint",
+          [](const Scene& s, bool arrays) {
+            nb::dict d;
+            for (const auto& [part, hash] : fingerprint(s, arrays)) {
+              char text[17];
+              std::snprintf(text, sizeof(text), "%016" PRIx64, hash);
+              d[part.c_str()] = text;
+            }
+            return d;
+          },
+          "arrays"_a = true)
       .def_prop_ro("warnings", &Scene::warnings)
       .def_prop_ro("bounds", [](const Scene& s) {
         const Bounds& b = s.bounds();

@@ -4,7 +4,7 @@
 Arrays are NumPy arrays and are not copied where said so.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,10 +40,11 @@ class Scene:
     @property
     def textures(self) -> list[tuple[str, int]]:
         """(name, bytes) of every texture."""
-    def fingerprint(self) -> dict[str, str]:
-        """Hashes of what decides over the picture: geometry, materials, textures, lights, camera.
+    def fingerprint(self, arrays: bool = True) -> dict[str, str]:
+        """Hashes of what decides over the picture, and of names: geometry, materials, textures,
+        lights, camera, names.
 
-        Reads every array once."""
+        arrays: geometry and textures, too, of which every byte is read."""
     @property
     def camera(self) -> dict[str, Any]:
         """As set_camera takes it: to_world (4, 4), window, lens_radius, focus_distance, near_clip,
@@ -343,9 +344,9 @@ class Renderer:
     def edit(
         self,
         *,
-        camera: Mapping[str, Any] | None = None,
-        materials: Mapping[int, Mapping[str, Any]] = {},
-        lights: Mapping[int, Mapping[str, Any]] = {},
+        camera: dict[str, Any] | None = None,
+        materials: dict[int, dict[str, Any]] = {},
+        lights: dict[int, dict[str, Any]] = {},
     ) -> None:
         """Changes the scene, all at once or nothing. Parameters that are not given stay.
 

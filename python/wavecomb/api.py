@@ -297,7 +297,7 @@ def render(
     scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
-    watcher, state = _keeping(scene, chosen, stage, checkpoint, every, resume)
+    watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
     result = _render(scene, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats, scene=scene, aovs=names)
@@ -398,6 +398,7 @@ def keeps_error(settings: Settings) -> bool:
 def _keeping(
     scene: Scene,
     settings: Settings,
+    aovs: Sequence[str],
     stage: str | None,
     checkpoint: str | os.PathLike[str] | None,
     every: float,
@@ -409,7 +410,7 @@ def _keeping(
     from wavecomb.checkpoint import check_fits, load_checkpoint, make_header
     from wavecomb.watcher import CheckpointSink, Watcher
 
-    header = make_header(scene, settings, stage=stage, source={})
+    header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
     before = load_checkpoint(resume) if resume is not None else None
     if before is not None:
         check_fits(before, header)

@@ -112,6 +112,14 @@ def make_stats(
     }
 
 
+def rendered_pixels(settings: Mapping[str, Any]) -> int:
+    """Pixels that a render with these settings has samples for."""
+    if settings.get("region") is None:
+        return int(settings["width"] * settings["height"])
+    x0, y0, x1, y1 = settings["region"]
+    return int((x1 - x0) * (y1 - y0))
+
+
 def sort_overhead(phases: Mapping[str, float]) -> float:
     """The share of ordered shading that went into the order.
 
@@ -155,7 +163,9 @@ def picture_metadata(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
     if stats.get("settings"):
         metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:
-        metadata["wavecomb:render_seconds"] = float(stats["seconds"].get("render", 0.0))
+        seconds = stats["seconds"]  # in all runs of a render that was resumed
+        rendered = seconds.get("render", 0.0) + seconds.get("resumed", 0.0)
+        metadata["wavecomb:render_seconds"] = float(rendered)
     return metadata
 
 

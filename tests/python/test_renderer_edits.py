@@ -265,6 +265,15 @@ def test_regions() -> None:
             chosen.region = bad
 
 
+def test_a_render_without_a_picture_has_its_figures() -> None:
+    renderer = _core.Renderer(build())
+    result = renderer.render(settings(), picture=False)
+    assert result.beauty is None
+    assert result.samples is None
+    assert result.stats["counts"]["samples"] == 40 * 30 * 4
+    assert set(result.costs["materials"]) >= {"/floor", "/card"}
+
+
 @pytest.fixture(scope="module")
 def cornell(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wavecomb.scenes import write_scene
@@ -319,3 +328,5 @@ def test_a_checkpoint_is_of_its_region(cornell: Path, tmp_path: Path) -> None:
     samples = read_layers(out)["samples"]
     assert samples[3:12, 2:9].min() == 4
     assert samples.sum() == 4 * 9 * 7
+    timed = run_cli(*given[:4], *given[5:], *region, "--spp", "4", "--time-limit", "60")
+    assert "4 samples a pixel" in timed.output, timed.output

@@ -156,6 +156,12 @@ class PurposeOptions:
         if None not in (spp, self.max_spp) and spp != self.max_spp:
             raise WavecombError(f"--spp is {spp} and --max-spp {self.max_spp}; give one of them")
         asked = spp if spp is not None else self.max_spp
+        was_timed = before.get("spp") == UNLIMITED_SPP and not is_adaptive
+        if was_timed and asked is None and self.time_limit is None:
+            raise WavecombError(
+                f"{self.resume}: is of a render that a time limit was to end: "
+                "give --time-limit or --spp"
+            )
         if asked is None and "spp" not in before:
             if self.time_limit is not None:
                 asked = UNLIMITED_SPP

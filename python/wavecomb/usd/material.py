@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.usd.materialx import MaterialXReader, model_of
@@ -112,8 +114,7 @@ class MaterialTable:
         self._plain: dict[tuple[float, ...], int] = {}
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
-        self.emits = False
-        """Whether a material is in use that emits anything."""
+        self._emitting: set[int] = set()
 
     def expect(self, material: UsdShade.Material) -> None:
         """Starts what takes long for a material that will be used: reading its images."""
@@ -146,7 +147,6 @@ class MaterialTable:
         if number is None:
             brightest = surface.brightest()
             self.glows = self.glows or brightest >= LAMP
-            self.emits = self.emits or brightest > 0
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,
@@ -155,6 +155,8 @@ class MaterialTable:
             )
             self._ids[key] = number
             self._names.append(surface.name)
+            if brightest > 0:
+                self._emitting.add(number)
         # Holding the surface keeps its address from being used again.
         self._surface_ids[id(surface)] = (surface, number)
         return number
@@ -162,6 +164,12 @@ class MaterialTable:
     def paths(self) -> tuple[str, ...]:
         """Prim of each material by id, "" of display colours."""
         return tuple(name if name.startswith("/") else "" for name in self._names)
+
+    def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
+        """Whether a mesh with this material, or with these of its faces, emits anything."""
+        if faces is None or not self._emitting:
+            return material in self._emitting
+        return bool(np.isin(faces, list(self._emitting)).any())
 
     def plain(self, colour: Iterable[float] = DEFAULT_COLOUR, opacity: float = 1.0) -> int:
         """Material id of a display colour."""

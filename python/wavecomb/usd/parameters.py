@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
+from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader
 from wavecomb.usd.material import PREVIEW, surface_source
@@ -214,7 +215,9 @@ def light_radiance(
         elif own != IDENTITY:
             matrix = own * matrix
     scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
-    light = LightReader(time, up_axis, None, LoadReport()).read(prim, scale)
+    report = LoadReport()
+    reader = LightReader(time, up_axis, None, LightGroups(report), report)
+    light = reader.read(prim, scale)
     r, g, b = light.options["color"]
     return (r, g, b)
 

@@ -16,6 +16,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
+from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
@@ -203,9 +204,10 @@ def _read(
     """Fills the builder; gives the paths of the camera and of the lights."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = find_camera(stage, camera)
-    lights = LightReader(time, up_axis, textures, report)
+    groups = LightGroups(report)
+    lights = LightReader(time, up_axis, textures, groups, report)
     traversal = Traversal(time, purposes, lights, report)
-    world = GroupBuilder(stage, traversal, builder, materials, report).world()
+    world = GroupBuilder(stage, traversal, builder, materials, groups, report).world()
     lit = materials.glows or has_lights
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):
