@@ -80,7 +80,9 @@ class PlotsPanel(QWidget):
     def _time_tab(self) -> QWidget:
         samples = self._add_curves("samples_rate", "Samples a second", _rates("samples"))
         rays = self._add_curves("rays_rate", "Rays a second", _rates("rays"))
-        return self._grid((self.phases, 0, 0, 2), (samples, 1, 0, 1), (rays, 1, 1, 1), stretch=(3, 2))
+        return self._grid(
+            (self.phases, 0, 0, 2), (samples, 1, 0, 1), (rays, 1, 1, 1), stretch=(3, 2)
+        )
 
     def _coherence_tab(self) -> QWidget:
         def so_far(value: Callable[[Any], float]) -> Curve:
@@ -103,9 +105,9 @@ class PlotsPanel(QWidget):
             (self._add_curves("lane_utilisation", "Lane utilisation, %", lanes), 0, 0, 1),
             (self._add_curves("run_length", "Run length, records",
                               coherence("run_length")), 0, 1, 1),
-            (self._add_curves("material_homogeneity", "Neighbours of one material, %",
+            (self._add_curves("material_homogeneity", "Neighbours: one material, %",
                               coherence("material_homogeneity", 100.0)), 1, 0, 1),
-            (self._add_curves("texture_homogeneity", "Neighbours at one place of a texture, %",
+            (self._add_curves("texture_homogeneity", "Neighbours: one texture place, %",
                               coherence("texture_homogeneity", 100.0)), 1, 1, 1),
             stretch=(1, 1),
         )  # fmt: skip
@@ -137,15 +139,13 @@ class PlotsPanel(QWidget):
         work = (setup.width, setup.height, setup.spp, setup.max_depth, setup.seed, setup.sampler,
                 setup.filter, setup.filter_width, setup.clamp_indirect, setup.fresnel,
                 setup.cosine_sampling, setup.region, setup.layers())  # fmt: skip
-        self.log.add(
-            statistics, settings, (self._revision.value(), *work), recipe=recipe_of(setup)
-        )
+        self.log.add(statistics, settings, (self._revision.value(), *work), recipe=recipe_of(setup))
         self.refresh()
 
     def _finish(self, frame: Frame) -> None:
-        if frame.final and frame.scale == 1 and not frame.status.get("cancelled"):
-            if self.log.finish():
-                self.refresh()
+        whole = frame.final and frame.scale == 1 and not frame.status.get("cancelled")
+        if whole and self.log.finish():
+            self.refresh()
 
     def _look_at_state(self, state: str) -> None:
         if state == "paused":
@@ -157,7 +157,7 @@ class PlotsPanel(QWidget):
     # ---- what is shown --------------------------------------------------------------------------
 
     def shown(self) -> list[Series]:
-        """Series of the picture that is looked at, the newest few, and what they are compared with."""
+        """The newest series of the picture that is looked at, and what they are compared with."""
         current = self.log.current
         if current is None:
             return []
@@ -202,9 +202,7 @@ def _rates(counter: str) -> Curve:
 
 
 def _entries(series: Sequence[Series], names: Sequence[str]) -> list[tuple[str, Any]]:
-    return [
-        (name, theme.series(one.number - 1)) for one, name in zip(series, names, strict=True)
-    ]
+    return [(name, theme.series(one.number - 1)) for one, name in zip(series, names, strict=True)]
 
 
 def summary(series: Series | None) -> str:

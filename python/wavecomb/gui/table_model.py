@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QFont
 from PySide6.QtWidgets import QTableView
 
 Cell = tuple[str, Any]
-"""What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``)."""
+"""What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``), whole in a tooltip."""
 
 _NOWHERE = QModelIndex()
 
@@ -56,7 +56,9 @@ class Table(QAbstractTableModel):
         elif more < 0:
             self.endRemoveRows()
         if rows:
-            self.dataChanged.emit(self.index(0, 0), self.index(len(rows) - 1, len(self._header) - 1))
+            self.dataChanged.emit(
+                self.index(0, 0), self.index(len(rows) - 1, len(self._header) - 1)
+            )
 
     def rowCount(self, parent: QModelIndex = _NOWHERE) -> int:
         """Rows."""
@@ -84,9 +86,11 @@ class Table(QAbstractTableModel):
         if role == Qt.ItemDataRole.UserRole:
             return self._rows[row][column][1]
         if role == Qt.ItemDataRole.ToolTipRole:
-            return self._rows[row][column][0] if column in self._left else None
+            return str(self._rows[row][column][1]) if column in self._left else None
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            side = Qt.AlignmentFlag.AlignLeft if column in self._left else Qt.AlignmentFlag.AlignRight
+            side = (
+                Qt.AlignmentFlag.AlignLeft if column in self._left else Qt.AlignmentFlag.AlignRight
+            )
             return int(side | Qt.AlignmentFlag.AlignVCenter)
         if role == Qt.ItemDataRole.FontRole and row in self._bold:
             font = QFont()
