@@ -354,9 +354,9 @@ class _Watch:
         start = time.perf_counter()
         self._send(snapshot)
         now = time.perf_counter()
-        # Looking costs at most a twentieth; a picture that changes slowly is looked at less often.
-        pause = max(20.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
-        self._next = now + pause
+        # Looking costs a tenth at most, unless that were rarer than once a second.
+        pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
+        self._next = now + min(pause, 1.0)
         while self._engine.paused and not self._engine._superseded:
             self._engine._going.wait(0.02)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb import aovs as aov_names
 from wavecomb.errors import WavecombError
+from wavecomb.scheduling import POLICIES
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
@@ -80,6 +81,8 @@ class Setup:
         if values.keys() & {"width", "height"} and "region" not in values:
             values["region"] = None
         new = replace(self, **values)
+        if new.policy not in POLICIES:
+            raise WavecombError(f"no policy {new.policy!r}; there are {', '.join(POLICIES)}")
         new.settings()
         return new
 
