@@ -20,12 +20,11 @@ class _CalmWheel(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Passes the wheel on."""
-        if event.type() != QEvent.Type.Wheel or not isinstance(watched, QWidget):
-            return False
-        if not watched.hasFocus():
+        is_wheel = event.type() == QEvent.Type.Wheel
+        passes = is_wheel and isinstance(watched, QWidget) and not watched.hasFocus()
+        if passes:
             event.ignore()
-            return True
-        return False
+        return passes
 
 
 def calm(widget: QWidget) -> None:
