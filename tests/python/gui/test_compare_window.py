@@ -129,8 +129,7 @@ def test_what_a_wipe_shows(qtbot, pair):
     """Left of the line A is painted, right of it B: the pixel that differs changes with it."""
     pair.set_mode("wipe")
     view = pair.view
-    pane = view._panes()[0][1]
-    at = view._target(pane, view._size()).topLeft()
+    at = view.target(0).topLeft()
     scale = view.points_per_pixel()
     spot = QPoint(round(at.x() + 7.5 * scale), round(at.y() + 4.5 * scale))
 
@@ -162,7 +161,7 @@ def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
         )
         QApplication.sendEvent(view, event)
     assert view.zoom is not None and view.pixel_at(at) == before
-    twin = QPointF(at.x() - (view._panes()[1][1].left()), at.y())
+    twin = at - view.target(1).topLeft() + view.target(0).topLeft()
     assert view.pixel_at(twin) == before  # the same place in A
     QTest.mousePress(view, LEFT, pos=at.toPoint())
     QTest.mouseMove(view, (at + QPointF(40, 0)).toPoint())
@@ -174,7 +173,7 @@ def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
 
 def test_values_under_the_mouse(qtbot, pair):
     view = pair.view
-    at = view._target(view._panes()[0][1], view._size()).topLeft()
+    at = view.target(0).topLeft()
     scale = view.points_per_pixel()
     QTest.mouseMove(view, QPoint(round(at.x() + 7.5 * scale), round(at.y() + 4.5 * scale)))
     table = pair.findChild(QTableWidget, "pixel")
