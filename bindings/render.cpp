@@ -332,6 +332,7 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
   options.recorder = a.recorder;
   options.policy = own_policy.get();
   options.interval_s = a.interval;
+  options.wants_picture = a.wants_picture;
   CostProfile profile;
   if (!a.costs.is_none()) {
     profile = to_profile(nb::cast<nb::dict>(a.costs));

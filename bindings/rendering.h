@@ -24,6 +24,7 @@ struct RenderArguments {
   wavecomb::RayRecording* recorder;
   nanobind::object watcher, state;
   double interval;
+  bool wants_picture = true;
 };
 
 /// Renders `scene` by what `renderer` gives, which is called without the GIL once the arguments are

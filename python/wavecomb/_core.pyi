@@ -88,6 +88,8 @@ class SceneBuilder:
         wrap: repeat, clamp, mirror, black. srgb matters for uint8 only.
         Tiled and mip-mapped inside.
         """
+    def share_texture(self, scene: Scene, texture: int) -> int:
+        """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
     def add_material(
         self,
         program: str,
@@ -366,9 +368,11 @@ class Renderer:
         watcher: Any = None,
         state: dict[str, Any] | None = None,
         interval: float = 0.1,
+        picture: bool = True,
     ) -> Result:
-        """As render(), of the scene as it is. Raises Error while another render of this one goes
-        on."""
+        """As render(), of the scene as it is. picture: False leaves all layers of the result None,
+        for a watcher that takes what it needs of snapshots; a render that is stopped ends sooner
+        then. Raises Error while another render of this one goes on."""
     def stop(self) -> None:
         """Ends the render that goes on within a wave; it returns what was done. Without one: does
         nothing."""

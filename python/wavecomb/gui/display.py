@@ -154,7 +154,8 @@ def show(layer: NDArray[Any], look: Look) -> Shown:
     if name == "position":
         return Shown(_codes(_stretched(array)))
     if array.ndim == 3:
-        array = array @ np.array((0.2126, 0.7152, 0.0722), np.float32)
+        with np.errstate(invalid="ignore"):  # an infinite variance: not known yet
+            array = array @ np.array((0.2126, 0.7152, 0.0722), np.float32)
     return heat(array, name, look.low, look.high)
 
 

@@ -7,7 +7,16 @@ from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QSettings, Qt
-from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QHBoxLayout, QLabel, QSlider, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QLabel,
+    QSizePolicy,
+    QSlider,
+    QToolBar,
+    QWidget,
+)
 
 from wavecomb import aovs as aov_names
 from wavecomb.gui import display, ocio, theme
@@ -42,7 +51,7 @@ _TITLES = {
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 
 
-class DisplayBar(QWidget):
+class DisplayBar(QToolBar):
     """Controls of what the viewport shows. Choosing a layer that is not kept restarts the render.
 
     Attributes:
@@ -77,7 +86,7 @@ class DisplayBar(QWidget):
         )  # fmt: skip
         self.slider.setRange(round(-EXPOSURE * 20), round(EXPOSURE * 20))
         self.slider.setPageStep(20)
-        self.slider.setMinimumWidth(theme.em(5))
+        self.slider.setMinimumWidth(theme.em(3))
         self.slider.valueChanged.connect(lambda value: self.set_exposure(value / 20))
         self.view = choice(
             "display.view",
@@ -87,6 +96,12 @@ class DisplayBar(QWidget):
             display.views(),
             self.set_view,
         )
+        for box, letters in ((self.layer, 10), (self.view, 8)):
+            box.setSizeAdjustPolicy(
+                QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            )
+            box.setMinimumContentsLength(letters)
+            box.view().setTextElideMode(Qt.TextElideMode.ElideNone)
         self.automatic = named(
             QCheckBox("Auto range"), "display.auto", "Automatic range",
             "False colours from the picture's least to its greatest value",
@@ -120,22 +135,17 @@ class DisplayBar(QWidget):
         return real(name, title, title, -1e9, 1e9, 0.1, 0.0, changed, decimals=4)
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout(self)
-        margin = theme.em(0.3)
-        row.setContentsMargins(margin, margin, margin, margin)
-        row.setSpacing(theme.em(0.4))
-        row.addWidget(self.layer)
-        row.addWidget(caption("&Exposure", self.exposure))
-        row.addWidget(self.slider, 1)
-        row.addWidget(self.exposure)
-        row.addWidget(self.view)
-        row.addWidget(self.automatic)
-        row.addWidget(self.low)
-        self._to = QLabel("to")
-        row.addWidget(self._to)
-        row.addWidget(self.high)
-        row.addStretch(1)
-        row.addWidget(self.zoom)
+        self._to = QLabel(" to ")
+        self._stops = caption(" &Exposure ", self.exposure)
+        gap = QWidget()
+        gap.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._places = {
+            widget: self.addWidget(widget)
+            for widget in (
+                self.layer, self._stops, self.slider, self.exposure,
+                self.view, self.automatic, self.low, self._to, self.high, gap, self.zoom,
+            )
+        }  # fmt: skip
 
     # ---- layers ----------------------------------------------------------------------------------
 
@@ -228,11 +238,11 @@ class DisplayBar(QWidget):
     def _update_range(self) -> None:
         light = display.is_light(self._viewport.look.layer)
         coloured = self._viewport.look.layer in display.SCALARS
-        for widget in (self.exposure, self.slider, self.view):
-            widget.setEnabled(light)
-        self.automatic.setVisible(coloured)
+        for widget in (self._stops, self.exposure, self.slider, self.view):
+            self._places[widget].setVisible(light)
+        self._places[self.automatic].setVisible(coloured)
         for widget in (self.low, self._to, self.high):
-            widget.setVisible(coloured and not self.automatic.isChecked())
+            self._places[widget].setVisible(coloured and not self.automatic.isChecked())
 
     def _shown(self, frame: Frame, look: display.Look) -> None:
         legend = self._viewport.legend()

@@ -78,8 +78,8 @@ class Listener(Protocol):
     def on_frame(self, frame: Frame) -> None:
         """A picture."""
 
-    def on_statistics(self, statistics: dict[str, Any]) -> None:
-        """Figures so far, docs/statistics.md."""
+    def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
+        """Figures so far, docs/statistics.md, of the task with that version."""
 
     def on_failed(self, message: str) -> None:
         """One line; the task is given up."""
@@ -229,11 +229,15 @@ class Engine:
 
     def _whole(self, renderer: Renderer, task: Task, preview: Frame | None) -> None:
         watch = _Watch(self, task, preview)
-        result = renderer.render(task.setup.settings(), watcher=watch, interval=LOOK_S)
+        setup = task.setup
+        result = renderer.render(
+            setup.settings(), policy=setup.own_policy, costs=setup.profile, watcher=watch,
+            interval=LOOK_S,
+        )  # fmt: skip
         if self._superseded and self._task is not None:
             return
         statistics = self._statistics(result)
-        self._listener.on_statistics(statistics)
+        self._listener.on_statistics(statistics, task.version)
         if not result.samples.any():
             return
         self._listener.on_frame(self._last_frame(renderer, task, preview, result, statistics))
@@ -350,9 +354,9 @@ class _Watch:
         start = time.perf_counter()
         self._send(snapshot)
         now = time.perf_counter()
-        # Looking costs at most a twentieth; a picture that changes slowly is looked at less often.
-        pause = max(20.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
-        self._next = now + pause
+        # Looking costs a tenth at most, unless that were rarer than once a second.
+        pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
+        self._next = now + min(pause, 1.0)
         while self._engine.paused and not self._engine._superseded:
             self._engine._going.wait(0.02)
 
@@ -365,7 +369,8 @@ class _Watch:
         now = time.perf_counter()
         if now >= self._next_statistics or self._engine.paused:
             self._next_statistics = now + STATISTICS_S
-            self._engine._listener.on_statistics(self._engine._statistics(_SoFar(snapshot)))
+            statistics = self._engine._statistics(_SoFar(snapshot))
+            self._engine._listener.on_statistics(statistics, self._task.version)
 
 
 class _SoFar:

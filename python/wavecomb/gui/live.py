@@ -92,7 +92,11 @@ class Live(QObject):
         """
         try:
             new = self.setup.changed(**values)
-            restart = self.setup.settings().to_dict() != new.settings().to_dict()
+            restart = (
+                self.setup.settings().to_dict() != new.settings().to_dict()
+                or new.own_policy is not self.setup.own_policy
+                or new.profile != self.setup.profile
+            )
         except Exception as error:
             self.failed.emit(describe(error))
             return False
@@ -205,9 +209,14 @@ class Live(QObject):
         """A picture."""
         self._send("frame", lambda: self._take(frame))
 
-    def on_statistics(self, statistics: dict[str, Any]) -> None:
-        """Figures."""
-        self._send("statistics", lambda: self.statistics.emit(statistics))
+    def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
+        """Figures; those of an older version would be taken for the newer one's."""
+
+        def take() -> None:
+            if version == self.version:
+                self.statistics.emit(statistics)
+
+        self._send("statistics", take)
 
     def on_failed(self, message: str) -> None:
         """An error."""

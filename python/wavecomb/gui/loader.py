@@ -13,6 +13,7 @@ from pxr import Sdf, Usd
 
 from wavecomb.cli.group import describe
 from wavecomb.usd import LoadedStage
+from wavecomb.usd.texture import TextureStock
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Request:
         overrides: What its session layer holds; a copy of its own.
         fresh: Read the layers of ``usd`` from the disk again, first.
         threads: For textures; 0: all.
+        textures: Of the scene read before, to share.
     """
 
     source: Source
@@ -51,6 +53,7 @@ class Request:
     overrides: Sdf.Layer | None = None
     fresh: bool = False
     threads: int = 0
+    textures: TextureStock | None = None
 
 
 def copied(layer: Sdf.Layer) -> Sdf.Layer:
@@ -106,9 +109,11 @@ class Loader:
             try:
                 usd, loaded = read(request)
             except Exception as error:
-                self._failed(request, describe(error))
+                if not self._closing:
+                    self._failed(request, describe(error))
             else:
-                self._done(request, usd, loaded)
+                if not self._closing:
+                    self._done(request, usd, loaded)
 
 
 def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
@@ -128,11 +133,13 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()
     options: dict[str, Any] = {} if source.purposes is None else {"purposes": source.purposes}
     loaded = load_stage(
-        source.path,
+        # A stage of its own, so that the window can go on with the other.
+        open_stage(source.path, overrides=overrides),
         frame=source.time,
         camera=source.camera,
         threads=request.threads,
-        overrides=overrides,
+        editable=True,
+        reuse=request.textures,
         **options,
     )
     return usd, loaded

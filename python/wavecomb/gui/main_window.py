@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QByteArray, QSettings, Qt
+from PySide6.QtCore import QByteArray, QSettings, Qt, QTimer
 from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -28,6 +28,7 @@ from wavecomb.gui.menus import CHECKED, MENUS, entries
 from wavecomb.gui.messages import MessageBar
 from wavecomb.gui.panels import make_panels
 from wavecomb.gui.render_bar import RenderBar
+from wavecomb.gui.scene_panel import ScenePanel
 from wavecomb.gui.session import Session, Setup
 from wavecomb.gui.shortcuts import ShortcutsDialog
 from wavecomb.gui.status import StatusLine
@@ -59,6 +60,7 @@ class MainWindow(QMainWindow):
         self.status = StatusLine(self.session, self)
         self.docks: dict[str, QDockWidget] = {}
         self._save_path: str | None = None
+        self._bottom_sized = False
         self._dialog: QWidget | None = None
         self._lay_out()
         self.actions_by_name: dict[str, QAction] = {}
@@ -82,13 +84,19 @@ class MainWindow(QMainWindow):
         self.setStatusBar(self.status)
         self.setDockNestingEnabled(True)
         self.setAcceptDrops(True)
-        self.resize(theme.em(84), theme.em(52))
+        self.resize(theme.em(100), theme.em(60))
+        areas = Qt.DockWidgetArea
+        self.setCorner(Qt.Corner.BottomLeftCorner, areas.LeftDockWidgetArea)
+        self.setCorner(Qt.Corner.BottomRightCorner, areas.RightDockWidgetArea)
         right = Qt.DockWidgetArea.RightDockWidgetArea
         self._add_dock("inspector", "Pixel", self.inspector, right)
         for panel in make_panels(self.session):
-            self._add_dock(panel.name, panel.title, panel.widget, panel.area)
+            dock = self._add_dock(panel.name, panel.title, panel.widget, panel.area)
             if panel.hidden:
-                self.docks[panel.name].hide()
+                dock.hide()
+                dock.visibilityChanged.connect(self._size_bottom)
+        sides = [self.docks["scene"], self.docks["inspector"]]
+        self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
 
     def _add_dock(
         self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea
@@ -100,9 +108,20 @@ class MainWindow(QMainWindow):
         self.addDockWidget(area, dock)
         if others:
             self.tabifyDockWidget(others[0], dock)
-            others[0].raise_()
+            if not others[0].isHidden():
+                others[0].raise_()
         self.docks[name] = dock
         return dock
+
+    def _size_bottom(self, visible: bool) -> None:
+        """A panel below the picture gets room when shown first, not all that it would like."""
+        if visible and not self._bottom_sized:
+            self._bottom_sized = True
+            shown = [dock for dock in self.docks.values() if dock is self.sender()]
+            high = round(0.42 * self.height())
+            QTimer.singleShot(
+                0, self, lambda: self.resizeDocks(shown, [high], Qt.Orientation.Vertical)
+            )
 
     def _make_menus(self) -> None:
         by_name = {entry.name: entry for entry in entries(self)}
@@ -139,8 +158,16 @@ class MainWindow(QMainWindow):
             action.triggered.connect(lambda checked=False, choice=choice: self.set_theme(choice))
             group.addAction(action)
 
+    @property
+    def scene(self) -> ScenePanel:
+        """The scene panel."""
+        panel = self.docks["scene"].widget()
+        assert isinstance(panel, ScenePanel)
+        return panel
+
     def _connect(self) -> None:
         session, viewport = self.session, self.viewport
+        self.scene.frame_wanted.connect(viewport.frame_selected)
         for told in (session.failed, viewport.failed):
             told.connect(self.message.show_error)
         session.warned.connect(self.message.show_warning)
@@ -312,6 +339,16 @@ class MainWindow(QMainWindow):
     def _dialog_gone(self) -> None:
         self._dialog = None
 
+    def show_compare(self) -> None:
+        """The window in which pictures and settings are compared."""
+        dock = self.docks["compare"]
+        if not self._bottom_sized and dock.isHidden():
+            dock.setFloating(True)
+            dock.resize(round(0.8 * self.width()), round(0.8 * self.height()))
+        dock.show()
+        dock.raise_()
+        dock.activateWindow()
+
     def toggle_full_screen(self) -> None:
         """All of the screen, or not."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
@@ -326,6 +363,7 @@ class MainWindow(QMainWindow):
         if isinstance(geometry, QByteArray):
             self.restoreGeometry(geometry)
         if isinstance(state, QByteArray):
+            self._bottom_sized = True
             self.restoreState(state, _STATE_VERSION)
         self.display.restore(self.settings)
         for name in CHECKED:

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from wavecomb.gui.main_window import MainWindow
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    ("&File", ("open", "recent", "reload", "-", "save", "save_as", "-", "quit")),
+    (
+        "&File",
+        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_edits", "-", "quit"),
+    ),
+    ("&Edit", ("undo", "redo")),
     (
         "&Render",
         ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise"),
@@ -27,7 +31,7 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
             "fit", "full", "zoom_in", "zoom_out",
         ),
     ),
-    ("&View", ("panels", "-", "theme", "full_screen", "reset_layout")),
+    ("&View", ("panels", "-", "compare", "-", "theme", "full_screen", "reset_layout")),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
 """Title and names; "-": a line."""
@@ -37,6 +41,7 @@ CHECKED = ("region",)
 def entries(window: MainWindow) -> list[Entry]:
     """All actions."""
     viewport, display, session = window.viewport, window.display, window.session
+    scene = window.scene
 
     def view(name: str, digit: int) -> Entry:
         return Entry(
@@ -56,6 +61,15 @@ def entries(window: MainWindow) -> list[Entry]:
         Entry(
             "save_as", "Save &as\u2026", window.save_as, ["Ctrl+Shift+S"],
             "Write all layers (EXR) or what is shown (PNG)",
+        ),
+        Entry(
+            "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
+            "Write what was edited as a small USD layer over the stage",
+        ),
+        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Take the last edit back"),
+        Entry(
+            "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
+            "Make the edit again that was taken back",
         ),
         Entry("quit", "&Quit", window.close, ["Ctrl+Q"]),
         Entry(
@@ -104,6 +118,10 @@ def entries(window: MainWindow) -> list[Entry]:
         ),
         Entry(
             "zoom_out", "Zoom &out", lambda: viewport.set_zoom(0.5 * viewport.zoom()), ["Ctrl+-"]
+        ),
+        Entry(
+            "compare", "&Compare\u2026", window.show_compare, ["Ctrl+D"],
+            "Two pictures or two live settings, side by side or with a wipe",
         ),
         Entry("full_screen", "F&ull screen", window.toggle_full_screen, ["F11"]),
         Entry("reset_layout", "&Reset the panels", window.reset_layout),

@@ -3,26 +3,21 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
+from wavecomb.gui.bench_panel import BenchPanel
+from wavecomb.gui.compare_window import CompareWindow
+from wavecomb.gui.plots_panel import PlotsPanel
+from wavecomb.gui.scene_panel import ScenePanel
+from wavecomb.gui.scheduling_panel import SchedulingPanel
 from wavecomb.gui.session import Session
 
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
 _RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
 _BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
-
-_PARTS = (
-    ("scene", "Scene", "scene_panel", "ScenePanel", _LEFT, False),
-    ("scheduling", "Scheduling", "scheduling_panel", "SchedulingPanel", _RIGHT, False),
-    ("plots", "Plots", "plots_panel", "PlotsPanel", _BOTTOM, True),
-    ("compare", "Compare", "compare_window", "CompareWindow", _BOTTOM, True),
-    ("bench", "Bench", "bench_panel", "BenchPanel", _BOTTOM, True),
-)
 
 
 @dataclass(frozen=True)
@@ -41,18 +36,17 @@ class Panel:
     title: str
     widget: QWidget
     area: Qt.DockWidgetArea
-    hidden: bool
+    hidden: bool = False
 
 
 def make_panels(session: Session) -> list[Panel]:
     """All of them."""
-    panels: list[Panel] = []
-    for name, title, module, kind, area, hidden in _PARTS:
-        if importlib.util.find_spec(f"wavecomb.gui.{module}") is None:
-            continue
-        widget = getattr(importlib.import_module(f"wavecomb.gui.{module}"), kind)(session)
-        panels.append(Panel(name, title, widget, area, hidden))
-    widgets = {panel.name: panel.widget for panel in panels}
-    if "bench" in widgets and "compare" in widgets:
-        widgets["bench"].compare.connect(widgets["compare"].compare)
-    return panels
+    compare, bench = CompareWindow(session), BenchPanel(session)
+    bench.compare.connect(compare.compare)
+    return [
+        Panel("scene", "Scene", ScenePanel(session), _LEFT),
+        Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),
+        Panel("plots", "Plots", PlotsPanel(session), _BOTTOM, hidden=True),
+        Panel("bench", "Bench", bench, _BOTTOM, hidden=True),
+        Panel("compare", "Compare", compare, _BOTTOM, hidden=True),
+    ]

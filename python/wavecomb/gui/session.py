@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -187,6 +188,8 @@ class Session(QObject):
         self._read(request, reason)
 
     def _read(self, request: Request, what: str) -> None:
+        if request.usd is not None and self.stage is not None:
+            request = replace(request, textures=self.stage.textures)
         self._request_wanted = request
         self._work("load", what)
         self._loader.want(request)
@@ -281,8 +284,6 @@ class Session(QObject):
         if self.pose is None:
             return
         if path is None:
-            from dataclasses import replace
-
             self.pose = replace(self.pose, path=None)
             self.camera_changed.emit(self.pose)
             return
@@ -296,8 +297,8 @@ class Session(QObject):
         from pxr import Sdf, UsdGeom
 
         from wavecomb.usd.camera import read_camera
+        from wavecomb.usd.opening import time_code
         from wavecomb.usd.report import LoadReport
-        from wavecomb.usd.stage import time_code
 
         if self.usd is None or self._request is None or not Sdf.Path.IsValidPathString(path):
             return None
@@ -465,7 +466,7 @@ def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.flo
     """
     from pxr import Sdf, UsdGeom
 
-    from wavecomb.usd.stage import time_code
+    from wavecomb.usd.opening import time_code
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):

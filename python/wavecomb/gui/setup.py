@@ -8,21 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb import aovs as aov_names
 from wavecomb.errors import WavecombError
+from wavecomb.scheduling import POLICIES
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
+    from wavecomb.costs import Profile
+    from wavecomb.scheduling import SchedulingPolicy
 
 Region = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of a live render. Fields are those of ``wavecomb.Settings`` but for the last three.
+    """Settings of a live render. Fields are those of ``wavecomb.Settings`` but for the last ones.
 
     Attributes:
         aovs: Layers to keep beside the beauty, names of docs/aovs.md.
         denoise: Whether frames come denoised, too.
         region: x0, y0, x1, y1 in pixels, end excluded: only these are rendered; None: all.
+        own_policy: A policy in Python, in place of ``policy``.
+        profile: Costs to start from, as ``wavecomb.costs.load_costs`` reads them.
     """
 
     width: int = 600
@@ -57,6 +62,8 @@ class Setup:
     aovs: tuple[str, ...] = aov_names.DEFAULT
     denoise: bool = False
     region: Region | None = None
+    own_policy: SchedulingPolicy | None = None
+    profile: Profile | None = None
 
     def changed(self, **values: Any) -> Setup:
         """With other values, checked.
@@ -74,6 +81,8 @@ class Setup:
         if values.keys() & {"width", "height"} and "region" not in values:
             values["region"] = None
         new = replace(self, **values)
+        if new.policy not in POLICIES:
+            raise WavecombError(f"no policy {new.policy!r}; there are {', '.join(POLICIES)}")
         new.settings()
         return new
 
@@ -94,7 +103,7 @@ class Setup:
         """
         from wavecomb.api import make_settings
 
-        own = {"width", "height", "spp", "aovs", "denoise", "region"}
+        own = {"width", "height", "spp", "aovs", "denoise", "region", "own_policy", "profile"}
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in own}
         if self.region is not None:
             values["region"] = scaled_region(self.region, scale, self.width, self.height)

@@ -78,6 +78,10 @@ def drag_of(button: Qt.MouseButton, modifiers: Qt.KeyboardModifier) -> Drag:
 class Viewport(PictureView):
     """Shows the frames of a session and moves its camera.
 
+    Attributes:
+        look: How frames are shown.
+        frame_shown: What is on the screen, or None.
+
     Signals:
         hovered(object): (x, y) of the pixel under the cursor, or None.
         picked(object): (x, y) of a pixel that was clicked.
@@ -101,6 +105,7 @@ class Viewport(PictureView):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.session = session
         self.look = Look()
+        self.frame_shown: Frame | None = None
         self._frame: Frame | None = None
         self._drag = Drag.NONE
         self._last = QPointF()
@@ -138,6 +143,7 @@ class Viewport(PictureView):
     def _developed(self, frame: Frame, look: Look, shown: Shown, image: QImage) -> None:
         if frame.version != self.session.version:
             return
+        self.frame_shown = frame
         self.set_picture(image, QSize(frame.setup.width, frame.setup.height), shown.legend)
         self.shown.emit(frame, look)
 

@@ -49,8 +49,13 @@ class LightReader:
     """Reads the lights of one stage."""
 
     def __init__(
-        self, time: Usd.TimeCode, up_axis: str, textures: TextureTable, report: LoadReport
+        self,
+        time: Usd.TimeCode,
+        up_axis: str,
+        textures: TextureTable | None,
+        report: LoadReport,
     ) -> None:
+        """``textures``: None: lights are read without theirs."""
         self.time = time
         self.up_axis = up_axis
         self.textures = textures
@@ -130,7 +135,7 @@ class LightReader:
         attribute = prim.GetAttribute("inputs:texture:file")
         value = attribute.Get(self.time) if attribute else None
         path = asset_file(value, attribute, self.report) if value is not None else ""
-        if not path:
+        if not path or self.textures is None:
             return None
         form = prim.GetAttribute("inputs:texture:format")
         layout = form.Get(self.time) if form else None

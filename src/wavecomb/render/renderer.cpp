@@ -286,11 +286,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   snapshot(true);
 
   RenderStatistics& s = impl_->statistics = statistics();
+  impl_->profile = costs.profile();
+  if (!options.wants_picture) return {settings.width, settings.height, {}, {}, {}, {}, {}};
   ErrorMap error;
   error.mean_relative = std::numeric_limits<double>::infinity();
   if (film.has_error()) error = measure_error(film);
   s.error = error.mean_relative;
-  impl_->profile = costs.profile();
   Film::Layers layers = std::move(film).finish(aovs.kept_names);
   s.peak_rss_bytes = peak_rss_bytes();
   Picture picture{settings.width,

@@ -60,6 +60,9 @@ struct RenderOptions {
   /// Gets the rays of the wavefront integrator; what it throws ends the render.
   RayRecorder* recorder = nullptr;
   double interval_s = 0.1;  ///< seconds between calls of progress
+  /// False: the picture is empty, for who took what it needs from snapshots. A stopped render of a
+  /// large picture ends sooner then.
+  bool wants_picture = true;
 };
 
 /// A scene ready to be rendered, and to be changed: its acceleration structure is built here, and

@@ -80,7 +80,8 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
     std::vector<Light> all = lights();
     for (const auto& [i, light] : edit.lights) all[i] = light;
     with_threads(threads, [&] {
-      new_lights = std::make_shared<const SceneLights>(std::move(all), *geometry_, *new_materials);
+      new_lights = std::make_shared<const SceneLights>(std::move(all), *geometry_, *new_materials,
+                                                       lights_.get());
     });
   }
   return std::shared_ptr<const Scene>(new Scene(

@@ -64,7 +64,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
 }  // namespace
 
 SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
-                         const SceneMaterials& materials)
+                         const SceneMaterials& materials, const SceneLights* before)
     : lights(std::move(all)) {
   // Triangles of meshes whose material emits become lights of their own.
   std::vector<EmissiveMesh> sources;
@@ -94,7 +94,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   };
   const Bounds& b = geometry.bounds;
   const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
-  set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures);
+  set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
+                     before ? &before->set : nullptr);
   // Table entries now point at the first triangle; make them light ids.
   for (uint32_t& entry : emissive)
     if (entry != kNoLight) entry += set.first_triangle();

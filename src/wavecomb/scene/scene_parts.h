@@ -64,7 +64,7 @@ struct SceneGeometry {
   std::vector<std::vector<uint32_t>> face_materials;
   std::vector<Group> groups;
   std::vector<Instance> instances;
-  std::vector<std::unique_ptr<Texture>> textures;
+  std::vector<TexturePtr> textures;
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;
@@ -102,9 +102,10 @@ struct SceneMaterials {
 
 /// Lights of the stage and emissive triangles.
 struct SceneLights {
-  /// Triangles of all meshes whose materials emit become lights.
+  /// Triangles of all meshes whose materials emit become lights. `before`: of a scene with the same
+  /// geometry, to take over what is the same; or null.
   SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
-              const SceneMaterials& materials);
+              const SceneMaterials& materials, const SceneLights* before);
 
   std::vector<Light> lights;
   LightSet set;

@@ -66,7 +66,7 @@ def cornell_window(window, qtbot, cornell):
     with qtbot.waitSignal(window.session.opened, timeout=10000):
         window.open(cornell)
     wait_final(qtbot, window.session)
-    qtbot.waitUntil(lambda: window.viewport.image() is not None)
+    qtbot.waitUntil(lambda: window.viewport.frame_shown is window.session.last_frame)
     return window
 
 

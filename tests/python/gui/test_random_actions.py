@@ -122,9 +122,13 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "excepthook", lambda *fault: faults.append(fault))
     monkeypatch.setattr(threading, "excepthook", lambda fault: faults.append(fault.exc_value))
     bad = (QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg)
-    before = qInstallMessageHandler(
-        lambda kind, context, text: faults.append(text) if kind in bad else None
-    )
+
+    def heard(kind, context, text):
+        # The offscreen platform says this of every window.
+        if kind in bad and "propagateSizeHints" not in text:
+            faults.append(text)
+
+    before = qInstallMessageHandler(heard)
     monkey = Monkey(window, cornell, broken)
     try:
         play(monkey, ACTIONS // 2)  # what is made once is made now

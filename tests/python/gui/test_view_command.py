@@ -60,7 +60,11 @@ def test_a_signal_closes_it(cornell):
     window = subprocess.Popen(
         [*COMMAND, str(cornell), "--size", "64", "64"], env=env, stderr=subprocess.PIPE, text=True
     )
-    time.sleep(3.0)
+    tasks, until = f"/proc/{window.pid}/task", time.monotonic() + 40
+    # Threads that read, render and develop: the window is being made.
+    while len(os.listdir(tasks)) < 4 and time.monotonic() < until:
+        time.sleep(0.1)
+    time.sleep(2.0)
     assert window.poll() is None
     window.send_signal(signal.SIGINT)
     assert window.wait(20) == 0
@@ -83,6 +87,14 @@ theme.apply("dark")
 settings = QSettings(sys.argv[2], QSettings.Format.IniFormat)
 window = MainWindow(Setup(width=96, height=96, spp=4), settings)
 window.show()
+
+def wait_for(met):
+    for _ in range(2000):
+        if met():
+            return True
+        QTest.qWait(10)
+    return False
+
 assert QTest.qWaitForWindowExposed(window, 5000)
 window.open(sys.argv[1])
 session, viewport = window.session, window.viewport
@@ -91,7 +103,8 @@ def settled():
     frame = session.last_frame
     return frame is not None and frame.final and frame.version == session.version
 
-assert QTest.qWaitFor(settled, 20000)
+assert wait_for(settled)
+assert wait_for(lambda: viewport.frame_shown is session.last_frame)
 ratio = viewport.devicePixelRatioF()
 assert ratio == float(sys.argv[3]), ratio
 viewport.set_zoom(1.0)
@@ -105,9 +118,12 @@ for k in range(8):
     QTest.qWait(10)
 QTest.mouseRelease(viewport, Qt.MouseButton.MiddleButton)
 assert session.pose is not before and session.pose.path is None, "a drag orbits"
+window.activateWindow()
+assert wait_for(window.isActiveWindow), "no focus"
+viewport.setFocus()
 QTest.keyClick(viewport, Qt.Key.Key_0)
 assert session.pose.path == "/World/Camera"
-assert QTest.qWaitFor(settled, 20000)
+assert wait_for(settled)
 QTest.qWait(100)
 picture = window.screen().grabWindow(window.winId()).toImage()
 place = viewport.mapTo(window, viewport.from_picture(QPointF(48.5, 80.5)).toPoint())

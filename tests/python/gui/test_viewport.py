@@ -27,13 +27,16 @@ def drag(widget, button, start, end, modifiers=No, steps=4):
     start, end = QPointF(*start), QPointF(*end)
     QTest.mousePress(widget, button, modifiers, start.toPoint())
     for k in range(1, steps + 1):
-        place = start + (end - start) * (k / steps)
-        event = QMouseEvent(
-            QEvent.Type.MouseMove, place, widget.mapToGlobal(place), Qt.MouseButton.NoButton,
-            button, modifiers,
-        )  # fmt: skip
-        QApplication.sendEvent(widget, event)
+        move(widget, start + (end - start) * (k / steps), button, modifiers)
     QTest.mouseRelease(widget, button, modifiers, end.toPoint())
+
+
+def move(widget, place, button=Qt.MouseButton.NoButton, modifiers=No):
+    event = QMouseEvent(
+        QEvent.Type.MouseMove, place, widget.mapToGlobal(place), Qt.MouseButton.NoButton, button,
+        modifiers,
+    )  # fmt: skip
+    QApplication.sendEvent(widget, event)
 
 
 def wheel(widget, place, notches, modifiers=No):
@@ -208,7 +211,7 @@ def test_escape_leaves_the_region_mode(viewport):
 
 def test_inspector_shows_the_pixel_under_the_cursor(viewport, qtbot):
     window, frame = viewport.window(), viewport.session.last_frame
-    QTest.mouseMove(viewport, viewport.from_picture(QPointF(30.5, 80.5)).toPoint())
+    move(viewport, viewport.from_picture(QPointF(30.5, 80.5)))
     qtbot.waitUntil(lambda: len(window.inspector.rows()) > 6, timeout=5000)
     rows = dict(window.inspector.rows())
     assert rows["samples"] == "4"
