@@ -41,7 +41,7 @@ def files(tmp_path):
 
 
 def settled(qtbot, window):
-    qtbot.waitUntil(lambda: not window.busy, timeout=20000)
+    qtbot.waitUntil(lambda: not window.busy, timeout=120000)
 
 
 def numbers(window):
@@ -243,12 +243,12 @@ def test_kept_picture_against_live_settings(qtbot, session):
             frame = live.last_frame
             return frame is not None and frame.final and frame.version == live.version
 
-        qtbot.waitUntil(done, timeout=20000)
+        qtbot.waitUntil(done, timeout=120000)
         settled(qtbot, window)
         assert verdict(window) == "beauty: bit for bit the same"
         assert "share all threads" in window._pickers["B"].findChild(QLabel, "sharing").text()
         window.b.change(seed=5)
-        qtbot.waitUntil(done, timeout=20000)
+        qtbot.waitUntil(done, timeout=120000)
         settled(qtbot, window)
         assert verdict(window).startswith("beauty: different")
         assert "seed 5" in window.findChild(QLabel, "titleB").text()
