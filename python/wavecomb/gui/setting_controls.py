@@ -20,8 +20,9 @@ class _CalmWheel(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Passes the wheel on."""
-        wheel = event.type() == QEvent.Type.Wheel and isinstance(watched, QWidget)
-        if wheel and not watched.hasFocus():
+        if event.type() != QEvent.Type.Wheel or not isinstance(watched, QWidget):
+            return False
+        if not watched.hasFocus():
             event.ignore()
             return True
         return False
@@ -116,7 +117,10 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
 def show_number(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
     """Shows what is set, without changing anything."""
     with QSignalBlocker(box):
-        box.setValue(int(value) if isinstance(box, QSpinBox) else value)
+        if isinstance(box, QSpinBox):
+            box.setValue(int(value))
+        else:
+            box.setValue(value)
 
 
 def value_text(value: Any) -> str:
