@@ -273,6 +273,8 @@ class CompareWindow(QWidget):
         self._error.setText(message)
         self._error.show()
         self.failed.emit(message)
+        if not self.isVisible():
+            self.session.failed.emit(message)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Nothing is computed for nobody: renders of its own stand still."""

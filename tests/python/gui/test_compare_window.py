@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, QSettings, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QTableWidget, QToolButton
@@ -16,6 +16,7 @@ from wavecomb.image import write_exr
 
 KEYS = Qt.Key
 LEFT = Qt.MouseButton.LeftButton
+SHIFTED = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
 
 
 @pytest.fixture
@@ -258,3 +259,26 @@ def test_kept_picture_against_live_settings(qtbot, session):
         assert live not in session._twins  # it was given back
     finally:
         window.shutdown()
+
+
+def test_keys_of_the_main_window_keep_the_picture(qtbot, cornell, tmp_path):
+    from wavecomb.gui.main_window import MainWindow
+    from wavecomb.gui.setup import Setup
+
+    settings = QSettings(str(tmp_path / "view.ini"), QSettings.Format.IniFormat)
+    window = MainWindow(Setup(width=48, height=48, spp=2), settings)
+    qtbot.addWidget(window)
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    compared = window.docks["compare"].widget()
+    with qtbot.waitSignal(window.session.failed) as failed:
+        QTest.keyClick(window, KEYS.Key_A, SHIFTED)
+    assert "open a stage first" in failed.args[0]
+    window.open(str(cornell))
+    qtbot.waitUntil(lambda: window.session.state == "finished", timeout=120000)
+    for key in (KEYS.Key_A, KEYS.Key_B):
+        QTest.keyClick(window, key, SHIFTED)
+    settled(qtbot, compared)
+    assert verdict(compared) == "beauty: bit for bit the same"
+    window.close()
