@@ -22,10 +22,11 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import display, theme
 from wavecomb.gui.compare_jobs import Ask, Jobs
+from wavecomb.gui.compare_layout import MODES, SIDE
 from wavecomb.gui.compare_numbers import NumbersPanel
 from wavecomb.gui.compare_picker import SidePicker
 from wavecomb.gui.compare_source import SideSource
-from wavecomb.gui.compare_view import MODES, SIDE, CompareView
+from wavecomb.gui.compare_view import CompareView
 from wavecomb.gui.differences import MAPS, Numbers
 from wavecomb.gui.display import Look
 from wavecomb.gui.sides import Side, common_layers
@@ -193,7 +194,7 @@ class CompareWindow(QWidget):
             dock.raise_()
 
     def set_mode(self, mode: str) -> None:
-        """One of ``compare_view.MODES``."""
+        """One of ``compare_layout.MODES``."""
         self._modes[mode].setChecked(True)
         self.view.set_mode(mode)
         self.view.setFocus()
@@ -272,6 +273,8 @@ class CompareWindow(QWidget):
         self._error.setText(message)
         self._error.show()
         self.failed.emit(message)
+        if not self.isVisible():
+            self.session.failed.emit(message)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Nothing is computed for nobody: renders of its own stand still."""
