@@ -126,6 +126,14 @@ uint32_t add_texture(SceneBuilder& builder,
   return builder.add_texture(desc);
 }
 
+uint32_t share_texture(SceneBuilder& builder, const Scene& scene, uint32_t texture) {
+  const auto& textures = scene.textures();
+  if (texture >= textures.size())
+    throw Error("texture " + std::to_string(texture) + " is not in a scene of " +
+                std::to_string(textures.size()) + " textures");
+  return builder.add_texture(textures[texture]);
+}
+
 uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
                       const std::string& name, const Color3& base_color,
                       const Color3& specular_color, const Color3& emission, float roughness,
@@ -347,6 +355,7 @@ void bind_scene(nb::module_& m) {
       .def(nb::init<uint32_t>(), "threads"_a = 0)
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
+      .def("share_texture", &share_texture, "scene"_a, "texture"_a)
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
            "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
            "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,

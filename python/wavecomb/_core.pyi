@@ -89,6 +89,8 @@ class SceneBuilder:
         wrap: repeat, clamp, mirror, black. srgb matters for uint8 only.
         Tiled and mip-mapped inside.
         """
+    def share_texture(self, scene: Scene, texture: int) -> int:
+        """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
     def add_material(
         self,
         program: str,

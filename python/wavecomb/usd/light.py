@@ -52,10 +52,11 @@ class LightReader:
         self,
         time: Usd.TimeCode,
         up_axis: str,
-        textures: TextureTable,
+        textures: TextureTable | None,
         groups: LightGroups,
         report: LoadReport,
     ) -> None:
+        """``textures``: None: lights are read without theirs."""
         self.time = time
         self.up_axis = up_axis
         self.textures = textures
@@ -136,7 +137,7 @@ class LightReader:
         attribute = prim.GetAttribute("inputs:texture:file")
         value = attribute.Get(self.time) if attribute else None
         path = asset_file(value, attribute, self.report) if value is not None else ""
-        if not path:
+        if not path or self.textures is None:
             return None
         form = prim.GetAttribute("inputs:texture:format")
         layout = form.Get(self.time) if form else None
