@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -213,7 +214,13 @@ def load(
     Raises:
         WavecombError: The stage cannot be rendered; one line that names the file or prim.
     """
-    from wavecomb.usd import load_stage
+    from wavecomb.progress import Interrupt
+
+    # USD's module loader swallows what a Ctrl-C raises within it, and leaves half a library.
+    with Interrupt() as interrupt:
+        from wavecomb.usd import load_stage
+    if interrupt.signal is not None:
+        signal.raise_signal(interrupt.signal)
 
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
     return load_stage(
