@@ -206,7 +206,8 @@ def test_moving_shows_reduced_pictures_then_the_whole_one(new_session, qtbot, co
         moves += 1
         qtbot.wait(8)
     shown = len(watched.frames)
-    assert shown >= 5 and all(f.scale > 1 for f, _ in watched.frames)
+    # How much they are reduced is for the speed of the machine to say.
+    assert shown >= 5 and all(f.status.get("preview") for f, _ in watched.frames)
     session.settle()
     frame = final(session, 30000)
     assert frame.scale == 1 and session.pose.path is None
