@@ -152,11 +152,7 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
         qInstallMessageHandler(before)
     story = "\n".join(monkey.log[-12:])
     assert not faults, f"{faults}\n{story}"
-<<<<<<< HEAD
-    assert "internal: " not in window.message.text(), window.message.text() + story
-=======
     assert not window.message.text().startswith("Error: internal:"), window.message.text() + story
->>>>>>> 1ed267aade19bcf688f90a7b0def73c0830be95a
     assert threading.active_count() <= threads + 1
     assert len(gc.get_objects()) < 1.15 * objects
     assert resident_bytes() < resident + 150e6
