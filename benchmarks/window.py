@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How quick the window is: benchmarks/window.py STAGE... [--size W H].
+"""How quick the window is.
 
-Prints, for each stage, seconds from the moment it is read to the first picture on the screen and to
-the first whole one, pictures a second while the camera turns, milliseconds from stop to standstill
-(median and most of ten), and the longest time that the window did not answer. Works without a
-display.
+Prints, for each stage, seconds from the moment it is read to the first picture on the screen and
+to the first whole one, pictures a second while the camera turns, milliseconds from stop to
+standstill (median and most of ten), and the longest time that the window did not answer. Works
+without a display.
 """
 
 import argparse
