@@ -37,11 +37,11 @@ AUTO_LEVEL = 8
 
 MAX_LEVEL = 10
 
-AUTO_TRIANGLES = 24_000_000
+AUTO_TRIANGLES = 16_000_000
 """Triangles of all subdivided meshes together that automatic levels may make."""
 
-BYTES_PER_TRIANGLE = 260
-"""Peak memory for each refined triangle, its part of the hierarchy included (measured)."""
+BYTES_PER_TRIANGLE = 210
+"""Peak memory for each refined triangle, while it is refined; less in the scene (measured)."""
 
 _BATCH_TRIANGLES = 4_000_000
 """Refined at once: bounds the memory that refinement itself takes."""
