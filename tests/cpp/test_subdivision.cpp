@@ -109,6 +109,16 @@ TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
   EXPECT_EQ(complaint(desc), "a face has fewer than three corners");
   sizes[0] = 2000000000;
   EXPECT_EQ(complaint(desc), "the face counts do not add up to the number of face indices");
+  desc = cube(11);
+  EXPECT_EQ(complaint(desc), "the level of subdivision must be 1 to 10");
+  desc = cube(10);
+  std::vector<int32_t> many(2048 / 24 * kCorners.size()), many_sizes(many.size() / 4, 4);
+  for (size_t i = 0; i < many.size(); ++i) many[i] = kCorners[i % kCorners.size()];
+  many.insert(many.end(), kCorners.begin(), kCorners.end());
+  many_sizes.insert(many_sizes.end(), kSizes.begin(), kSizes.end());
+  desc.cage.corners = many;
+  desc.cage.face_sizes = many_sizes;
+  EXPECT_EQ(complaint(desc), "too many faces for level 10");
   desc = cube(0);
   const std::vector<uint32_t> triangle = {0, 1, 9}, face = {0};
   desc.triangles = triangle;

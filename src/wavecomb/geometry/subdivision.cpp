@@ -198,6 +198,9 @@ std::vector<float> flat(const std::vector<V>& values) {
 Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   if (level < 1 || level > kMaxLevel) throw Error("the level of subdivision must be 1 to 10");
   check(cage);
+  // OpenSubdiv counts with 32 bits; each level has four times the corners.
+  if ((cage.corners.size() >> (31 - 2 * level)) > 0)
+    throw Error("too many faces for level " + std::to_string(level));
   catch_messages();
   last_message.clear();
   const auto count = [](size_t n) { return static_cast<int>(n); };
