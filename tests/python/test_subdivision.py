@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subdivision surfaces: against closed forms and masks that are worked out here."""
 
+import json
+
 import numpy as np
 import pytest
-from usd_recorder import load, said
+from click.testing import CliRunner
+from usd_recorder import load, said, write
 
 from wavecomb import _core
+from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 from wavecomb.usd import surfaces
 
@@ -618,6 +622,19 @@ def test_degenerate_faces_and_shapes_that_are_no_manifolds(tmp_path):
 def test_levels_that_are_none(tmp_path, level):
     with pytest.raises(WavecombError, match="must be off, auto or a level from 0 to 10"):
         load(tmp_path, mesh(QUAD, [[0, 1, 2, 3]]), subdivision=level)
+
+
+@pytest.mark.parametrize("command", ["render", "info"])
+def test_the_option_of_the_command_line(tmp_path, command):
+    stage = write(tmp_path, CAMERA + mesh(QUAD, [[0, 1, 2, 3]]))
+    output = ["-o", str(tmp_path / "a.exr"), "--spp", "1"] if command == "render" else ["--json"]
+    bad = CliRunner().invoke(main, [command, str(stage), *output, "--subdivision", "11"])
+    assert bad.exit_code == 2 and "must be off, auto or a level from 0 to 10" in bad.stderr
+    assert not (tmp_path / "a.exr").exists()
+    if command == "info":
+        for level, triangles in (("off", 2), ("0", 2), ("3", 128)):
+            told = CliRunner().invoke(main, ["info", str(stage), "--json", "--subdivision", level])
+            assert json.loads(told.stdout)["triangles"]["unique"] == triangles
 
 
 def test_threads_change_nothing(tmp_path):
