@@ -192,6 +192,8 @@ def load(
     purposes: Sequence[str] | None = None,
     variants: Mapping[str, str] | None = None,
     threads: int = 0,
+    subdivision: str | int = "auto",
+    size: tuple[int, int] = (600, 600),
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -202,7 +204,10 @@ def load(
         frame: Time code; by default the stage's start.
         purposes: Of the geometry, as in USD; by default "default" and "render".
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
-        threads: For images and textures; 0: all.
+        threads: For images, textures and subdivision; 0: all.
+        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
+            size of their edges in the picture (docs/subdivision.md).
+        size: Width and height of the picture that automatic levels are for.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -224,8 +229,9 @@ def load(
 
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
     return load_stage(
-        Path(path), camera=camera, frame=frame, variants=variants, threads=threads, **options
-    )
+        Path(path), camera=camera, frame=frame, variants=variants, threads=threads,
+        subdivision=subdivision, size=size, **options,
+    )  # fmt: skip
 
 
 def render(
@@ -236,6 +242,7 @@ def render(
     progress: Progress | None = None,
     camera: str | None = None,
     frame: float | None = None,
+    subdivision: str | int | None = None,
     policy: str | SchedulingPolicy | None = None,
     costs: str | Mapping[str, Mapping[str, float]] | None = None,
     aovs: Iterable[str] | None = None,
@@ -254,6 +261,7 @@ def render(
             False to stop and keep what is done.
         camera: As in ``load``; for a path only.
         frame: As in ``load``; for a path only.
+        subdivision: As in ``load``; for a path only.
         policy: Order of shading: a name, or an object of a ``SchedulingPolicy`` of your own. No
             policy changes the picture.
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
@@ -301,7 +309,7 @@ def render(
         profile = check_costs(costs)
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
     chosen = make_settings(size, spp, aovs=names, **settings)
-    scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
+    scene, loaded, stage = _resolve(source, camera, frame, subdivision, chosen)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
@@ -436,13 +444,20 @@ def _resolve(
     source: str | os.PathLike[str] | LoadedStage | Scene,
     camera: str | None,
     frame: float | None,
-    threads: int,
+    subdivision: str | int | None,
+    settings: Settings,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
-        loaded = load(source, camera=camera, frame=frame, threads=threads)
+        loaded = load(
+            source, camera=camera, frame=frame, threads=settings.threads,
+            subdivision="auto" if subdivision is None else subdivision,
+            size=(settings.width, settings.height),
+        )  # fmt: skip
         return loaded.scene, loaded, os.fspath(source)
-    if camera is not None or frame is not None:
-        raise TypeError("camera and frame are chosen when the stage is loaded: give them to load()")
+    if camera is not None or frame is not None or subdivision is not None:
+        raise TypeError(
+            "camera, frame and subdivision are chosen when the stage is loaded: give them to load()"
+        )
     loaded_scene: Any = getattr(source, "scene", None)
     if loaded_scene is not None:
         stage: Any = source

@@ -47,8 +47,14 @@ def examples(*lines: str) -> str:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant and --purpose."""
+    """STAGE, --camera, --frame, --variant, --purpose and --subdivision."""
     for option in (
+        click.option(
+            "--subdivision",
+            metavar="off|LEVEL|auto",
+            help="Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their "
+            "size in the picture.  [default: auto]",
+        ),
         click.option(
             "--variant",
             "variants",
@@ -88,6 +94,7 @@ class StageOptions:
     frame: float | None
     purposes: tuple[str, ...]
     variants: tuple[str, ...]
+    subdivision: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -100,15 +107,18 @@ class StageOptions:
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
         """With what was chosen before in place of what is not chosen here."""
-        values = {name: value or before[name] for name, value in self.as_dict().items()}
+        mine = self.as_dict()
+        values: dict[str, Any] = {name: mine[name] or before.get(name) for name in mine}
         if self.frame is not None:
             values["frame"] = self.frame
         for name in ("purposes", "variants"):
             values[name] = tuple(values[name])
         return StageOptions(**values)
 
-    def load(self, stage: str, threads: int = 0) -> LoadedStage:
-        """Loads a stage as the options say, on ``threads`` threads (0: all)."""
+    def load(
+        self, stage: str, threads: int = 0, size: tuple[int, int] | None = None
+    ) -> LoadedStage:
+        """Loads a stage as the options say, on ``threads`` threads (0: all), for a picture."""
         from wavecomb.api import load
         from wavecomb.errors import WavecombError
 
@@ -121,6 +131,8 @@ class StageOptions:
             purposes=self.all_purposes(),
             variants=self.selections() or None,
             threads=threads,
+            subdivision="auto" if self.subdivision is None else self.subdivision,
+            **({} if size is None else {"size": size}),
         )
 
     def selections(self) -> dict[str, str]:

@@ -39,7 +39,9 @@ def run(
     from wavecomb.watcher import CheckpointSink, PreviewSink, Sink, Watcher
 
     with reporter.loading(stage):
-        loaded: LoadedStage = source.load(stage, settings.threads)
+        loaded: LoadedStage = source.load(
+            stage, settings.threads, (settings.width, settings.height)
+        )
     warn(stage_warnings(loaded))
     if "light_groups" in aovs:
         check_memory(settings, aovs, len(loaded.scene.light_groups))

@@ -27,6 +27,7 @@ from wavecomb.usd.mesh import IDENTITY, UV_NAMES, MeshArrays, MeshReader
 from wavecomb.usd.network import colour
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.surfaces import Repaint, Surfaces
 from wavecomb.usd.traverse import Gathered, Placed, Traversal
 from wavecomb.usd.triangulate import MeshError
 
@@ -48,7 +49,8 @@ class Group:
         bounds: (2, 3) in its own space.
         root: Prim path that the names of what is in it begin with.
         lights: With their transforms (4, 4) in the group.
-        children: Groups placed in it, transforms (k, 4, 4).
+        children: Groups that hold lights placed in it, transforms (k, 4, 4).
+        surfaced: The same of groups that hold surfaces to be refined.
     """
 
     name: str
@@ -57,7 +59,9 @@ class Group:
     bounds: NDArray[Any] | None = None
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
     children: list[tuple[Group, Matrices]] = field(default_factory=list)
+    surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
     lit: bool = False
+    has_surfaces: bool = False
 
     @property
     def empty(self) -> bool:
@@ -103,6 +107,7 @@ class GroupBuilder:
         materials: MaterialTable,
         light_groups: LightGroups,
         report: LoadReport,
+        surfaces: Surfaces,
     ) -> None:
         self.stage = stage
         self.traversal = traversal
@@ -111,7 +116,8 @@ class GroupBuilder:
         self.materials = materials
         self.light_groups = light_groups
         self.report = report
-        self.meshes = MeshReader(self.time, report)
+        self.surfaces = surfaces
+        self.meshes = MeshReader(self.time, report, surfaces.subdivide)
         self.assigner = Assigner(materials, self.time, report)
         self.bindings = BindingScan()
         self.assets = Assets()
@@ -183,7 +189,8 @@ class GroupBuilder:
             if kind == "shape":
                 mesh = self.meshes.shape(draw.prim, draw.matrix)
             else:
-                mesh = self.meshes.mesh(draw.prim, draw.matrix, names, draw.inherited)
+                displaced = self.surfaces.is_displaced(draw)
+                mesh = self.meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
         except MeshError as error:
             self.report.warn(f"mesh left out: {error}", draw.prim.GetPath())
             return
@@ -214,15 +221,25 @@ class GroupBuilder:
             return
         self.builder.add_to_group(self._number(group), number)
         group.grow(mesh.bounds)
+        if mesh.cage is not None:
+            repaint = self._repainter(draw, scope) if faces is not None else None
+            self.surfaces.add(group, number, draw, mesh, material, repaint)
         self.report.tally("meshes" if kind == "mesh" else "shapes")
 
-    def _materials(self, draw: Draw, mesh: MeshArrays, scope: Scope) -> tuple[int, Any]:
+    def _repainter(self, draw: Draw, scope: Scope) -> Repaint:
+        """Materials of the same mesh once its triangles are others; says nothing twice."""
+        quiet = Assigner(self.materials, self.time, LoadReport())
+        return lambda mesh: self._materials(draw, mesh, scope, quiet)
+
+    def _materials(
+        self, draw: Draw, mesh: MeshArrays, scope: Scope, assigner: Assigner | None = None
+    ) -> tuple[int, Any]:
         if scope.override:
             return INHERIT_MATERIAL, None
         otherwise = INHERIT_MATERIAL if scope.inside else None
         if draw.material is None and scope.bound and not any(draw.subset_materials):
             return INHERIT_MATERIAL, None
-        return self.assigner.assign(draw, mesh, otherwise)
+        return (assigner or self.assigner).assign(draw, mesh, otherwise)
 
     def _asset_length(self, prim: Usd.Prim, name: str) -> int:
         """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
@@ -417,6 +434,9 @@ class GroupBuilder:
         if child.lit:
             parent.children.append((child, transforms))
             parent.lit = True
+        if child.has_surfaces:
+            parent.surfaced.append((child, transforms))
+            parent.has_surfaces = True
         if child.number is None:
             return
         names = [self.report.place(prim.GetPath()) for prim in prims]

@@ -21,6 +21,7 @@ from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 PURPOSES = ("default", "render", "proxy", "guide")
+SurfacesOf = Callable[[MaterialTable], Surfaces]
+
 MAX_LIGHTS = 4096
 """Lights that are placed; instances may multiply them."""
 
@@ -86,6 +89,8 @@ def load_stage(
     threads: int = 0,
     editable: bool = False,
     reuse: TextureStock | None = None,
+    subdivision: str | int = "auto",
+    size: tuple[int, int] = (600, 600),
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -99,7 +104,10 @@ def load_stage(
         purposes: Of the geometry to draw: default, render, proxy, guide.
         variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
             prim's.
-        threads: For images and textures; 0: all.
+        threads: For images, textures and subdivision; 0: all.
+        subdivision: Of subdivision surfaces: "off", a level from 0 to 10, or "auto", by the size of
+            edges in the picture (docs/subdivision.md).
+        size: Of the picture that automatic levels are for, width and height.
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
@@ -114,15 +122,25 @@ def load_stage(
         raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
+    level = parse_level(subdivision)
+    if not (len(size) == 2 and min(size) >= 1):
+        raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
     report = LoadReport()
     file = _file_of(source)
     with captured(report):
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
         textures = TextureTable(builder, report, threads, reuse)
+
+        def surfaces_of(materials: MaterialTable) -> Surfaces:
+            return Surfaces(
+                builder, materials, report, subdivision=level, size=size, threads=threads
+            )
+
         try:
             filled = _fill(
-                builder, source, frame, camera, purposes, variants or {}, textures, report, editable
-            )
+                builder, source, frame, camera, purposes, variants or {}, textures, report,
+                editable, surfaces_of,
+            )  # fmt: skip
         finally:
             textures.release()
         scene = _build(builder, file)
@@ -161,6 +179,7 @@ def _fill(
     textures: TextureTable,
     report: LoadReport,
     editable: bool,
+    surfaces_of: SurfacesOf,
 ) -> _Filled:
     """Fills the builder. A stage that was opened here is closed then."""
     if isinstance(source, Usd.Stage):
@@ -172,8 +191,9 @@ def _fill(
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=editable)
     chosen, lights = _read(
-        stage, time, camera, purposes, builder, textures, materials, bool(found.lights), report
-    )
+        stage, time, camera, purposes, builder, textures, materials, bool(found.lights), report,
+        surfaces_of(materials),
+    )  # fmt: skip
     used = None if time.IsDefault() else float(time.GetValue())
     return _Filled(chosen, found, materials.paths(), lights, used)
 
@@ -200,6 +220,7 @@ def _read(
     materials: MaterialTable,
     has_lights: bool,
     report: LoadReport,
+    surfaces: Surfaces,
 ) -> tuple[str | None, tuple[str, ...]]:
     """Fills the builder; gives the paths of the camera and of the lights."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
@@ -207,7 +228,7 @@ def _read(
     groups = LightGroups(report)
     lights = LightReader(time, up_axis, textures, groups, report)
     traversal = Traversal(time, purposes, lights, report)
-    world = GroupBuilder(stage, traversal, builder, materials, groups, report).world()
+    world = GroupBuilder(stage, traversal, builder, materials, groups, report, surfaces).world()
     lit = materials.glows or has_lights
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):
@@ -220,6 +241,7 @@ def _read(
     if view is None:
         report.note("no camera: framed the bounds")
         view = frame_bounds(world.bounds, up_axis)
+    surfaces.finish(world, view)
     builder.set_camera(view.transform, **view.options)
     return chosen, light_paths
 
