@@ -16,6 +16,8 @@ from PySide6.QtWidgets import QLabel, QListWidget, QPushButton
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench_results import policy_rows, write_folder
 
+from wavecomb.bench.columns import Column
+from wavecomb.gui import bench_tables
 from wavecomb.gui.bench_panel import BenchPanel
 from wavecomb.gui.recent_folders import recent_folders
 from wavecomb.image import write_png
@@ -194,3 +196,21 @@ def test_errors_of_a_run_are_messages(qtbot, panel, tmp_path):
     with qtbot.waitSignal(panel.failed) as failed:
         QTest.mouseClick(button(panel, "benchStart"), LEFT)
     assert "tick one" in failed.args[0] and not panel.runner.running
+
+
+def test_a_table_asks_for_no_cell_that_is_not_seen(qtbot, monkeypatch):
+    """Qt's way to size columns asked for each cell several times: seconds for a large sitting."""
+    asked = []
+    data = bench_tables.RunsModel.data
+
+    def counted(self, index, role=Qt.ItemDataRole.DisplayRole):
+        asked.append(role)
+        return data(self, index, role)
+
+    monkeypatch.setattr(bench_tables.RunsModel, "data", counted)
+    columns = [Column(f"c{k}", "integer", "", "") for k in range(40)]
+    table = bench_tables.RunsTable("rows")
+    qtbot.addWidget(table)
+    table.set_rows(columns, [{c.name: k for c in columns} for k in range(500)])
+    assert len(asked) < 500 * 40
+    assert table.view.columnWidth(0) > 0
