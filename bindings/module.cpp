@@ -9,8 +9,12 @@ namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The native core of Wavecomb.";
+  // What lives when the interpreter ends, a window's last picture or an exception's, is no news to
+  // those who render; the list would also name other modules' objects.
+  nb::set_leak_warnings(false);
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_scene(m);
+  bind_geometry(m);
   bind_recording(m);
   bind_watching(m);
   bind_render(m);

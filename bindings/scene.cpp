@@ -65,6 +65,8 @@ void fill(std::array<float, N>& to, const nb::handle& from, const char* what) {
   std::copy(values.begin(), values.end(), to.begin());
 }
 
+}  // namespace
+
 TextureUse texture_use(const nb::dict& d) {
   TextureUse use;
   use.texture = nb::cast<uint32_t>(d["texture"]);
@@ -76,6 +78,8 @@ TextureUse texture_use(const nb::dict& d) {
   if (d.contains("uv")) fill(use.uv, d["uv"], "uv");
   return use;
 }
+
+namespace {
 
 Slot slot(const std::string& name) {
   std::string list;
@@ -175,15 +179,13 @@ Attribute attribute_of(const std::optional<Array<float>>& values, size_t k,
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
 
-uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
-                  const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
-                  const std::optional<Array<float>>& normals,
-                  const std::optional<Array<float>>& uvs,
-                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                  const std::string& name, const std::string& light_group, uint32_t asset_length) {
+/// Arrays as a mesh; they are kept alive, not copied.
+Mesh make_mesh(const Array<float>& positions,
+               const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+               const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
+               const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+               const std::string& name) {
   Mesh mesh;
-  mesh.light_group = builder.light_group(light_group);
-  mesh.asset_length = asset_length;
   mesh.name = name;
   if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 ||
       indices.shape(1) != 3)
@@ -211,7 +213,28 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
   }
   mesh.material = material;
   mesh.owner = hold(std::move(owners));
+  return mesh;
+}
+
+uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
+                  const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+                  const std::optional<Array<float>>& normals,
+                  const std::optional<Array<float>>& uvs,
+                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                  const std::string& name, const std::string& light_group, uint32_t asset_length) {
+  Mesh mesh = make_mesh(positions, indices, normals, uvs, face_materials, material, name);
+  mesh.light_group = builder.light_group(light_group);
+  mesh.asset_length = asset_length;
   return builder.add_mesh(std::move(mesh));
+}
+
+void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positions,
+                  const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+                  const std::optional<Array<float>>& normals,
+                  const std::optional<Array<float>>& uvs,
+                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material) {
+  builder.replace_mesh(id,
+                       make_mesh(positions, indices, normals, uvs, face_materials, material, ""));
 }
 
 void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
@@ -367,6 +390,10 @@ void bind_scene(nb::module_& m) {
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "name"_a = "", "light_group"_a = "",
            "asset_length"_a = 0)
+      .def("replace_mesh", &replace_mesh, "mesh"_a, "positions"_a, "indices"_a, nb::kw_only(),
+           "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
+           "material"_a = kInheritMaterial)
+      .def("make_surfaces", &make_surfaces, "descriptions"_a, "threads"_a = 0)
       .def("add_group", &SceneBuilder::add_group, "name"_a = "", "root"_a = "")
       .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,

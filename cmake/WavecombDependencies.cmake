@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Finds Embree 4, oneTBB, Dr.Jit's headers and Python.
+# Finds Embree 4, oneTBB, OpenSubdiv, Dr.Jit's headers and Python.
 #
 # Embree: the distribution's first; else the one that tools/setup_embree staged in .deps/embree.
 # oneTBB: from where Embree came, so that one scheduler owns the threads: the distribution's beside the
@@ -74,6 +74,15 @@ else()
   set(WAVECOMB_TBB_IS_WHEEL FALSE)
 endif()
 
+# Far and Sdc of it; neither its evaluators nor OpenGL.
+list(APPEND CMAKE_MODULE_PATH "${PROJECT_SOURCE_DIR}/cmake")
+find_package(OpenSubdiv 3.4 MODULE QUIET)
+if(NOT OpenSubdiv_FOUND)
+  message(FATAL_ERROR "OpenSubdiv 3.4 or newer was not found: run tools/setup, or install your distribution's "
+    "package (libosd-dev, opensubdiv-devel, opensubdiv), or pass -DOpenSubdiv_ROOT=.")
+endif()
+
 message(STATUS "Embree ${embree_VERSION} (${embree_DIR})")
 message(STATUS "oneTBB ${TBB_VERSION} (${TBB_DIR})")
+message(STATUS "OpenSubdiv ${OpenSubdiv_VERSION} (${OpenSubdiv_LIBRARY})")
 message(STATUS "Dr.Jit (${WAVECOMB_DRJIT_INCLUDE_DIR})")

@@ -25,11 +25,21 @@ if(NOT WAVECOMB_EMBREE_IS_STAGED)
   endif()
 endif()
 
+# OpenSubdiv travels with us, and the OpenMP runtime that it is linked with where it is: no wheel has it.
+get_filename_component(_osd_library "${OpenSubdiv_LIBRARY}" REALPATH)
+set(_osd_link "")
+if(OpenSubdiv_NEEDS_OPENMP AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -print-file-name=libgomp.so.1
+    OUTPUT_VARIABLE _gomp_library OUTPUT_STRIP_TRAILING_WHITESPACE)
+  # A direct need of ours: it is then looked for where we say, and OpenSubdiv finds it loaded.
+  set(_osd_link "-Wl,--push-state,--no-as-needed" gomp "-Wl,--pop-state")
+endif()
+
 # wavecomb_add_module(NAME CORE FLAGS FOLDER): wavecomb/FOLDER/_core on top of the core library CORE.
 function(wavecomb_add_module name core flags folder)
   nanobind_add_module(${name} NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sources})
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
-  target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb)
+  target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
   # Nothing but its entry leaves the module: no other library is to be bound to code of its instruction set.
   if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
     target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
@@ -67,6 +77,11 @@ else()
   endif()
 endif()
 
+install(PROGRAMS "${_osd_library}" DESTINATION wavecomb/lib COMPONENT python)
+if(IS_ABSOLUTE "${_gomp_library}")
+  get_filename_component(_gomp_library "${_gomp_library}" REALPATH)
+  install(PROGRAMS "${_gomp_library}" DESTINATION wavecomb/lib RENAME libgomp.so.1 COMPONENT python)
+endif()
 if(WAVECOMB_EMBREE_IS_STAGED)
   install(FILES "${WAVECOMB_STAGED_EMBREE}/lib/libembree4.so.4" DESTINATION wavecomb/lib
     PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE

@@ -142,6 +142,38 @@ class SceneBuilder:
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
         afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
         names the asset that it is part of; 0: none known."""
+    def replace_mesh(
+        self,
+        mesh: int,
+        positions: NDArray[np.float32],
+        indices: NDArray[np.uint32] | NDArray[np.int32],
+        *,
+        normals: NDArray[np.float32] | None = None,
+        uvs: NDArray[np.float32] | None = None,
+        face_materials: NDArray[np.uint32] | None = None,
+        material: int = ...,
+    ) -> None:
+        """Gives a mesh other arrays, as add_mesh takes them; its name and its groups stay."""
+    def make_surfaces(
+        self, descriptions: list[dict[str, Any]], threads: int = 0
+    ) -> list[dict[str, Any] | str]:
+        """Subdivision surfaces and displaced polygons as triangle meshes, in parallel.
+
+        Each description: level (0: polygons), points (n, 3) float32, counts (faces,) and indices
+        (corners,) int32, left_handed; from level 1 on scheme, boundary, face_varying (tokens of
+        UsdGeomMesh), smooth_triangles, and as there are holes, crease_edges (k, 2) int32 with
+        crease_sharpness (k,) float32, corner_vertices and corner_sharpness; at level 0 triangles
+        (m, 3) and triangle_faces (m,) uint32, and triangle_corners (m * 3,) for face-varying uvs.
+        As there are: matrix (4, 4) float64, row vectors; uvs and a list primvars of
+        {"interpolation": "vertex", "varying" or "faceVarying", "values": (k, width) float32,
+        "width", "indices": (corners,) int32 where it is face-varying}; displacements, a list of
+        lengths and of texture uses as add_material takes them, and face_displacement (faces,)
+        int32: which of them, -1 for none.
+
+        Returns for each either a line that says why there is no mesh, or positions, normals, uvs
+        (or None), triangles, faces (m,): face of the cage of each triangle, primvars: mean of each
+        on each triangle, and manifold: false where edges or points had to be kept sharp.
+        """
     def add_group(self, name: str = "", root: str = "") -> int:
         """A new empty group; group 0, the world, is there. root: the prim path that names of what
         is in it begin with, and that names of its instances take the place of."""
@@ -436,3 +468,27 @@ def peak_rss_bytes() -> int:
 
 def build_info() -> dict[str, str]:
     """version, compiler, library (its -march), isa (what its kernels use), tbb."""
+
+MAX_SUBDIVISION: int
+"""Highest level of make_surfaces."""
+
+def edge_pixels(
+    points: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    transforms: NDArray[np.float64],
+    to_camera: NDArray[np.float64],
+    centre: tuple[float, float],
+    half: tuple[float, float],
+    pixels_per_unit: float,
+) -> float:
+    """Mean length in pixels of the edges of polygons, long ones counting by their length.
+
+    The greatest over transforms (k, 4, 4) to the world. Edges out of the picture count an eighth.
+    to_camera (4, 4), row vectors; centre, half: of the window on the plane z = -1."""
+
+def weld_corners(
+    corners: NDArray[np.int32], point_count: int, values: NDArray[np.float32]
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Indices (corners,) that join the corners of a point with equal values (corners, width), and
+    the values they address."""

@@ -194,6 +194,8 @@ def load(
     mask: Sequence[str] = (),
     session_layer: str | os.PathLike[str] | None = None,
     threads: int = 0,
+    subdivision: str | int = "auto",
+    size: tuple[int, int] = (600, 600),
     progress: Callable[[int, int], None] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
@@ -207,7 +209,10 @@ def load(
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
         mask: Prims to draw with all below them, and what they need; by default all.
         session_layer: File with opinions that are stronger than the stage's.
-        threads: For images and textures; 0: all.
+        threads: For images, textures and subdivision; 0: all.
+        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
+            size of their edges in the picture (docs/subdivision.md).
+        size: Width and height of the picture that automatic levels are for.
         progress: Called now and then as progress(prims read, prims found so far).
 
     Returns:
@@ -232,6 +237,8 @@ def load(
         mask=tuple(mask),
         session_layer=None if session_layer is None else Path(session_layer),
         threads=threads,
+        subdivision=subdivision,
+        size=size,
         progress=progress,
         **options,
     )
@@ -259,6 +266,7 @@ def render(
     progress: Progress | None = None,
     camera: str | None = None,
     frame: float | None = None,
+    subdivision: str | int | None = None,
     policy: str | SchedulingPolicy | None = None,
     costs: str | Mapping[str, Mapping[str, float]] | None = None,
     aovs: Iterable[str] | None = None,
@@ -277,6 +285,7 @@ def render(
             False to stop and keep what is done.
         camera: As in ``load``; for a path only.
         frame: As in ``load``; for a path only.
+        subdivision: As in ``load``; for a path only.
         policy: Order of shading: a name, or an object of a ``SchedulingPolicy`` of your own. No
             policy changes the picture.
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
@@ -308,7 +317,7 @@ def render(
     from wavecomb.stats import make_stats
 
     own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
-    scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
+    scene, loaded, stage = _resolve(source, camera, frame, subdivision, chosen)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
@@ -472,13 +481,20 @@ def _resolve(
     source: str | os.PathLike[str] | LoadedStage | Scene,
     camera: str | None,
     frame: float | None,
-    threads: int,
+    subdivision: str | int | None,
+    settings: Settings,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
-        loaded = load(source, camera=camera, frame=frame, threads=threads)
+        loaded = load(
+            source, camera=camera, frame=frame, threads=settings.threads,
+            subdivision="auto" if subdivision is None else subdivision,
+            size=(settings.width, settings.height),
+        )  # fmt: skip
         return loaded.scene, loaded, os.fspath(source)
-    if camera is not None or frame is not None:
-        raise TypeError("camera and frame are chosen when the stage is loaded: give them to load()")
+    if camera is not None or frame is not None or subdivision is not None:
+        raise TypeError(
+            "camera, frame and subdivision are chosen when the stage is loaded: give them to load()"
+        )
     loaded_scene: Any = getattr(source, "scene", None)
     if loaded_scene is not None:
         stage: Any = source

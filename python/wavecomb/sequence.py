@@ -108,6 +108,8 @@ class Frames:
         view = read_camera(prim, to_world, when, told)
         if view is None or not {*told.lines()} <= {*before.report.lines()}:
             return None
+        if not self._stock.has_same_levels(view):
+            return None
         renderer.edit(camera={"transform": view.transform, **_CAMERA, **view.options})
         return replace(before, scene=renderer.scene)
 
@@ -151,6 +153,7 @@ def render_frames(
     variants: Mapping[str, str] | None = None,
     mask: Iterable[str] = (),
     session_layer: str | os.PathLike[str] | None = None,
+    subdivision: str | int = "auto",
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -166,11 +169,12 @@ def render_frames(
         frames: "1-48", "1-48x2", "1,5,9", or numbers.
         size: As in ``render``, like spp, progress, policy, costs, aovs and settings.
         spp: Likewise.
-        camera: As in ``load``, like purposes, variants, mask and session_layer.
+        camera: As in ``load``, like what follows.
         purposes: Likewise.
         variants: Likewise.
         mask: Likewise.
         session_layer: Likewise.
+        subdivision: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -196,6 +200,8 @@ def render_frames(
         mask=mask,
         session_layer=session_layer,
         threads=chosen.threads,
+        subdivision=subdivision,
+        size=(chosen.width, chosen.height),
         **options,
     )
     return _pictures(shots, numbers, chosen, names, progress, own, profile)

@@ -61,6 +61,7 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
         stage, size=(32, 16), spp=2, progress=progress, camera="/C", frame=3.0, max_depth=4
     )
     chosen = {"camera": "/C", "frame": 3.0, "variants": None, "threads": 0}
+    chosen |= {"size": (32, 16), "subdivision": "auto"}
     assert fake.loaded[0] == {"path": stage, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)

@@ -157,6 +157,31 @@ def vary_light(stage):
     ramp(light.CreateIntensityAttr(), [10, 20, 30, 40])
 
 
+def subdivide(stage):
+    """Two of the squares become surfaces, one of them in several colours."""
+    for i in (0, 2):
+        UsdGeom.Mesh.Get(stage, f"/World/Q{i}").GetSubdivisionSchemeAttr().Set("catmullClark")
+    colours = UsdGeom.Mesh.Get(stage, "/World/Q2").GetDisplayColorPrimvar()
+    colours.Set([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+    colours.SetInterpolation("vertex")
+
+
+def vary_near_surfaces(stage):
+    """The camera goes from where surfaces are a few pixels large to where they are many."""
+    subdivide(stage)
+    ramp(
+        UsdGeom.Xformable.Get(stage, "/World/Rig/Camera")
+        .GetPrim()
+        .GetAttribute("xformOp:translate"),
+        [(0, 0, z) for z in (80, 40, 12, 11.9)],
+    )
+
+
+def vary_beside_surfaces(stage):
+    subdivide(stage)
+    vary_object(stage)
+
+
 def vary_nothing(stage):
     pass
 
@@ -169,6 +194,8 @@ CHANGES = [
     vary_visibility,
     vary_inherited_colour,
     vary_light,
+    vary_near_surfaces,
+    vary_beside_surfaces,
     vary_nothing,
 ]
 
@@ -193,7 +220,9 @@ def test_each_frame_is_what_it_is_alone(shot, vary):
 @pytest.mark.parametrize("vary", CHANGES)
 def test_what_only_moves_views(shot, vary):
     vary(shot)
-    assert Varying(shot).is_view_only == (vary in (vary_camera, vary_lens, vary_nothing))
+    assert Varying(shot).is_view_only == (
+        vary in (vary_camera, vary_lens, vary_near_surfaces, vary_nothing)
+    )
 
 
 def test_a_camera_that_carries_something_is_no_view_only(shot):
@@ -244,6 +273,40 @@ def test_scene_and_hierarchy_stay_where_the_camera_moves(shot):
     assert build[0] > 0 and build[1:] == [0, 0]
 
 
+def test_levels_of_surfaces_follow_the_camera(shot):
+    """The scene is made anew where a surface is refined more, and only there."""
+    vary_near_surfaces(shot)
+    shot.Save()
+    frames = Frames(shot.GetRootLayer().realPath, size=(100, 100))
+    settings = wavecomb.Settings(width=8, height=8, spp=1)
+    triangles, build = [], []
+    for frame in (1, 2, 3, 4):
+        triangles.append(frames.load(frame).scene.triangles)
+        build.append(frames.stats(frames.render(settings))["seconds"]["build"] > 0)
+    assert triangles[0] < triangles[1] < triangles[2] == triangles[3]
+    assert build == [True, True, True, False]
+
+
+def test_refined_surfaces_are_shared_beside_what_moves(shot):
+    vary_beside_surfaces(shot)
+    stage = Usd.Stage.Open(shot.GetRootLayer())
+    stock = FrameStock(stage, LoadReport())
+    made = []
+
+    class Counts(Recorder):
+        def make_surfaces(self, surfaces, threads=0):
+            made.append(len(surfaces))
+            return super().make_surfaces(surfaces, threads)
+
+        def share_texture(self, scene, texture):
+            return self.add_texture(scene.textures[texture]["pixels"], srgb=False)
+
+    for frame in (1, 2):
+        load_stage(stage, frame=frame, stock=stock, subdivision=2, builder_factory=Counts)
+    # The one with a colour for each point is refined with its colours.
+    assert made == [2, 1]
+
+
 def test_value_clips(tmp_path):
     """Points that come from a clip for each two frames."""
     for number, height in ((1, 1.0), (2, 3.0)):
@@ -256,6 +319,7 @@ def test_value_clips(tmp_path):
     mesh = UsdGeom.Mesh.Define(stage, "/Model")
     mesh.CreateFaceVertexCountsAttr([3])
     mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
+    mesh.CreateSubdivisionSchemeAttr("none")
     mesh.CreatePointsAttr()
     api = Usd.ClipsAPI(mesh)
     api.SetClipPrimPath("/Clip")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wavecomb import _core
 from wavecomb.usd import LoadedStage, load_stage
 
 INHERIT = 0xFFFFFFFF
@@ -73,6 +74,20 @@ class Recorder:
         )
         return len(self.meshes) - 1
 
+    def replace_mesh(self, mesh, positions, indices, *, material=INHERIT, **arrays):
+        kept = {key: self.meshes[mesh][key] for key in ("name", "light_group", "asset")}
+        number = self.add_mesh(positions, indices, material=material, **arrays)
+        self.meshes[mesh] = {**self.meshes.pop(number), **kept}
+
+    def make_surfaces(self, descriptions, threads=0):
+        builder = _core.SceneBuilder(1)
+        for texture in self.textures:
+            builder.add_texture(
+                texture["pixels"], srgb=texture["srgb"],
+                wrap_s=texture["wrap"][0], wrap_t=texture["wrap"][1],
+            )  # fmt: skip
+        return builder.make_surfaces(descriptions, threads)
+
     def add_group(self, name="", root=""):
         self.groups.append({"name": name, "meshes": [], "children": []})
         return len(self.groups) - 1
@@ -138,7 +153,8 @@ def write(folder: Path, text: str, name: str = "stage.usda") -> Path:
 
 
 def load(folder: Path, text: str, **options) -> tuple[Recorder, LoadedStage]:
-    """Loads a stage of some prims."""
+    """Loads a stage of some prims; meshes stay as they are unless ``subdivision`` says more."""
+    options.setdefault("subdivision", "off")
     loaded = load_stage(write(folder, text), builder_factory=Recorder, **options)
     return loaded.scene, loaded
 

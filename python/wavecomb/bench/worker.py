@@ -54,7 +54,7 @@ def run(job: Job) -> dict[str, Any]:
     settings = dict(job["settings"])
     size, spp = tuple(settings.pop("size")), int(settings.pop("spp"))
     profile = load_costs(job["profile"]) if job.get("profile") else None
-    stage = api.load(job["stage"], camera=job.get("camera"))
+    stage = api.load(job["stage"], camera=job.get("camera"), size=size)
     if profile is not None:
         settings["costs"] = profile
     for _ in range(int(job.get("warm", 0))):

@@ -138,7 +138,7 @@ def _open(job: Job, source: StageOptions) -> Frames:
     import_usd()
     from wavecomb.sequence import Frames
 
-    options = source.for_load()
+    options = source.for_load((job.settings.width, job.settings.height))
     if options["purposes"] is None:
         del options["purposes"]
     return Frames(job.stage, threads=job.settings.threads, **options)

@@ -56,15 +56,17 @@ class Shot(Protocol):
 class Still:
     """A stage at one frame."""
 
-    def __init__(self, source: StageOptions, stage: str, threads: int) -> None:
+    def __init__(self, source: StageOptions, stage: str, settings: Any) -> None:
         self._source = source
         self._stage = stage
-        self._threads = threads
+        self._settings = settings
         self._loaded: LoadedStage | None = None
 
     def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
         """Reads the stage."""
-        self._loaded = self._source.load(self._stage, self._threads, progress)
+        chosen = self._settings
+        size = chosen.width, chosen.height
+        self._loaded = self._source.load(self._stage, chosen.threads, size, progress)
         return self._loaded
 
     def render(self, *arguments: Any, **named: Any) -> Any:

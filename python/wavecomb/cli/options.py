@@ -47,8 +47,14 @@ def examples(*lines: str) -> str:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant, --purpose, --mask and --session-layer."""
+    """STAGE, --camera, --frame, --variant, --purpose, --mask, --subdivision ..."""
     for option in (
+        click.option(
+            "--subdivision",
+            metavar="off|LEVEL|auto",
+            help="Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their "
+            "size in the picture.  [default: auto]",
+        ),
         click.option(
             "--session-layer",
             type=click.Path(),
@@ -103,6 +109,7 @@ class StageOptions:
     variants: tuple[str, ...]
     mask: tuple[str, ...] = ()
     session_layer: str | None = None
+    subdivision: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -124,15 +131,19 @@ class StageOptions:
         return StageOptions(**values)
 
     def load(
-        self, stage: str, threads: int = 0, progress: Callable[[int, int], None] | None = None
+        self,
+        stage: str,
+        threads: int = 0,
+        size: tuple[int, int] | None = None,
+        progress: Callable[[int, int], None] | None = None,
     ) -> LoadedStage:
-        """Loads a stage as the options say, on ``threads`` threads (0: all)."""
+        """Loads a stage as the options say, on ``threads`` threads (0: all), for a picture."""
         from wavecomb.api import load
 
-        options = self.for_load()
+        options = self.for_load(size)
         return load(stage, frame=self.frame, threads=threads, progress=progress, **options)
 
-    def for_load(self) -> dict[str, Any]:
+    def for_load(self, size: tuple[int, int] | None) -> dict[str, Any]:
         """Arguments of ``wavecomb.load``, but for the frame."""
         from wavecomb.errors import WavecombError
 
@@ -144,6 +155,8 @@ class StageOptions:
             "variants": self.selections() or None,
             "mask": self.mask,
             "session_layer": self.session_layer,
+            "subdivision": "auto" if self.subdivision is None else self.subdivision,
+            **({} if size is None else {"size": size}),
         }
 
     def selections(self) -> dict[str, str]:

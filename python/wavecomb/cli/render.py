@@ -230,7 +230,7 @@ def render_command(
         if last is not None and costs_file is not None:
             _save_costs(costs_file, last)
         return
-    shot = Still(source, stage, settings.threads)
+    shot = Still(source, stage, settings)
     picture, stopped, report = job.run(shot, source, purpose, resumed)
     del shot  # the scene: nothing needs it while files are written
     if stopped is not None and not picture.samples.any():

@@ -67,6 +67,17 @@ class RunsModel(QAbstractTableModel):
         """As it was read."""
         return self._rows[row].get(self._columns[column].name)
 
+    def longest_texts(self) -> list[str]:
+        """The longest text of each column, title and cells."""
+        cells = (
+            (self.headerData(k, Qt.Orientation.Horizontal) or "", column.name)
+            for k, column in enumerate(self._columns)
+        )
+        return [
+            max((title, *(cell_text(row.get(name)) for row in self._rows)), key=len)
+            for title, name in cells
+        ]
+
     def rowCount(self, parent: Any = _Index()) -> int:  # noqa: B008
         """Qt's."""
         return 0 if parent.isValid() else len(self._rows)
@@ -123,6 +134,8 @@ class RunsProxy(QSortFilterProxyModel):
 
     def filterAcceptsRow(self, row: int, parent: Any) -> bool:
         """Qt's."""
+        if not self._words:
+            return True
         model = self.sourceModel()
         assert isinstance(model, RunsModel)
         texts = [cell_text(model.value(row, k)).lower() for k in range(model.columnCount())]
@@ -205,9 +218,11 @@ class RunsTable(QWidget):
         """Shows other rows, in their own order."""
         self.model.set_rows(columns, rows)
         self.view.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
-        self.view.resizeColumnsToContents()
-        for k in range(self.model.columnCount()):
-            self.view.setColumnWidth(k, min(self.view.columnWidth(k), theme.em(22)))
+        # Qt's own resizing asks for each cell many times: seconds for a large sitting.
+        metrics = self.view.fontMetrics()
+        for k, text in enumerate(self.model.longest_texts()):
+            wide = metrics.horizontalAdvance(text) + theme.em(2)
+            self.view.setColumnWidth(k, min(wide, theme.em(22)))
         self._filter(self.filter.text())
 
     def _filter(self, text: str) -> None:

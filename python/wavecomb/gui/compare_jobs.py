@@ -116,6 +116,8 @@ class Jobs(QObject):
         for latest in (self._pictures, self._figures, self._looks, self._map):
             latest.close()
         self._process.stop()
+        self._ask = self._numbers = None
+        self._flip.clear()
 
     # ---- inside --------------------------------------------------------------------------------
 

@@ -120,6 +120,7 @@ class SideSource(QObject):
         """Ends what runs."""
         self._reader.close()
         self._release()
+        self.side = None
 
     # ---- inside --------------------------------------------------------------------------------
 

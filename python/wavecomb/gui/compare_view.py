@@ -11,26 +11,16 @@ from PySide6.QtGui import (
     QPainter,
     QPaintEvent,
     QPen,
-    QResizeEvent,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from wavecomb.gui import theme
+from wavecomb.gui.compare_layout import DIFFERENCE, THREE, WIPE, A, B, D, Layout
 from wavecomb.gui.compare_paint import paint_bar, paint_label
 from wavecomb.heatmap import Scale
 
-SIDE, WIPE, FLIP, DIFFERENCE, THREE = "side", "wipe", "flip", "difference", "three"
-MODES = {
-    SIDE: "Side by side",
-    WIPE: "Wipe",
-    FLIP: "Flip",
-    DIFFERENCE: "Difference",
-    THREE: "A, B and difference",
-}
-A, B, D = "A", "B", "D"
 ZOOM_STEP = 1.25
-MOST_ZOOM = 64.0
 _PAN_STEP = 0.1
 """Of what is seen, for an arrow key."""
 
@@ -63,13 +53,8 @@ class CompareView(QWidget):
         self.setAcceptDrops(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(theme.em(12), theme.em(8))
-        self.mode = SIDE
-        self.shown = A
+        self._layout = Layout()
         self.wipe = 0.5
-        self.zoom: float | None = None
-        """Screen points per pixel; None: the whole picture."""
-        self.centre = QPointF(0.5, 0.5)
-        """What is in the middle, as a share of the picture."""
         self.names = {A: "A", B: "B", D: "A - B"}
         self.message = ""
         self._images: dict[str, QImage | None] = {A: None, B: None, D: None}
@@ -95,8 +80,8 @@ class CompareView(QWidget):
         self.update()
 
     def set_mode(self, mode: str) -> None:
-        """One of ``MODES``."""
-        self.mode = mode
+        """One of ``compare_layout.MODES``."""
+        self._layout.mode = mode
         self.update()
 
     def set_message(self, message: str) -> None:
@@ -106,7 +91,7 @@ class CompareView(QWidget):
 
     def flip(self) -> None:
         """The other of A and B."""
-        self.shown = B if self.shown == A else A
+        self._layout.shown = B if self.shown == A else A
         self.flipped.emit(self.shown)
         self.update()
 
@@ -118,90 +103,54 @@ class CompareView(QWidget):
 
     def fit(self) -> None:
         """The whole picture."""
-        self.zoom, self.centre = None, QPointF(0.5, 0.5)
+        self._arranged().fit()
         self.update()
 
     def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
         """So many points per pixel; what is at a point of the widget stays there."""
-        pane = self._pane_at(at) if at is not None else self._panes()[0][1]
-        before = self._to_share(at, pane) if at is not None else None
-        self.zoom = min(max(zoom, 1.0 / MOST_ZOOM), MOST_ZOOM)
-        if before is not None:
-            after = self._to_share(at, pane)
-            self.centre = self._kept(self.centre + before - after)
+        self._arranged().set_zoom(zoom, at)
         self.update()
+
+    @property
+    def mode(self) -> str:
+        """What ``set_mode`` got."""
+        return self._layout.mode
+
+    @property
+    def shown(self) -> str:
+        """A or B, of a flip."""
+        return self._layout.shown
+
+    @property
+    def zoom(self) -> float | None:
+        """Points per pixel that were asked for; None: the whole picture."""
+        return self._layout.zoom
 
     def points_per_pixel(self) -> float:
         """The zoom as it is."""
-        size, pane = self._size(), self._panes()[0][1]
-        if self.zoom is not None or size is None:
-            return self.zoom or 1.0
-        return min(pane.width() / size.width(), pane.height() / size.height())
-
-    # ---- geometry ------------------------------------------------------------------------------
-
-    def _size(self) -> QSizeF | None:
-        """Of a picture in pixels; of two sizes that of A."""
-        for which in (A, B):
-            image = self._images[which]
-            if image is not None:
-                return QSizeF(image.size())
-        return None
-
-    def _panes(self) -> list[tuple[str, QRectF]]:
-        """What is drawn where."""
-        which = {SIDE: (A, B), WIPE: (A,), FLIP: (self.shown,), DIFFERENCE: (D,), THREE: (A, B, D)}
-        kinds, area = which[self.mode], QRectF(self.rect())
-        gap = theme.em(0.3) if len(kinds) > 1 else 0
-        width = (area.width() - gap * (len(kinds) - 1)) / len(kinds)
-        bar = theme.em(3.2) if D in kinds and self._scale is not None else 0
-        height = max(area.height() - bar, 1.0)
-        return [(k, QRectF(i * (width + gap), 0, width, height)) for i, k in enumerate(kinds)]
-
-    def _pane_at(self, at: QPointF | None) -> QRectF:
-        panes = [rect for _, rect in self._panes()]
-        return next((rect for rect in panes if at is not None and rect.contains(at)), panes[0])
-
-    def _target(self, pane: QRectF, size: QSizeF) -> QRectF:
-        """Where a whole picture of this size lies."""
-        reference = self._size() or size
-        scale = self.points_per_pixel()
-        width, height = reference.width() * scale, reference.height() * scale
-        corner = pane.center() - QPointF(self.centre.x() * width, self.centre.y() * height)
-        return QRectF(corner, QSizeF(size.width() * scale, size.height() * scale))
-
-    def _to_share(self, at: QPointF | None, pane: QRectF) -> QPointF:
-        size = self._size()
-        if at is None or size is None:
-            return QPointF(0.5, 0.5)
-        target = self._target(pane, size)
-        offset = at - target.topLeft()
-        return QPointF(offset.x() / target.width(), offset.y() / target.height())
+        return self._arranged().points_per_pixel()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
         """Column and row under a point of the widget."""
-        size = self._size()
-        if size is None:
-            return None
-        share = self._to_share(at, self._pane_at(at))
-        if not (0.0 <= share.x() < 1.0 and 0.0 <= share.y() < 1.0):
-            return None
-        return int(share.x() * size.width()), int(share.y() * size.height())
+        return self._arranged().pixel_at(at)
 
-    @staticmethod
-    def _kept(centre: QPointF) -> QPointF:
-        return QPointF(min(max(centre.x(), 0.0), 1.0), min(max(centre.y(), 0.0), 1.0))
+    def target(self, number: int) -> QRectF:
+        """Where the picture of a pane lies."""
+        layout = self._arranged()
+        return layout.target(layout.panes()[number][1])
 
-    def _pan(self, dx: float, dy: float) -> None:
-        """By points of the screen."""
-        size = self._size()
-        if size is not None:
-            if self.zoom is None:
-                self.zoom = self.points_per_pixel()
-            scale = self.points_per_pixel()
-            step = QPointF(dx / (size.width() * scale), dy / (size.height() * scale))
-            self.centre = self._kept(self.centre - step)
-            self.update()
+    def _arranged(self) -> Layout:
+        """For the widget and the pictures as they are."""
+        layout = self._layout
+        layout.area = QRectF(self.rect())
+        there = [image for image in (self._images[A], self._images[B]) if image is not None]
+        layout.size = QSizeF(there[0].size()) if there else None
+        layout.gap = theme.em(0.3)
+        layout.bar = theme.em(3.2) if self._scale is not None else 0
+        return layout
+
+    def _panes(self) -> list[tuple[str, QRectF]]:
+        return self._arranged().panes()
 
     def _line_x(self) -> float:
         return self._panes()[0][1].width() * self.wipe
@@ -247,14 +196,13 @@ class CompareView(QWidget):
         painter.setClipRect(pane)
         smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-        painter.drawImage(self._target(pane, QSizeF(image.size())), image)
+        painter.drawImage(self._arranged().target(pane, QSizeF(image.size())), image)
         painter.restore()
 
     def _paint_cursor(self, painter: QPainter, pane: QRectF) -> None:
-        size = self._size()
-        if size is None or self._cursor is None:
+        if self._cursor is None:
             return
-        target, scale = self._target(pane, size), self.points_per_pixel()
+        target, scale = self._arranged().target(pane), self.points_per_pixel()
         x, y = self._cursor
         box = QRectF(target.left() + x * scale, target.top() + y * scale, scale, scale)
         arm = max(theme.em(0.3), 3)
@@ -276,7 +224,7 @@ class CompareView(QWidget):
         if image is not None:
             smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-            painter.drawImage(self._target(pane, QSizeF(image.size())), image)
+            painter.drawImage(self._arranged().target(pane, QSizeF(image.size())), image)
         painter.restore()
         for width, colour in ((3.0, Qt.GlobalColor.black), (1.0, Qt.GlobalColor.white)):
             painter.setPen(QPen(colour, width))
@@ -285,6 +233,10 @@ class CompareView(QWidget):
         paint_label(painter, right, self.names[B], right=True)
 
     # ---- events --------------------------------------------------------------------------------
+
+    def _pan(self, dx: float, dy: float) -> None:
+        self._arranged().pan(dx, dy)
+        self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Takes the line of a wipe, or the picture."""
@@ -367,10 +319,6 @@ class CompareView(QWidget):
         self.update()
 
     focusOutEvent = focusInEvent
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Nothing is kept that depends on the size."""
-        self.update()
 
     def dragEnterEvent(self, event: object) -> None:
         """Files are welcome."""

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QHideEvent
+from PySide6.QtGui import QHideEvent, QPalette
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QDockWidget,
     QDoubleSpinBox,
@@ -22,10 +23,11 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import display, theme
 from wavecomb.gui.compare_jobs import Ask, Jobs
+from wavecomb.gui.compare_layout import MODES, SIDE
 from wavecomb.gui.compare_numbers import NumbersPanel
 from wavecomb.gui.compare_picker import SidePicker
 from wavecomb.gui.compare_source import SideSource
-from wavecomb.gui.compare_view import MODES, SIDE, CompareView
+from wavecomb.gui.compare_view import CompareView
 from wavecomb.gui.differences import MAPS, Numbers
 from wavecomb.gui.display import Look
 from wavecomb.gui.sides import Side, common_layers
@@ -64,11 +66,9 @@ class CompareWindow(QWidget):
         self._error.setObjectName("compareError")
         self._error.setWordWrap(True)
         self._error.hide()
-        self.setStyleSheet(
-            "QToolButton:checked { background: palette(highlight);"
-            " color: palette(highlighted-text) }"
-        )
         self._lay_out()
+        self._mark_mode()
+        theme.on_change(self._mark_mode)
         for name, source in self.sources.items():
             source.changed.connect(self.refresh)
             source.failed.connect(self._fail)
@@ -98,10 +98,11 @@ class CompareWindow(QWidget):
         column = QVBoxLayout(self)
         column.addLayout(sides)
         column.addWidget(self._error)
-        column.addLayout(self._bar())
+        column.addLayout(self._mode_bar())
+        column.addLayout(self._look_bar())
         column.addWidget(split, 1)
 
-    def _bar(self) -> QHBoxLayout:
+    def _mode_bar(self) -> QHBoxLayout:
         bar = QHBoxLayout()
         self._modes: dict[str, QToolButton] = {}
         for mode, title in MODES.items():
@@ -110,9 +111,32 @@ class CompareWindow(QWidget):
             button.setAutoExclusive(True)
             button.setShortcut(f"Alt+{_KEYS[mode]}")
             button.clicked.connect(lambda checked=False, mode=mode: self.set_mode(mode))
+            button.toggled.connect(lambda checked: self._mark_mode())
             self._modes[mode] = button
             bar.addWidget(button)
         self._modes[SIDE].setChecked(True)
+        bar.addStretch(1)
+        for name, text, tip, call in (
+            ("fit", "Fit", "The whole picture (0)", self.view.fit),
+            ("one", "1:1", "Pixel by pixel (1)", self._one_to_one),
+        ):
+            button = self._tool(name, text, tip)
+            button.clicked.connect(lambda checked=False, call=call: call())
+            bar.addWidget(button)
+        return bar
+
+    def _mark_mode(self) -> None:
+        """The chosen view's button in the colours of a selection."""
+        colours = QApplication.palette()
+        for button in self._modes.values():
+            own = QPalette()
+            if button.isChecked():
+                own.setColor(QPalette.ColorRole.Button, colours.highlight().color())
+                own.setColor(QPalette.ColorRole.ButtonText, colours.highlightedText().color())
+            button.setPalette(own)
+
+    def _look_bar(self) -> QHBoxLayout:
+        bar = QHBoxLayout()
         self._map = self._combo("map", "Difference", "What the difference shows")
         for kind, title in MAPS.items():
             self._map.addItem(title, kind)
@@ -133,13 +157,6 @@ class CompareWindow(QWidget):
         for widget in (self._map, self._layer, self._exposure, self._tone):
             bar.addWidget(widget)
         bar.addStretch(1)
-        for name, text, tip, call in (
-            ("fit", "Fit", "The whole picture (0)", self.view.fit),
-            ("one", "1:1", "Pixel by pixel (1)", self._one_to_one),
-        ):
-            button = self._tool(name, text, tip)
-            button.clicked.connect(lambda checked=False, call=call: call())
-            bar.addWidget(button)
         return bar
 
     def _tool(self, name: str, text: str, tip: str) -> QToolButton:
@@ -155,7 +172,8 @@ class CompareWindow(QWidget):
         combo.setObjectName(f"compare-{name}")
         combo.setAccessibleName(accessible)
         combo.setToolTip(tip)
-        combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        combo.setMinimumContentsLength(12)
         return combo
 
     def sizeHint(self) -> QSize:
@@ -193,7 +211,7 @@ class CompareWindow(QWidget):
             dock.raise_()
 
     def set_mode(self, mode: str) -> None:
-        """One of ``compare_view.MODES``."""
+        """One of ``compare_layout.MODES``."""
         self._modes[mode].setChecked(True)
         self.view.set_mode(mode)
         self.view.setFocus()
@@ -272,6 +290,8 @@ class CompareWindow(QWidget):
         self._error.setText(message)
         self._error.show()
         self.failed.emit(message)
+        if not self.isVisible():
+            self.session.failed.emit(message)
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Nothing is computed for nobody: renders of its own stand still."""

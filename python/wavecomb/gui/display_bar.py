@@ -125,7 +125,7 @@ class DisplayBar(QToolBar):
         session.frame.connect(self._refresh)
         if session.setup.denoise:
             self._apply(layer="denoised")
-            self._fill_layers(())
+            self.layer.setCurrentIndex(self.layer.findData("denoised"))
         self._update_range()
 
     def _bound(self, name: str, title: str) -> QDoubleSpinBox:

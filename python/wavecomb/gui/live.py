@@ -35,6 +35,14 @@ IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "sto
 class Live(QObject):
     """One live render with its own settings. All methods are for the UI thread; none waits.
 
+    Attributes:
+        setup: Settings.
+        last_frame: What ``frame`` gave last.
+        version: Of scene and settings.
+        oldest: Frames of a version below this must not come to the screen any more.
+        state: What ``state_changed`` gave last.
+        renderer: The core's, or None.
+
     Signals:
         frame(Frame): A newer picture, of the newest version.
         statistics(dict): docs/statistics.md, about twice a second while it renders.
@@ -58,6 +66,7 @@ class Live(QObject):
         self.setup = setup or Setup()
         self.last_frame: Frame | None = None
         self.version = 0
+        self.oldest = 0
         self.state = IDLE
         self.renderer: Renderer | None = None
         self._numbers = itertools.count(1)
@@ -176,6 +185,9 @@ class Live(QObject):
 
     def _submit(self, task: Task) -> None:
         self.version = task.version = next(self._numbers)
+        # While something moves the last picture may still be on its way to the screen.
+        last = self.last_frame.version if self.last_frame is not None else self.version
+        self.oldest = last if task.moving else self.version
         self._awaiting, self._submitted = True, time.perf_counter()
         if self.state == PAUSED:
             self._engine.resume()

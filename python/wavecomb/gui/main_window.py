@@ -91,19 +91,27 @@ class MainWindow(QMainWindow):
         right = Qt.DockWidgetArea.RightDockWidgetArea
         self._add_dock("inspector", "Pixel", self.inspector, right)
         for panel in make_panels(self.session):
-            dock = self._add_dock(panel.name, panel.title, panel.widget, panel.area)
+            dock = self._add_dock(
+                panel.name, panel.title, panel.widget, panel.area, hidden=panel.hidden
+            )
             if panel.hidden:
-                dock.hide()
                 dock.visibilityChanged.connect(self._size_bottom)
         sides = [self.docks["scene"], self.docks["inspector"]]
         self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
 
     def _add_dock(
-        self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea
+        self,
+        name: str,
+        title: str,
+        widget: QWidget,
+        area: Qt.DockWidgetArea,
+        *,
+        hidden: bool = False,
     ) -> QDockWidget:
         dock = QDockWidget(title, self)
         dock.setObjectName(f"dock.{name}")
         dock.setWidget(widget)
+        dock.setHidden(hidden)
         others = [d for d in self.docks.values() if self.dockWidgetArea(d) == area]
         self.addDockWidget(area, dock)
         if others:

@@ -201,7 +201,7 @@ class MaterialsTab(QWidget):
         self.model.replace(
             [
                 (
-                    (row.name, row.name),
+                    (row.short, row.name),
                     (row.program, row.program),
                     (amount(row.records), row.records),
                     (f"{100 * row.share:.1f} %", row.share),

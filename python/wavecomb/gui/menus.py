@@ -31,7 +31,13 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
             "fit", "full", "zoom_in", "zoom_out",
         ),
     ),
-    ("&View", ("panels", "-", "compare", "-", "theme", "full_screen", "reset_layout")),
+    (
+        "&View",
+        (
+            "panels", "-", "compare", "keep_a", "keep_b", "-",
+            "theme", "full_screen", "reset_layout",
+        ),
+    ),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
 """Title and names; "-": a line."""
@@ -122,6 +128,15 @@ def entries(window: MainWindow) -> list[Entry]:
         Entry(
             "compare", "&Compare\u2026", window.show_compare, ["Ctrl+D"],
             "Two pictures or two live settings, side by side or with a wipe",
+        ),
+        *(
+            Entry(
+                f"keep_{which.lower()}", f"Keep as &{which}",
+                lambda which=which: window.docks["compare"].widget().keep(which),
+                [f"Ctrl+Shift+{which}"],
+                f"The picture as it is now becomes {which} of Compare",
+            )
+            for which in "AB"
         ),
         Entry("full_screen", "F&ull screen", window.toggle_full_screen, ["F11"]),
         Entry("reset_layout", "&Reset the panels", window.reset_layout),

@@ -69,7 +69,7 @@ class MessageBar(QFrame):
 
     def _show(self, message: str, is_error: bool) -> None:
         self._is_error = is_error
-        self._label.setText(message)
+        self._label.setText(" ".join(message.split()))
         self._colour()
         self.show()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plots in the colours of the window: curves, stacked and grouped bars, legends beside them."""
+"""Plots in the colours of the window: curves, bars, and legends beside them."""
 
 from __future__ import annotations
 
@@ -94,19 +94,19 @@ class Curves(Plot):
         """Draws (times, values, colour, strong); strong: the one that goes on."""
         self.clear()
         for times, values, colour, strong in curves:
-            width = max(1.0, theme.em(0.14 if strong else 0.08))
+            width = max(1.0, 0.2 * theme.em() if strong else 0.12 * theme.em())
             few = len(times) < 3
             self.plot(
                 list(times), list(values), pen=pg.mkPen(colour, width=width),
                 symbol="o" if few else None, symbolBrush=colour, symbolPen=None,
-                symbolSize=theme.em(0.4),
+                symbolSize=0.4 * theme.em(),
             )  # fmt: skip
         if not any(len(times) for times, *_ in curves):
             return
         latest = max((max(times) for times, *_ in curves if len(times)), default=1.0)
         most = max((max(values) for _, values, *_ in curves if len(values)), default=1.0)
         self.setXRange(0.0, latest * 1.02, padding=0.0)
-        self.setYRange(0.0, max(most * 1.08, 1e-9), padding=0.0)
+        self.setYRange(0.0, 1.08 * most if most > 0.0 else 1.0, padding=0.0)
 
 
 class Bars(Plot):

@@ -105,9 +105,9 @@ class PlotsPanel(QWidget):
             (self._add_curves("lane_utilisation", "Lane utilisation, %", lanes), 0, 0, 1),
             (self._add_curves("run_length", "Run length, records",
                               coherence("run_length")), 0, 1, 1),
-            (self._add_curves("material_homogeneity", "Neighbours of one material, %",
+            (self._add_curves("material_homogeneity", "Neighbours: one material, %",
                               coherence("material_homogeneity", 100.0)), 1, 0, 1),
-            (self._add_curves("texture_homogeneity", "Neighbours at one place of a texture, %",
+            (self._add_curves("texture_homogeneity", "Neighbours: one texture place, %",
                               coherence("texture_homogeneity", 100.0)), 1, 1, 1),
             stretch=(1, 1),
         )  # fmt: skip
@@ -157,7 +157,7 @@ class PlotsPanel(QWidget):
     # ---- what is shown --------------------------------------------------------------------------
 
     def shown(self) -> list[Series]:
-        """Series of the picture shown, the newest few, and what they are compared with."""
+        """The newest series of the picture that is looked at, and what they are compared with."""
         current = self.log.current
         if current is None:
             return []

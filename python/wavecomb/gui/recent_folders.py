@@ -14,7 +14,7 @@ MOST = 10
 
 def recent_folders() -> list[Path]:
     """Those that are still there, newest first."""
-    stored: Any = QSettings("Wavecomb", "view").value(_KEY, [])
+    stored: Any = QSettings("Wavecomb", "Wavecomb").value(_KEY, [])
     names = [stored] if isinstance(stored, str) else list(stored or [])
     return [Path(name) for name in names if (Path(name) / "runs.csv").is_file()]
 
@@ -22,4 +22,4 @@ def recent_folders() -> list[Path]:
 def remember_folder(path: Path) -> None:
     """Puts it first."""
     kept = [path.resolve(), *(p for p in recent_folders() if p != path.resolve())]
-    QSettings("Wavecomb", "view").setValue(_KEY, [str(p) for p in kept[:MOST]])
+    QSettings("Wavecomb", "Wavecomb").setValue(_KEY, [str(p) for p in kept[:MOST]])

@@ -11,11 +11,11 @@ is *held* only where repeats agree.
 
 from __future__ import annotations
 
-import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from wavecomb.gui.run_log import Look, Run, Series, ratio
 
@@ -152,8 +152,8 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     if n < MIN_STRETCHES or seconds < MIN_SECONDS:
         return Ratio(value, 0.0, math.inf, 1, short=True)
     ends = [samples * k / n for k in range(n + 1)]
-    mine = [time_of(run, b) - time_of(run, a) for a, b in itertools.pairwise(ends)]
-    theirs = [time_of(base, b) - time_of(base, a) for a, b in itertools.pairwise(ends)]
+    mine = [time_of(run, b) - time_of(run, a) for a, b in pairwise(ends)]
+    theirs = [time_of(base, b) - time_of(base, a) for a, b in pairwise(ends)]
     # The ratio estimator sum(theirs) / sum(mine); its variance is that of theirs - value * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)

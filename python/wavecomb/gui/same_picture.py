@@ -36,7 +36,7 @@ class Verdict:
 
 def fingerprint(beauty: NDArray[np.float32]) -> str:
     """A hash of the bits of a picture."""
-    return hashlib.blake2b(np.ascontiguousarray(beauty), digest_size=8).hexdigest()
+    return hashlib.blake2b(np.ascontiguousarray(beauty).data, digest_size=8).hexdigest()
 
 
 def even_samples(samples: NDArray[Any] | None) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.api import Picture
 from wavecomb.errors import WavecombError
+from wavecomb.gui.denoiser import denoised_frame
 from wavecomb.gui.developer import develop_frame
 from wavecomb.gui.display import LINEAR, NEUTRAL, Look
 from wavecomb.gui.frames import Frame
@@ -70,6 +71,9 @@ def save_frame(
     """
     if frame.scale != 1:
         raise WavecombError("there is only a preview yet: save again when the picture is there")
+    if frame.setup.denoise:
+        # What is shown may be of an earlier pass.
+        frame = replace(frame, denoised=denoised_frame(frame))
     picture = picture_of_frame(frame, scene, loaded)
     as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)
     if not path.lower().endswith(".png"):

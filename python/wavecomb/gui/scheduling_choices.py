@@ -133,7 +133,6 @@ ADAPTIVE_MODES = {
     "pixel": "Pixels stop when their own error is small enough.",
     "noise": "The render ends when the picture's mean error is small enough; samples go where "
     "the noise is.",
-    "both": "Whichever of the two is met first.",
 }
 PIXEL_ERROR = Number(
     "adaptive", "Pixel error", "Error that a pixel may have, as a share of its brightness.",

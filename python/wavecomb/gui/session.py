@@ -118,6 +118,11 @@ class Session(QObject):
         return self._live.version
 
     @property
+    def oldest(self) -> int:
+        """Frames of a version below this must not come to the screen any more."""
+        return self._live.oldest
+
+    @property
     def last_frame(self) -> Frame | None:
         """What ``frame`` gave last."""
         return self._live.last_frame

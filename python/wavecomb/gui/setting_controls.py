@@ -20,11 +20,11 @@ class _CalmWheel(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Passes the wheel on."""
-        wheel = event.type() == QEvent.Type.Wheel and isinstance(watched, QWidget)
-        if wheel and not watched.hasFocus():
+        is_wheel = event.type() == QEvent.Type.Wheel
+        passes = is_wheel and isinstance(watched, QWidget) and not watched.hasFocus()
+        if passes:
             event.ignore()
-            return True
-        return False
+        return passes
 
 
 def calm(widget: QWidget) -> None:
@@ -116,7 +116,10 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
 def show_number(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
     """Shows what is set, without changing anything."""
     with QSignalBlocker(box):
-        box.setValue(int(value) if isinstance(box, QSpinBox) else value)
+        if isinstance(box, QSpinBox):
+            box.setValue(int(value))
+        else:
+            box.setValue(value)
 
 
 def value_text(value: Any) -> str:

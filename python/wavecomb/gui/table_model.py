@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QFont
 from PySide6.QtWidgets import QTableView
 
 Cell = tuple[str, Any]
-"""What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``)."""
+"""What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``), whole in a tooltip."""
 
 _NOWHERE = QModelIndex()
 
@@ -86,7 +86,7 @@ class Table(QAbstractTableModel):
         if role == Qt.ItemDataRole.UserRole:
             return self._rows[row][column][1]
         if role == Qt.ItemDataRole.ToolTipRole:
-            return self._rows[row][column][0] if column in self._left else None
+            return str(self._rows[row][column][1]) if column in self._left else None
         if role == Qt.ItemDataRole.TextAlignmentRole:
             side = (
                 Qt.AlignmentFlag.AlignLeft if column in self._left else Qt.AlignmentFlag.AlignRight

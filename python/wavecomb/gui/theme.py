@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QToolTip
 
 SYSTEM, DARK, LIGHT = "system", "dark", "light"
 CHOICES = (SYSTEM, DARK, LIGHT)
@@ -82,7 +82,7 @@ def apply(chosen: str) -> None:
     if application.style().objectName() != "fusion":
         application.setStyle("Fusion")
     application.setPalette(palette(is_dark()))
-    application.setStyleSheet(_style_sheet())
+    QToolTip.setPalette(application.palette())
     theme.changed.emit()
 
 
@@ -113,14 +113,6 @@ def palette(dark: bool) -> QPalette:
         out.setColor(disabled, which, dim)
     out.setColor(disabled, role.Highlight, line)
     return out
-
-
-def _style_sheet() -> str:
-    _, base, _, _, text, _, line, _, _ = _COLOURS[_name()]
-    return (
-        f"QToolTip {{ color: {text}; background: {base}; border: 1px solid {line}; }}"
-        "QDockWidget::title { padding: 0.3em; }"
-    )
 
 
 def series(n: int) -> QColor:

@@ -141,7 +141,7 @@ class Viewport(PictureView):
         self._developer.want(frame, self.look)
 
     def _developed(self, frame: Frame, look: Look, shown: Shown, image: QImage) -> None:
-        if frame.version != self.session.version:
+        if frame.version < self.session.oldest:
             return
         self.frame_shown = frame
         self.set_picture(image, QSize(frame.setup.width, frame.setup.height), shown.legend)

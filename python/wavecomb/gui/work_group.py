@@ -62,8 +62,8 @@ class WorkGroup(QGroupBox):
 
     def _choose_mode(self, field: str, mode: str) -> None:
         values: dict[str, Any] = {
-            "adaptive": self._targets["adaptive"] if mode in ("pixel", "both") else 0.0,
-            "noise": self._targets["noise"] if mode in ("noise", "both") else 0.0,
+            "adaptive": self._targets["adaptive"] if mode == "pixel" else 0.0,
+            "noise": self._targets["noise"] if mode == "noise" else 0.0,
         }
         setup = self._session.setup
         if mode != "off" and setup.spp < setup.min_spp:
@@ -87,7 +87,5 @@ class WorkGroup(QGroupBox):
 
 
 def mode_of(setup: Setup) -> str:
-    """Which of the two targets are set."""
-    if setup.adaptive and setup.noise:
-        return "both"
+    """Which of the two targets is set; the core takes one of them."""
     return "pixel" if setup.adaptive else "noise" if setup.noise else "off"

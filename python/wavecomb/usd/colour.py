@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.primvar import Primvar, spread
-from wavecomb.usd.triangulate import Topology
+from wavecomb.usd.triangulate import RefinedTopology, Topology
 
 MAX_COLOURS = 256
 """Materials that one varying colour may turn into."""
@@ -17,6 +17,8 @@ MAX_COLOURS = 256
 
 def face_values(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:
     """Mean of a primvar on each triangle: (m, width); (1, width) where it is constant."""
+    if isinstance(topology, RefinedTopology) and primvar.name in topology.means:
+        return np.ascontiguousarray(topology.means[primvar.name][:, :width])
     values, at = spread(primvar, topology, width)
     if at == "vertex":
         return values[topology.triangles].mean(axis=1)

@@ -28,6 +28,7 @@ from wavecomb.usd.network import colour
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.stock import MeshStock
+from wavecomb.usd.surfaces import Repaint, Surfaces
 from wavecomb.usd.traverse import Gathered, Placed, Traversal
 from wavecomb.usd.triangulate import MeshError
 
@@ -53,7 +54,8 @@ class Group:
         bounds: (2, 3) in its own space.
         root: Prim path that the names of what is in it begin with.
         lights: With their transforms (4, 4) in the group.
-        children: Groups placed in it, transforms (k, 4, 4).
+        children: Groups that hold lights placed in it, transforms (k, 4, 4).
+        surfaced: The same of groups that hold surfaces to be refined.
     """
 
     name: str
@@ -62,7 +64,9 @@ class Group:
     bounds: NDArray[Any] | None = None
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
     children: list[tuple[Group, Matrices]] = field(default_factory=list)
+    surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
     lit: bool = False
+    has_surfaces: bool = False
 
     @property
     def empty(self) -> bool:
@@ -108,6 +112,7 @@ class GroupBuilder:
         materials: MaterialTable,
         light_groups: LightGroups,
         report: LoadReport,
+        surfaces: Surfaces,
         stock: MeshStock | None = None,
         progress: LoadProgress | None = None,
     ) -> None:
@@ -119,6 +124,7 @@ class GroupBuilder:
         self.materials = materials
         self.light_groups = light_groups
         self.report = report
+        self.surfaces = surfaces
         self.stock = stock
         self.progress = progress
         self.found, self.drawn = 0, 0
@@ -224,29 +230,40 @@ class GroupBuilder:
             return
         self.builder.add_to_group(self._number(group), number)
         group.grow(mesh.bounds)
+        if mesh.cage is not None:
+            repaint = self._repainter(draw, scope) if faces is not None else None
+            self.surfaces.add(group, number, draw, mesh, material, repaint)
         self.report.tally("meshes" if kind == "mesh" else "shapes")
 
     def _arrays(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | None:
         """The arrays of a gprim, of the frame before where they are the same."""
+        displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
 
         def read(report: LoadReport) -> MeshArrays | None:
-            reader = MeshReader(self.time, report)
+            reader = MeshReader(self.time, report, self.surfaces.subdivide)
             if kind == "shape":
                 return reader.shape(draw.prim, draw.matrix)
-            return reader.mesh(draw.prim, draw.matrix, names, draw.inherited)
+            return reader.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
 
         if self.stock is None:
             return read(self.report)
-        options = (tuple(names), names is UV_NAMES)
+        options = (tuple(names), names is UV_NAMES, displaced)
         return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
 
-    def _materials(self, draw: Draw, mesh: MeshArrays, scope: Scope) -> tuple[int, Any]:
+    def _repainter(self, draw: Draw, scope: Scope) -> Repaint:
+        """Materials of the same mesh once its triangles are others; says nothing twice."""
+        quiet = Assigner(self.materials, self.time, LoadReport())
+        return lambda mesh: self._materials(draw, mesh, scope, quiet)
+
+    def _materials(
+        self, draw: Draw, mesh: MeshArrays, scope: Scope, assigner: Assigner | None = None
+    ) -> tuple[int, Any]:
         if scope.override:
             return INHERIT_MATERIAL, None
         otherwise = INHERIT_MATERIAL if scope.inside else None
         if draw.material is None and scope.bound and not any(draw.subset_materials):
             return INHERIT_MATERIAL, None
-        return self.assigner.assign(draw, mesh, otherwise)
+        return (assigner or self.assigner).assign(draw, mesh, otherwise)
 
     def _asset_length(self, prim: Usd.Prim, name: str) -> int:
         """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
@@ -441,6 +458,9 @@ class GroupBuilder:
         if child.lit:
             parent.children.append((child, transforms))
             parent.lit = True
+        if child.has_surfaces:
+            parent.surfaced.append((child, transforms))
+            parent.has_surfaces = True
         if child.number is None:
             return
         names = [self.report.place(prim.GetPath()) for prim in prims]

@@ -106,7 +106,7 @@ class MaterialTable:
         self._names: list[str] = []
         self._builder = builder
         self._textures = textures
-        self._time = time
+        self.time = time
         self._report = report
         self._surfaces: dict[Sdf.Path, Surface] = {}
         self._ids: dict[str, int] = {}
@@ -119,7 +119,7 @@ class MaterialTable:
     def expect(self, material: UsdShade.Material) -> None:
         """Starts what takes long for a material that will be used: reading its images."""
         if material.GetPath() not in self._surfaces:
-            self._textures.expect(material.GetPrim(), self._time)
+            self._textures.expect(material.GetPrim(), self.time)
 
     def surface(self, material: UsdShade.Material) -> Surface:
         """The surface of a bound material."""
@@ -184,9 +184,9 @@ class MaterialTable:
         prim = material.GetPrim()
         kind, shader = surface_source(material)
         if kind == PREVIEW:
-            return PreviewReader(prim, self._time, self._textures, self._report).read(shader)
+            return PreviewReader(prim, self.time, self._textures, self._report).read(shader)
         if kind:
-            reader = MaterialXReader(prim, self._time, self._textures, self._report)
+            reader = MaterialXReader(prim, self.time, self._textures, self._report)
             return reader.read(shader, kind)
         what = shader_id(shader) or shader_id(material.ComputeSurfaceSource("mtlx")[0])
         if what:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.usd.normals import crease_edges, smooth_normals
+from wavecomb.usd.cage import SCHEMES, Cage, crease_pairs, integers, read_rules
+from wavecomb.usd.normals import smooth_normals
 from wavecomb.usd.primvar import (
     Primvar,
     PrimvarError,
@@ -34,6 +35,9 @@ LIMIT = 1e18
 UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
 """Texture coordinates that are looked for where no material says which."""
 
+SHARP = 1.0
+"""Crease sharpness from which an edge of polygons is drawn as an edge."""
+
 _CHUNK = 1 << 18
 
 
@@ -48,6 +52,7 @@ class MeshArrays:
         uvs: (n, 2), (m, 3, 2) or None.
         bounds: (2, 3) lowest and highest coordinates.
         topology: Where the triangles come from; None for implicit shapes.
+        cage: What can be subdivided or displaced once the view is known; None: this is all.
     """
 
     positions: Array
@@ -56,6 +61,7 @@ class MeshArrays:
     uvs: Array | None
     bounds: Array
     topology: Topology | None = None
+    cage: Cage | None = None
 
 
 def check_matrix(matrix: Gf.Matrix4d) -> bool:
@@ -126,9 +132,11 @@ def extent(positions: Array) -> Array:
 class MeshReader:
     """Reads meshes and shapes of one stage."""
 
-    def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
+    def __init__(self, time: Usd.TimeCode, report: LoadReport, subdivide: bool = True) -> None:
+        """``subdivide``: subdivision meshes get a cage, and their authored normals do not count."""
         self.time = time
         self.report = report
+        self.subdivide = subdivide
 
     def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> MeshArrays:
         """An implicit shape, in its group's space."""
@@ -152,14 +160,16 @@ class MeshReader:
         matrix: Gf.Matrix4d,
         uv_names: Sequence[str],
         inherited: Sequence[Any] = (),
+        displaced: bool = False,
     ) -> MeshArrays | None:
-        """A mesh in its group's space; None where it is empty.
+        """A mesh in its group's space, as polygons; None where it is empty.
 
         Args:
             prim: A UsdGeomMesh.
             matrix: From the mesh to its group.
             uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
             inherited: Primvars of its ancestors.
+            displaced: Its points will be moved.
 
         Raises:
             MeshError: It cannot be drawn.
@@ -167,39 +177,54 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         points = as_array(get("points").Get(time))
-        counts = _integers(get("faceVertexCounts").Get(time))
+        counts = integers(get("faceVertexCounts").Get(time))
         if points is None or len(points) == 0 or len(counts) == 0:
             return None
         if points.shape[1] != 3:
             raise MeshError("points are not triples")
         points = np.ascontiguousarray(points, np.float32)
-        indices = _integers(get("faceVertexIndices").Get(time))
+        indices = integers(get("faceVertexIndices").Get(time))
         holes = get("holeIndices")
-        hole_list = _integers(holes.Get(time)) if holes.HasAuthoredValue() else None
+        hole_list = integers(holes.Get(time)) if holes.HasAuthoredValue() else None
         flip = get("orientation").Get(time) == "leftHanded"
         positions = points if matrix == IDENTITY else bake(points, matrix)
         bounds = extent(positions)
         topology = triangulate(points, counts, indices, hole_list, flip)
-        normals = self._normals(prim, points, topology)
-        uvs = self._uvs(prim, topology, uv_names, inherited) if uv_names else None
+        scheme = prim.GetAttribute("subdivisionScheme").Get(time)
+        subdivided = self.subdivide and scheme in SCHEMES
+        normals = self._normals(prim, points, topology, scheme)
+        primvar = self._coordinates(prim, topology, uv_names, inherited) if uv_names else None
+        uvs, primvar = self._uvs(prim, topology, primvar)
         if normals is not None and not _moves_only(matrix):
             normals = bake_normals(normals, matrix)
+        cage = None
+        if subdivided or displaced:
+            rules = read_rules(prim, time, self.report) if subdivided else {}
+            kind = str(scheme) if subdivided else "none"
+            cage = Cage(
+                points, counts, indices, matrix, flip, kind, rules, primvar, topology,
+                normals is not None,
+            )  # fmt: skip
         triangles = topology.triangles
         if mirrored:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
             normals, uvs = _reverse(normals), _reverse(uvs)
-        return MeshArrays(positions, triangles, normals, uvs, bounds, topology)
+        return MeshArrays(positions, triangles, normals, uvs, bounds, topology, cage)
 
-    def _normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
-        """(n, 3), (m, 3, 3), or None for flat: authored, else smooth for subdivision surfaces."""
-        authored = self._authored_normals(prim, points, topology)
-        scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
-        if scheme not in (None, "none"):
-            what = "subdivision mesh shaded as smooth polygons"
-            if scheme == "bilinear":
-                what = "bilinear subdivision mesh shaded as polygons"
-            self.report.note(what, prim.GetPath())
-        if authored is not None or scheme in (None, "none", "bilinear"):
+    def _normals(
+        self, prim: Usd.Prim, points: Array, topology: Topology, scheme: str | None
+    ) -> Array | None:
+        """(n, 3), (m, 3, 3), or None for flat: authored, else smooth for subdivision surfaces.
+
+        Authored ones do not count for meshes that are subdivided, as UsdGeomMesh says.
+        """
+        if scheme not in SCHEMES:
+            if scheme not in (None, "none"):
+                what = f"subdivisionScheme {scheme!r} is none of {', '.join(SCHEMES)}: polygons"
+                self.report.warn(what, prim.GetPath())
+            return self._authored_normals(prim, points, topology)
+        authored = None if self.subdivide else self._authored_normals(prim, points, topology)
+        if authored is not None or scheme == "bilinear":
             return authored
         return smooth_normals(points, topology, self._creases(prim, topology))
 
@@ -207,12 +232,13 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         if not get("creaseIndices").HasAuthoredValue():
             return None
-        indices = _integers(get("creaseIndices").Get(time))
-        lengths = _integers(get("creaseLengths").Get(time))
+        indices = integers(get("creaseIndices").Get(time))
+        lengths = integers(get("creaseLengths").Get(time))
         sharpness = as_array(get("creaseSharpnesses").Get(time))
         if sharpness is None or (len(indices) and indices.max() >= topology.point_count):
             return None
-        return crease_edges(indices, lengths, sharpness[:, 0])
+        creases = crease_pairs(indices, lengths, sharpness[:, 0])
+        return None if creases is None else creases[0][creases[1] >= SHARP].astype(np.int64)
 
     def _authored_normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
         """primvars:normals, else normals; None where there are none that fit."""
@@ -247,39 +273,50 @@ class MeshReader:
             normals = np.where(lengths.reshape(*normals.shape[:-1], 1) > 0, normals, smooth)
         return np.ascontiguousarray(normals, np.float32)
 
-    def _uvs(
+    def _coordinates(
         self,
         prim: Usd.Prim,
         topology: Topology,
         names: Sequence[str],
         inherited: Sequence[Any],
-    ) -> Array | None:
-        """(n, 2), (m, 3, 2) or None."""
+    ) -> Primvar | None:
+        """The primvar to take texture coordinates from; all at (0, 0) where it is not there."""
         try:
             primvar = next(
                 (p for p in (self._find(prim, name, inherited) for name in names) if p), None
             )
             if primvar is None:
                 primvar = self._any_coordinates(prim)
-                if primvar is None and names is UV_NAMES:
-                    return None
-                if primvar is None:
+                if primvar is None and names is not UV_NAMES:
                     what = f"no primvar {names[0]!r} for its textures: all at (0, 0)"
                     self.report.warn(what, prim.GetPath())
-                    return np.zeros((topology.point_count, 2), np.float32)
-                if names is not UV_NAMES:
+                    zeros = np.zeros((topology.point_count, 2), np.float32)
+                    return Primvar(zeros, "vertex", names[0])
+                if primvar is not None and names is not UV_NAMES:
                     what = f"no primvar {names[0]!r}: used {primvar.name!r} in its place"
                     self.report.warn(what, prim.GetPath())
-            uvs, at = spread(primvar, topology, 2)
         except PrimvarError as error:
             self.report.warn(f"{error}: ignored", prim.GetPath())
             return None
+        return primvar
+
+    def _uvs(
+        self, prim: Usd.Prim, topology: Topology, primvar: Primvar | None
+    ) -> tuple[Array | None, Primvar | None]:
+        """(n, 2), (m, 3, 2) or None, and the primvar where it is of use."""
+        if primvar is None:
+            return None, None
+        try:
+            uvs, at = spread(primvar, topology, 2)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", prim.GetPath())
+            return None, None
         if not np.isfinite(uvs).all():
             self.report.warn("texture coordinates that are not finite: set to 0", prim.GetPath())
             uvs = np.nan_to_num(uvs, nan=0.0, posinf=0.0, neginf=0.0)
         if at == "constant":
-            return np.repeat(uvs, topology.point_count, axis=0)
-        return uvs
+            uvs = np.repeat(uvs, topology.point_count, axis=0)
+        return uvs, primvar
 
     def _find(self, prim: Usd.Prim, name: str, inherited: Sequence[Any]) -> Primvar | None:
         return find_primvar(prim, name, inherited, self.time)
@@ -307,13 +344,6 @@ def find_primvar(
         if primvar.GetPrimvarName() == name:
             return from_attribute(primvar.GetAttr(), name, time)
     return None
-
-
-def _integers(value: Any) -> NDArray[np.int32]:
-    array = as_array(value)
-    if array is None or array.dtype.kind not in "iu":
-        return np.empty(0, np.int32)
-    return np.ascontiguousarray(array[:, 0], np.int32)
 
 
 def _reverse(values: Array | None) -> Array | None:

@@ -10,10 +10,6 @@ from numpy.typing import NDArray
 
 from wavecomb.usd.triangulate import Topology, cross
 
-SHARP = 1.0
-"""Crease sharpness from which an edge is drawn as an edge."""
-
-
 _CHUNK = 1 << 16
 """Triangles whose normals are added at once: bounds the memory in use."""
 
@@ -88,23 +84,3 @@ def _smoothing_groups(
         labels = labels[labels]
         if np.array_equal(labels, before):
             return labels
-
-
-def crease_edges(
-    indices: NDArray[np.int32], lengths: NDArray[np.int32], sharpness: NDArray[np.float32]
-) -> NDArray[np.int64]:
-    """(k, 2) points of the creases of a UsdGeomMesh from ``SHARP`` on; none where data is bad."""
-    none = np.empty((0, 2), np.int64)
-    if len(lengths) == 0 or lengths.min() < 2 or lengths.sum(dtype=np.int64) != len(indices):
-        return none
-    last = np.zeros(len(indices), bool)
-    last[np.cumsum(lengths) - 1] = True
-    first = np.flatnonzero(~last)
-    if len(sharpness) == len(lengths):
-        sharp = np.repeat(sharpness, lengths - 1)
-    elif len(sharpness) == len(first):
-        sharp = sharpness
-    else:
-        return none
-    edges = np.stack([indices[first], indices[first + 1]], axis=1).astype(np.int64)
-    return edges[sharp >= SHARP]

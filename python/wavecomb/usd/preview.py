@@ -129,7 +129,6 @@ class PreviewReader:
             parameters["specular_workflow"] = bool(number(workflow, 0))
             mode = value_of(shader, "opacityMode", self.time, "transparent")
             parameters["presence"] = mode == "presence"
-            self._look_for_displacement(shader)
         for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
             attribute = self.material.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
@@ -137,6 +136,7 @@ class PreviewReader:
         evaluations = evaluations_of(self.material, self.time, self.report)
         if evaluations != 1:
             parameters["evaluations"] = evaluations
+        displacement = self._displacement(shader)
         return Surface(
             str(self.material.GetPath()),
             program,
@@ -144,12 +144,29 @@ class PreviewReader:
             self.slots,
             tuple(dict.fromkeys(self.uv_names)),
             self.primvars,
+            displacement,
         )
 
-    def _look_for_displacement(self, shader: UsdShade.Shader) -> None:
-        source = source_of(shader, "displacement", self.time)
-        if source is not None and (not source.is_value or number(source.value, 0.0) != 0.0):
-            self.report.missing("displacement", self.material.GetPath())
+    def _displacement(self, surface: UsdShade.Shader) -> float | dict[str, Any] | None:
+        """What the material's displacement output leads to: a length or a texture use."""
+        shader = UsdShade.Material(self.material).ComputeDisplacementSource()[0]
+        connected = shader and "UsdPreviewSurface" in shader_id(shader)
+        if shader and not connected:
+            what = f"displacement shader {shader_id(shader) or '(none)'}"
+            self.report.missing(what, self.material.GetPath())
+        source = source_of(shader if connected else surface, "displacement", self.time)
+        if source is None or (source.is_value and number(source.value, 0.0) == 0.0):
+            return None
+        if not connected:
+            what = "displacement that the material's displacement output does not lead to: ignored"
+            self.report.note(what, self.material.GetPath())
+            return None
+        value = self._input("displacement", source, 0.0)
+        texture = self.slots.pop("displacement", None)
+        if self.primvars.pop("displacement", None) is not None:
+            self.report.missing("displacement by a primvar", self.material.GetPath())
+            return None
+        return texture if texture is not None else (float(value or 0.0) or None)
 
     def _input(self, slot: str, source: Source, default: Any) -> Any:
         """A constant for a slot, None for its default; a texture goes to ``slots``."""

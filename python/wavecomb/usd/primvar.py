@@ -25,11 +25,13 @@ class Primvar:
         values: (k, c), with indices already applied.
         interpolation: constant, uniform, varying, vertex or faceVarying.
         name: As authored.
+        index: (k,) Which authored value each came from; None where no indices are authored.
     """
 
     values: NDArray[Any]
     interpolation: str
     name: str
+    index: NDArray[np.int32] | None = None
 
 
 def as_array(value: Any) -> NDArray[Any] | None:
@@ -60,14 +62,15 @@ def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> P
     if values is None:
         return None
     interpolation = attribute.GetMetadata("interpolation") or "constant"
+    kept: NDArray[np.int32] | None = None
     companion = attribute.GetPrim().GetAttribute(attribute.GetName() + ":indices")
     if companion and companion.HasAuthoredValue():
         index = np.asarray(companion.Get(time))
         if index.ndim == 1 and index.dtype.kind in "iu":
             if len(index) and (index.min() < 0 or index.max() >= len(values)):
                 raise PrimvarError(f"indices of primvar {name!r} are out of range")
-            values = values[index]
-    return Primvar(values, interpolation, name)
+            values, kept = values[index], np.ascontiguousarray(index, np.int32)
+    return Primvar(values, interpolation, name, kept)
 
 
 def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.stock import FrameStock
+from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
 
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 PURPOSES = ("default", "render", "proxy", "guide")
+SurfacesOf = Callable[[MaterialTable], Surfaces]
+
 MAX_LIGHTS = 4096
 """Lights that are placed; instances may multiply them."""
 
@@ -100,6 +104,8 @@ def load_stage(
     threads: int = 0,
     editable: bool = False,
     reuse: TextureStock | None = None,
+    subdivision: str | int = "auto",
+    size: tuple[int, int] = (600, 600),
     stock: FrameStock | None = None,
     progress: LoadProgress | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
@@ -118,7 +124,10 @@ def load_stage(
         mask: Prims to draw, with all below them; with what they need, all lights and cameras. None:
             all prims. Of files only.
         session_layer: File with opinions that are stronger than the stage's. Of files only.
-        threads: For images and textures; 0: all.
+        threads: For images, textures and subdivision; 0: all.
+        subdivision: Of subdivision surfaces: "off", a level from 0 to 10, or "auto", by the size of
+            edges in the picture (docs/subdivision.md).
+        size: Of the picture that automatic levels are for, width and height.
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
@@ -138,6 +147,9 @@ def load_stage(
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
         raise WavecombError("mask and session_layer are chosen when the stage is opened")
+    level = parse_level(subdivision)
+    if not (len(size) == 2 and min(size) >= 1):
+        raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
     report = LoadReport()
     file = _file_of(source)
     if stock is not None:
@@ -146,15 +158,21 @@ def load_stage(
     with captured(report):
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
         textures = TextureTable(builder, report, threads, reuse)
+
+        def surfaces_of(materials: MaterialTable) -> Surfaces:
+            return Surfaces(
+                builder, materials, report, subdivision=level, size=size, threads=threads
+            )
+
         try:
             choice = _Choice(opened, frame, camera, purposes, editable)
-            filled = _fill(builder, choice, textures, report, stock, progress)
+            filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         finally:
             textures.release()
         scene = _build(builder, file)
     if stock is not None:
         stock.textures = textures.stock(scene)
-        stock.meshes.end_frame()
+        stock.end_frame()
         report.absorb(stock.opening)
     if builder_factory is None:
         _give_back_memory()
@@ -206,6 +224,7 @@ def _fill(
     choice: _Choice,
     textures: TextureTable,
     report: LoadReport,
+    surfaces_of: SurfacesOf,
     stock: FrameStock | None,
     progress: LoadProgress | None,
 ) -> _Filled:
@@ -224,6 +243,7 @@ def _fill(
         materials,
         bool(found.lights),
         report,
+        surfaces_of(materials),
         stock,
         progress,
     )
@@ -253,6 +273,7 @@ def _read(
     materials: MaterialTable,
     has_lights: bool,
     report: LoadReport,
+    surfaces: Surfaces,
     stock: FrameStock | None,
     progress: LoadProgress | None,
 ) -> tuple[str | None, tuple[str, ...]]:
@@ -263,8 +284,9 @@ def _read(
     lights = LightReader(time, up_axis, textures, groups, report)
     traversal = Traversal(time, purposes, lights, report)
     meshes = None if stock is None else stock.meshes
+    surfaces.stock = None if stock is None else stock.refined
     world = GroupBuilder(
-        stage, traversal, builder, materials, groups, report, meshes, progress
+        stage, traversal, builder, materials, groups, report, surfaces, meshes, progress
     ).world()
     lit = materials.glows or has_lights
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
@@ -278,6 +300,9 @@ def _read(
     if view is None:
         report.note("no camera: framed the bounds")
         view = frame_bounds(world.bounds, up_axis)
+    surfaces.finish(world, view)
+    if stock is not None:
+        stock.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
     return chosen, light_paths
 

@@ -13,6 +13,8 @@ from wavecomb.usd.texture import TextureStock
 from wavecomb.usd.varying import Varying
 
 if TYPE_CHECKING:
+    from wavecomb.usd.cage import Cage
+    from wavecomb.usd.camera import View
     from wavecomb.usd.mesh import MeshArrays
 
 
@@ -62,8 +64,37 @@ class MeshStock:
         self._kept, self._used = self._used, {}
 
 
+class RefinedStock:
+    """Refined surfaces whose cages and levels no frame changes.
+
+    Not of those that are displaced or that colour single triangles: materials have a say in them.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[int, tuple[Cage, int, dict[str, Any]]] = {}
+        self._used: dict[int, tuple[Cage, int, dict[str, Any]]] = {}
+
+    def get(self, cage: Cage, level: int) -> dict[str, Any] | None:
+        """What the frame before made of a cage; None where it did not."""
+        known = self._kept.get(id(cage))
+        if known is None or known[0] is not cage or known[1] != level:
+            return None
+        self._used[id(cage)] = known
+        return known[2]
+
+    def put(self, cage: Cage, level: int, refined: dict[str, Any]) -> None:
+        """Keeps what was made for the frame after this."""
+        self._used[id(cage)] = cage, level, refined
+
+    def end_frame(self) -> None:
+        """Forgets what the frame did not use."""
+        self._kept, self._used = self._used, {}
+
+
 class FrameStock:
     """For ``load_stage``: what it may take from the frame before, and leaves for the next one.
+
+    ``has_same_levels`` says of another view whether subdivision surfaces would be refined as much.
 
     Contract: for one open stage, which does not change but in time.
     """
@@ -72,5 +103,12 @@ class FrameStock:
         """``opening``: what there was to say when the stage was opened."""
         self.varying = Varying(stage)
         self.meshes = MeshStock(self.varying)
+        self.refined = RefinedStock()
+        self.has_same_levels: Callable[[View], bool] = lambda view: True
         self.textures: TextureStock | None = None
         self.opening = opening
+
+    def end_frame(self) -> None:
+        """Forgets what the frame did not use."""
+        self.meshes.end_frame()
+        self.refined.end_frame()

@@ -30,6 +30,8 @@ class Surface:
         textures: Slots as ``SceneBuilder.add_material`` takes them.
         uv_names: Primvars that hold texture coordinates, first use first.
         primvars: Slots read from a primvar of the mesh: slot -> (primvar, scale).
+        displacement: How far points move along their normals: a length, or a texture use; None: not
+            at all. Part of the mesh's shape, not of the material's look.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Surface:
     textures: dict[str, dict[str, Any]] = field(default_factory=dict)
     uv_names: tuple[str, ...] = ()
     primvars: dict[str, str] = field(default_factory=dict)
+    displacement: float | dict[str, Any] | None = None
 
     def key(self) -> str:
         """Equal for surfaces that look alike."""

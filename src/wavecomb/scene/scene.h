@@ -118,11 +118,16 @@ class SceneBuilder {
   uint32_t add_texture(const TextureDesc& desc);
   /// A texture of another scene, which may end before this one.
   uint32_t add_texture(TexturePtr texture);
+  /// A texture that was added; valid until the builder is gone or build() is called.
+  const Texture& texture(uint32_t id) const;
   /// Texture ids in the material must exist.
   uint32_t add_material(Material material);
   /// Checks sizes and indices. Faces with points that are not finite are refused by name; faces
   /// without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
+  /// Gives a mesh other arrays, checked as those of add_mesh; its name, its light group and its
+  /// place in groups stay.
+  void replace_mesh(uint32_t id, Mesh mesh);
   /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.
   /// `root` is the prim path that names of its meshes and of placements in it begin with, which
   /// each of its own placements' names takes the place of (ObjectNames).

@@ -114,6 +114,11 @@ uint32_t SceneBuilder::add_texture(TexturePtr texture) {
   return static_cast<uint32_t>(textures_.size() - 1);
 }
 
+const Texture& SceneBuilder::texture(uint32_t id) const {
+  if (id >= textures_.size()) throw Error("texture " + std::to_string(id) + " was never added");
+  return *textures_[id];
+}
+
 uint32_t SceneBuilder::add_material(Material material) {
   check_material(material, textures_.size());
   const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
@@ -126,7 +131,10 @@ uint32_t SceneBuilder::add_material(Material material) {
   return static_cast<uint32_t>(materials_.size() - 1);
 }
 
-uint32_t SceneBuilder::add_mesh(Mesh mesh) {
+namespace {
+
+/// What add_mesh and replace_mesh ask of a mesh.
+void check_mesh(const Mesh& mesh) {
   const auto name = quoted("mesh", mesh.name);
   if (mesh.positions.size() % 3 != 0) throw Error(name + ": positions must be triples");
   if (mesh.indices.size() % 3 != 0) throw Error(name + ": indices must be triples");
@@ -146,8 +154,24 @@ uint32_t SceneBuilder::add_mesh(Mesh mesh) {
   if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.triangle_count())
     throw Error(name + " has " + std::to_string(mesh.face_materials.size()) +
                 " face materials for " + std::to_string(mesh.triangle_count()) + " triangles");
+}
+
+}  // namespace
+
+uint32_t SceneBuilder::add_mesh(Mesh mesh) {
+  check_mesh(mesh);
   meshes_.push_back(std::move(mesh));
   return static_cast<uint32_t>(meshes_.size() - 1);
+}
+
+void SceneBuilder::replace_mesh(uint32_t id, Mesh mesh) {
+  if (id >= meshes_.size()) throw Error("mesh " + std::to_string(id) + " was never added");
+  Mesh& old = meshes_[id];
+  mesh.name = old.name;
+  mesh.light_group = old.light_group;
+  mesh.asset_length = old.asset_length;
+  check_mesh(mesh);
+  old = std::move(mesh);
 }
 
 uint32_t SceneBuilder::add_group(std::string name, std::string root) {

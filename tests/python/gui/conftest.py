@@ -43,7 +43,7 @@ def new_session(qtbot):
 @pytest.fixture
 def window(qtbot, qapp, tmp_path):
     """An empty window with settings of its own, 96 x 96 pixels and 4 samples."""
-    from PySide6.QtCore import QSettings
+    from PySide6.QtCore import QCoreApplication, QEvent, QSettings
 
     from wavecomb.gui import theme
     from wavecomb.gui.main_window import MainWindow
@@ -58,6 +58,8 @@ def window(qtbot, qapp, tmp_path):
     yield made
     made.close()
     made.deleteLater()
+    # Not by itself between tests, and each change of colours would go through all old windows.
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture

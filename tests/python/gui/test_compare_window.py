@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, QSettings, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QTableWidget, QToolButton
@@ -16,6 +16,7 @@ from wavecomb.image import write_exr
 
 KEYS = Qt.Key
 LEFT = Qt.MouseButton.LeftButton
+SHIFTED = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
 
 
 @pytest.fixture
@@ -41,7 +42,7 @@ def files(tmp_path):
 
 
 def settled(qtbot, window):
-    qtbot.waitUntil(lambda: not window.busy, timeout=20000)
+    qtbot.waitUntil(lambda: not window.busy, timeout=120000)
 
 
 def numbers(window):
@@ -129,8 +130,7 @@ def test_what_a_wipe_shows(qtbot, pair):
     """Left of the line A is painted, right of it B: the pixel that differs changes with it."""
     pair.set_mode("wipe")
     view = pair.view
-    pane = view._panes()[0][1]
-    at = view._target(pane, view._size()).topLeft()
+    at = view.target(0).topLeft()
     scale = view.points_per_pixel()
     spot = QPoint(round(at.x() + 7.5 * scale), round(at.y() + 4.5 * scale))
 
@@ -162,7 +162,7 @@ def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
         )
         QApplication.sendEvent(view, event)
     assert view.zoom is not None and view.pixel_at(at) == before
-    twin = QPointF(at.x() - (view._panes()[1][1].left()), at.y())
+    twin = at - view.target(1).topLeft() + view.target(0).topLeft()
     assert view.pixel_at(twin) == before  # the same place in A
     QTest.mousePress(view, LEFT, pos=at.toPoint())
     QTest.mouseMove(view, (at + QPointF(40, 0)).toPoint())
@@ -174,7 +174,7 @@ def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
 
 def test_values_under_the_mouse(qtbot, pair):
     view = pair.view
-    at = view._target(view._panes()[0][1], view._size()).topLeft()
+    at = view.target(0).topLeft()
     scale = view.points_per_pixel()
     QTest.mouseMove(view, QPoint(round(at.x() + 7.5 * scale), round(at.y() + 4.5 * scale)))
     table = pair.findChild(QTableWidget, "pixel")
@@ -244,12 +244,12 @@ def test_kept_picture_against_live_settings(qtbot, session):
             frame = live.last_frame
             return frame is not None and frame.final and frame.version == live.version
 
-        qtbot.waitUntil(done, timeout=20000)
+        qtbot.waitUntil(done, timeout=120000)
         settled(qtbot, window)
         assert verdict(window) == "beauty: bit for bit the same"
         assert "share all threads" in window._pickers["B"].findChild(QLabel, "sharing").text()
         window.b.change(seed=5)
-        qtbot.waitUntil(done, timeout=20000)
+        qtbot.waitUntil(done, timeout=120000)
         settled(qtbot, window)
         assert verdict(window).startswith("beauty: different")
         assert "seed 5" in window.findChild(QLabel, "titleB").text()
@@ -259,3 +259,26 @@ def test_kept_picture_against_live_settings(qtbot, session):
         assert live not in session._twins  # it was given back
     finally:
         window.shutdown()
+
+
+def test_keys_of_the_main_window_keep_the_picture(qtbot, cornell, tmp_path):
+    from wavecomb.gui.main_window import MainWindow
+    from wavecomb.gui.setup import Setup
+
+    settings = QSettings(str(tmp_path / "view.ini"), QSettings.Format.IniFormat)
+    window = MainWindow(Setup(width=48, height=48, spp=2), settings)
+    qtbot.addWidget(window)
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    compared = window.docks["compare"].widget()
+    with qtbot.waitSignal(window.session.failed) as failed:
+        QTest.keyClick(window, KEYS.Key_A, SHIFTED)
+    assert "open a stage first" in failed.args[0]
+    window.open(str(cornell))
+    qtbot.waitUntil(lambda: window.session.state == "finished", timeout=120000)
+    for key in (KEYS.Key_A, KEYS.Key_B):
+        QTest.keyClick(window, key, SHIFTED)
+    settled(qtbot, compared)
+    assert verdict(compared) == "beauty: bit for bit the same"
+    window.close()

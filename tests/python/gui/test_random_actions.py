@@ -124,8 +124,8 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
     bad = (QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg)
 
     def heard(kind, context, text):
-        # The offscreen platform says this of every window.
-        if kind in bad and "propagateSizeHints" not in text:
+        # The offscreen platform says so of sizes and of raising windows.
+        if kind in bad and not text.startswith("This plugin does not support"):
             faults.append(text)
 
     before = qInstallMessageHandler(heard)
@@ -152,7 +152,7 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
         qInstallMessageHandler(before)
     story = "\n".join(monkey.log[-12:])
     assert not faults, f"{faults}\n{story}"
-    assert "internal" not in window.message.text(), window.message.text() + story
+    assert not window.message.text().startswith("Error: internal:"), window.message.text() + story
     assert threading.active_count() <= threads + 1
     assert len(gc.get_objects()) < 1.15 * objects
     assert resident_bytes() < resident + 150e6

@@ -217,8 +217,8 @@ def test_adaptive_sampling(panel: SchedulingPanel, session: Any, qtbot: Any) -> 
     assert panel.light.verdict.kind == "first"
     choose(panel, "policy", "none")
     expect_same(panel, session, qtbot, 1)  # the map of samples is the same, too
-    choose(panel, "adaptive_mode", "both")
-    assert session.setup.noise == 0.5, "as it was"
+    choose(panel, "adaptive_mode", "noise")
+    assert session.setup.noise == 0.5 and session.setup.adaptive == 0, "the target as it was"
     type_number(panel, "min_spp", "64")
     assert messages and "min_spp" in messages[-1], "more than there may be"
     assert panel.findChild(QAbstractSpinBox, "min_spp").value() == session.setup.min_spp == 16

@@ -74,6 +74,21 @@ def test_orbit(viewport, button, modifiers):
     assert session.pose.path is None
 
 
+def test_pictures_follow_while_it_is_dragged(viewport, qtbot):
+    session, shown = viewport.session, []
+    viewport.shown.connect(lambda frame, look: shown.append(frame.version))
+    drag_start = QPointF(*middle(viewport))
+    QTest.mousePress(viewport, Middle, No, drag_start.toPoint())
+    for k in range(100):
+        move(viewport, drag_start + QPointF(k, 0), Middle)
+        qtbot.wait(5)
+    during = len(shown)
+    QTest.mouseRelease(viewport, Middle, No, (drag_start + QPointF(99, 0)).toPoint())
+    assert during >= 3 and shown == sorted(shown)
+    wait_final(qtbot, session)
+    qtbot.waitUntil(lambda: viewport.frame_shown is session.last_frame)
+
+
 def test_pan_takes_what_is_under_the_cursor_along(viewport):
     session, (x, y) = viewport.session, middle(viewport)
     at = viewport.to_picture(QPointF(x, y))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import wait_final
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QPalette
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QPushButton,
     QSlider,
+    QWidget,
 )
 
 from wavecomb.gui import messages, theme
@@ -256,3 +257,22 @@ def test_closing_ends_all_threads(window, qtbot, cornell):
     window.close()
     names = [thread.name for thread in threading.enumerate()]
     assert not [name for name in names if name.startswith("wavecomb-")]
+
+
+def test_colours_reach_every_widget(window, qapp):
+    for dock in window.docks.values():
+        dock.show()
+    for colours, is_dark in (("light", False), ("dark", True)):
+        theme.apply(colours)
+        qapp.processEvents()
+        for widget in window.findChildren(QWidget):
+            background = widget.palette().color(QPalette.ColorRole.Base)
+            text = widget.palette().color(QPalette.ColorRole.Text)
+            where = f"{type(widget).__name__} {widget.objectName()} in {colours}"
+            assert (background.lightness() < 128) == is_dark, where
+            assert (text.lightness() > 128) == is_dark, where
+
+
+def test_panels_leave_room_for_the_picture(window):
+    for name, dock in window.docks.items():
+        assert dock.minimumSizeHint().width() <= 600, name

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bind.h"
+#include "wavecomb/core/error.h"
+#include "wavecomb/geometry/screen_size.h"
+#include "wavecomb/geometry/surface.h"
+#include "wavecomb/scene/parallel.h"
+#include "wavecomb/scene/scene.h"
+
+namespace nb = nanobind;
+using namespace wavecomb;
+
+namespace {
+
+template <typename T>
+using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+
+/// The entry of a description, kept alive by the description; empty where it is not there.
+template <typename T>
+std::span<const T> span_of(const nb::dict& d, const char* key) {
+  if (!d.contains(key) || d[key].is_none()) return {};
+  const auto array = nb::cast<Array<T>>(d[key]);
+  return {array.data(), array.size()};
+}
+
+template <typename Enum>
+Enum rule_of(const nb::dict& d, const char* key, std::initializer_list<const char*> names) {
+  const auto value = nb::cast<std::string>(d[key]);
+  size_t i = 0;
+  for (const char* name : names) {
+    if (value == name) return static_cast<Enum>(i);
+    ++i;
+  }
+  throw Error(std::string(key) + " is '" + value + "', which is no such rule");
+}
+
+SurfacePrimvar primvar_of(const nb::dict& d, uint32_t width, Cage& cage) {
+  SurfacePrimvar primvar;
+  primvar.width = width;
+  primvar.kind =
+      rule_of<PrimvarKind>(d, "interpolation", {"none", "vertex", "varying", "faceVarying"});
+  primvar.values = span_of<float>(d, "values");
+  if (primvar.kind == PrimvarKind::kFaceVarying) {
+    primvar.channel = static_cast<uint32_t>(cage.channels.size());
+    cage.channels.push_back(
+        {span_of<int32_t>(d, "indices"), static_cast<uint32_t>(primvar.values.size() / width)});
+  }
+  return primvar;
+}
+
+SurfaceDesc describe(const SceneBuilder& builder, const nb::dict& d) {
+  SurfaceDesc desc;
+  desc.level = nb::cast<uint32_t>(d["level"]);
+  desc.points = span_of<float>(d, "points");
+  Cage& cage = desc.cage;
+  cage.vertex_count = static_cast<uint32_t>(desc.points.size() / 3);
+  cage.face_sizes = span_of<int32_t>(d, "counts");
+  cage.corners = span_of<int32_t>(d, "indices");
+  if (desc.level > 0) {
+    cage.scheme = rule_of<Scheme>(d, "scheme", {"catmullClark", "loop", "bilinear"});
+    cage.boundary = rule_of<BoundaryRule>(d, "boundary", {"none", "edgeOnly", "edgeAndCorner"});
+    cage.face_varying = rule_of<FaceVaryingRule>(
+        d, "face_varying",
+        {"none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundaries", "all"});
+    cage.smooth_triangles = nb::cast<bool>(d["smooth_triangles"]);
+    cage.holes = span_of<int32_t>(d, "holes");
+    cage.crease_edges = span_of<int32_t>(d, "crease_edges");
+    cage.crease_sharpness = span_of<float>(d, "crease_sharpness");
+    cage.corner_vertices = span_of<int32_t>(d, "corner_vertices");
+    cage.corner_sharpness = span_of<float>(d, "corner_sharpness");
+  }
+  desc.triangles = span_of<uint32_t>(d, "triangles");
+  desc.triangle_faces = span_of<uint32_t>(d, "triangle_faces");
+  desc.triangle_corners = span_of<uint32_t>(d, "triangle_corners");
+  if (d.contains("uvs") && !d["uvs"].is_none())
+    desc.uvs = primvar_of(nb::cast<nb::dict>(d["uvs"]), 2, cage);
+  if (d.contains("primvars"))
+    for (const nb::handle item : nb::cast<nb::list>(d["primvars"])) {
+      const auto primvar = nb::cast<nb::dict>(item);
+      desc.primvars.push_back(primvar_of(primvar, nb::cast<uint32_t>(primvar["width"]), cage));
+    }
+  if (d.contains("displacements"))
+    for (const nb::handle item : nb::cast<nb::list>(d["displacements"])) {
+      Displacement displacement;
+      if (nb::isinstance<nb::dict>(item)) {
+        displacement.use = texture_use(nb::cast<nb::dict>(item));
+        displacement.texture = &builder.texture(displacement.use.texture).view();
+      } else {
+        displacement.constant = nb::cast<float>(item);
+      }
+      desc.displacements.push_back(displacement);
+    }
+  desc.face_displacement = span_of<int32_t>(d, "face_displacement");
+  if (d.contains("matrix")) {
+    const auto matrix = span_of<double>(d, "matrix");
+    if (matrix.size() != 16) throw Error("a transform must be 4 x 4");
+    std::copy(matrix.begin(), matrix.end(), desc.matrix.begin());
+  }
+  desc.left_handed = nb::cast<bool>(d["left_handed"]);
+  return desc;
+}
+
+/// A vector as an array (-1, columns), or a list where `columns` is 0; moved, not copied.
+template <typename T>
+nb::object array_of(std::vector<T>&& values, size_t columns) {
+  auto* held = new std::vector<T>(std::move(values));
+  const nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  using Made = nb::ndarray<nb::numpy, T>;
+  if (columns == 0) return nb::cast(Made(held->data(), {held->size()}, owner));
+  return nb::cast(Made(held->data(), {held->size() / columns, columns}, owner));
+}
+
+}  // namespace
+
+nb::list make_surfaces(const SceneBuilder& builder, const nb::list& descriptions,
+                       uint32_t threads) {
+  std::vector<SurfaceDesc> descs;
+  std::vector<std::string> errors(nb::len(descriptions));
+  for (const nb::handle item : descriptions) {
+    try {
+      descs.push_back(describe(builder, nb::cast<nb::dict>(item)));
+    } catch (const Error& error) {
+      errors[descs.size()] = error.what();
+      descs.emplace_back();
+    }
+  }
+  std::vector<SurfaceMesh> meshes(descs.size());
+  {
+    const nb::gil_scoped_release release;
+    with_threads(threads, [&] {
+      parallel_for(descs.size(), [&](size_t i) {
+        if (!errors[i].empty()) return;
+        try {
+          meshes[i] = make_surface(descs[i]);
+        } catch (const Error& error) {
+          errors[i] = error.what();
+        } catch (const std::bad_alloc&) {
+          errors[i] = "out of memory";
+        }
+      });
+    });
+  }
+  nb::list out;
+  for (size_t i = 0; i < meshes.size(); ++i) {
+    if (!errors[i].empty()) {
+      out.append(errors[i]);
+      continue;
+    }
+    SurfaceMesh& mesh = meshes[i];
+    nb::dict d;
+    d["positions"] = array_of(std::move(mesh.positions), 3);
+    d["normals"] = array_of(std::move(mesh.normals), 3);
+    d["uvs"] = mesh.uvs.empty() ? nb::none() : array_of(std::move(mesh.uvs), 2);
+    d["triangles"] = array_of(std::move(mesh.triangles), 3);
+    d["faces"] = array_of(std::move(mesh.faces), 0);
+    nb::list primvars;
+    for (size_t p = 0; p < mesh.primvars.size(); ++p)
+      primvars.append(array_of(std::move(mesh.primvars[p]), descs[i].primvars[p].width));
+    d["primvars"] = primvars;
+    d["manifold"] = mesh.is_manifold;
+    out.append(d);
+  }
+  return out;
+}
+
+namespace {
+
+double pixels(const Array<float>& points, const Array<int32_t>& counts,
+              const Array<int32_t>& indices, const Array<double>& transforms,
+              const Array<double>& to_camera, const std::array<double, 2>& centre,
+              const std::array<double, 2>& half, double pixels_per_unit) {
+  if (transforms.ndim() != 3 || transforms.shape(1) != 4 || transforms.shape(2) != 4 ||
+      to_camera.size() != 16)
+    throw Error("transforms must have the shape (k, 4, 4)");
+  ScreenView view;
+  std::copy_n(to_camera.data(), 16, view.to_camera.begin());
+  std::copy_n(centre.begin(), 2, view.centre);
+  std::copy_n(half.begin(), 2, view.half);
+  view.pixels = pixels_per_unit;
+  const nb::gil_scoped_release release;
+  double most = 0;
+  for (size_t i = 0; i < transforms.shape(0); ++i)
+    most = std::max(
+        most, edge_pixels({points.data(), points.size()}, {counts.data(), counts.size()},
+                          {indices.data(), indices.size()}, transforms.data() + 16 * i, view));
+  return most;
+}
+
+nb::tuple weld(const Array<int32_t>& corners, uint32_t point_count, const Array<float>& values) {
+  if (values.ndim() != 2) throw Error("values must have the shape (corners, width)");
+  Welded welded;
+  {
+    const nb::gil_scoped_release release;
+    welded = weld_corners({corners.data(), corners.size()}, point_count,
+                          {values.data(), values.size()}, static_cast<uint32_t>(values.shape(1)));
+  }
+  return nb::make_tuple(array_of(std::move(welded.indices), 0),
+                        array_of(std::move(welded.values), values.shape(1)));
+}
+
+}  // namespace
+
+void bind_geometry(nb::module_& m) {
+  using namespace nb::literals;
+  m.attr("MAX_SUBDIVISION") = Subdivision::kMaxLevel;
+  m.def("edge_pixels", &pixels, "points"_a, "counts"_a, "indices"_a, "transforms"_a, "to_camera"_a,
+        "centre"_a, "half"_a, "pixels_per_unit"_a);
+  m.def("weld_corners", &weld, "corners"_a, "point_count"_a, "values"_a);
+}

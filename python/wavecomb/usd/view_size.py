@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How large the edges of meshes are in the picture, over all their instances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.usd.cage import Cage
+from wavecomb.usd.camera import View
+
+if TYPE_CHECKING:
+    from wavecomb.usd.groups import Group
+
+Matrices = NDArray[np.float64]
+
+NEAREST = 16
+"""Placements of a mesh that are measured edge by edge; the others look smaller than these."""
+
+_MOST_PLACED = 1 << 20
+"""Placements of a group along one way from the world that are looked at."""
+
+
+class ViewSize:
+    """Measures in pixels of one view."""
+
+    def __init__(self, view: View, size: tuple[int, int]) -> None:
+        """``size``: of the picture, width and height."""
+        x0, x1, y0, y1 = (float(value) for value in view.options["window"])
+        half = [0.5 * (x1 - x0), 0.5 * (y1 - y0)]
+        # As the camera does: the window grows to the shape of the picture.
+        aspect = size[0] / size[1]
+        if half[0] / half[1] < aspect:
+            half[0] = half[1] * aspect
+        else:
+            half[1] = half[0] / aspect
+        self.centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        self.half = half[0], half[1]
+        self.pixels = size[0] / (2.0 * half[0])
+        self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
+
+    def edges(self, cage: Cage, bounds: NDArray[Any], placed: Matrices) -> float:
+        """The largest mean length in pixels of a cage's edges (``_core.edge_pixels``).
+
+        Args:
+            cage: What is measured.
+            bounds: (2, 3), in its group.
+            placed: (k, 4, 4) from its group to the world.
+        """
+        from wavecomb import _core
+
+        if len(placed) > NEAREST:
+            placed = placed[self._largest(bounds, placed)]
+        transforms = np.array(cage.matrix) @ placed
+        return _core.edge_pixels(
+            cage.points, cage.counts, cage.indices, np.ascontiguousarray(transforms),
+            np.ascontiguousarray(self.to_camera), self.centre, self.half, self.pixels,
+        )  # fmt: skip
+
+    def _largest(self, bounds: NDArray[Any], placed: Matrices) -> NDArray[np.intp]:
+        """The placements in which a bounding sphere looks largest, those in the picture first."""
+        centre = 0.5 * (bounds[0] + bounds[1]).astype(np.float64)
+        radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
+        linear = placed[:, :3, :3]
+        scale = np.sqrt(np.einsum("kij,kij->ki", linear, linear).max(axis=1))
+        world = centre @ linear + placed[:, 3, :3]
+        seen = world @ self.to_camera[:3, :3] + self.to_camera[3, :3]
+        reach = radius * scale
+        distance = np.maximum(np.linalg.norm(seen, axis=1) - reach, 0.01 * reach + 1e-30)
+        depth = np.maximum(-seen[:, 2] + reach, 0.0)
+        aside = [
+            np.abs(seen[:, axis] - self.centre[axis] * depth) - reach <= self.half[axis] * depth
+            for axis in (0, 1)
+        ]
+        weight = np.where((depth > 0) & aside[0] & aside[1], 1.0, 0.125)
+        return np.argsort(-weight * scale / distance, kind="stable")[:NEAREST]
+
+
+def placements(world: Group) -> dict[int, Matrices]:
+    """Where the groups that hold surfaces are placed: id of a group -> (k, 4, 4)."""
+    found: dict[int, list[Matrices]] = {}
+    for group, placed in _walk(world, np.eye(4)[None]):
+        found.setdefault(id(group), []).append(placed)
+    return {key: np.concatenate(parts) for key, parts in found.items()}
+
+
+def _walk(group: Group, placed: Matrices) -> Iterator[tuple[Group, Matrices]]:
+    yield group, placed
+    for child, transforms in group.surfaced:
+        every = transforms[:, None] @ placed[None]
+        yield from _walk(child, every.reshape(-1, 4, 4)[:_MOST_PLACED])

@@ -1,0 +1,416 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/geometry/subdivision.h"
+
+#include <opensubdiv/far/error.h>
+#include <opensubdiv/far/primvarRefiner.h>
+#include <opensubdiv/far/topologyDescriptor.h>
+#include <opensubdiv/far/topologyRefinerFactory.h>
+
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+namespace Far = OpenSubdiv::Far;
+namespace Sdc = OpenSubdiv::Sdc;
+
+/// What OpenSubdiv said last on this thread: its callbacks are one for the process.
+thread_local std::string last_message;
+
+void catch_messages() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    const auto keep = [](const char* text) {
+      if (last_message.empty()) last_message = text;
+    };
+    static const auto keep_text = keep;
+    Far::SetErrorCallback([](Far::ErrorType, const char* text) { keep_text(text); });
+    Far::SetWarningCallback([](const char* text) { keep_text(text); });
+  });
+}
+
+/// N floats as OpenSubdiv wants them.
+template <int N>
+struct Values {
+  float v[N];
+  void Clear() { std::fill(v, v + N, 0.f); }
+  void AddWithWeight(const Values& other, float weight) {
+    for (int i = 0; i < N; ++i) v[i] += weight * other.v[i];
+  }
+};
+
+/// Calls f with a std::integral_constant of `width`.
+template <typename F>
+auto with_width(uint32_t width, F&& f) {
+  switch (width) {
+    case 1:
+      return f(std::integral_constant<int, 1>());
+    case 2:
+      return f(std::integral_constant<int, 2>());
+    case 3:
+      return f(std::integral_constant<int, 3>());
+    case 4:
+      return f(std::integral_constant<int, 4>());
+    default:
+      throw Error("primvars that are refined have 1 to 4 components");
+  }
+}
+
+Sdc::SchemeType scheme_of(Scheme scheme) {
+  switch (scheme) {
+    case Scheme::kLoop:
+      return Sdc::SCHEME_LOOP;
+    case Scheme::kBilinear:
+      return Sdc::SCHEME_BILINEAR;
+    case Scheme::kCatmullClark:
+      break;
+  }
+  return Sdc::SCHEME_CATMARK;
+}
+
+Sdc::Options options_of(const Cage& cage) {
+  static constexpr Sdc::Options::VtxBoundaryInterpolation kBoundaries[] = {
+      Sdc::Options::VTX_BOUNDARY_NONE, Sdc::Options::VTX_BOUNDARY_EDGE_ONLY,
+      Sdc::Options::VTX_BOUNDARY_EDGE_AND_CORNER};
+  static constexpr Sdc::Options::FVarLinearInterpolation kLinear[] = {
+      Sdc::Options::FVAR_LINEAR_NONE,          Sdc::Options::FVAR_LINEAR_CORNERS_ONLY,
+      Sdc::Options::FVAR_LINEAR_CORNERS_PLUS1, Sdc::Options::FVAR_LINEAR_CORNERS_PLUS2,
+      Sdc::Options::FVAR_LINEAR_BOUNDARIES,    Sdc::Options::FVAR_LINEAR_ALL};
+  Sdc::Options options;
+  options.SetVtxBoundaryInterpolation(kBoundaries[static_cast<size_t>(cage.boundary)]);
+  options.SetFVarLinearInterpolation(kLinear[static_cast<size_t>(cage.face_varying)]);
+  options.SetTriangleSubdivision(cage.smooth_triangles ? Sdc::Options::TRI_SUB_SMOOTH
+                                                       : Sdc::Options::TRI_SUB_CATMARK);
+  return options;
+}
+
+void check_points(std::span<const int32_t> points, uint32_t count, const char* what) {
+  for (const int32_t p : points)
+    if (p < 0 || static_cast<uint32_t>(p) >= count)
+      throw Error(std::string(what) + " names a point that is not there");
+}
+
+/// What OpenSubdiv takes for granted.
+void check(const Cage& cage) {
+  size_t at = 0;
+  for (const int32_t size : cage.face_sizes) {
+    if (size < 3) throw Error("a face has fewer than three corners");
+    if (cage.scheme == Scheme::kLoop && size != 3)
+      throw Error("Loop subdivision needs triangles, and a face is none");
+    if (static_cast<size_t>(size) > cage.corners.size() - at)
+      throw Error("the face counts do not add up to the number of face indices");
+    at += static_cast<size_t>(size);
+  }
+  if (at != cage.corners.size())
+    throw Error("the face counts do not add up to the number of face indices");
+  if (at == 0) throw Error("no faces");
+  check_points(cage.corners, cage.vertex_count, "a face");
+  at = 0;
+  std::vector<int32_t> sorted;
+  for (const int32_t size : cage.face_sizes) {
+    const auto face = cage.corners.subspan(at, static_cast<size_t>(size));
+    sorted.assign(face.begin(), face.end());
+    std::sort(sorted.begin(), sorted.end());
+    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
+      throw Error("a face has one point twice");
+    at += static_cast<size_t>(size);
+  }
+  check_points(cage.crease_edges, cage.vertex_count, "a crease");
+  check_points(cage.corner_vertices, cage.vertex_count, "a sharp corner");
+  if (cage.crease_edges.size() != 2 * cage.crease_sharpness.size() ||
+      cage.corner_vertices.size() != cage.corner_sharpness.size())
+    throw Error("creases or corners do not have a sharpness each");
+  for (const FaceVaryingIndices& channel : cage.channels) {
+    if (channel.indices.size() != cage.corners.size())
+      throw Error("a face-varying primvar does not have an index for each corner");
+    check_points(channel.indices, channel.value_count, "a face-varying primvar");
+  }
+}
+
+}  // namespace
+
+struct Subdivision::Refiner {
+  std::unique_ptr<Far::TopologyRefiner> far;
+  Scheme scheme;
+  bool manifold = true;
+
+  int level() const { return far->GetMaxLevel(); }
+  Far::TopologyLevel last() const { return far->GetLevel(level()); }
+
+  /// Face of the cage of every face of the last level.
+  std::vector<uint32_t> bases() const {
+    std::vector<uint32_t> base(static_cast<size_t>(far->GetLevel(0).GetNumFaces()));
+    std::iota(base.begin(), base.end(), 0u);
+    for (int l = 1; l <= level(); ++l) {
+      const Far::TopologyLevel here = far->GetLevel(l);
+      std::vector<uint32_t> next(static_cast<size_t>(here.GetNumFaces()));
+      for (size_t f = 0; f < next.size(); ++f)
+        next[f] = base[static_cast<size_t>(here.GetFaceParentFace(static_cast<int>(f)))];
+      base = std::move(next);
+    }
+    return base;
+  }
+
+  /// Calls f(face) for the faces of the last level that are drawn, in order.
+  template <typename F>
+  void each_face(const std::vector<uint32_t>& base, F&& f) const {
+    const Far::TopologyLevel cage = far->GetLevel(0);
+    for (size_t i = 0; i < base.size(); ++i)
+      if (!cage.IsFaceHole(static_cast<int>(base[i]))) f(static_cast<int>(i));
+  }
+
+  /// Refines values of the cage level by level with `step(level, from, to)`, sizes by
+  /// `size(level)`.
+  template <typename V, typename Size, typename Step>
+  std::vector<V> refine(std::span<const float> values, Size&& size, Step&& step) const {
+    const size_t width = sizeof(V) / sizeof(float);
+    std::vector<V> here(size(0));
+    if (values.size() != here.size() * width)
+      throw Error("a primvar has the wrong number of values");
+    std::copy(values.begin(), values.end(), reinterpret_cast<float*>(here.data()));
+    for (int l = 1; l <= level(); ++l) {
+      std::vector<V> next(size(l));
+      const V* from = here.data();
+      V* to = next.data();
+      step(l, from, to);
+      here = std::move(next);
+    }
+    return here;
+  }
+
+  size_t vertices_of(int l) const { return static_cast<size_t>(far->GetLevel(l).GetNumVertices()); }
+};
+
+namespace {
+
+template <typename V>
+std::vector<float> flat(const std::vector<V>& values) {
+  const float* first = reinterpret_cast<const float*>(values.data());
+  return {first, first + values.size() * (sizeof(V) / sizeof(float))};
+}
+
+}  // namespace
+
+Subdivision::Subdivision(const Cage& cage, uint32_t level) {
+  if (level < 1 || level > kMaxLevel) throw Error("the level of subdivision must be 1 to 10");
+  check(cage);
+  // OpenSubdiv counts with 32 bits; each level has four times the corners.
+  if ((cage.corners.size() >> (31 - 2 * level)) > 0)
+    throw Error("too many faces for level " + std::to_string(level));
+  catch_messages();
+  last_message.clear();
+  const auto count = [](size_t n) { return static_cast<int>(n); };
+  Far::TopologyDescriptor desc;
+  desc.numVertices = count(cage.vertex_count);
+  desc.numFaces = count(cage.face_sizes.size());
+  desc.numVertsPerFace = cage.face_sizes.data();
+  desc.vertIndicesPerFace = cage.corners.data();
+  desc.numCreases = count(cage.crease_sharpness.size());
+  desc.creaseVertexIndexPairs = cage.crease_edges.data();
+  desc.creaseWeights = cage.crease_sharpness.data();
+  desc.numCorners = count(cage.corner_vertices.size());
+  desc.cornerVertexIndices = cage.corner_vertices.data();
+  desc.cornerWeights = cage.corner_sharpness.data();
+  std::vector<int32_t> holes;
+  for (const int32_t hole : cage.holes)
+    if (hole >= 0 && hole < desc.numFaces) holes.push_back(hole);
+  desc.numHoles = count(holes.size());
+  desc.holeIndices = holes.data();
+  std::vector<Far::TopologyDescriptor::FVarChannel> channels(cage.channels.size());
+  for (size_t c = 0; c < channels.size(); ++c) {
+    channels[c].numValues = count(cage.channels[c].value_count);
+    channels[c].valueIndices = cage.channels[c].indices.data();
+  }
+  desc.numFVarChannels = count(channels.size());
+  desc.fvarChannels = channels.data();
+  using Factory = Far::TopologyRefinerFactory<Far::TopologyDescriptor>;
+  Factory::Options options(scheme_of(cage.scheme), options_of(cage));
+  options.validateFullTopology = true;
+  refiner_ = std::make_unique<Refiner>();
+  refiner_->scheme = cage.scheme;
+  refiner_->far.reset(Factory::Create(desc, options));
+  if (refiner_->far == nullptr)
+    throw Error(last_message.empty() ? "its topology cannot be subdivided" : last_message);
+  const Far::TopologyLevel base = refiner_->far->GetLevel(0);
+  for (int e = 0; e < base.GetNumEdges() && refiner_->manifold; ++e)
+    refiner_->manifold = !base.IsEdgeNonManifold(e);
+  for (int v = 0; v < base.GetNumVertices() && refiner_->manifold; ++v)
+    refiner_->manifold = !base.IsVertexNonManifold(v);
+  Far::TopologyRefiner::UniformOptions uniform(static_cast<int>(level));
+  uniform.fullTopologyInLastLevel = true;
+  refiner_->far->RefineUniform(uniform);
+}
+
+Subdivision::~Subdivision() = default;
+Subdivision::Subdivision(Subdivision&&) noexcept = default;
+
+bool Subdivision::is_manifold() const {
+  return refiner_->manifold;
+}
+
+uint32_t Subdivision::vertex_count() const {
+  return static_cast<uint32_t>(refiner_->last().GetNumVertices());
+}
+
+RefinedFaces Subdivision::faces() const {
+  const Far::TopologyLevel last = refiner_->last();
+  const std::vector<uint32_t> base = refiner_->bases();
+  RefinedFaces faces;
+  faces.size = refiner_->scheme == Scheme::kLoop ? 3 : 4;
+  faces.vertex_count = vertex_count();
+  faces.corners.reserve(base.size() * faces.size);
+  faces.base.reserve(base.size());
+  refiner_->each_face(base, [&](int f) {
+    const Far::ConstIndexArray points = last.GetFaceVertices(f);
+    faces.corners.insert(faces.corners.end(), points.begin(), points.end());
+    faces.base.push_back(base[static_cast<size_t>(f)]);
+  });
+  if (last.GetNumFVarChannels() > 0) faces.first_values = face_varying_corners(0);
+  return faces;
+}
+
+std::vector<uint32_t> Subdivision::face_varying_corners(uint32_t channel) const {
+  const Far::TopologyLevel last = refiner_->last();
+  std::vector<uint32_t> out;
+  refiner_->each_face(refiner_->bases(), [&](int f) {
+    const Far::ConstIndexArray values = last.GetFaceFVarValues(f, static_cast<int>(channel));
+    out.insert(out.end(), values.begin(), values.end());
+  });
+  return out;
+}
+
+std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
+                                                  uint32_t& count) const {
+  const Far::TopologyLevel last = refiner_->last();
+  const std::vector<uint32_t> base = refiner_->bases();
+  count = vertex_count();
+  // Where each face of the level is in `faces`.
+  std::vector<uint32_t> place(base.size(), ~0u);
+  uint32_t next = 0;
+  refiner_->each_face(base, [&](int f) { place[static_cast<size_t>(f)] = next++; });
+  const auto sharp = [&](int e) {
+    const Far::ConstIndexArray around = last.GetEdgeFaces(e);
+    if (around.size() != 2 || last.GetEdgeSharpness(e) > 0) return true;
+    // A bilinear surface has an edge wherever its cage has one.
+    return refiner_->scheme == Scheme::kBilinear &&
+           base[static_cast<size_t>(around[0])] != base[static_cast<size_t>(around[1])];
+  };
+  std::vector<uint32_t> normals = faces.corners;
+  std::vector<int> sector;
+  for (int v = 0; v < last.GetNumVertices(); ++v) {
+    const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
+    int cuts = 0;
+    for (const int e : edges) cuts += sharp(e);
+    if (cuts < 2 || around.size() < 2) continue;
+    // Faces that share a smooth edge are in one sector: the lowest of them names it.
+    sector.resize(static_cast<size_t>(around.size()));
+    std::iota(sector.begin(), sector.end(), 0);
+    for (const int e : edges) {
+      if (sharp(e)) continue;
+      const Far::ConstIndexArray pair = last.GetEdgeFaces(e);
+      const int a = sector[static_cast<size_t>(around.FindIndex(pair[0]))];
+      const int b = sector[static_cast<size_t>(around.FindIndex(pair[1]))];
+      std::replace(sector.begin(), sector.end(), std::max(a, b), std::min(a, b));
+    }
+    const Far::ConstLocalIndexArray local = last.GetVertexFaceLocalIndices(v);
+    if (std::count(sector.begin(), sector.end(), 0) == around.size()) continue;
+    for (int s = 0; s < around.size(); ++s) {
+      bool used = false;
+      for (int f = s; f < around.size(); ++f) {
+        const uint32_t at = place[static_cast<size_t>(around[f])];
+        if (sector[static_cast<size_t>(f)] != s || at == ~0u) continue;
+        normals[static_cast<size_t>(at) * faces.size + local[f]] = count;
+        used = true;
+      }
+      count += used;
+    }
+  }
+  return normals;
+}
+
+std::vector<float> Subdivision::vertex(std::span<const float> values, uint32_t width,
+                                       std::vector<float>* tangents) const {
+  return with_width(width, [&](auto n) {
+    using V = Values<decltype(n)::value>;
+    const Far::PrimvarRefiner refine(*refiner_->far);
+    const std::vector<V> here = refiner_->refine<V>(
+        values, [&](int l) { return refiner_->vertices_of(l); },
+        [&](int l, const V* from, V* to) { refine.Interpolate(l, from, to); });
+    std::vector<V> limit(here.size());
+    const V* from = here.data();
+    V* to = limit.data();
+    if (tangents == nullptr) {
+      refine.Limit(from, to);
+      return flat(limit);
+    }
+    std::vector<V> first(here.size()), second(here.size());
+    V *u = first.data(), *v = second.data();
+    refine.Limit(from, to, u, v);
+    tangents->resize(here.size() * 2 * width);
+    for (size_t i = 0; i < here.size(); ++i) {
+      std::copy_n(first[i].v, width, tangents->data() + 2 * width * i);
+      std::copy_n(second[i].v, width, tangents->data() + (2 * i + 1) * width);
+    }
+    return flat(limit);
+  });
+}
+
+std::vector<float> Subdivision::varying(std::span<const float> values, uint32_t width) const {
+  return with_width(width, [&](auto n) {
+    using V = Values<decltype(n)::value>;
+    const Far::PrimvarRefiner refine(*refiner_->far);
+    return flat(refiner_->refine<V>(
+        values, [&](int l) { return refiner_->vertices_of(l); },
+        [&](int l, const V* from, V* to) { refine.InterpolateVarying(l, from, to); }));
+  });
+}
+
+std::vector<float> Subdivision::face_varying(uint32_t channel, std::span<const float> values,
+                                             uint32_t width) const {
+  return with_width(width, [&](auto n) {
+    using V = Values<decltype(n)::value>;
+    const Far::PrimvarRefiner refine(*refiner_->far);
+    const int c = static_cast<int>(channel);
+    const std::vector<V> here = refiner_->refine<V>(
+        values,
+        [&](int l) { return static_cast<size_t>(refiner_->far->GetLevel(l).GetNumFVarValues(c)); },
+        [&](int l, const V* from, V* to) { refine.InterpolateFaceVarying(l, from, to, c); });
+    std::vector<V> limit(here.size());
+    const V* from = here.data();
+    V* to = limit.data();
+    refine.LimitFaceVarying(from, to, c);
+    return flat(limit);
+  });
+}
+
+Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
+                    std::span<const float> values, uint32_t width) {
+  check_points(corners, vertex_count, "a face");
+  if (values.size() != corners.size() * width)
+    throw Error("a face-varying primvar has the wrong number of values");
+  Welded out;
+  out.indices.resize(corners.size());
+  // The distinct values of each point so far, as a list of corners.
+  constexpr uint32_t kEnd = ~0u;
+  std::vector<uint32_t> first(vertex_count, kEnd), next(corners.size(), kEnd);
+  for (size_t c = 0; c < corners.size(); ++c) {
+    const float* own = values.data() + c * width;
+    uint32_t* link = &first[static_cast<size_t>(corners[c])];
+    while (*link != kEnd && !std::equal(own, own + width, values.data() + size_t{*link} * width))
+      link = &next[*link];
+    if (*link != kEnd) {
+      out.indices[c] = out.indices[*link];
+      continue;
+    }
+    *link = static_cast<uint32_t>(c);
+    out.indices[c] = static_cast<int32_t>(out.values.size() / width);
+    out.values.insert(out.values.end(), own, own + width);
+  }
+  return out;
+}
+
+}  // namespace wavecomb

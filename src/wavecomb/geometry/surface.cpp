@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/geometry/surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/geometry/point.h"
+#include "wavecomb/texture/lookup.h"
+
+namespace wavecomb {
+namespace {
+
+Point point_at(const std::vector<float>& values, size_t i) {
+  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+}
+
+void put(std::vector<float>& values, size_t i, const Point& p) {
+  values[3 * i] = static_cast<float>(p.x);
+  values[3 * i + 1] = static_cast<float>(p.y);
+  values[3 * i + 2] = static_cast<float>(p.z);
+}
+
+/// Length 1, or (0, 0, 1) for what has no direction.
+Point unit(const Point& p) {
+  const double square = dot_of(p, p);
+  if (!(square > 0) || !std::isfinite(square)) return {0, 0, 1};
+  return p * (1 / std::sqrt(square));
+}
+
+/// A surface on its way to triangles. Corners are in the order of `faces`.
+struct Work {
+  RefinedFaces faces;
+  std::vector<float> positions;   ///< 3 for each point
+  std::vector<uint32_t> sectors;  ///< normal of each corner
+  std::vector<float> normals;     ///< 3 for each normal
+  std::vector<float> uvs;         ///< 2 for each value
+  std::vector<uint32_t> uv_at;    ///< value of each corner; empty: no coordinates
+};
+
+/// Sums at each normal of what is at its corners: normal of the face there times twice the area of
+/// its corner.
+std::vector<double> corner_sums(const Work& work, size_t normal_count) {
+  std::vector<double> sums(3 * normal_count, 0.0);
+  const uint32_t k = work.faces.size;
+  for (size_t f = 0; f < work.faces.count(); ++f) {
+    const uint32_t* corner = &work.faces.corners[f * k];
+    for (uint32_t c = 0; c < k; ++c) {
+      const Point here = point_at(work.positions, corner[c]);
+      const Point to_next = point_at(work.positions, corner[(c + 1) % k]) - here;
+      const Point to_last = point_at(work.positions, corner[(c + k - 1) % k]) - here;
+      const Point n = cross_of(to_next, to_last);
+      double* sum = &sums[3 * size_t{work.sectors[f * k + c]}];
+      sum[0] += n.x;
+      sum[1] += n.y;
+      sum[2] += n.z;
+    }
+  }
+  return sums;
+}
+
+/// Normals at the limit: of the derivatives (tangents) where a point has one normal and they span
+/// a plane, else of the faces in its sector.
+void set_normals(Work& work, size_t normal_count, const std::vector<float>& tangents) {
+  const std::vector<double> sums = corner_sums(work, normal_count);
+  work.normals.resize(3 * normal_count);
+  std::vector<bool> used(work.faces.vertex_count, false);
+  std::vector<bool> split(work.faces.vertex_count, false);
+  for (size_t c = 0; c < work.sectors.size(); ++c)
+    if (work.sectors[c] >= work.faces.vertex_count) split[work.faces.corners[c]] = true;
+  for (size_t i = 0; i < normal_count; ++i) {
+    const Point sum{sums[3 * i], sums[3 * i + 1], sums[3 * i + 2]};
+    Point normal = unit(sum);
+    if (!tangents.empty() && i < work.faces.vertex_count && !split[i]) {
+      const float* t = &tangents[6 * i];
+      const Point u{t[0], t[1], t[2]}, v{t[3], t[4], t[5]};
+      const Point exact = cross_of(u, v);
+      // Tangents that nearly line up tell nothing.
+      if (dot_of(exact, exact) > 1e-8 * dot_of(u, u) * dot_of(v, v)) normal = unit(exact);
+    }
+    put(work.normals, i, normal);
+  }
+}
+
+/// Moves the points along their normals.
+void displace(Work& work, const SurfaceDesc& desc) {
+  const size_t points = work.faces.vertex_count;
+  std::vector<double> moves(points, 0.0), counts(points, 0.0), directions(3 * points, 0.0);
+  const uint32_t k = work.faces.size;
+  for (size_t c = 0; c < work.faces.corners.size(); ++c) {
+    const uint32_t base = work.faces.base[c / k];
+    const int32_t which = desc.face_displacement.empty() ? 0 : desc.face_displacement[base];
+    const uint32_t point = work.faces.corners[c];
+    counts[point] += 1;
+    const Point n = point_at(work.normals, work.sectors[c]);
+    directions[3 * point] += n.x;
+    directions[3 * point + 1] += n.y;
+    directions[3 * point + 2] += n.z;
+    if (which < 0) continue;
+    const size_t uv = work.uv_at.empty() ? 0 : 2 * size_t{work.uv_at[c]};
+    const float u = work.uv_at.empty() ? 0 : work.uvs[uv];
+    const float v = work.uv_at.empty() ? 0 : work.uvs[uv + 1];
+    moves[point] += desc.displacements[static_cast<size_t>(which)].at(u, v);
+  }
+  for (size_t i = 0; i < points; ++i) {
+    if (counts[i] == 0) continue;
+    const double* d = &directions[3 * i];
+    const Point to{d[0], d[1], d[2]};
+    if (!(dot_of(to, to) > 0)) continue;
+    put(work.positions, i, point_at(work.positions, i) + unit(to) * (moves[i] / counts[i]));
+  }
+}
+
+/// Takes points and normals through desc.matrix, in double precision.
+void place(Work& work, const SurfaceDesc& desc, bool& mirrored) {
+  const std::array<double, 16>& m = desc.matrix;
+  const Point x{m[0], m[1], m[2]}, y{m[4], m[5], m[6]}, z{m[8], m[9], m[10]},
+      t{m[12], m[13], m[14]};
+  // Rows of the cofactor matrix: det M times its inverse transpose.
+  const Point cx = cross_of(y, z), cy = cross_of(z, x), cz = cross_of(x, y);
+  mirrored = dot_of(x, cx) < 0;
+  const double side = (mirrored ? -1 : 1) * (desc.left_handed ? -1 : 1);
+  for (size_t i = 0; i < work.positions.size() / 3; ++i) {
+    const Point p = point_at(work.positions, i);
+    put(work.positions, i, x * p.x + y * p.y + z * p.z + t);
+  }
+  for (size_t i = 0; i < work.normals.size() / 3; ++i) {
+    const Point n = point_at(work.normals, i) * side;
+    put(work.normals, i, unit(cx * n.x + cy * n.y + cz * n.z));
+  }
+}
+
+double distance2(const std::vector<float>& positions, uint32_t a, uint32_t b) {
+  const Point d = point_at(positions, a) - point_at(positions, b);
+  return dot_of(d, d);
+}
+
+/// The triangles, with a point for each pair of normal and texture coordinate.
+void emit(const Work& work, bool reversed, SurfaceMesh& mesh) {
+  const uint32_t k = work.faces.size;
+  const size_t corners = work.faces.corners.size();
+  constexpr uint32_t kEnd = ~0u;
+  // Points that were made of each normal so far, as lists.
+  std::vector<uint32_t> first(work.normals.size() / 3, kEnd), next, point, uv_of, normal_of;
+  std::vector<uint32_t> ids(corners);
+  for (size_t c = 0; c < corners; ++c) {
+    const uint32_t uv = work.uv_at.empty() ? 0 : work.uv_at[c];
+    uint32_t* link = &first[work.sectors[c]];
+    while (*link != kEnd && uv_of[*link] != uv) link = &next[*link];
+    if (*link == kEnd) {
+      // The link may lie in `next`, which grows here.
+      const auto id = static_cast<uint32_t>(point.size());
+      *link = id;
+      next.push_back(kEnd);
+      point.push_back(work.faces.corners[c]);
+      uv_of.push_back(uv);
+      normal_of.push_back(work.sectors[c]);
+      ids[c] = id;
+    } else {
+      ids[c] = *link;
+    }
+  }
+  mesh.positions.resize(3 * point.size());
+  mesh.normals.resize(3 * point.size());
+  if (!work.uv_at.empty()) mesh.uvs.resize(2 * point.size());
+  for (size_t i = 0; i < point.size(); ++i) {
+    std::copy_n(&work.positions[3 * size_t{point[i]}], 3, &mesh.positions[3 * i]);
+    std::copy_n(&work.normals[3 * size_t{normal_of[i]}], 3, &mesh.normals[3 * i]);
+    if (!work.uv_at.empty()) std::copy_n(&work.uvs[2 * size_t{uv_of[i]}], 2, &mesh.uvs[2 * i]);
+  }
+  mesh.triangles.reserve(3 * (k - 2) * work.faces.count());
+  mesh.faces.reserve((k - 2) * work.faces.count());
+  const auto add = [&](size_t at, uint32_t a, uint32_t b, uint32_t c) {
+    if (reversed) std::swap(b, c);
+    for (const uint32_t corner : {a, b, c}) mesh.triangles.push_back(ids[at + corner]);
+    mesh.faces.push_back(work.faces.base[at / k]);
+  };
+  for (size_t at = 0; at < corners; at += k) {
+    if (k == 3) {
+      add(at, 0, 1, 2);
+      continue;
+    }
+    const uint32_t* q = &work.faces.corners[at];
+    // The shorter diagonal, where it is shorter by more than rounding.
+    if (distance2(work.positions, q[1], q[3]) < 0.98 * distance2(work.positions, q[0], q[2])) {
+      add(at, 0, 1, 3);
+      add(at, 1, 2, 3);
+    } else {
+      add(at, 0, 1, 2);
+      add(at, 0, 2, 3);
+    }
+  }
+}
+
+/// A primvar on the refined faces: values and the value of each corner.
+struct Spread {
+  std::vector<float> values;
+  std::vector<uint32_t> at;
+};
+
+Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
+              const RefinedFaces& faces) {
+  switch (primvar.kind) {
+    case PrimvarKind::kVertex:
+      return {surface.vertex(primvar.values, primvar.width), faces.corners};
+    case PrimvarKind::kVarying:
+      return {surface.varying(primvar.values, primvar.width), faces.corners};
+    case PrimvarKind::kFaceVarying:
+      return {surface.face_varying(primvar.channel, primvar.values, primvar.width),
+              surface.face_varying_corners(primvar.channel)};
+    case PrimvarKind::kNone:
+      break;
+  }
+  return {};
+}
+
+/// Means over the faces, repeated for each triangle of one.
+std::vector<float> means(const Spread& spread, uint32_t width, const RefinedFaces& faces) {
+  const uint32_t k = faces.size;
+  std::vector<float> out;
+  out.reserve(faces.count() * (k - 2) * width);
+  std::vector<float> mean(width);
+  for (size_t f = 0; f < faces.count(); ++f) {
+    std::fill(mean.begin(), mean.end(), 0.f);
+    for (uint32_t c = 0; c < k; ++c)
+      for (uint32_t i = 0; i < width; ++i)
+        mean[i] += spread.values[size_t{spread.at[f * k + c]} * width + i];
+    for (float& value : mean) value /= static_cast<float>(k);
+    for (uint32_t t = 0; t + 2 < k; ++t) out.insert(out.end(), mean.begin(), mean.end());
+  }
+  return out;
+}
+
+void check_displacement(const SurfaceDesc& desc) {
+  if (desc.displacements.empty()) return;
+  if (!desc.face_displacement.empty() &&
+      desc.face_displacement.size() != desc.cage.face_sizes.size())
+    throw Error("its faces do not have a displacement each");
+  for (const int32_t which : desc.face_displacement)
+    if (which >= static_cast<int32_t>(desc.displacements.size()))
+      throw Error("a face has a displacement that is not there");
+}
+
+/// The corners of polygons, which are there already.
+Work polygons(const SurfaceDesc& desc) {
+  Work work;
+  work.faces.size = 3;
+  work.faces.vertex_count = desc.cage.vertex_count;
+  work.faces.corners.assign(desc.triangles.begin(), desc.triangles.end());
+  work.faces.base.assign(desc.triangle_faces.begin(), desc.triangle_faces.end());
+  for (const uint32_t p : work.faces.corners)
+    if (p >= desc.cage.vertex_count) throw Error("a face names a point that is not there");
+  for (const uint32_t f : work.faces.base)
+    if (f >= desc.cage.face_sizes.size()) throw Error("a triangle is of a face that is not there");
+  if (work.faces.corners.size() != 3 * work.faces.base.size())
+    throw Error("its triangles do not have a face each");
+  work.positions.assign(desc.points.begin(), desc.points.end());
+  work.sectors = work.faces.corners;
+  work.uvs.assign(desc.uvs.values.begin(), desc.uvs.values.end());
+  if (desc.uvs.kind == PrimvarKind::kFaceVarying)
+    work.uv_at.assign(desc.triangle_corners.begin(), desc.triangle_corners.end());
+  else if (desc.uvs.kind != PrimvarKind::kNone)
+    work.uv_at = work.faces.corners;
+  if (!work.uv_at.empty() && work.uv_at.size() != work.faces.corners.size())
+    throw Error("a face-varying primvar has the wrong number of values");
+  for (const uint32_t i : work.uv_at)
+    if (i >= work.uvs.size() / 2) throw Error("a texture coordinate is not there");
+  set_normals(work, work.faces.vertex_count, {});
+  return work;
+}
+
+}  // namespace
+
+float Displacement::at(float u, float v) const {
+  if (texture == nullptr) return constant;
+  const float s = use.uv[0] * u + use.uv[1] * v + use.uv[2];
+  const float t = use.uv[3] * u + use.uv[4] * v + use.uv[5];
+  const Texel<float> texel = lookup<float>(*texture, s, t, 0.f, true);
+  const float channels[] = {texel.r, texel.g, texel.b, texel.a};
+  const uint32_t c = use.channel < 4 ? use.channel : 0;
+  const float value = channels[c] * use.scale[c] + use.bias[c];
+  return std::isfinite(value) ? value : 0.f;
+}
+
+SurfaceMesh make_surface(const SurfaceDesc& desc) {
+  if (desc.points.size() != size_t{3} * desc.cage.vertex_count)
+    throw Error("its points are not triples");
+  check_displacement(desc);
+  SurfaceMesh mesh;
+  Work work;
+  size_t normal_count = desc.cage.vertex_count;
+  if (desc.level == 0) {
+    work = polygons(desc);
+  } else {
+    const Subdivision surface(desc.cage, desc.level);
+    mesh.is_manifold = surface.is_manifold();
+    work.faces = surface.faces();
+    if (work.faces.count() == 0) throw Error("no faces");
+    uint32_t count = 0;
+    work.sectors = surface.normal_sectors(work.faces, count);
+    normal_count = count;
+    std::vector<float> tangents;
+    work.positions = surface.vertex(desc.points, 3, &tangents);
+    // The limit of a bilinear surface has no tangents of its own at points.
+    if (desc.cage.scheme == Scheme::kBilinear) tangents.clear();
+    set_normals(work, normal_count, tangents);
+    Spread uvs = spread(desc.uvs, surface, work.faces);
+    work.uvs = std::move(uvs.values);
+    work.uv_at = std::move(uvs.at);
+    for (const SurfacePrimvar& primvar : desc.primvars)
+      mesh.primvars.push_back(
+          means(spread(primvar, surface, work.faces), primvar.width, work.faces));
+  }
+  if (!desc.displacements.empty()) {
+    displace(work, desc);
+    set_normals(work, normal_count, {});
+  }
+  bool mirrored = false;
+  place(work, desc, mirrored);
+  emit(work, mirrored != desc.left_handed, mesh);
+  return mesh;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/geometry/subdivision.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/geometry/screen_size.h"
+#include "wavecomb/geometry/surface.h"
+
+namespace wavecomb {
+namespace {
+
+const std::vector<float> kCube = {-1, -1, -1, 1, -1, -1, -1, 1, -1, 1, 1, -1,
+                                  -1, -1, 1,  1, -1, 1,  -1, 1, 1,  1, 1, 1};
+const std::vector<int32_t> kSizes(6, 4);
+const std::vector<int32_t> kCorners = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4,
+                                       2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
+
+SurfaceDesc cube(uint32_t level) {
+  SurfaceDesc desc;
+  desc.level = level;
+  desc.points = kCube;
+  desc.cage.vertex_count = 8;
+  desc.cage.face_sizes = kSizes;
+  desc.cage.corners = kCorners;
+  return desc;
+}
+
+TEST(Subdivision, CountsOfEveryLevel) {
+  for (uint32_t level = 1; level <= 4; ++level) {
+    const SurfaceMesh mesh = make_surface(cube(level));
+    const size_t quads = size_t{6} << (2 * level);
+    EXPECT_EQ(mesh.faces.size(), 2 * quads);
+    EXPECT_EQ(mesh.positions.size() / 3, quads + 2);  // Euler's formula
+    EXPECT_EQ(mesh.normals.size(), mesh.positions.size());
+  }
+}
+
+TEST(Subdivision, MovesNoPointOfASurfaceWhenItIsCutBySeams) {
+  // Every face its own texture coordinates: the points at its edges are there once for each.
+  std::vector<int32_t> indices(24);
+  std::vector<float> uvs(48);
+  for (size_t i = 0; i < 24; ++i) {
+    indices[i] = static_cast<int32_t>(i);
+    uvs[2 * i] = static_cast<float>(i);
+  }
+  SurfaceDesc desc = cube(3);
+  desc.cage.channels.push_back({indices, 24});
+  desc.uvs = {PrimvarKind::kFaceVarying, uvs, 2, 0};
+  const auto places = [](const SurfaceMesh& mesh) {
+    std::set<std::array<float, 3>> out;
+    for (size_t i = 0; i < mesh.positions.size(); i += 3)
+      out.insert({mesh.positions[i], mesh.positions[i + 1], mesh.positions[i + 2]});
+    return out;
+  };
+  const SurfaceMesh cut = make_surface(desc), whole = make_surface(cube(3));
+  EXPECT_EQ(places(cut), places(whole));
+  EXPECT_EQ(cut.positions.size() / 3, size_t{6 * 81});
+}
+
+TEST(Subdivision, DisplacementOfOneFaceIsSharedAtItsEdges) {
+  SurfaceDesc desc = cube(2);
+  const std::vector<int32_t> which = {-1, 0, -1, -1, -1, -1};
+  desc.displacements.push_back({.constant = 0.5f, .use = {}, .texture = nullptr});
+  desc.face_displacement = which;
+  const SurfaceMesh moved = make_surface(desc), still = make_surface(cube(2));
+  for (size_t i = 0; i < moved.positions.size(); i += 3) {
+    double square = 0;
+    for (size_t k = 0; k < 3; ++k)
+      square += std::pow(double{moved.positions[i + k]} - still.positions[i + k], 2);
+    const double distance = std::sqrt(square);
+    // None, all, or the share of the faces around: a half at edges, a third at corners.
+    double nearest = 1;
+    for (const double share : {0.0, 1.0 / 3, 0.5, 1.0})
+      nearest = std::min(nearest, std::abs(distance - 0.5 * share));
+    EXPECT_LT(nearest, 1e-5);
+  }
+}
+
+std::string complaint(const SurfaceDesc& desc) {
+  try {
+    make_surface(desc);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
+  SurfaceDesc desc = cube(1);
+  std::vector<int32_t> corners = kCorners;
+  desc.cage.corners = corners;
+  corners[3] = 8;
+  EXPECT_EQ(complaint(desc), "a face names a point that is not there");
+  corners[3] = -1;
+  EXPECT_EQ(complaint(desc), "a face names a point that is not there");
+  corners[3] = corners[0];
+  EXPECT_EQ(complaint(desc), "a face has one point twice");
+  desc = cube(1);
+  desc.cage.scheme = Scheme::kLoop;
+  EXPECT_EQ(complaint(desc), "Loop subdivision needs triangles, and a face is none");
+  desc = cube(1);
+  std::vector<int32_t> sizes = kSizes;
+  desc.cage.face_sizes = sizes;
+  sizes[0] = 2;
+  EXPECT_EQ(complaint(desc), "a face has fewer than three corners");
+  sizes[0] = 2000000000;
+  EXPECT_EQ(complaint(desc), "the face counts do not add up to the number of face indices");
+  desc = cube(11);
+  EXPECT_EQ(complaint(desc), "the level of subdivision must be 1 to 10");
+  desc = cube(10);
+  std::vector<int32_t> many(2048 / 24 * kCorners.size()), many_sizes(many.size() / 4, 4);
+  for (size_t i = 0; i < many.size(); ++i) many[i] = kCorners[i % kCorners.size()];
+  many.insert(many.end(), kCorners.begin(), kCorners.end());
+  many_sizes.insert(many_sizes.end(), kSizes.begin(), kSizes.end());
+  desc.cage.corners = many;
+  desc.cage.face_sizes = many_sizes;
+  EXPECT_EQ(complaint(desc), "too many faces for level 10");
+  desc = cube(0);
+  const std::vector<uint32_t> triangle = {0, 1, 9}, face = {0};
+  desc.triangles = triangle;
+  desc.triangle_faces = face;
+  EXPECT_EQ(complaint(desc), "a face names a point that is not there");
+}
+
+TEST(Subdivision, ManyFacesOnOneEdgeAreKeptSharp) {
+  // A book of 5 pages.
+  SurfaceDesc desc;
+  std::vector<float> points = {0, 0, 0, 0, 0, 1};
+  std::vector<int32_t> corners;
+  for (int page = 0; page < 5; ++page) {
+    const float x = std::cos(static_cast<float>(page)), y = std::sin(static_cast<float>(page));
+    points.insert(points.end(), {x, y, 0, x, y, 1});
+    corners.insert(corners.end(), {0, 2 * page + 2, 2 * page + 3, 1});
+  }
+  const std::vector<int32_t> sizes(5, 4);
+  desc.level = 3;
+  desc.points = points;
+  desc.cage.vertex_count = 12;
+  desc.cage.face_sizes = sizes;
+  desc.cage.corners = corners;
+  const SurfaceMesh mesh = make_surface(desc);
+  EXPECT_FALSE(mesh.is_manifold);
+  EXPECT_EQ(mesh.faces.size(), size_t{5 * 128});
+  for (size_t i = 0; i < mesh.normals.size(); i += 3) {
+    EXPECT_NEAR(std::hypot(mesh.normals[i], mesh.normals[i + 1], mesh.normals[i + 2]), 1.0, 1e-5);
+    EXPECT_NEAR(mesh.normals[i + 2], 0.0, 1e-5);  // pages stand upright
+  }
+}
+
+TEST(EdgePixels, OfASquareBeforeTheCamera) {
+  const std::vector<float> square = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+  const std::vector<int32_t> sizes = {4}, corners = {0, 1, 2, 3};
+  ScreenView view{};
+  for (size_t i = 0; i < 16; i += 5) view.to_camera[i] = 1;
+  view.half[0] = view.half[1] = 0.5;
+  view.pixels = 100;
+  std::array<double, 16> placed = view.to_camera;
+  placed[14] = -100;
+  // Edges of 2, their middles at a distance of sqrt(100^2 + 1).
+  const double seen = edge_pixels(square, sizes, corners, placed.data(), view);
+  EXPECT_NEAR(seen, 2 * 100 / std::sqrt(10001.0), 1e-9);
+  placed[14] = 100;
+  EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen / 8, 1e-9);
+  // All round the camera: finite.
+  placed[14] = 0;
+  EXPECT_LE(edge_pixels(square, sizes, corners, placed.data(), view), 200.0);
+}
+
+}  // namespace
+}  // namespace wavecomb
