@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
@@ -32,6 +31,7 @@ from wavecomb.gui.bench_two import TwoFolders
 from wavecomb.gui.command import Command
 from wavecomb.gui.latest import Latest
 from wavecomb.gui.recent_folders import recent_folders, remember_folder
+from wavecomb.gui.widgets import set_text_colour
 
 _FACTS = (
     Column("fact", "text", "", "What."),
@@ -186,7 +186,7 @@ class BenchBrowser(QWidget):
         self._title.setText(f"{folder.name}{title}\n{folder.path}: {counts}")
         self._warnings.setText("\n".join(folder.warnings))
         self._warnings.setVisible(bool(folder.warnings))
-        self._colour(self._warnings, theme.warning())
+        set_text_colour(self._warnings, theme.warning())
         self.figures.set_figures(folder.figures)
         self.runs.set_rows(folder.columns, folder.runs)
         self.pages.set_pages(folder.pages)
@@ -224,15 +224,10 @@ class BenchBrowser(QWidget):
             menu.addAction("None yet").setEnabled(False)
 
     def _fail(self, message: str) -> None:
-        self._colour(self._error, theme.error())
+        set_text_colour(self._error, theme.error())
         self._error.setText(message)
         self._error.show()
         self.failed.emit(message)
-
-    def _colour(self, label: QLabel, colour: Any) -> None:
-        palette = label.palette()
-        palette.setColor(label.foregroundRole(), colour)
-        label.setPalette(palette)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Folders are welcome."""

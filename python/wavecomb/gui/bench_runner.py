@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.bench_choice import SuiteChoice
 from wavecomb.gui.command import Command
+from wavecomb.gui.widgets import set_text_colour
 from wavecomb.progress import time_text
 
 if TYPE_CHECKING:
@@ -268,15 +269,11 @@ class BenchRunner(QWidget):
         )
 
     def _say(self, text: str) -> None:
-        palette = self.state.palette()
-        palette.setColor(self.state.foregroundRole(), theme.text())
-        self.state.setPalette(palette)
+        set_text_colour(self.state, theme.text())
         self.state.setText(text)
 
     def _fail(self, message: str) -> None:
-        palette = self.state.palette()
-        palette.setColor(self.state.foregroundRole(), theme.error())
-        self.state.setPalette(palette)
+        set_text_colour(self.state, theme.error())
         self.state.setText(message)
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.failed.emit(message)

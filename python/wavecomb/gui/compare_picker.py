@@ -23,6 +23,7 @@ from wavecomb.gui import theme
 from wavecomb.gui.compare_live import LiveSettings
 from wavecomb.gui.compare_source import LIVE, SideSource
 from wavecomb.gui.sides import SUFFIXES
+from wavecomb.gui.widgets import set_text_colour
 
 if TYPE_CHECKING:
     from wavecomb.gui.session import Session
@@ -124,9 +125,7 @@ class SidePicker(QWidget):
         self._title.setToolTip(str(side.path) if side is not None and side.path else title)
         self._note.setText(note)
         self._note.setToolTip(note)
-        palette = self._note.palette()
-        palette.setColor(self._note.foregroundRole(), theme.dim())
-        self._note.setPalette(palette)
+        set_text_colour(self._note, theme.dim())
         self._live.setVisible(source.live is not None)
         self._live.show_setup()
 

@@ -31,6 +31,7 @@ from wavecomb.gui.compare_view import CompareView
 from wavecomb.gui.differences import MAPS, Numbers
 from wavecomb.gui.display import Look
 from wavecomb.gui.sides import Side, common_layers
+from wavecomb.gui.widgets import set_text_colour
 from wavecomb.heatmap import Scale
 
 if TYPE_CHECKING:
@@ -284,9 +285,7 @@ class CompareWindow(QWidget):
         self.numbers.set_pixel(self.a.side, self.b.side, self.look().layer, x, y)
 
     def _fail(self, message: str) -> None:
-        palette = self._error.palette()
-        palette.setColor(self._error.foregroundRole(), theme.error())
-        self._error.setPalette(palette)
+        set_text_colour(self._error, theme.error())
         self._error.setText(message)
         self._error.show()
         self.failed.emit(message)

@@ -6,11 +6,9 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
+from PySide6.QtCore import QModelIndex, QObject, Qt
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QFormLayout,
-    QHeaderView,
     QLabel,
     QScrollArea,
     QSplitter,
@@ -20,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.headed_model import HeadedModel, lay_out_rows
 from wavecomb.gui.scene_edits import LIGHT_INPUTS
 from wavecomb.gui.value_fields import ColourField, Field, NumberField, Range, swatch
 from wavecomb.gui.visibility import uneditable
@@ -43,11 +42,11 @@ TIPS = {
 }
 
 
-class LightsModel(QAbstractTableModel):
+class LightsModel(HeadedModel):
     """The list: lights that are switched off are in it, too."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(HEADERS, parent)
         self._edits = edits
         self.paths: list[str] = []
 
@@ -66,21 +65,9 @@ class LightsModel(QAbstractTableModel):
             last = self.index(len(self.paths) - 1, len(HEADERS) - 1)
             self.dataChanged.emit(self.index(0, 0), last)
 
-    def rowCount(self, parent: Any = None) -> int:
-        """As Qt has it."""
-        return 0 if parent is not None and parent.isValid() else len(self.paths)
-
-    def columnCount(self, parent: Any = None) -> int:
-        """As Qt has it."""
-        return len(HEADERS)
-
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """As Qt has it."""
-        if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
-            return HEADERS[section]
-        return None
+    def row_count(self) -> int:
+        """Lights."""
+        return len(self.paths)
 
     def flags(self, index: Any) -> Qt.ItemFlag:
         """As Qt has it: what can be switched has a box."""
@@ -163,20 +150,14 @@ class LightsPanel(QWidget):
     def _make_view(self) -> None:
         view = self.view
         view.setModel(self.model)
-        view.setObjectName("lights")
-        view.setAccessibleName("Lights")
-        view.setToolTip("Lights of the stage; those that are off are listed, too")
-        view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        view.setTabKeyNavigation(False)
-        view.setShowGrid(False)
-        view.setAlternatingRowColors(True)
-        view.verticalHeader().hide()
-        view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
-        header = view.horizontalHeader()
-        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
-        for column, wide in ((KIND, 5), (ON, 3), (SOLO, 3.4)):
-            header.resizeSection(column, theme.em(wide))
+        lay_out_rows(
+            view,
+            "lights",
+            "Lights",
+            "Lights of the stage; those that are off are listed, too",
+            stretch=NAME,
+            widths={KIND: 5, ON: 3, SOLO: 3.4},
+        )
         view.selectionModel().currentRowChanged.connect(lambda now, before: self._on_row(now))
 
     def choose(self, path: str) -> bool:

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
+from PySide6.QtCore import QModelIndex, QObject, Qt
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QFormLayout,
-    QHeaderView,
     QLabel,
     QScrollArea,
     QSplitter,
@@ -21,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.headed_model import HeadedModel, lay_out_rows
 from wavecomb.gui.value_fields import (
     UNIT,
     ColourField,
@@ -85,11 +84,11 @@ def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
     return out
 
 
-class MaterialsModel(QAbstractTableModel):
+class MaterialsModel(HeadedModel):
     """The list."""
 
     def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(HEADERS, parent, TIPS)
         self.rows: list[Row] = []
         self.colours: list[tuple[float, float, float]] = []
         self._figures: list[dict[str, Any]] = []
@@ -115,23 +114,9 @@ class MaterialsModel(QAbstractTableModel):
         if self.rows:
             self.dataChanged.emit(self.index(0, first), self.index(len(self.rows) - 1, last))
 
-    def rowCount(self, parent: Any = None) -> int:
-        """As Qt has it."""
-        return 0 if parent is not None and parent.isValid() else len(self.rows)
-
-    def columnCount(self, parent: Any = None) -> int:
-        """As Qt has it."""
-        return len(HEADERS)
-
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """As Qt has it."""
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        if role == Qt.ItemDataRole.DisplayRole:
-            return HEADERS[section]
-        return TIPS[section] if role == Qt.ItemDataRole.ToolTipRole else None
+    def row_count(self) -> int:
+        """Materials."""
+        return len(self.rows)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """As Qt has it."""
@@ -191,20 +176,14 @@ class MaterialsPanel(QWidget):
     def _make_view(self) -> None:
         view = self.view
         view.setModel(self.model)
-        view.setObjectName("materials")
-        view.setAccessibleName("Materials")
-        view.setToolTip("Materials that are in use")
-        view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        view.setTabKeyNavigation(False)
-        view.setShowGrid(False)
-        view.setAlternatingRowColors(True)
-        view.verticalHeader().hide()
-        view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
-        header = view.horizontalHeader()
-        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
-        for column, wide in ((PROGRAM, 5.5), (RECORDS, 6), (COST, 3)):
-            header.resizeSection(column, theme.em(wide))
+        lay_out_rows(
+            view,
+            "materials",
+            "Materials",
+            "Materials that are in use",
+            stretch=NAME,
+            widths={PROGRAM: 5.5, RECORDS: 6, COST: 3},
+        )
         view.selectionModel().currentRowChanged.connect(lambda now, before: self._on_row(now))
 
     # ---- what is chosen ------------------------------------------------------------------------

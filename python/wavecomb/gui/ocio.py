@@ -82,7 +82,10 @@ def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
         )
     _, display, linear = current
     source = oiio.ImageBuf(np.ascontiguousarray(rgb, dtype=np.float32))
-    shown = oiio.ImageBufAlgo.ociodisplay(source, display, view, linear, colorconfig=_name())
+    # On this thread alone: the cores render, and OpenImageIO's pool was seen to wait for ever.
+    shown = oiio.ImageBufAlgo.ociodisplay(
+        source, display, view, linear, colorconfig=_name(), nthreads=1
+    )
     if shown.has_error:
         raise WavecombError(f"view {view!r}: {shown.geterror()}")
     values = np.asarray(shown.get_pixels(oiio.FLOAT), np.float32).reshape(rgb.shape)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QWidget
 
 W = TypeVar("W", bound=QWidget)
@@ -84,3 +85,10 @@ def set_quietly(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
     box.blockSignals(True)
     box.setValue(value)  # type: ignore[arg-type]
     box.blockSignals(False)
+
+
+def set_text_colour(label: QLabel, colour: QColor) -> None:
+    """Of its text alone; the rest goes on following the application."""
+    palette = label.palette()
+    palette.setColor(label.foregroundRole(), colour)
+    label.setPalette(palette)
