@@ -46,8 +46,26 @@ def examples(*lines: str) -> str:
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
+def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> None:
+    """Goes on in a child, as early as can be: little is in memory yet."""
+    from wavecomb.isolate import supervisor
+
+    if not context.resilient_parsing and (
+        value == "on" or (value == "auto" and supervisor.is_wise())
+    ):
+        supervisor.supervise()
+
+
+def _set_load_limit(
+    context: click.Context, parameter: click.Parameter, value: float | None
+) -> None:
+    from wavecomb.isolate import patience
+
+    patience.limit_s = value
+
+
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant, --purpose and --subdivision."""
+    """STAGE, --camera, --frame, --variant, --purpose, --subdivision; --isolate, --load-limit."""
     for option in (
         click.option(
             "--subdivision",
@@ -79,6 +97,25 @@ def stage_options(command: F) -> F:
             "--camera",
             metavar="PATH",
             help="Camera prim.  [default: of the render settings, else the first]",
+        ),
+        click.option(
+            "--load-limit",
+            type=Real(0),
+            metavar="S",
+            expose_value=False,
+            callback=_set_load_limit,
+            help="Seconds that USD may compose the stage; 0: any.  "
+            "[default: 6, and 1 for each MB of layers]",
+        ),
+        click.option(
+            "--isolate",
+            type=click.Choice(["auto", "on", "off"]),
+            default="auto",
+            expose_value=False,
+            is_eager=True,
+            callback=_isolate,
+            help="Work in a child process, so that a crash is one line.  "
+            "[default: auto: unless called from within a program]",
         ),
         click.argument("stage", type=click.Path()),
     ):
@@ -124,6 +161,7 @@ class StageOptions:
 
         if self.camera == "":
             raise WavecombError("--camera is empty: give the path of a camera prim")
+        more: dict[str, Any] = {} if size is None else {"size": size}
         return load(
             stage,
             camera=self.camera,
@@ -132,7 +170,7 @@ class StageOptions:
             variants=self.selections() or None,
             threads=threads,
             subdivision="auto" if self.subdivision is None else self.subdivision,
-            **({} if size is None else {"size": size}),
+            **more,
         )
 
     def selections(self) -> dict[str, str]:

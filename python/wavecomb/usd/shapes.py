@@ -13,6 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
+from wavecomb.usd.network import number as number_of
+from wavecomb.usd.network import word
+
 Array = NDArray[np.float32]
 
 AROUND = 64
@@ -41,12 +44,12 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
     def number(name: str, default: float) -> float:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
-        return float(value) if value is not None else default
+        return number_of(value, default)
 
     def token(name: str, default: str) -> str:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
-        return str(value) if value in ("X", "Y", "Z") else default
+        return word(value) if word(value) in ("X", "Y", "Z") else default
 
     return _READERS[kind](number, token)
 

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.isolate import trail
 from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
-from wavecomb.usd.diagnostics import captured
+from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
@@ -141,9 +142,17 @@ def load_stage(
                 builder, source, frame, camera, purposes, variants or {}, textures, report,
                 editable, surfaces_of,
             )  # fmt: skip
+        except UnicodeDecodeError:
+            raise WavecombError(f"{file}: {NOT_TEXT}") from None
+        except Tf.ErrorException as error:
+            raise WavecombError(f"{file}: USD cannot read it: {commentary(error)}") from None
+        except MemoryError:
+            raise WavecombError(f"{file}: out of memory while it was read") from None
         finally:
             textures.release()
+        trail.note("building the scene of", file)
         scene = _build(builder, file)
+        trail.note("rendering", file)
     if builder_factory is None:
         _give_back_memory()
     return LoadedStage(
