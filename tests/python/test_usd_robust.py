@@ -294,6 +294,20 @@ def test_instances_that_multiply_take_no_step_each(tmp_path):
     assert "more than 4096 lights" in said(loaded)
 
 
+def test_more_instances_than_memory_holds(tmp_path):
+    pytest.importorskip("wavecomb._core")
+    count = 12
+    text = "".join(
+        f'def PointInstancer "P{i}" {{ rel prototypes = </P{i + 1}>\n'
+        f"int[] protoIndices = {[0] * count}\n"
+        f"point3f[] positions = {[(j, 0, i) for j in range(count)]} }}\n"
+        for i in range(12)
+    )
+    path = write(tmp_path, text + 'def Cube "P12" {}')
+    with pytest.raises(WavecombError, match=r"more than \d+ million instances"):
+        load_stage(path)
+
+
 def test_material_networks_with_endless_ways(tmp_path):
     """Every node takes the next one twice: 2^30 ways."""
     nodes = "".join(
