@@ -199,6 +199,138 @@ def test_point_instancers_that_do_not_fit(tmp_path):
         assert words in text
 
 
+def test_text_that_is_not_utf_8(tmp_path):
+    path = tmp_path / "s.usda"
+    path.write_bytes(b'#usda 1.0\ndef Mesh \xa0"M" {}')
+    fails(path, "UTF-8|cannot be read as USD")
+
+
+@pytest.mark.parametrize(
+    ("prim", "left"),
+    [
+        (
+            'def Cylinder "M" {{ float3[] height = [(0,0,1)]\n asset axis = @x@ }}',
+            1,
+        ),
+        ('def Sphere "M" {{ string radius = "large" }}', 1),
+        ('def Mesh "M" {{ {quad}\n token[] visibility = ["invisible"]\n int[] purpose = [1] }}', 1),
+        ('def Mesh "M" {{ {quad}\n int[] orientation = [1] }}', 1),
+        ('def Mesh "M" {{ {quad}\n string[] creaseIndices = ["a"]\n int creaseLengths = 2 }}', 1),
+        ('def Mesh "M" {{ {quad}\n string primvars:displayColor = "red" }}', 1),
+        (
+            'def Mesh "M" {{ {quad}\n def GeomSubset "S" {{ string[] indices = ["a"]\n'
+            'token[] elementType = ["face"]\n uniform token familyName = "materialBind" }} }}',
+            1,
+        ),
+        ('def Camera "C" {{ float clippingRange = 3\n string focalLength = "x" }}', 0),
+        (
+            'def RectLight "L" {{ string inputs:shaping:cone:angle = "wide" }}',
+            0,
+        ),
+        (
+            'def PointInstancer "P" {{ rel prototypes = </Q>\n int[] protoIndices = [0]\n'
+            'point3f[] positions = [(0,0,0)]\n float invisibleIds = 2\n string[] ids = ["f"]\n'
+            'float3[] scales = [(inf, 0, nan)] }}\n def Scope "Q" {{}}',
+            0,
+        ),
+        (
+            'def PointInstancer "P" {{ rel prototypes = </Q>\n float[] protoIndices = [0]\n'
+            "float2[] positions = [(0,0)] }}",
+            0,
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_values_of_other_types_than_the_schema_says(tmp_path, prim, left):
+    scene, _ = load(tmp_path, prim.format(quad=QUAD))
+    assert len(scene.meshes) == left
+
+
+def test_creases_that_name_no_points_are_said(tmp_path):
+    creases = (
+        "int[] creaseIndices = [0, -7]\nint[] creaseLengths = [2]\nfloat[] creaseSharpnesses = [9]"
+    )
+    smooth = QUAD.replace('subdivisionScheme = "none"', 'subdivisionScheme = "loop"')
+    scene, loaded = load(tmp_path, f'def Mesh "M" {{ {smooth}\n{creases} }}')
+    assert len(scene.meshes) == 1
+    assert "creases that name no points of the mesh: ignored: /M" in said(loaded)
+
+
+def test_instancers_in_instancers_without_end(tmp_path):
+    depth = 400
+    text = "".join(
+        f'def PointInstancer "P{i}" {{ rel prototypes = </P{i + 1}>\nint[] protoIndices = [0]\n'
+        "point3f[] positions = [(0,0,0)] }\n"
+        for i in range(depth)
+    )
+    _, loaded = load(tmp_path, text + f'def Cube "P{depth}" {{}}')
+    assert "instances in instances, more than 100 deep: left out: /P" in said(loaded)
+
+
+def test_prims_in_prims_a_thousand_deep(tmp_path):
+    inside = 'def Cube "C" {\n}\n' + 'def Xform "I" (instanceable = true\nreferences = </R>) {\n}\n'
+    scene, _ = load(
+        tmp_path,
+        'class Xform "R" {\ndef Cube "C" {\n}\n}\n'
+        + 'def Xform "A" {\n' * 1500
+        + inside
+        + "}\n" * 1500,
+    )
+    assert len(scene.meshes) == 2
+
+
+def test_instances_that_multiply_take_no_step_each(tmp_path):
+    """2^60 cameras and lights in sixty prototypes."""
+    text = ""
+    for i in range(60):
+        inside = "".join(
+            f'def "C{j}" (instanceable = true\nreferences = </P{i + 1}>) {{}}\n' for j in range(2)
+        )
+        text += f'{"def" if i == 0 else "class"} Xform "P{i}" {{\n{inside}}}\n'
+    leaf = 'class Xform "P60" {\ndef Camera "Cam" {}\ndef SphereLight "Bulb" {}\n}\n'
+    _, loaded = load(tmp_path, text + leaf)
+    assert len(loaded.cameras) + len(loaded.lights) == 4096
+    assert loaded.camera_path == "/P0" + "/C0" * 60 + "/Cam"
+    assert "more than 4096 lights" in said(loaded)
+
+
+def test_more_instances_than_memory_holds(tmp_path):
+    pytest.importorskip("wavecomb._core")
+    count = 12
+    text = "".join(
+        f'def PointInstancer "P{i}" {{ rel prototypes = </P{i + 1}>\n'
+        f"int[] protoIndices = {[0] * count}\n"
+        f"point3f[] positions = {[(j, 0, i) for j in range(count)]} }}\n"
+        for i in range(12)
+    )
+    path = write(tmp_path, text + 'def Cube "P12" {}')
+    with pytest.raises(WavecombError, match=r"more than \d+ million instances"):
+        load_stage(path)
+
+
+def test_material_networks_with_endless_ways(tmp_path):
+    """Every node takes the next one twice: 2^30 ways."""
+    nodes = "".join(
+        f'def Shader "N{i}" {{ uniform token info:id = "ND_multiply_color3"\n'
+        f"color3f inputs:in1.connect = </Mat/N{i + 1}.outputs:out>\n"
+        f"color3f inputs:in2.connect = </Mat/N{i + 1}.outputs:out>\n color3f outputs:out }}\n"
+        for i in range(30)
+    )
+    surface = (
+        'def Shader "S" { uniform token info:id = "ND_standard_surface_surfaceshader"\n'
+        "color3f inputs:base_color.connect = </Mat/N0.outputs:out>\n token outputs:out }\n"
+    )
+    scene, _ = load(
+        tmp_path,
+        f"""def Material "Mat" {{
+            token outputs:mtlx:surface.connect = </Mat/S.outputs:out>
+            {surface} {nodes} }}
+        def Mesh "M" {BIND} {{ {QUAD}
+            rel material:binding = </Mat> }}""",
+    )
+    assert scene.material_of("M")["program"] == "principled"
+
+
 def test_composition_errors_are_lines_and_not_spilt(tmp_path):
     path = write(
         tmp_path,

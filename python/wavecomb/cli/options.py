@@ -46,6 +46,24 @@ def examples(*lines: str) -> str:
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
+def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> None:
+    """Goes on in a child, as early as can be: little is in memory yet."""
+    from wavecomb.isolate import supervisor
+
+    if not context.resilient_parsing and (
+        value == "on" or (value == "auto" and supervisor.is_wise())
+    ):
+        supervisor.supervise()
+
+
+def _set_load_limit(
+    context: click.Context, parameter: click.Parameter, value: float | None
+) -> None:
+    from wavecomb.isolate import patience
+
+    patience.limit_s = value
+
+
 def stage_options(command: F) -> F:
     """STAGE, --camera, --frame, --variant, --purpose, --mask, --subdivision ..."""
     for option in (
@@ -92,6 +110,25 @@ def stage_options(command: F) -> F:
             "--camera",
             metavar="PATH",
             help="Camera prim.  [default: of the render settings, else the first]",
+        ),
+        click.option(
+            "--load-limit",
+            type=Real(0),
+            metavar="S",
+            expose_value=False,
+            callback=_set_load_limit,
+            help="Seconds that USD may compose the stage; 0: any.  "
+            "[default: 6, and 1 for each MB of layers]",
+        ),
+        click.option(
+            "--isolate",
+            type=click.Choice(["auto", "on", "off"]),
+            default="auto",
+            expose_value=False,
+            is_eager=True,
+            callback=_isolate,
+            help="Work in a child process, so that a crash is one line.  "
+            "[default: auto: unless called from within a program]",
         ),
         click.argument("stage", type=click.Path()),
     ):

@@ -15,7 +15,7 @@ from wavecomb.usd.colour import face_values, quantise
 from wavecomb.usd.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.mesh import MeshArrays, find_primvar
 from wavecomb.usd.network import colour, number
-from wavecomb.usd.primvar import Primvar, PrimvarError
+from wavecomb.usd.primvar import Primvar, PrimvarError, as_integers
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.triangulate import Topology
@@ -95,8 +95,7 @@ class Assigner:
         ):
             if material is None:
                 continue
-            value = subset.GetAttribute("indices").Get(self.time)
-            index = np.asarray(value if value is not None else (), np.int64)
+            index = as_integers(subset.GetAttribute("indices").Get(self.time), np.int64)
             inside = (index >= 0) & (index < topology.face_count)
             if not inside.all():
                 self.report.warn("subset names faces that are not there", subset.GetPath())

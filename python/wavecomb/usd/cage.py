@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.primvar import Primvar, as_array
+from wavecomb.usd.network import word
+from wavecomb.usd.primvar import Primvar, as_array, as_integers
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.triangulate import Topology
 
@@ -87,22 +88,14 @@ class Cage:
         return out | {"indices": corners} if kind == "faceVarying" else out
 
 
-def integers(value: Any) -> Ints:
-    """A list of whole numbers; empty for anything else."""
-    array = as_array(value)
-    if array is None or array.dtype.kind not in "iu":
-        return np.empty(0, np.int32)
-    return np.ascontiguousarray(array[:, 0], np.int32)
-
-
 def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[str, Any]:
     """Boundary rules, creases, corners and holes of a UsdGeomMesh."""
     get, path = prim.GetAttribute, prim.GetPath()
 
     def token(name: str, known: Sequence[str], default: str) -> str:
         value = get(name).Get(time)
-        if value is None or value in known:
-            return str(value or default)
+        if value is None or word(value) in known:
+            return word(value) or default
         report.warn(f"{name} {value!r} is none of {', '.join(known)}: {default}", path)
         return default
 
@@ -120,11 +113,11 @@ def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[s
         == "smooth",
     }
     if get("holeIndices").HasAuthoredValue():
-        rules["holes"] = integers(get("holeIndices").Get(time))
+        rules["holes"] = as_integers(get("holeIndices").Get(time))
     if get("creaseIndices").HasAuthoredValue():
         edges = crease_pairs(
-            integers(get("creaseIndices").Get(time)),
-            integers(get("creaseLengths").Get(time)),
+            as_integers(get("creaseIndices").Get(time)),
+            as_integers(get("creaseLengths").Get(time)),
             numbers("creaseSharpnesses"),
         )
         if edges is None:
@@ -132,7 +125,10 @@ def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[s
         else:
             rules["crease_edges"], rules["crease_sharpness"] = edges
     if get("cornerIndices").HasAuthoredValue():
-        corners, sharpness = integers(get("cornerIndices").Get(time)), numbers("cornerSharpnesses")
+        corners, sharpness = (
+            as_integers(get("cornerIndices").Get(time)),
+            numbers("cornerSharpnesses"),
+        )
         if len(corners) == len(sharpness):
             rules["corner_vertices"], rules["corner_sharpness"] = corners, sharpness
         else:

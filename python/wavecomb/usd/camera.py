@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.network import number
+from wavecomb.usd.network import number, pair
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.search import every
 
 Matrix = NDArray[np.float64]
 
@@ -49,19 +51,23 @@ def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
             camera = stage.GetPrimAtPath(target)
             if camera and camera.IsA(UsdGeom.Camera):
                 return camera
-    for predicate in (Usd.PrimDefaultPredicate, _PROXIES):
-        for prim in Usd.PrimRange.Stage(stage, predicate):
-            if prim.GetTypeName() == "Camera":
-                return prim
-    return None
+    for prim in Usd.PrimRange.Stage(stage):
+        if prim.GetTypeName() == "Camera":
+            return prim
+    return next(every(stage, _is_camera), None)
 
 
-_PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+def _is_camera(prim: Usd.Prim) -> bool:
+    return bool(prim.IsA(UsdGeom.Camera))
+
+
+MAX_CAMERAS = 1000
+"""Cameras that are listed; instances may multiply them."""
 
 
 def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
-    """Every camera of the stage, those inside instances too, in the stage's order."""
-    return [p for p in Usd.PrimRange.Stage(stage, _PROXIES) if p.IsA(UsdGeom.Camera)]
+    """The cameras of the stage, those inside instances too, in the stage's order."""
+    return list(islice(every(stage, _is_camera), MAX_CAMERAS))
 
 
 def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:
@@ -107,9 +113,9 @@ def read_camera(
     exposure = prim.GetAttribute("exposure")
     if exposure and number(exposure.Get(time), 0.0) != 0.0:
         report.missing("camera exposure", path)
-    clip = camera.GetClippingRangeAttr().Get(time)
-    if clip is not None and 0 <= clip[0] < clip[1]:
-        options |= {"near_clip": float(clip[0]), "far_clip": min(float(clip[1]), 1e30)}
+    near, far = pair(camera.GetClippingRangeAttr().Get(time), (0.0, 0.0))
+    if 0 <= near < far:
+        options |= {"near_clip": near, "far_clip": min(far, 1e30)}
     stop = number(camera.GetFStopAttr().Get(time), 0.0)
     focus = number(camera.GetFocusDistanceAttr().Get(time), 0.0)
     if stop > 0 and focus > 0:

@@ -8,10 +8,13 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 from pxr import Tf
 
 from wavecomb.usd.report import LoadReport
+
+NOT_TEXT = "it holds text that is not UTF-8; the file is damaged"
 
 MAX_LINES = 12
 """Diagnostics that are passed on; the rest is counted."""
@@ -47,11 +50,22 @@ def _tell(report: LoadReport, text: str) -> None:
 
 def commentary(error: BaseException) -> str:
     """What a ``Tf.ErrorException`` says, first message only."""
-    for item in error.args:
-        text = getattr(item, "commentary", None)
-        if text:
-            return plain(text)
-    return plain(str(error))
+    try:
+        for item in error.args:
+            text = getattr(item, "commentary", None)
+            if text:
+                return plain(text)
+        return plain(str(error))
+    except UnicodeDecodeError:  # USD quotes the file, whatever is in it
+        return NOT_TEXT
+
+
+def _text(diagnostic: Any) -> str:
+    """What a diagnostic says."""
+    try:
+        return str(diagnostic.commentary)
+    except UnicodeDecodeError:
+        return NOT_TEXT
 
 
 @contextlib.contextmanager
@@ -81,7 +95,7 @@ def captured(report: LoadReport) -> Iterator[None]:
         try:
             yield
         finally:
-            texts = [item.commentary for item in (*trap.GetErrors(), *trap.GetWarnings())]
+            texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
             lines = sorted({plain(text) for text in texts})
             # What can be said in our words is grouped there, however often it comes.
             known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom
 
+from wavecomb.isolate import trail
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
 from wavecomb.usd.identity import Assets, LightGroups
@@ -99,6 +100,10 @@ class Scope:
     override: bool = False
     alias: tuple[Sdf.Path, Sdf.Path] | None = None
     root: Sdf.Path = Sdf.Path.absoluteRootPath
+
+
+MAX_NESTING = 100
+"""Instances in instances, each a call of ``GroupBuilder`` within another."""
 
 
 class GroupBuilder:
@@ -198,6 +203,8 @@ class GroupBuilder:
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
         kind = self.traversal.kind(draw.prim)
+        if trail.is_expendable():
+            trail.note("reading", draw.prim.GetPath())
         try:
             mesh = self._arrays(kind, draw, names)
         except MeshError as error:
@@ -293,6 +300,10 @@ class GroupBuilder:
             return known
         if key in self._building:
             self.report.warn("prototype contains itself: left out", name)
+            return None
+        if len(self._building) == MAX_NESTING:
+            what = f"instances in instances, more than {MAX_NESTING} deep: left out"
+            self.report.warn(what, name)
             return None
         self._building.add(key)
         try:

@@ -87,14 +87,18 @@ class Assets:
 
     def length(self, prim: Usd.Prim) -> int:
         """How much of the prim's path names its asset; 0 where no ancestor is a component."""
-        path = prim.GetPath()
-        known = self._known.get(path)
-        if known is None:
+        above: list[Sdf.Path] = []
+        length: int | None = 0
+        while prim:
+            path = prim.GetPath()
+            length = self._known.get(path)
+            if length is not None:
+                break
+            above.append(path)
             kind = prim.GetKind()
             if kind and Kind.Registry.IsA(kind, Kind.Tokens.component):
-                known = len(str(path))
-            else:
-                parent = prim.GetParent()
-                known = self.length(parent) if parent else 0
-            self._known[path] = known
-        return known
+                length = len(str(path))
+                break
+            prim = prim.GetParent()
+        self._known.update(dict.fromkeys(above, length or 0))
+        return length or 0

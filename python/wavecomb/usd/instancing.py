@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from wavecomb.usd.primvar import as_array
+from wavecomb.usd.primvar import as_array, as_integers
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.triangulate import cross
 
@@ -70,13 +70,12 @@ def read_instances(
     """The visible instances of a point instancer; None where it cannot be used."""
     instancer = UsdGeom.PointInstancer(prim)
     path = prim.GetPath()
-    prototypes = as_array(instancer.GetProtoIndicesAttr().Get(time))
+    index = as_integers(instancer.GetProtoIndicesAttr().Get(time), np.int64)
     positions = as_array(instancer.GetPositionsAttr().Get(time))
-    if prototypes is None or len(prototypes) == 0:
-        return None
-    index = prototypes[:, 0].astype(np.int64)
     count = len(index)
-    if positions is None or len(positions) != count:
+    if count == 0:
+        return None
+    if positions is None or positions.shape != (count, 3):
         report.warn("point instancer left out: positions do not match protoIndices", path)
         return None
     keep = _mask(instancer, time, count, report)
@@ -100,20 +99,18 @@ def _mask(
     """(count,) which instances are neither invisible nor inactive."""
     keep = np.ones(count, bool)
     hidden: list[int] = []
-    invisible = instancer.GetInvisibleIdsAttr().Get(time)
-    if invisible is not None and len(invisible):
-        hidden += np.asarray(invisible).tolist()
+    hidden += as_integers(instancer.GetInvisibleIdsAttr().Get(time), np.int64).tolist()
     inactive = instancer.GetPrim().GetMetadata("inactiveIds")
     if inactive is not None:
         hidden += [int(i) for i in inactive.GetAddedOrExplicitItems()]
     if not hidden:
         return keep
-    ids = as_array(instancer.GetIdsAttr().Get(time))
-    if ids is not None and len(ids) != count:
+    value = instancer.GetIdsAttr().Get(time)
+    numbers = np.arange(count) if value is None else as_integers(value, np.int64)
+    if len(numbers) != count:
         what = "point instancer ids do not match protoIndices: ignored"
         report.warn(what, instancer.GetPath())
-        ids = None
-    numbers = np.arange(count) if ids is None else ids[:, 0]
+        numbers = np.arange(count)
     return ~np.isin(numbers, np.array(hidden, np.int64))
 
 
@@ -137,7 +134,8 @@ def _linear(
     scales = as_array(instancer.GetScalesAttr().Get(time))
     if scales is not None and len(scales):
         if scales.shape == (count, 3):
-            out = out * scales.astype(np.float64)[:, :, None]
+            with np.errstate(invalid="ignore"):  # ``sound`` leaves such instances out
+                out = out * scales.astype(np.float64)[:, :, None]
         else:
             report.warn("point instancer scales do not match: ignored", path)
     return out

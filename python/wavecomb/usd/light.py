@@ -166,8 +166,7 @@ class LightReader:
             value = attribute and attribute.HasAuthoredValue() and attribute.Get(self.time)
             return value or None
 
-        cone = authored("inputs:shaping:cone:angle")
-        if cone is not None and cone < 180.0:
+        if number(authored("inputs:shaping:cone:angle"), 180.0) < 180.0:
             self.report.missing("light shaping cone", path)
         if authored("inputs:shaping:focus"):
             self.report.missing("light shaping focus", path)

@@ -74,20 +74,21 @@ class BindingScan:
 
     def above(self, prim: Usd.Prim) -> tuple[bool, bool]:
         """(a direct binding stronger than descendants, a collection binding) here or above."""
-        if not prim or prim.IsPseudoRoot():
-            return False, False
-        path = prim.GetPath()
-        known = self._cache.get(path)
-        if known is None:
-            strong, collection = self.above(prim.GetParent())
+        above: list[Usd.Prim] = []
+        while prim and not prim.IsPseudoRoot() and prim.GetPath() not in self._cache:
+            above.append(prim)
+            prim = prim.GetParent()
+        nothing = (False, False)
+        strong, collection = self._cache.get(prim.GetPath(), nothing) if prim else nothing
+        for prim in reversed(above):
             for name in prim.GetAuthoredPropertyNames():
                 if name.startswith("material:binding"):
                     if name.startswith("material:binding:collection"):
                         collection = True
                     strength = prim.GetRelationship(name).GetMetadata("bindMaterialAs")
                     strong = strong or strength == UsdShade.Tokens.strongerThanDescendants
-            known = self._cache[path] = (strong, collection)
-        return known
+            self._cache[prim.GetPath()] = (strong, collection)
+        return strong, collection
 
 
 class MaterialTable:

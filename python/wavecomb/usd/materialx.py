@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.network import MAX_DEPTH, colour, number, shader_id, source_of, value_of
+from wavecomb.usd.network import (
+    MAX_DEPTH,
+    colour,
+    number,
+    pair,
+    shader_id,
+    source_of,
+    value_of,
+)
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.texture import asset_file
 
@@ -99,6 +107,7 @@ class MaterialXReader:
         self.report = report
         self.slots: dict[str, dict[str, Any]] = {}
         self.uv_names: list[str] = []
+        self._tried: set[tuple[str, str, str]] = set()
 
     def read(self, shader: UsdShade.Shader, model_name: str) -> Surface:
         """The nearest surface: dielectric where it mostly transmits, else principled."""
@@ -191,6 +200,11 @@ class MaterialXReader:
             return self._image(node, identifier, slot, weight)
         if identifier.startswith(("ND_convert", "ND_dot", "ND_swizzle", "ND_extract")):
             return self._value(node, "in", slot, weight, depth + 1)
+        # Once for each slot: networks that fork and meet again have endless ways through them.
+        key = (str(node.GetPath()), source.output, slot)
+        if key in self._tried:
+            return None
+        self._tried.add(key)
         what = f"MaterialX node {identifier or '(no info:id)'} (inputs tried in its place)"
         self.report.missing(what, self.material.GetPath())
         for item in node.GetInputs():
@@ -225,15 +239,14 @@ class MaterialXReader:
             texture = self.textures.add(path, image, space, wraps[0], wraps[1])
             wide = slot in (*COLOUR_SLOTS, "normal") and image.channels >= 3
             channel = "rgb" if wide else "r"
-        tiling = value_of(node, "uvtiling", self.time)
-        u, v = (number(tiling[0], 1.0), number(tiling[1], 1.0)) if tiling is not None else (1, 1)
+        u, v = pair(value_of(node, "uvtiling", self.time), (1.0, 1.0))
         scale = weight if slot in COLOUR_SLOTS else 1.0
         self.slots[slot] = {
             "texture": texture,
             "channel": channel,
             "scale": (scale, scale, scale, 1.0),
             "bias": (0.0, 0.0, 0.0, 0.0),
-            "uv": (float(u), 0.0, 0.0, 0.0, float(v), 0.0),
+            "uv": (u, 0.0, 0.0, 0.0, v, 0.0),
         }
         self.uv_names.append(self._uv_name(node))
         return None

@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.usd.cage import SCHEMES, Cage, crease_pairs, integers, read_rules
+from wavecomb.usd.cage import SCHEMES, Cage, crease_pairs, read_rules
+from wavecomb.usd.network import word
 from wavecomb.usd.normals import smooth_normals
 from wavecomb.usd.primvar import (
     Primvar,
     PrimvarError,
     as_array,
+    as_integers,
     from_attribute,
     read_primvar,
     spread,
@@ -177,20 +179,20 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         points = as_array(get("points").Get(time))
-        counts = integers(get("faceVertexCounts").Get(time))
+        counts = as_integers(get("faceVertexCounts").Get(time))
         if points is None or len(points) == 0 or len(counts) == 0:
             return None
         if points.shape[1] != 3:
             raise MeshError("points are not triples")
         points = np.ascontiguousarray(points, np.float32)
-        indices = integers(get("faceVertexIndices").Get(time))
+        indices = as_integers(get("faceVertexIndices").Get(time))
         holes = get("holeIndices")
-        hole_list = integers(holes.Get(time)) if holes.HasAuthoredValue() else None
-        flip = get("orientation").Get(time) == "leftHanded"
+        hole_list = as_integers(holes.Get(time)) if holes.HasAuthoredValue() else None
+        flip = word(get("orientation").Get(time)) == "leftHanded"
         positions = points if matrix == IDENTITY else bake(points, matrix)
         bounds = extent(positions)
         topology = triangulate(points, counts, indices, hole_list, flip)
-        scheme = prim.GetAttribute("subdivisionScheme").Get(time)
+        scheme = word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
         subdivided = self.subdivide and scheme in SCHEMES
         normals = self._normals(prim, points, topology, scheme)
         primvar = self._coordinates(prim, topology, uv_names, inherited) if uv_names else None
@@ -232,10 +234,14 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         if not get("creaseIndices").HasAuthoredValue():
             return None
-        indices = integers(get("creaseIndices").Get(time))
-        lengths = integers(get("creaseLengths").Get(time))
+        indices = as_integers(get("creaseIndices").Get(time))
+        lengths = as_integers(get("creaseLengths").Get(time))
         sharpness = as_array(get("creaseSharpnesses").Get(time))
-        if sharpness is None or (len(indices) and indices.max() >= topology.point_count):
+        inside = (indices >= 0) & (indices < topology.point_count)
+        if sharpness is None or not inside.all():
+            if not self.subdivide:  # else said of the surface
+                what = "creases that name no points of the mesh: ignored"
+                self.report.warn(what, prim.GetPath())
             return None
         creases = crease_pairs(indices, lengths, sharpness[:, 0])
         return None if creases is None else creases[0][creases[1] >= SHARP].astype(np.int64)

@@ -67,9 +67,21 @@ def number(value: Any, default: float) -> float:
     """A finite float of a value; of a vector its first component."""
     try:
         result = float(value[0]) if hasattr(value, "__getitem__") else float(value)
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, IndexError, OverflowError):
         return default
     return result if result - result == 0 else default
+
+
+def word(value: Any, default: str = "") -> str:
+    """A token or string; the default for a value of any other type."""
+    return value if isinstance(value, str) else default
+
+
+def pair(value: Any, default: tuple[float, float]) -> tuple[float, float]:
+    """The first two components of a value, finite; the default where it has fewer."""
+    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) < 2:
+        return default
+    return number(value[0], default[0]), number(value[1], default[1])
 
 
 def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -5,14 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.isolate import patience, trail
 from wavecomb.usd.diagnostics import commentary
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.population import populate
+from wavecomb.usd.search import every
+
+MAX_SURVEYED = 4096
+"""Cameras and lights that are listed; instances may multiply them."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +27,7 @@ class Survey:
 
     Attributes:
         cameras: Prim paths of all cameras.
-        lights: Prim paths of all lights that Wavecomb knows.
+        lights: Prim paths of all lights that Wavecomb knows; of both together ``MAX_SURVEYED``.
     """
 
     cameras: tuple[str, ...] = ()
@@ -33,12 +39,16 @@ def survey(stage: Usd.Stage) -> Survey:
     cameras: list[str] = []
     lights: list[str] = []
     kinds: dict[str, list[str] | None] = {}
-    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+
+    def kind(prim: Usd.Prim) -> list[str] | None:
         name = prim.GetTypeName()
         if name not in kinds:
             camera = cameras if prim.IsA(UsdGeom.Camera) else None
             kinds[name] = lights if name in LIGHT_KINDS else camera
-        found = kinds[name]
+        return kinds[name]
+
+    for prim in islice(every(stage, lambda prim: kind(prim) is not None), MAX_SURVEYED):
+        found = kind(prim)
         if found is not None:
             found.append(str(prim.GetPath()))
     return Survey(tuple(cameras), tuple(lights))
@@ -67,14 +77,16 @@ def open_stage(
     _check_file(file)
     if session_layer is not None:
         _check_file(session_layer)
+    trail.note("opening", file)
     try:
         session = Sdf.Layer.CreateAnonymous("session.usda")
         if overrides is not None:
             session.TransferContent(overrides)
         if session_layer is not None:
             session.subLayerPaths.append(_session(session_layer).identifier)
-        root = Sdf.Layer.FindOrOpen(str(file))
-        stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll) if root else None
+        with patience.watched(file):
+            root = Sdf.Layer.FindOrOpen(str(file))
+            stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll) if root else None
     except Tf.ErrorException as error:
         raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
     if not stage:

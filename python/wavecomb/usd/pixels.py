@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Ar
 
+from wavecomb.isolate import trail
 from wavecomb.machine import usable_cores
 
 if TYPE_CHECKING:
@@ -106,11 +107,13 @@ def _read_file(path: str) -> NDArray[Any]:
     # Not before an image is read: the library takes 30 MB as soon as it is loaded.
     import OpenImageIO as oiio
 
+    trail.note("decoding", path, "image")
     # Colours as stored: not multiplied by alpha.
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(path, config)
     if source is None:
+        trail.note("", "", "image")
         raise TextureError(" ".join(oiio.geterror().split()) or "not a known image file")
     try:
         spec = source.spec()
@@ -130,6 +133,7 @@ def _read_file(path: str) -> NDArray[Any]:
             raise TextureError(" ".join(source.geterror().split()) or "it cannot be read")
     finally:
         source.close()
+        trail.note("", "", "image")
     pixels = np.asarray(pixels).reshape(spec.height, spec.width, channels)
     if pixels.dtype != np.uint8:
         limit = 65504.0 if dtype == np.float16 else 3.4e38

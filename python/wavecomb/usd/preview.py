@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.network import MAX_DEPTH, Source, colour, number, shader_id, source_of, value_of
+from wavecomb.usd.network import (
+    MAX_DEPTH,
+    Source,
+    colour,
+    number,
+    pair,
+    shader_id,
+    source_of,
+    value_of,
+    word,
+)
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.texture import asset_file
 
@@ -62,7 +72,7 @@ def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> st
     name = attribute.Get(time) if attribute else None
     if name is None:
         return "principled"
-    if name not in PROGRAMS:
+    if word(name) not in PROGRAMS:
         known = ", ".join(PROGRAMS)
         report.warn(f"wavecomb:program {name!r} is none of {known}: principled", material.GetPath())
         return "principled"
@@ -128,7 +138,7 @@ class PreviewReader:
             workflow = value_of(shader, "useSpecularWorkflow", self.time, 0)
             parameters["specular_workflow"] = bool(number(workflow, 0))
             mode = value_of(shader, "opacityMode", self.time, "transparent")
-            parameters["presence"] = mode == "presence"
+            parameters["presence"] = word(mode) == "presence"
         for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
             attribute = self.material.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
@@ -230,7 +240,7 @@ class PreviewReader:
 
     def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
         """auto, raw or sRGB: by sourceColorSpace, else by the file attribute's colour space."""
-        space = value_of(shader, "sourceColorSpace", self.time)
+        space = word(value_of(shader, "sourceColorSpace", self.time))
         if space in ("auto", "raw", "sRGB"):
             return str(space)
         attribute = file.attribute if file is not None else None
@@ -277,7 +287,7 @@ class PreviewReader:
         for _ in range(MAX_DEPTH):
             source = source_of(node, key, self.time)
             if source is None or source.shader is None:
-                u, v = _two(source.value if source is not None else None, (0.0, 0.0))
+                u, v = pair(source.value if source is not None else None, (0.0, 0.0))
                 return _compose(matrix, (0.0, 0.0, u, 0.0, 0.0, v))
             node = source.shader
             identifier = shader_id(node)
@@ -297,20 +307,10 @@ class PreviewReader:
     def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
         """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""
         angle = math.radians(number(value_of(node, "rotation", self.time), 0.0))
-        sx, sy = _two(value_of(node, "scale", self.time), (1.0, 1.0))
-        tx, ty = _two(value_of(node, "translation", self.time), (0.0, 0.0))
+        sx, sy = pair(value_of(node, "scale", self.time), (1.0, 1.0))
+        tx, ty = pair(value_of(node, "translation", self.time), (0.0, 0.0))
         c, s = math.cos(angle), math.sin(angle)
         return (c * sx, -s * sy, tx, s * sx, c * sy, ty)
-
-
-def _is_pair(value: Any) -> bool:
-    return hasattr(value, "__len__") and len(value) >= 2
-
-
-def _two(value: Any, default: tuple[float, float]) -> tuple[float, float]:
-    if not _is_pair(value):
-        return default
-    return number(value[0], default[0]), number(value[1], default[1])
 
 
 def _four(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:

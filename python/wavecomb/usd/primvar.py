@@ -52,6 +52,14 @@ def as_array(value: Any) -> NDArray[Any] | None:
     return array if array.ndim == 2 else None
 
 
+def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
+    """The whole numbers of a value (k,); none where it holds anything else."""
+    array = as_array(value)
+    if array is None or array.dtype.kind not in "iu":
+        return np.empty(0, dtype)
+    return np.ascontiguousarray(array[:, 0], dtype)
+
+
 def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> Primvar | None:
     """A primvar with its indices applied, or None where it has no value.
 

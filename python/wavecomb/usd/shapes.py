@@ -17,6 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
+from wavecomb.usd.network import number as number_of
+from wavecomb.usd.network import word
+
 Array = NDArray[np.float32]
 
 AROUND = 64
@@ -45,12 +48,12 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
     def number(name: str, default: float) -> float:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
-        return abs(float(value)) if value is not None else default
+        return abs(number_of(value, default))
 
     def token(name: str, default: str) -> str:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
-        return str(value) if value in ("X", "Y", "Z") else default
+        return word(value) if word(value) in ("X", "Y", "Z") else default
 
     shape = _READERS[kind](number, token)
     if prim.GetAttribute("orientation").Get(time) == "leftHanded":

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.isolate import trail
 from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
-from wavecomb.usd.diagnostics import captured
+from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
@@ -167,9 +168,17 @@ def load_stage(
         try:
             choice = _Choice(opened, frame, camera, purposes, editable)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
+        except UnicodeDecodeError:
+            raise WavecombError(f"{file}: {NOT_TEXT}") from None
+        except Tf.ErrorException as error:
+            raise WavecombError(f"{file}: USD cannot read it: {commentary(error)}") from None
+        except MemoryError:
+            raise WavecombError(f"{file}: out of memory while it was read") from None
         finally:
             textures.release()
+        trail.note("building the scene of", file)
         scene = _build(builder, file)
+        trail.note("rendering", file)
     if stock is not None:
         stock.textures = textures.stock(scene)
         stock.end_frame()

@@ -19,7 +19,7 @@ from wavecomb.usd.assign import Draw
 from wavecomb.usd.cage import Cage
 from wavecomb.usd.camera import View
 from wavecomb.usd.mesh import MeshArrays, find_primvar
-from wavecomb.usd.primvar import PrimvarError
+from wavecomb.usd.primvar import PrimvarError, as_integers
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.triangulate import RefinedTopology
 from wavecomb.usd.view_size import ViewSize, placements
@@ -180,7 +180,7 @@ class Surfaces:
         for subset, material in zip(draw.subsets, draw.subset_materials, strict=bool(draw.subsets)):
             if material is not None:
                 value = subset.GetAttribute("indices").Get(self.materials.time)
-                index = np.asarray(value if value is not None else (), np.int64)
+                index = as_integers(value, np.int64)
                 index = index[(index >= 0) & (index < count)]
                 which[index] = note(self.materials.surface(material).displacement)
         if (which >= 0).any():

@@ -16,6 +16,7 @@ from wavecomb.usd.instancing import sound
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import Light, LightReader
 from wavecomb.usd.mesh import IDENTITY
+from wavecomb.usd.network import word
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shapes import SHAPES
 
@@ -109,11 +110,11 @@ class Traversal:
             if kind == "shading":
                 continue
             if kind != "other":
-                if prim.GetAttribute("visibility").Get(time) == "invisible":
+                if word(prim.GetAttribute("visibility").Get(time)) == "invisible":
                     continue
                 authored = prim.GetAttribute("purpose")
                 if authored.HasAuthoredValue():
-                    purpose = authored.Get()
+                    purpose = word(authored.Get(), purpose)
                 if kind != "scope":
                     own, resets = local(prim)
                     if resets:
@@ -180,6 +181,6 @@ def _binds(prim: Usd.Prim) -> bool:
     """Whether a child of a mesh is a face subset that binds a material."""
     return (
         prim.GetTypeName() == "GeomSubset"
-        and prim.GetAttribute("familyName").Get() == "materialBind"
-        and prim.GetAttribute("elementType").Get() in (None, "face")
+        and word(prim.GetAttribute("familyName").Get()) == "materialBind"
+        and word(prim.GetAttribute("elementType").Get(), "face") == "face"
     )

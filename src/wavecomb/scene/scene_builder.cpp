@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// SceneBuilder.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -13,6 +15,16 @@ namespace {
 
 constexpr uint64_t kUncounted = ~uint64_t{0};
 constexpr uint64_t kMaxInstances = 0x0fffffff;
+/// What an instance takes at least, Embree's geometry for it before all.
+constexpr uint64_t kInstanceBytes = 400;
+
+/// Instances that can be numbered and that the memory of this machine holds.
+uint64_t max_instances() {
+  const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGE_SIZE);
+  if (pages <= 0 || page_bytes <= 0) return kMaxInstances;
+  return std::min(kMaxInstances, static_cast<uint64_t>(pages) * static_cast<uint64_t>(page_bytes) /
+                                     kInstanceBytes);
+}
 constexpr uint32_t kMaxNesting = 4096;
 
 /// Attribute arrays must have 'arity' floats per vertex or per corner.
@@ -238,7 +250,10 @@ uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
   uint64_t count = group != 0 && !groups_[group].meshes.empty() ? 1 : 0;
   for (const Node& node : children_[group]) {
     count += count_placements(node.child, depth + 1, of_group);
-    if (count > kMaxInstances) throw Error("more than 268 million instances; use fewer");
+    if (count > max_instances())
+      throw Error("more than " + std::to_string(max_instances() / 1000000) +
+                  " million instances, the most that can be numbered or that this machine's "
+                  "memory holds; use fewer");
   }
   return known = count;
 }

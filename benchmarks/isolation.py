@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What it costs to live on when a library crashes (docs/decisions/isolation.md).
+
+    .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
+
+For each stage, in turns, so that a busy machine hits all alike: ``wavecomb info`` with --isolate
+off and on, and ``wavecomb.load`` without and with isolate=True. Medians; CPU seconds are of the
+process with its children, and memory is that of the largest of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+LOAD = (
+    "import sys, wavecomb, wavecomb.usd; from wavecomb import _core; "
+    "wavecomb.load(sys.argv[1], isolate=sys.argv[2] == 'on')"
+)
+NOTHING = "import sys; from wavecomb.isolate import supervisor; "
+WAYS = {
+    "nothing": lambda stage, how: [
+        "-c",
+        NOTHING + ("supervisor.supervise()" if how == "on" else ""),
+    ],
+    "info": lambda stage, how: ["-m", "wavecomb", "info", stage, "--isolate", how],
+    "load": lambda stage, how: ["-c", LOAD, stage, how],
+}
+
+
+def many_prims(path: Path, count: int) -> None:
+    """A stage of so many prims, half of them meshes."""
+    from pxr import Sdf, Usd, UsdGeom, Vt
+
+    layer = Sdf.Layer.CreateNew(str(path))
+    stage = Usd.Stage.Open(layer)
+    with Sdf.ChangeBlock():
+        for i in range(count // 2):
+            parent = Sdf.CreatePrimInLayer(layer, f"/World/Set{i // 1000}/Part{i}")
+            parent.specifier, parent.typeName = Sdf.SpecifierDef, "Xform"
+            prim = Sdf.PrimSpec(parent, "Mesh", Sdf.SpecifierDef, "Mesh")
+            values = (
+                ("points", "point3f[]", Vt.Vec3fArray([(i, 0, 0), (i + 1, 0, 0), (i, 1, 0)])),
+                ("faceVertexCounts", "int[]", Vt.IntArray([3])),
+                ("faceVertexIndices", "int[]", Vt.IntArray([0, 1, 2])),
+            )
+            for name, kind, value in values:
+                Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind)).default = value
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    layer.Save()
+
+
+def seconds(arguments: list[str]) -> tuple[float, float, float]:
+    """(wall, CPU, peak memory in MB of the largest process) of Python with these arguments."""
+    start = time.perf_counter()
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        raise SystemExit(f"{arguments} failed")
+    wall = time.perf_counter() - start
+    return wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("stages", nargs="*")
+    parser.add_argument("--prims", type=int, default=0, help="a stage of so many prims, too")
+    parser.add_argument("--turns", type=int, default=9)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        stages = list(options.stages)
+        if options.prims:
+            path = Path(folder, f"{options.prims}-prims.usdc")
+            # In a process of its own: what it takes would count as memory of those started later.
+            writer = multiprocessing.get_context("spawn").Process(
+                target=many_prims, args=(path, options.prims)
+            )
+            writer.start()
+            writer.join()
+            stages.append(str(path))
+        jobs = [("nothing", "")] + [(way, stage) for stage in stages for way in ("info", "load")]
+        print("| what | off: s | CPU s | MB | on: s | CPU s | MB | more CPU s (pairs) |")
+        print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+        for way, stage in jobs:
+            pairs = [
+                [seconds(WAYS[way](stage, how)) for how in ("off", "on")]
+                for _ in range(options.turns)
+            ]
+            cells = [
+                f"{statistics.median(pair[side][figure] for pair in pairs):.3f}"
+                for side in (0, 1)
+                for figure in range(3)
+            ]
+            more = statistics.median(pair[1][1] - pair[0][1] for pair in pairs)
+            name = f"{way} {Path(stage).name}".strip()
+            print(f"| {name} | {' | '.join(cells)} | {more:.3f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Broken stages and images by the thousand: ``python tests/python/fuzz_stages.py``.
+
+Each case is made from its kind, the seed and a number (``fuzz_cases``). Workers (``fuzz_worker``)
+load and render cases in turn, with nothing around them: so we see where a library crashes. A case
+that kills its worker, or takes longer than the limit there, is then given to ``wavecomb render`` as
+a user would, which must say one clear line and end with code 2, within the limit.
+
+    python tests/python/fuzz_stages.py                       # 2,000 cases of seed 1, a table
+    python tests/python/fuzz_stages.py --only "usdc bits" --keep out/fuzz
+    python tests/python/fuzz_stages.py --case "usdc bits/17" --keep out/fuzz
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from fuzz_cases import KINDS, make_case, plan
+from fuzz_seeds import stage_text
+
+GOOD = ("rendered", "warned", "refused", "contained")
+"""Outcomes that a user can live with; the others are faults."""
+
+WORKER_BYTES = 3 << 30
+LIMIT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of a case.
+
+    Attributes:
+        kind: Of ``KINDS``.
+        number: Of the case within its kind.
+        outcome: rendered, warned, refused; contained: a library crashed, and the caller got a
+            line; wrong, hang: a fault.
+        said: The line, or what was wrong.
+        seconds: Taken by the worker, or by the command.
+        death: How the worker ended, where it did.
+    """
+
+    kind: str
+    number: int
+    outcome: str
+    said: str
+    seconds: float
+    death: str = ""
+
+    @property
+    def name(self) -> str:
+        """What --case takes."""
+        return f"{self.kind}/{self.number}"
+
+
+class Watch:
+    """A limit to the time that a process and its children compute.
+
+    So a machine that is busy, or halts a process for a while, finds no hangs where there are none.
+    One that waits for ever is found by the clock, later.
+    """
+
+    PATIENCE = 12
+
+    def __init__(self, pid: int, limit_s: float) -> None:
+        self._pid = pid
+        self._limit_s = limit_s
+        self._last, self._cpu = time.monotonic(), self._cpu_s()
+        self._busy_s = self._idle_s = 0.0
+
+    def is_over(self) -> bool:
+        """Whether it took too long; asked about ten times a second."""
+        now, cpu = time.monotonic(), self._cpu_s()
+        passed, computed = now - self._last, max(0.0, cpu - self._cpu)
+        self._busy_s += min(passed, computed)
+        # Where we were halted, it was too.
+        self._idle_s += passed if passed < 1.0 else 0.0
+        self._last, self._cpu = now, cpu
+        return self._busy_s > self._limit_s or self._idle_s > self.PATIENCE * self._limit_s
+
+    def _cpu_s(self) -> float:
+        pids, total = [self._pid], 0.0
+        for pid in pids:
+            with contextlib.suppress(OSError):
+                fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+                total += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+                pids += map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+        return total
+
+
+class Worker:
+    """A process that judges stages, started anew when it died."""
+
+    def __init__(self, limit_s: float, folder: Path) -> None:
+        self._folder = folder
+        self._limit_s = limit_s
+        self._process: subprocess.Popen[str] | None = None
+
+    def judge(self, stage: Path) -> tuple[str, str, str]:
+        """(outcome, said, death); the outcome is "died" or "hang" where there is no answer."""
+        process = self._started()
+        assert process.stdin is not None
+        process.stdin.write(f"{stage}\n")
+        process.stdin.flush()
+        answer = self._answer(process, self._limit_s)
+        if isinstance(answer, dict):
+            if "ended" in answer:
+                self.close()
+            return answer["outcome"], answer["said"], ""
+        self.close()
+        if answer == "hang":
+            return "hang", f"no answer within {self._limit_s:g} s", "stopped"
+        code = process.returncode
+        return "died", "", signal.Signals(-code).name if code < 0 else f"code {code}"
+
+    def start(self) -> None:
+        """Starts the process where there is none."""
+        self._started()
+
+    def _started(self) -> subprocess.Popen[str]:
+        if self._process is None:
+            script = Path(__file__).with_name("fuzz_worker.py")
+            sound = self._folder / "sound.usda"
+            sound.write_text(stage_text())
+            self._process = subprocess.Popen(
+                [sys.executable, str(script), str(WORKER_BYTES), str(sound)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            assert isinstance(self._answer(self._process, 60.0), dict), "the worker does not start"
+        return self._process
+
+    @staticmethod
+    def _answer(process: subprocess.Popen[str], limit_s: float) -> dict[str, Any] | str:
+        assert process.stdout is not None
+        watch = Watch(process.pid, limit_s)
+        while not select.select([process.stdout], [], [], 0.1)[0]:
+            if watch.is_over():
+                process.kill()
+                process.wait()
+                return "hang"
+        line = process.stdout.readline()
+        if not line:
+            process.wait()
+            return "died"
+        return json.loads(line)
+
+    def close(self) -> None:
+        """Ends the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            assert process.stdin is not None and process.stdout is not None
+            process.kill()
+            process.wait()
+            process.stdin.close()
+            process.stdout.close()
+
+
+def command_line(stage: Path, limit_s: float) -> tuple[str, str]:
+    """(outcome, said) of ``wavecomb render`` on a stage, as a user would run it."""
+    out = stage.with_name("out.exr")
+    arguments = ["render", str(stage), "-o", str(out), "--size", "8", "8", "--spp", "1", "--quiet"]
+    command = [sys.executable, "-m", "wavecomb", *arguments]
+    with tempfile.TemporaryFile("w+", errors="replace") as stderr:
+        done = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr)
+        watch = Watch(done.pid, limit_s)
+        while done.poll() is None:
+            time.sleep(0.05)
+            if watch.is_over():
+                done.kill()
+                done.wait()
+                return "hang", f"wavecomb render: no end within {limit_s:g} s"
+        stderr.seek(0)
+        text = stderr.read()
+    lines = text.splitlines()
+    errors = [line for line in lines if line.startswith("error: ")]
+    others = [line for line in lines if not line.startswith(("error: ", "warning: "))]
+    if others or done.returncode not in (0, 2) or len(errors) != (done.returncode == 2):
+        return "wrong", f"wavecomb render: code {done.returncode}: {text}"
+    if out.exists() != (done.returncode == 0):
+        return "wrong", f"wavecomb render: code {done.returncode}, and its picture: {out.exists()}"
+    return "contained", errors[0] if errors else "; ".join(lines)
+
+
+def check(
+    worker: Worker, kind: str, number: int, seed: int, folder: Path, limit_s: float
+) -> Verdict:
+    """Makes a case in an empty folder and sees what comes of it."""
+    stage = make_case(kind, seed, number, folder)
+    worker.start()
+    start = time.monotonic()
+    outcome, said, death = worker.judge(stage)
+    if death:
+        start = time.monotonic()
+        outcome, said = command_line(stage, limit_s)
+    return Verdict(kind, number, outcome, said, time.monotonic() - start, death)
+
+
+def run(
+    cases: Iterable[tuple[str, int]],
+    *,
+    seed: int = 1,
+    jobs: int = 2,
+    limit_s: float = LIMIT_S,
+    keep: Path | None = None,
+) -> list[Verdict]:
+    """Checks cases with some workers; faults are kept with their files where ``keep`` says."""
+    queue: SimpleQueue[tuple[int, tuple[str, int]]] = SimpleQueue()
+    for case in enumerate(cases):
+        queue.put(case)
+    found: dict[int, Verdict] = {}
+
+    def work() -> None:
+        place = tempfile.TemporaryDirectory(prefix="wavecomb-fuzz-")
+        worker = Worker(limit_s, Path(place.name))
+        try:
+            while True:
+                try:
+                    index, (kind, number) = queue.get_nowait()
+                except Empty:
+                    return
+                with tempfile.TemporaryDirectory(dir=place.name) as name:
+                    verdict = check(worker, kind, number, seed, Path(name), limit_s)
+                    found[index] = verdict
+                    if keep is not None and verdict.outcome not in GOOD:
+                        target = keep / f"{seed}-{kind.replace(' ', '-')}-{number}"
+                        shutil.copytree(name, target, dirs_exist_ok=True)
+                        (target / "said.txt").write_text(f"{verdict}\n{verdict.said}\n")
+        finally:
+            worker.close()
+            place.cleanup()
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for future in [pool.submit(work) for _ in range(jobs)]:
+            future.result()
+    return [found[index] for index in sorted(found)]
+
+
+def table(verdicts: list[Verdict]) -> str:
+    """Outcomes by kind, as Markdown."""
+    columns = ("rendered", "warned", "refused", "contained", "wrong", "hang")
+    lines = [
+        f"| kind | cases | {' | '.join(columns)} | slowest s |",
+        "| --- |" + " --- |" * (len(columns) + 2),
+    ]
+    kinds = list(dict.fromkeys(verdict.kind for verdict in verdicts))
+    for kind in [*kinds, "all"]:
+        mine = [verdict for verdict in verdicts if kind in (verdict.kind, "all")]
+        counts = Counter(verdict.outcome for verdict in mine)
+        slowest = max(verdict.seconds for verdict in mine)
+        figures = " | ".join(str(counts[column] or "") for column in columns)
+        lines.append(f"| {kind} | {len(mine)} | {figures} | {slowest:.1f} |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """The command; 1 where there are faults."""
+    parser = argparse.ArgumentParser(description="Fuzzes the loader.")
+    parser.add_argument("--cases", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--only", action="append", choices=KINDS, help="kinds; default: all")
+    parser.add_argument("--case", action="append", metavar="KIND/NUMBER", help="only these")
+    parser.add_argument(
+        "--limit", type=float, default=LIMIT_S, help="seconds that a case may compute"
+    )
+    parser.add_argument("--keep", type=Path, help="folder for the files of faults (--case: of all)")
+    parser.add_argument("--details", type=Path, help="JSON of all verdicts")
+    options = parser.parse_args()
+    cases = plan(options.cases)
+    if options.only:
+        cases = [case for case in cases if case[0] in options.only]
+    if options.case:
+        cases = [(name.rpartition("/")[0], int(name.rpartition("/")[2])) for name in options.case]
+        for kind, number in cases if options.keep else ():
+            folder = options.keep / f"{options.seed}-{kind.replace(' ', '-')}-{number}"
+            folder.mkdir(parents=True, exist_ok=True)
+            print(make_case(kind, options.seed, number, folder))
+    start = time.monotonic()
+    verdicts = run(
+        cases, seed=options.seed, jobs=options.jobs, limit_s=options.limit, keep=options.keep
+    )
+    print(table(verdicts))
+    print(f"\n{len(verdicts)} cases in {time.monotonic() - start:.0f} s")
+    for verdict in verdicts:
+        if verdict.outcome not in GOOD or options.case:
+            print(f"\n{verdict.name}: {verdict.outcome} {verdict.death}\n{verdict.said}")
+    deaths = Counter(f"{verdict.kind}: {verdict.death}" for verdict in verdicts if verdict.death)
+    if deaths:
+        print("\nworkers that ended:", ", ".join(f"{n} x {what}" for what, n in deaths.items()))
+    if options.details:
+        options.details.write_text(json.dumps([vars(verdict) for verdict in verdicts], indent=1))
+    return int(any(verdict.outcome not in GOOD for verdict in verdicts))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Loads and renders broken stages, one after the other: a process of ``fuzz_stages``.
+
+Reads a stage's file from each line of stdin and answers with a line of JSON: ``outcome`` (one of
+``OUTCOMES``) and ``said``. Nothing here protects it from a library that crashes.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import resource
+import sys
+import tempfile
+import traceback
+from typing import NoReturn, TextIO
+
+LOAD_LIMIT_S = 1.5
+"""Less than the default, which would make thousands of cases take hours."""
+
+OUTCOMES = ("rendered", "warned", "refused", "wrong")
+
+
+def judge(stage: str) -> tuple[str, str]:
+    """What comes of a stage, and the line that says why."""
+    import numpy as np
+
+    import wavecomb
+    from wavecomb import _core
+    from wavecomb.errors import WavecombError
+
+    try:
+        loaded = wavecomb.load(stage, threads=1, size=(8, 8))
+        picture = wavecomb.render(loaded, size=(8, 8), spp=1, threads=1, max_depth=3)
+    except (WavecombError, _core.Error) as error:
+        line = str(error)
+        clear = line and "\n" not in line and len(line) < 1000
+        return ("refused" if clear else "wrong"), line
+    except MemoryError:
+        return "refused", "out of memory"
+    except Exception:
+        return "wrong", "\n".join(traceback.format_exc().splitlines()[-4:])
+    lines = [*loaded.report.lines(), *loaded.scene.warnings]
+    if any("\n" in line for line in lines):
+        return "wrong", "\n".join(lines)
+    if not np.isfinite(picture.beauty).all():
+        return "wrong", "\n".join(["the picture is not finite", *lines])
+    told = [*loaded.report.warnings, *loaded.scene.warnings]
+    return ("warned" if told else "rendered"), "; ".join(lines)
+
+
+def give_up(answers: TextIO, line: str) -> NoReturn:
+    """USD composes without end: only the end of the process stops it."""
+    answer = {"outcome": "refused", "said": line, "ended": True}
+    print(json.dumps(answer), file=answers, flush=True)
+    os._exit(0)
+
+
+def main() -> None:
+    """Answers until stdin ends."""
+    from wavecomb.isolate import patience, trail
+    from wavecomb.isolate.supervisor import CHATTER
+
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    limit = int(sys.argv[1])
+    if limit:
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+    answers = os.fdopen(os.dup(1), "w")
+    trail.follow(trail.new_page())
+    patience.limit_s = LOAD_LIMIT_S
+    patience.on_end = functools.partial(give_up, answers)
+    judge(sys.argv[2])  # all is imported, and no case pays for it
+    with tempfile.TemporaryFile() as spilt:
+        os.dup2(spilt.fileno(), 1)
+        os.dup2(spilt.fileno(), 2)
+        print(json.dumps({"outcome": "ready", "said": ""}), file=answers, flush=True)
+        for line in sys.stdin:
+            outcome, said = judge(line.rstrip("\n"))
+            sys.stdout.flush()
+            sys.stderr.flush()
+            if os.fstat(1).st_size:
+                words = os.pread(1, 4096, 0).decode(errors="replace")
+                # The supervisor keeps these off the terminal: the command's own test.
+                if not all(text.startswith(CHATTER) for text in words.splitlines()):
+                    outcome, said = "wrong", f"spilt: {words}"
+                os.ftruncate(1, 0)
+                os.lseek(1, 0, os.SEEK_SET)
+            print(json.dumps({"outcome": outcome, "said": said}), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()

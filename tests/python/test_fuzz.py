@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A few broken stages of each kind; ``fuzz_stages.py`` checks them by the thousand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fuzz_cases import KINDS, make_case, plan
+from fuzz_stages import GOOD, Verdict, run, table
+
+pytest.importorskip("wavecomb._core")
+
+
+def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
+    for kind in KINDS:
+        folders = [tmp_path / f"{kind}-{turn}" for turn in range(3)]
+        texts = []
+        for folder, number in zip(folders, (5, 5, 6), strict=True):
+            folder.mkdir()
+            stage = make_case(kind, 1, number, folder)
+            assert stage.parent == folder and stage.exists()
+            texts.append({path.name: path.read_bytes() for path in folder.iterdir()})
+        assert texts[0] == texts[1], kind
+        assert texts[0] != texts[2] or kind == "deep", kind
+
+
+def test_broken_stages_end_in_a_line() -> None:
+    verdicts = run(plan(len(KINDS)), seed=1)
+    faults = [f"{v.name}: {v.outcome} {v.said}" for v in verdicts if v.outcome not in GOOD]
+    assert not faults
+    assert {v.kind for v in verdicts} == set(KINDS)
+    # Cases that break nothing would test nothing.
+    outcomes = [v.outcome for v in verdicts]
+    assert outcomes.count("refused") > 5 and outcomes.count("warned") > 5
+    assert all(v.said for v in verdicts if v.outcome != "rendered")
+
+
+def test_table() -> None:
+    text = table([Verdict("png cut", 0, "warned", "x", 0.5), Verdict("deep", 1, "hang", "y", 9.0)])
+    assert "| png cut | 1 |  | 1 |" in text and "| all | 2 |" in text
