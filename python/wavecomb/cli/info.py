@@ -8,7 +8,14 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import StageOptions, examples, stage_options, stage_warnings, warn
+from wavecomb.cli.options import (
+    StageOptions,
+    examples,
+    isolation_options,
+    stage_options,
+    stage_warnings,
+    warn,
+)
 
 
 @click.command(
@@ -19,6 +26,7 @@ from wavecomb.cli.options import StageOptions, examples, stage_options, stage_wa
     ),
 )
 @stage_options
+@isolation_options
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 def info_command(stage: str, as_json: bool, **options: Any) -> None:
     """Say what would be rendered of STAGE, and what would not."""

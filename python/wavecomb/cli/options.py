@@ -64,6 +64,33 @@ def _set_load_limit(
     patience.limit_s = value
 
 
+def isolation_options(command: F) -> F:
+    """--isolate and --load-limit, for commands that end when their stage is done."""
+    for option in (
+        click.option(
+            "--load-limit",
+            type=Real(0),
+            metavar="S",
+            expose_value=False,
+            callback=_set_load_limit,
+            help="Seconds that USD may compose the stage; 0: any.  "
+            "[default: 6, and 1 for each MB of layers]",
+        ),
+        click.option(
+            "--isolate",
+            type=click.Choice(["auto", "on", "off"]),
+            default="auto",
+            expose_value=False,
+            is_eager=True,
+            callback=_isolate,
+            help="Work in a child process, so that a crash is one line.  "
+            "[default: auto: unless called from within a program]",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
 def stage_options(command: F) -> F:
     """STAGE, --camera, --frame, --variant, --purpose, --mask, --subdivision ..."""
     for option in (
@@ -110,25 +137,6 @@ def stage_options(command: F) -> F:
             "--camera",
             metavar="PATH",
             help="Camera prim.  [default: of the render settings, else the first]",
-        ),
-        click.option(
-            "--load-limit",
-            type=Real(0),
-            metavar="S",
-            expose_value=False,
-            callback=_set_load_limit,
-            help="Seconds that USD may compose the stage; 0: any.  "
-            "[default: 6, and 1 for each MB of layers]",
-        ),
-        click.option(
-            "--isolate",
-            type=click.Choice(["auto", "on", "off"]),
-            default="auto",
-            expose_value=False,
-            is_eager=True,
-            callback=_isolate,
-            help="Work in a child process, so that a crash is one line.  "
-            "[default: auto: unless called from within a program]",
         ),
         click.argument("stage", type=click.Path()),
     ):

@@ -12,7 +12,7 @@ from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions, aov_options
 from wavecomb.cli.frames import check_frames, frame_options, render_sequence
 from wavecomb.cli.job import Job, Names, Still, how_far, purpose_at
-from wavecomb.cli.options import Real, StageOptions, examples, stage_options
+from wavecomb.cli.options import Real, StageOptions, examples, isolation_options, stage_options
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
 from wavecomb.costs import SOURCES
@@ -39,6 +39,7 @@ _INTEGERS = click.IntRange(min=0)
 )
 @stage_options
 @frame_options
+@isolation_options
 @click.option(
     "-o",
     "--output",
