@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
+from wavecomb.usd.curves import CurveArrays, CurveReader, uniform_scale
 from wavecomb.usd.identity import Assets, light_group
 from wavecomb.usd.instancing import read_instances, sound
 from wavecomb.usd.light import Light
@@ -25,9 +26,10 @@ from wavecomb.usd.material import (
 )
 from wavecomb.usd.mesh import IDENTITY, UV_NAMES, MeshArrays, MeshReader
 from wavecomb.usd.network import colour
+from wavecomb.usd.points import PointReader
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
-from wavecomb.usd.traverse import Gathered, Placed, Traversal
+from wavecomb.usd.traverse import STRANDS, Gathered, Placed, Traversal
 from wavecomb.usd.triangulate import MeshError
 
 if TYPE_CHECKING:
@@ -37,6 +39,12 @@ Matrices = NDArray[np.float64]
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
+
+
+_WORDS = {"mesh": "mesh", "shape": "mesh", "curves": "curves", "points": "points"}
+_COUNTS = {"mesh": "meshes", "shape": "shapes", "curves": "curves", "points": "points"}
+DRAWN_COUNTS = tuple(_COUNTS.values())
+"""Counts of ``LoadReport`` for what is drawn."""
 
 
 @dataclass
@@ -110,6 +118,8 @@ class GroupBuilder:
         self.materials = materials
         self.report = report
         self.meshes = MeshReader(self.time, report)
+        self.curves = CurveReader(self.time, report)
+        self.points = PointReader(self.time, report)
         self.assigner = Assigner(materials, self.time, report)
         self.bindings = BindingScan()
         self.assets = Assets()
@@ -170,51 +180,92 @@ class GroupBuilder:
 
     def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
         """Adds one gprim to a group."""
+        kind = self.traversal.kind(draw.prim)
+        if kind in STRANDS.values() and uniform_scale(draw.matrix) is None:
+            return self._draw_skewed(group, draw, scope)
         if scope.override:
             draw.subsets = ()
         names = self.assigner.uv_names(draw)
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
-        kind = self.traversal.kind(draw.prim)
         try:
-            mesh: MeshArrays | None
-            if kind == "shape":
-                mesh = self.meshes.shape(draw.prim, draw.matrix)
-            else:
-                mesh = self.meshes.mesh(draw.prim, draw.matrix, names, draw.inherited)
+            shape = self._read(kind, draw, names)
         except MeshError as error:
-            self.report.warn(f"mesh left out: {error}", draw.prim.GetPath())
+            self.report.warn(f"{_WORDS[kind]} left out: {error}", draw.prim.GetPath())
             return
         except (Tf.ErrorException, MemoryError) as error:
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
-            self.report.warn(f"mesh left out: {what}", draw.prim.GetPath())
+            self.report.warn(f"{_WORDS[kind]} left out: {what}", draw.prim.GetPath())
             return
-        if mesh is None:
-            self.report.note("mesh without faces", draw.prim.GetPath())
+        if shape is None:
+            what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
+            self.report.note(what, draw.prim.GetPath())
             return
-        material, faces = self._materials(draw, mesh, scope)
+        material, faces = self._materials(draw, shape, scope)
         name = self.report.place(draw.prim.GetPath())
         may_shine = self.materials.emits or material == INHERIT_MATERIAL
+        options: dict[str, Any] = {
+            "face_materials": faces,
+            "material": material,
+            "name": name,
+            "light_group": light_group(draw.prim, draw.inherited) if may_shine else "",
+            "asset_length": self._asset_length(draw.prim, name),
+        }
         try:
-            number = self.builder.add_mesh(
-                mesh.positions,
-                mesh.triangles,
-                normals=mesh.normals,
-                uvs=mesh.uvs,
-                face_materials=faces,
-                material=material,
-                name=name,
-                light_group=light_group(draw.prim, draw.inherited) if may_shine else "",
-                asset_length=self._asset_length(draw.prim, name),
-            )
+            number = self._add_shape(shape, options)
         except ValueError as error:
-            self.report.warn(f"mesh left out: {error}")
+            self.report.warn(f"{_WORDS[kind]} left out: {error}")
             return
         self.builder.add_to_group(self._number(group), number)
-        group.grow(mesh.bounds)
-        self.report.tally("meshes" if kind == "mesh" else "shapes")
+        group.grow(shape.bounds)
+        self.report.tally(_COUNTS[kind])
 
-    def _materials(self, draw: Draw, mesh: MeshArrays, scope: Scope) -> tuple[int, Any]:
+    def _read(
+        self, kind: str, draw: Draw, names: Sequence[str]
+    ) -> MeshArrays | CurveArrays | None:
+        """The arrays of a gprim, in its group's space."""
+        if kind == "shape":
+            return self.meshes.shape(draw.prim, draw.matrix)
+        read = {
+            "mesh": self.meshes.mesh,
+            "curves": self.curves.curves,
+            "points": self.points.points,
+        }[kind]
+        return read(draw.prim, draw.matrix, names, draw.inherited)
+
+    def _add_shape(self, shape: MeshArrays | CurveArrays, options: dict[str, Any]) -> int:
+        """Adds arrays to the scene; gives their number there."""
+        if isinstance(shape, MeshArrays):
+            return self.builder.add_mesh(
+                shape.positions, shape.triangles, normals=shape.normals, uvs=shape.uvs, **options
+            )
+        if shape.segments is None:
+            return self.builder.add_points(shape.positions, shape.radii, uvs=shape.uvs, **options)
+        return self.builder.add_curves(
+            shape.kind,
+            shape.positions,
+            shape.segments,
+            shape.radii,
+            normals=shape.normals,
+            uvs=shape.uvs,
+            **options,
+        )
+
+    def _draw_skewed(self, group: Group, draw: Draw, scope: Scope) -> None:
+        """Adds curves or points whose transform would make their round sections oval: a group of
+        their own that the transform places."""
+        path = draw.prim.GetPath()
+        child = Group(str(path), self.report.place(path))
+        own = replace(draw, matrix=IDENTITY)
+        self._draw(child, own, scope)
+        if child.empty:
+            return
+        inherit = np.array([INHERIT_MATERIAL], np.uint32)
+        self._add(group, child, np.array(draw.matrix)[None], inherit, [draw.prim])
+
+    def _materials(
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope
+    ) -> tuple[int, Any]:
         if scope.override:
             return INHERIT_MATERIAL, None
         otherwise = INHERIT_MATERIAL if scope.inside else None

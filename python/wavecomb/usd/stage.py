@@ -15,7 +15,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from wavecomb.errors import WavecombError
 from wavecomb.usd.camera import all_cameras, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured, commentary
-from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
+from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, placed_lights
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
@@ -196,7 +196,7 @@ def _read(
     world = GroupBuilder(stage, traversal, builder, materials, report).world()
     lit = materials.glows or _has_lights(stage)
     _add_lights(world, lit, up_axis, textures, builder, report)
-    if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):
+    if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")
     view = None
     if view_prim is not None:

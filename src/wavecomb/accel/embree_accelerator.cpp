@@ -11,6 +11,8 @@
 #include <limits>
 #include <vector>
 
+#include "wavecomb/accel/embree_curves.h"
+#include "wavecomb/accel/embree_query.h"
 #include "wavecomb/accel/light_shapes.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/error.h"
@@ -18,16 +20,6 @@
 
 namespace wavecomb {
 namespace {
-
-/// Handed through Embree to the filters: the rays' paths, and the closest hits so far of the
-/// packet's rays. Packets are traced at widths that Embree has natively, so lane i there is lane i
-/// here.
-struct alignas(64) QueryContext {
-  RTCRayQueryContext base;
-  const PresenceKeys* keys;
-  const unsigned *inst, *geom, *prim;  ///< of the hits that Embree holds, W each
-  alignas(64) float t[16];             ///< their true distances
-};
 
 /// What a geometry with partly present materials knows of itself.
 struct GeometryUser {
@@ -67,9 +59,6 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
     if (!present) args->valid[i] = 0;
   }
 }
-
-/// Hits farther than the closest by less than this fraction are looked at still.
-constexpr float kSlack = 1.f + 0x1p-20f;
 
 /// Makes the closest hit independent of the order in which triangles are tried. Embree keeps
 /// whichever of two hits it tries last when they are equally far up to rounding (on shared edges,
@@ -176,9 +165,10 @@ void round_light_box(const RTCBoundsFunctionArguments* args) {
 }
 
 /// How closest hits are asked for.
-RTCIntersectArguments intersect_arguments(QueryContext& context, const PresenceKeys& keys,
-                                          bool coherent) {
+RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView& scene,
+                                          const PresenceKeys& keys, bool coherent) {
   rtcInitRayQueryContext(&context.base);
+  context.scene = &scene;
   context.keys = &keys;
   RTCIntersectArguments args;
   rtcInitIntersectArguments(&args);
@@ -211,6 +201,7 @@ struct EmbreeAccelerator::Impl {
   std::vector<RTCScene> group_scenes;
   std::vector<RTCGeometry> mesh_geometries;
   std::vector<std::unique_ptr<GeometryUser>> users;
+  std::vector<std::unique_ptr<CurveGeometry>> curves;
   std::vector<std::vector<float>> padded;  ///< copies of arrays that end at a page boundary
   uint32_t first_world = 0;                ///< geometry id of the world's first mesh
   uint32_t first_light = 0;                ///< geometry id of light record 0
@@ -247,6 +238,14 @@ struct EmbreeAccelerator::Impl {
 
   RTCGeometry make_mesh(uint32_t mesh_id, bool can_inherit_presence) {
     const Mesh& mesh = scene->meshes()[mesh_id];
+    const bool is_filtered = rule == HitRule::kCanonical &&
+                             (mesh_has_presence(*scene, mesh) ||
+                              (can_inherit_presence && mesh.material == kInheritMaterial &&
+                               mesh.face_materials.empty()));
+    if (mesh.is_curved()) {
+      curves.push_back(std::make_unique<CurveGeometry>(CurveGeometry{&mesh, mesh_id, is_filtered}));
+      return make_curve_geometry(device, *curves.back(), rule);
+    }
     RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     const float* positions = mesh.positions.data();
     // Embree loads 16 bytes per vertex. A last vertex that ends at the end of a page is copied.
@@ -260,10 +259,7 @@ struct EmbreeAccelerator::Impl {
                                mesh.vertex_count());
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(),
                                0, 12, mesh.triangle_count());
-    if (rule == HitRule::kCanonical &&
-        (mesh_has_presence(*scene, mesh) ||
-         (can_inherit_presence && mesh.material == kInheritMaterial &&
-          mesh.face_materials.empty()))) {
+    if (is_filtered) {
       users.push_back(std::make_unique<GeometryUser>(GeometryUser{&view, mesh_id}));
       rtcSetGeometryUserData(g, users.back().get());
       rtcSetGeometryIntersectFilterFunction(g, presence_filter);
@@ -383,7 +379,7 @@ struct EmbreeAccelerator::Impl {
     for (size_t i = 0; i < rays.size; ++i) {
       RTCRayHit rh{};
       QueryContext context;
-      RTCIntersectArguments args = intersect_arguments(context, keys, coherent);
+      RTCIntersectArguments args = intersect_arguments(context, view, keys, coherent);
       rh.ray = load_ray(rays, i);
       rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
       rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -428,7 +424,7 @@ struct EmbreeAccelerator::Impl {
                          const PresenceKeys& keys) const {
     alignas(64) typename PacketTypes<W>::RayHit rh;
     QueryContext context;
-    RTCIntersectArguments args = intersect_arguments(context, keys, coherent);
+    RTCIntersectArguments args = intersect_arguments(context, view, keys, coherent);
     alignas(64) int valid[W];
     context.inst = rh.hit.instID[0];
     context.geom = rh.hit.geomID;
@@ -524,6 +520,7 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
                                  bool coherent, const PresenceKeys& keys) const {
   QueryContext context;
   rtcInitRayQueryContext(&context.base);
+  context.scene = &impl_->view;
   context.keys = &keys;
   RTCOccludedArguments args;
   rtcInitOccludedArguments(&args);

@@ -42,6 +42,7 @@ struct SceneView {
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;
+  bool has_curves = false;  ///< curves or points
 };
 
 struct Bounds {
@@ -75,7 +76,7 @@ inline constexpr const char* kOtherLights = "other";
 
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
-  uint64_t meshes = 0;    ///< points, indices, normals, texture coordinates, materials of faces
+  uint64_t meshes = 0;    ///< points, indices, radii, normals, texture coordinates, materials of faces
   uint64_t textures = 0;  ///< all mip levels
   uint64_t records = 0;   ///< instances, materials, lights
 };
@@ -111,6 +112,9 @@ class Scene {
   /// Triangles of all meshes, each counted once, and with every instance counted.
   uint64_t unique_triangles() const;
   uint64_t instanced_triangles() const;
+  /// Segments of curves and points, each counted once.
+  uint64_t curve_segments() const;
+  uint64_t points() const;
   SceneBytes bytes() const;
   /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
   const std::vector<std::string>& warnings() const { return warnings_; }
@@ -161,7 +165,7 @@ class SceneBuilder {
   uint32_t add_texture(const TextureDesc& desc);
   /// Texture ids in the material must exist.
   uint32_t add_material(Material material);
-  /// Checks sizes and indices. Faces with points that are not finite are refused by name; faces
+  /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name; faces
   /// without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
   /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.

@@ -124,6 +124,8 @@ void SceneBuilder::make_lights(Scene& scene) const {
   v.lights = scene.light_set_.view(v.materials);
   v.scale = radius;
   v.has_emissive_meshes = any_emissive;
+  v.has_curves = std::any_of(scene.meshes_.begin(), scene.meshes_.end(),
+                             [](const Mesh& mesh) { return mesh.is_curved(); });
   v.has_presence = std::any_of(scene.materials_.begin(), scene.materials_.end(),
                                [](const Material& m) { return m.needs_presence(); });
 }
