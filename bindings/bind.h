@@ -7,3 +7,4 @@ void bind_scene(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
 void bind_watching(nanobind::module_& m);
 void bind_render(nanobind::module_& m);
+void bind_renderer(nanobind::module_& m);

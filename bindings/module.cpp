@@ -14,4 +14,5 @@ NB_MODULE(_core, m) {
   bind_recording(m);
   bind_watching(m);
   bind_render(m);
+  bind_renderer(m);
 }

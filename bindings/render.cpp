@@ -7,10 +7,12 @@
 #include <tbb/version.h>
 
 #include <algorithm>
-#include <map>
+#include <cmath>
 #include <memory>
 
 #include "bind.h"
+#include "rendering.h"
+#include "statistics.h"
 #include "watching.h"
 #include "wavecomb/core/aov.h"
 #include "wavecomb/core/error.h"
@@ -92,10 +94,11 @@ constexpr const char* kAttributes[] = {"width",           "height",         "spp
                                        "roulette_depth",  "clamp_indirect", "fresnel",
                                        "cosine_sampling", "integrator",     "aovs",
                                        "adaptive",        "noise",          "min_spp",
-                                       "time_limit",      "error",          "threads",
-                                       "wave_size",       "lanes",          "traversal",
-                                       "policy",          "materialize",    "ray_order",
-                                       "shadow_order",    "costs",          "cost_weight"};
+                                       "time_limit",      "error",          "region",
+                                       "progressive",     "threads",        "wave_size",
+                                       "lanes",           "traversal",      "policy",
+                                       "materialize",     "ray_order",      "shadow_order",
+                                       "costs",           "cost_weight"};
 
 /// Before the name of a light group, in names of AOVs and of layers.
 constexpr const char* kLightPrefix = "light_";
@@ -133,14 +136,6 @@ nb::dict to_dict(nb::handle settings) {
   for (const char* name : kAttributes) d[name] = nb::getattr(settings, name);
   return d;
 }
-
-/// A picture with the figures of its render.
-struct Result {
-  Picture picture;
-  RenderStatistics statistics;
-  CostProfile profile;
-  nb::dict settings;
-};
 
 /// Python's side of a policy. order() gets NumPy arrays of its own, so whatever it keeps or does to
 /// them harms nothing, and fills `keys`. Exceptions end the render and come out of it.
@@ -279,159 +274,85 @@ nb::dict manifests_dict(const Result& r) {
   return d;
 }
 
-/// Lists by depth: rays, shadow rays, records, and how many paths ended there.
-nb::dict depths_dict(const RenderStatistics& s) {
-  nb::dict d;
-  std::vector<uint64_t> ended;
-  for (size_t i = 0; i < s.rays_at.size(); ++i)
-    ended.push_back(s.rays_at[i] - (i + 1 < s.rays_at.size() ? s.rays_at[i + 1] : 0));
-  d["rays"] = s.rays_at;
-  d["shadow_rays"] = s.shadow_rays_at;
-  d["records"] = s.records_at;
-  d["paths_ended"] = ended;
-  return d;
-}
-
-nb::list materials_list(const RenderStatistics& s) {
-  nb::list out;
-  for (const MaterialStatistics& m : s.materials) {
-    nb::dict d;
-    d["name"] = m.name;
-    d["program"] = m.program;
-    d["records"] = m.records;
-    d["timed_records"] = m.timed_records;
-    d["ns_per_record"] = m.measured_ns;
-    d["calibrated_ns"] = m.calibrated_ns;
-    d["predicted_ns"] = m.predicted_ns;
-    out.append(d);
-  }
-  return out;
-}
-
-/// Sums over the materials of each program that shaded anything.
-nb::dict programs_dict(const RenderStatistics& s) {
-  struct Sum {
-    uint64_t records = 0, timed = 0;
-    double ns = 0;
-  };
-  std::map<std::string, Sum> sums;
-  for (const MaterialStatistics& m : s.materials) {
-    Sum& sum = sums[m.program];
-    sum.records += m.records;
-    sum.timed += m.timed_records;
-    sum.ns += m.measured_ns * static_cast<double>(m.timed_records);
-  }
-  nb::dict out;
-  for (const auto& [name, sum] : sums) {
-    if (sum.records == 0) continue;
-    nb::dict d;
-    d["records"] = sum.records;
-    d["ns_per_record"] = sum.timed > 0 ? sum.ns / static_cast<double>(sum.timed) : 0.0;
-    out[name.c_str()] = d;
-  }
-  return out;
-}
-
-nb::dict statistics_dict(const Result& r) {
-  const RenderStatistics& s = r.statistics;
-  nb::dict d, seconds, phases, counts, memory;
-  d["settings"] = r.settings;
-  seconds["build"] = s.build_s;
-  seconds["render"] = s.render_s;
-  seconds["first_samples"] = s.first_samples_s;
-  d["seconds"] = seconds;
-  for (const auto& [name, value] : s.phases_s) phases[name.c_str()] = value;
-  d["phases_s"] = phases;
-  counts["samples"] = s.samples;
-  counts["rays"] = s.rays;
-  counts["shadow_rays"] = s.shadow_rays;
-  counts["records"] = s.records;
-  counts["packets"] = s.packets;
-  counts["packet_lanes"] = s.packet_lanes;
-  d["counts"] = counts;
-  const auto rate = [&](uint64_t n) {
-    return s.render_s > 0 ? static_cast<double>(n) / s.render_s : 0.0;
-  };
-  d["samples_per_s"] = rate(s.samples);
-  d["rays_per_s"] = rate(s.rays + s.shadow_rays);
-  d["lane_utilisation"] = s.packet_lanes > 0
-                              ? static_cast<double>(s.records) / static_cast<double>(s.packet_lanes)
-                              : 1.0;
-  d["depths"] = depths_dict(s);
-  nb::dict coherence, costs;
-  coherence["run_length"] = s.run_length;
-  coherence["material_homogeneity"] = s.material_homogeneity;
-  coherence["texture_homogeneity"] = s.texture_homogeneity;
-  d["coherence"] = coherence;
-  d["materials"] = materials_list(s);
-  d["programs"] = programs_dict(s);
-  costs["r2"] = s.cost_r2;
-  costs["mean_error"] = s.cost_mean_error;
-  costs["materials"] = s.cost_materials;
-  costs["calibration_s"] = s.calibration_s;
-  d["cost_prediction"] = costs;
-  nb::dict uses;
-  for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
-  d["policy_uses"] = uses;
-  d["threads"] = s.threads;
-  d["wave_size"] = s.wave_size;
-  d["lanes"] = s.lanes;
-  memory["accelerator"] = s.accelerator_bytes;
-  memory["waves"] = s.wave_bytes;
-  memory["film"] = s.film_bytes;
+size_t picture_bytes(const Picture& p) {
   const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
-  size_t picture = bytes(r.picture.beauty, r.picture.albedo, r.picture.normal, r.picture.depth,
-                         r.picture.samples, r.picture.error, r.picture.variance);
-  for (const AovLayer& layer : r.picture.aovs) picture += bytes(layer.values);
-  memory["picture"] = picture;
-  memory["meshes"] = s.scene_bytes.meshes;
-  memory["textures"] = s.scene_bytes.textures;
-  memory["records"] = s.scene_bytes.records;
-  d["memory_bytes"] = memory;
-  d["peak_rss_bytes"] = s.peak_rss_bytes;
-  d["passes"] = s.passes;
-  d["resumed_samples"] = s.resumed_samples;
-  d["error"] = s.error;
-  d["cancelled"] = s.cancelled;
-  return d;
+  size_t sum = bytes(p.beauty, p.albedo, p.normal, p.depth, p.samples, p.error, p.variance);
+  for (const AovLayer& layer : p.aovs) sum += bytes(layer.values);
+  return sum;
 }
 
-Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings_object,
+Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings,
               const nb::object& progress, const nb::object& policy, const nb::object& costs,
-              RayRecording* recorder, const nb::object& watcher, const nb::object& state) {
-  const Settings settings = nb::cast<Settings>(settings_object);
+              RayRecording* recorder, const nb::object& watcher, const nb::object& state,
+              double interval) {
+  std::unique_ptr<WavefrontRenderer> renderer;
+  return run_render(
+      [&](const Settings& s) -> WavefrontRenderer& {
+        renderer = std::make_unique<WavefrontRenderer>(scene, s.threads);
+        return *renderer;
+      },
+      *scene, {settings, progress, policy, costs, recorder, watcher, state, interval});
+}
+
+/// None, or (x0, y0, x1, y1).
+nb::object region_of(const Settings& s) {
+  if (!s.region) return nb::none();
+  return nb::make_tuple(s.region->x0, s.region->y0, s.region->x1, s.region->y1);
+}
+
+void set_region(Settings& s, const nb::object& value) {
+  s.region.reset();
+  if (value.is_none()) return;
+  std::vector<int64_t> edges;
+  if (!nb::try_cast(value, edges) || edges.size() != 4)
+    throw Error("region must be None or four whole numbers: x0, y0, x1, y1");
+  for (const int64_t edge : edges)
+    if (edge < 0 || edge > kMaxSize)
+      throw Error("region has the edge " + std::to_string(edge) + "; it must be from 0 to " +
+                  std::to_string(kMaxSize));
+  const auto at = [&](size_t i) { return static_cast<uint32_t>(edges[i]); };
+  s.region = Region{at(0), at(1), at(2), at(3)};
+}
+
+}  // namespace
+
+Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& renderer,
+                  const Scene& scene, const RenderArguments& a) {
+  const Settings settings = nb::cast<Settings>(a.settings);
   Result result;
-  result.settings = to_dict(settings_object);
-  RenderOptions options = watched_by(progress, watcher);
-  options.recorder = recorder;
+  result.settings = to_dict(a.settings);
   std::unique_ptr<PythonPolicy> own_policy;
-  if (!policy.is_none()) {
-    own_policy = std::make_unique<PythonPolicy>(policy, *scene);
+  if (!a.policy.is_none()) {
+    own_policy = std::make_unique<PythonPolicy>(a.policy, scene);
     result.settings["policy"] = std::string(own_policy->name());
-    options.policy = own_policy.get();
   }
+  if (!(a.interval > 0) || !std::isfinite(a.interval))
+    throw Error("interval is the seconds between looks; it must be above 0");
+  RenderOptions options = watched_by(a.progress, a.watcher, result.settings);
+  options.recorder = a.recorder;
+  options.policy = own_policy.get();
+  options.interval_s = a.interval;
+  options.wants_picture = a.wants_picture;
   CostProfile profile;
-  if (!costs.is_none()) {
-    profile = to_profile(nb::cast<nb::dict>(costs));
+  if (!a.costs.is_none()) {
+    profile = to_profile(nb::cast<nb::dict>(a.costs));
     options.profile = &profile;
   }
   nb::dict resumed;
-  if (!state.is_none()) {
-    resumed = nb::cast<nb::dict>(state);
+  if (!a.state.is_none()) {
+    resumed = nb::cast<nb::dict>(a.state);
     options.resume = resumed_from(resumed);
   }
   {
     const nb::gil_scoped_release release;
     settings.check();
-    WavefrontRenderer renderer(scene, settings.threads);
-    result.picture = renderer.render(settings, options);
-    result.statistics = renderer.statistics();
-    result.profile = renderer.cost_profile();
+    WavefrontRenderer& ready = renderer(settings);
+    result.picture = ready.render(settings, options);
+    result.statistics = ready.statistics();
+    result.profile = ready.cost_profile();
   }
   return result;
 }
-
-}  // namespace
 
 void bind_render(nb::module_& m) {
   nb::class_<Settings> c(m, "Settings");
@@ -465,6 +386,8 @@ void bind_render(nb::module_& m) {
       .def_rw("lanes", &Settings::lanes)
       .def_rw("policy", &Settings::policy)
       .def_rw("cost_weight", &Settings::cost_weight)
+      .def_rw("progressive", &Settings::progressive)
+      .def_prop_rw("region", &region_of, &set_region, nb::for_setter(nb::arg("region").none()))
       .def_prop_rw("aovs", &aov_names, &set_aovs)
       .def("check", &Settings::check)
       .def("to_dict", [](nb::handle_t<Settings> self) { return to_dict(self); });
@@ -498,11 +421,13 @@ void bind_render(nb::module_& m) {
       .def_prop_ro("manifests", &manifests_dict)
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
       .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
-      .def_prop_ro("stats", &statistics_dict);
+      .def_prop_ro("stats", [](const Result& r) {
+        return statistics_dict(r.statistics, r.settings, picture_bytes(r.picture));
+      });
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
         "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none(),
-        "watcher"_a = nb::none(), "state"_a = nb::none());
+        "watcher"_a = nb::none(), "state"_a = nb::none(), "interval"_a = 0.1);
   m.attr("AOVS") = nb::cast(AovSet{(1u << kAovCount) - 1}.names());
   m.def("crypto_id", [](const std::string& name) { return crypto_id(name); });
   m.def("lane_widths", &lane_widths);

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "bind.h"
+#include "scene_values.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/fingerprint.h"
 #include "wavecomb/scene/scene.h"
@@ -35,23 +36,6 @@ std::shared_ptr<const void> hold(nb::list arrays) {
             const nb::gil_scoped_acquire gil;
             delete static_cast<const nb::list*>(p);
           }};
-}
-
-/// USD's row-vector matrix at `m` as a column-vector map.
-template <typename T>
-Affine affine(const T* m) {
-  const auto at = [m](int row, int column) { return static_cast<float>(m[4 * row + column]); };
-  Affine a;
-  for (int i = 0; i < 3; ++i) a.row[i] = {at(0, i), at(1, i), at(2, i)};
-  a.t = {at(3, 0), at(3, 1), at(3, 2)};
-  return a;
-}
-
-Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
-  if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4) throw Error("a transform must be 4 x 4");
-  if (m.dtype() == nb::dtype<double>()) return affine(static_cast<const double*>(m.data()));
-  if (m.dtype() == nb::dtype<float>()) return affine(static_cast<const float*>(m.data()));
-  throw Error("a transform must be of float32 or float64");
 }
 
 template <typename Enum>
@@ -348,23 +332,6 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   return builder.add_light(std::move(light));
 }
 
-/// The camera as set_camera takes it, its transform as rows of floats.
-nb::dict camera_dict(const Scene& scene) {
-  const Camera& c = scene.camera();
-  std::vector<std::vector<float>> to_world;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3<float> axis = c.to_world.axis(i);
-    to_world.push_back({axis.x, axis.y, axis.z, 0});
-  }
-  to_world.push_back({c.to_world.t.x, c.to_world.t.y, c.to_world.t.z, 1});
-  nb::dict d;
-  d["to_world"] = to_world;
-  d["window"] = nb::make_tuple(c.window[0], c.window[1], c.window[2], c.window[3]);
-  d["near_clip"] = c.near_clip;
-  d["far_clip"] = c.far_clip;
-  return d;
-}
-
 void set_camera(SceneBuilder& builder,
                 const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
                 const std::tuple<float, float, float, float>& window, float lens_radius,
@@ -395,11 +362,9 @@ void bind_scene(nb::module_& m) {
       .def_prop_ro("light_count", [](const Scene& s) { return s.lights().size(); })
       .def_prop_ro("lights",
                    [](const Scene& s) {
-                     constexpr const char* kKinds[kLightKindCount] = {
-                         "rect", "disk", "sphere", "distant", "dome", "triangle"};
                      std::vector<std::pair<std::string, std::string>> out;
                      for (const Light& light : s.lights())
-                       out.emplace_back(light.name, kKinds[static_cast<size_t>(light.kind)]);
+                       out.emplace_back(light.name, light_kind_name(light.kind));
                      return out;
                    })
       .def_prop_ro("materials",
@@ -418,6 +383,8 @@ void bind_scene(nb::module_& m) {
                      return out;
                    })
       .def_prop_ro("camera", &camera_dict)
+      .def("material", &material_dict, "material"_a)
+      .def("light", &light_dict, "light"_a)
       .def_prop_ro("light_groups", &Scene::light_groups)
       .def_prop_ro("object_names",
                    [](const Scene& s) {

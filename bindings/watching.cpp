@@ -6,9 +6,12 @@
 
 #include <cmath>
 #include <cstring>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "bind.h"
+#include "statistics.h"
 #include "wavecomb/core/error.h"
 
 namespace nb = nanobind;
@@ -47,12 +50,49 @@ nb::dict state_dict(const Snapshot& s) {
   return d;
 }
 
-nb::object beauty(const Snapshot& s) {
-  auto* values = new std::vector<float>(s.film.beauty());
-  const nb::capsule owner(values,
-                          [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
-  const size_t shape[3] = {s.film.height(), s.film.width(), 3};
-  return nb::cast(nb::ndarray<nb::numpy, float>(values->data(), 3, shape, owner));
+/// What Python gets of a snapshot: empty once the callback that got it is over.
+class LiveSnapshot {
+ public:
+  LiveSnapshot(const Snapshot& snapshot, const nb::dict& settings)
+      : snapshot_(&snapshot), settings_(settings) {}
+  void end() { snapshot_ = nullptr; }
+
+  const Snapshot& get() const {
+    if (!snapshot_)
+      throw Error("the snapshot is over; take what is needed of it while snapshot() runs");
+    return *snapshot_;
+  }
+  nb::dict stats() const { return statistics_dict(get().statistics(), settings_, 0); }
+
+ private:
+  const Snapshot* snapshot_;
+  nb::dict settings_;
+};
+
+/// An array of the film's size that owns its values; those of one channel have two axes.
+template <typename T>
+nb::object image(const Film& film, std::vector<T> values, size_t channels) {
+  auto* own = new std::vector<T>(std::move(values));
+  const nb::capsule owner(own, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  const size_t shape[3] = {film.height(), film.width(), channels};
+  return nb::cast(nb::ndarray<nb::numpy, T>(own->data(), channels == 1 ? 2 : 3, shape, owner));
+}
+
+nb::object samples(const LiveSnapshot& live) {
+  const Film& film = live.get().film;
+  return image(film, film.samples(), 1);
+}
+
+nb::object layer(const LiveSnapshot& live, const std::string& name) {
+  if (name == "samples") return samples(live);
+  const Snapshot& s = live.get();
+  std::optional<AovLayer> found;
+  {
+    const nb::gil_scoped_release release;
+    found = s.layer(name);
+  }
+  if (!found) return nb::none();
+  return image(s.film, std::move(found->values), found->channels);
 }
 
 Request request_of(const nb::object& answer) {
@@ -77,7 +117,8 @@ Bytes bytes_of(const nb::dict& state, const std::string& key, size_t size) {
 
 }  // namespace
 
-RenderOptions watched_by(const nb::object& progress, const nb::object& watcher) {
+RenderOptions watched_by(const nb::object& progress, const nb::object& watcher,
+                         const nb::dict& settings) {
   RenderOptions options;
   options.progress = [&](const RenderStatus& s) {
     const nb::gil_scoped_acquire gil;
@@ -92,7 +133,10 @@ RenderOptions watched_by(const nb::object& progress, const nb::object& watcher) 
   if (!watcher.is_none())
     options.snapshot = [&](const Snapshot& s) {
       const nb::gil_scoped_acquire gil;
-      watcher.attr("snapshot")(nb::cast(&s, nb::rv_policy::reference));
+      const nb::object live = nb::cast(LiveSnapshot(s, settings));
+      const auto end = [&live](void*) { nb::cast<LiveSnapshot&>(live).end(); };
+      const std::unique_ptr<LiveSnapshot, decltype(end)> guard(&nb::cast<LiveSnapshot&>(live), end);
+      watcher.attr("snapshot")(live);
     };
   return options;
 }
@@ -112,9 +156,12 @@ std::function<void(Film&, PassState&)> resumed_from(const nb::dict& state) {
 }
 
 void bind_watching(nb::module_& m) {
-  nb::class_<Snapshot>(m, "Snapshot")
-      .def_ro("finished", &Snapshot::finished)
-      .def_prop_ro("status", [](const Snapshot& s) { return status_dict(s.status); })
-      .def("beauty", &beauty)
-      .def("state", &state_dict);
+  nb::class_<LiveSnapshot>(m, "Snapshot")
+      .def_prop_ro("finished", [](const LiveSnapshot& s) { return s.get().finished; })
+      .def_prop_ro("status", [](const LiveSnapshot& s) { return status_dict(s.get().status); })
+      .def_prop_ro("stats", &LiveSnapshot::stats)
+      .def("beauty", [](const LiveSnapshot& s) { return layer(s, "beauty"); })
+      .def("samples", &samples)
+      .def("layer", &layer, "name"_a)
+      .def("state", [](const LiveSnapshot& s) { return state_dict(s.get()); });
 }

@@ -7,9 +7,10 @@
 #include "wavecomb/render/renderer.h"
 
 /// Options whose callbacks ask Python's `progress(done, total)` and `watcher`; either may be None.
-/// The callbacks take the GIL; both objects must outlive the render.
+/// `settings`: for statistics of snapshots. The callbacks take the GIL; all three must outlive the
+/// render.
 wavecomb::RenderOptions watched_by(const nanobind::object& progress,
-                                   const nanobind::object& watcher);
+                                   const nanobind::object& watcher, const nanobind::dict& settings);
 /// What RenderOptions::resume is to be for `state`, a Snapshot.state() of before.
 std::function<void(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
     const nanobind::dict& state);

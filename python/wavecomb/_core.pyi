@@ -51,7 +51,15 @@ class Scene:
         Reads every array once."""
     @property
     def camera(self) -> dict[str, Any]:
-        """As set_camera takes it: to_world (4, 4), window, near_clip, far_clip."""
+        """As set_camera takes it: to_world (4, 4), window, lens_radius, focus_distance, near_clip,
+        far_clip."""
+    def material(self, material: int) -> dict[str, Any]:
+        """name, program and parameters of a material as add_material takes them; its textures with
+        their names as well. Raises Error for an id that is not there."""
+    def light(self, light: int) -> dict[str, Any]:
+        """name, kind, transform and parameters of a light as add_light takes them, its group by
+        name; texture: the name of its texture, or None. Raises Error for an index that is not
+        there."""
     @property
     def light_groups(self) -> list[str]:
         """Names; the first, "other", is of lights without a group."""
@@ -244,6 +252,8 @@ class Settings:
     min_spp: int  # adaptive: before the first look at errors
     time_limit: float  # seconds of rendering; 0: none
     error: bool  # keep error and variance where nothing else asks for them
+    region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
+    progressive: bool  # passes of 1, 1, 2, 4 ... samples: the whole picture is there soon
     threads: int  # 0: all
     wave_size: int  # 0: default
     lanes: int  # 0: widest
@@ -303,7 +313,7 @@ class Result:
         """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
 
 class Snapshot:
-    """A render that stands still. Valid while Watcher.snapshot() runs, as are its arrays."""
+    """A render that stands still. Valid while Watcher.snapshot() runs: later it raises Error."""
 
     @property
     def finished(self) -> bool:
@@ -315,9 +325,17 @@ class Snapshot:
         run), error (mean relative error at the last look, or None)."""
     def beauty(self) -> NDArray[np.float32]:
         """(height, width, 3), linear; a copy."""
+    def samples(self) -> NDArray[np.uint32]:
+        """(height, width); a copy."""
+    def layer(self, name: str) -> NDArray[Any] | None:
+        """A layer as Result and its aovs have it, by name ("depth", "error", "cost" ...), made now;
+        None where it is not kept."""
+    @property
+    def stats(self) -> dict[str, Any]:
+        """As Result.stats, so far; error is that of the last look."""
     def state(self) -> dict[str, Any]:
         """All that render(state=...) needs to go on from here: numbers, and arrays of bytes that
-        are not copied."""
+        are not copied: they are valid while Watcher.snapshot() runs."""
 
 def render(
     scene: Scene,
@@ -328,16 +346,85 @@ def render(
     recorder: RayRecording | None = None,
     watcher: Any = None,
     state: dict[str, Any] | None = None,
+    interval: float = 0.1,
 ) -> Result:
-    """Renders; calls progress(samples_done, samples_total) some 10 times a second on the calling
+    """Renders; calls progress(samples_done, samples_total) every `interval` seconds on the calling
     thread (GIL held); returning False cancels, and the result holds what was done.
     KeyboardInterrupt raised in the callback also stops the render. Raises Error.
     policy: as wavecomb.SchedulingPolicy, in place of the settings' one; what its order() raises
-    comes out of here. costs: a profile to start from, as Result.costs. recorder: keeps the rays of
+    comes out of here. costs: a profile to start from, as Result.costs; one that knows all materials
+    and textures spares the measuring. recorder: keeps the rays of
     the wavefront integrator. watcher: as wavecomb.watcher.Watcher: progress(status) is called like
     progress and answers None, "snapshot" or "stop"; snapshot(snapshot) gets the snapshots that were
     asked for and one at the end. state: of a snapshot of a render with the same settings, to go on
     from."""
+
+class Renderer:
+    """A scene ready to be rendered, and to be changed.
+
+    One thread at a time may call render() and edit(), all else may be called by any thread.
+
+    >>> renderer = wavecomb._core.Renderer(stage.scene)  # doctest: +SKIP
+    >>> renderer.edit(materials={0: {"roughness": 0.2}})  # doctest: +SKIP
+    >>> renderer.render(wavecomb.Settings(spp=16)).beauty  # doctest: +SKIP
+    """
+
+    def __init__(self, scene: Scene, threads: int = 0) -> None:
+        """Builds the hierarchy. threads: for that, and for edits; 0: all. Raises Error."""
+    @property
+    def scene(self) -> Scene:
+        """As edited: another object after each edit, which shares with the one before what did not
+        change."""
+    @property
+    def version(self) -> int:
+        """Edits so far."""
+    def edit(
+        self,
+        *,
+        camera: dict[str, Any] | None = None,
+        materials: dict[int, dict[str, Any]] = {},
+        lights: dict[int, dict[str, Any]] = {},
+    ) -> None:
+        """Changes the scene, all at once or nothing. Parameters that are not given stay.
+
+        camera: those of set_camera, or what Scene.camera gives. materials: by id, those of
+        add_material but program, name and textures. lights: by index, those of add_light but kind,
+        name, texture and group. A picture is then, bit for bit, that of a scene built with these
+        values.
+
+        Costs microseconds for a camera and little for materials and colours of lights. Where a mesh
+        begins or ceases to be partly present, groups with it are built anew; then, and where a
+        light's shape or place changes, the top level, too, with the meshes that no instance holds.
+        Raises Error for a bad value, and while a render goes on.
+        """
+    def render(
+        self,
+        settings: Settings,
+        progress: Callable[[int, int], bool | None] | None = None,
+        policy: Any = None,
+        costs: dict[str, dict[str, float]] | None = None,
+        watcher: Any = None,
+        state: dict[str, Any] | None = None,
+        interval: float = 0.1,
+        picture: bool = True,
+    ) -> Result:
+        """As render(), of the scene as it is. picture: False leaves all layers of the result None,
+        for a watcher that takes what it needs of snapshots; a render that is stopped ends sooner
+        then. Raises Error while another render of this one goes on."""
+    def stop(self) -> None:
+        """Ends the render that goes on within a wave; it returns what was done. Without one: does
+        nothing."""
+    def twin(self) -> Renderer:
+        """Another renderer of the same scene, to be edited and run by itself. They share hierarchy
+        and geometry."""
+    def pick(self, x: float, y: float, width: int, height: int) -> dict[str, Any] | None:
+        """What the ray through point (x, y) of a picture of that size, (0, 0) being its top left
+        corner, meets first; None where it leaves the scene.
+
+        object and asset (names as of Cryptomatte), position, depth (along the camera's axis) and
+        distance; of a surface also material (id), material_name, instance (from 1, as the AOV),
+        normal and uv; of a light's shape light (index).
+        """
 
 class RayRecording:
     """The rays of one render, kept and traced again; for benchmarks/limit.py."""

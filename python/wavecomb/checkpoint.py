@@ -40,6 +40,7 @@ _HOW = (
     "ray_order",
     "shadow_order",
     "cost_weight",
+    "progressive",
 )
 """Settings that say how a picture is computed and never change it."""
 

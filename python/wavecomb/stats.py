@@ -112,6 +112,14 @@ def make_stats(
     }
 
 
+def rendered_pixels(settings: Mapping[str, Any]) -> int:
+    """Pixels that a render with these settings has samples for."""
+    if settings.get("region") is None:
+        return int(settings["width"] * settings["height"])
+    x0, y0, x1, y1 = settings["region"]
+    return int((x1 - x0) * (y1 - y0))
+
+
 def sort_overhead(phases: Mapping[str, float]) -> float:
     """The share of ordered shading that went into the order.
 

@@ -241,8 +241,7 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
       rgb[rng() % rgb.size()] = -50.f;
       Lights lights;
       const uint32_t texture = lights.add_texture(w, h, rgb);
-      double mean = 0;
-      const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1}, &mean);
+      const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1});
       ASSERT_GT(d.width, 0u);
       ASSERT_LE(d.width, 1024u);
       ASSERT_LE(d.height, 512u);
@@ -356,7 +355,7 @@ TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
           rgb.insert(rgb.end(), 3, images[image](x, y, w, h, static_cast<uint32_t>(rng())));
       Lights lights;
       const uint32_t texture = lights.add_texture(w, h, rgb);
-      const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1}, nullptr);
+      const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1});
       if (*std::max_element(rgb.begin(), rgb.end()) == 0) {  // an image smaller than its bands
         EXPECT_EQ(d.width, 0u);
         continue;
@@ -380,11 +379,10 @@ TEST(DomeDistribution, MeanAndBlack) {
   Lights lights;
   const uint32_t grey = lights.add_texture(5, 7, std::vector<float>(5 * 7 * 3, 0.25f));
   const uint32_t black = lights.add_texture(4, 2, std::vector<float>(4 * 2 * 3, -1.f));
-  double mean = 0;
-  build_dome_distribution(lights.views[grey], {2, 2, 2}, &mean);
-  EXPECT_NEAR(mean, 0.5, 1e-6);
-  EXPECT_EQ(build_dome_distribution(lights.views[black], {1, 1, 1}, &mean).width, 0u);
-  EXPECT_EQ(mean, 0);
+  EXPECT_NEAR(build_dome_distribution(lights.views[grey], {2, 2, 2}).mean_luminance, 0.5, 1e-6);
+  const Distribution2D nothing = build_dome_distribution(lights.views[black], {1, 1, 1});
+  EXPECT_EQ(nothing.width, 0u);
+  EXPECT_EQ(nothing.mean_luminance, 0);
   Light light = make_light(LightKind::kDome);
   light.texture = black;
   lights.build({light});

@@ -106,7 +106,7 @@ std::map<uint32_t, std::pair<uint32_t, uint32_t>> by_pixel(const PassPlan& plan)
 }
 
 TEST(PassPlan, AllPixelsInMortonOrder) {
-  const std::vector<uint32_t> order = morton_pixel_order(5, 3), none(15, 0);
+  const std::vector<uint32_t> order = morton_pixel_order({0, 0, 5, 3}), none(15, 0);
   const PassPlan plan = plan_pass(order, 5, none, {16, {}});
   EXPECT_EQ(plan.pixels, order);
   ASSERT_EQ(plan.batches.size(), 1u);
@@ -114,7 +114,7 @@ TEST(PassPlan, AllPixelsInMortonOrder) {
 }
 
 TEST(PassPlan, TakesActivePixelsBelowTheTarget) {
-  const std::vector<uint32_t> order = morton_pixel_order(3, 2);
+  const std::vector<uint32_t> order = morton_pixel_order({0, 0, 3, 2});
   //                                      a pass that was cut, and one pixel that was left at 16
   const std::vector<uint32_t> samples = {32, 48, 64, 16, 64, 32};
   const std::vector<uint8_t> active = {1, 1, 1, 1, 0, 0};
@@ -126,8 +126,28 @@ TEST(PassPlan, TakesActivePixelsBelowTheTarget) {
   EXPECT_TRUE(plan_pass(order, 3, std::vector<uint32_t>(6, 64), {64, active}).batches.empty());
 }
 
+TEST(PassPlan, ProgressivePassesDoubleUpToTheStep) {
+  PassRules rules;
+  rules.spp = 100;
+  rules.progressive = true;
+  std::vector<uint32_t> targets;
+  for (uint32_t done = 0; done < rules.spp;)
+    targets.push_back(done = next_target(done, rules, {}, 1000));
+  EXPECT_EQ(targets, (std::vector<uint32_t>{1, 2, 4, 8, 16, 32, 48, 64, 80, 96, 100}));
+}
+
+TEST(PassPlan, RegionsAreRenderedAloneAndInTheSameOrder) {
+  const std::vector<uint32_t> all = morton_pixel_order({0, 0, 150, 90});
+  const Region region{60, 10, 140, 70};
+  std::vector<uint32_t> within;
+  for (const uint32_t pixel : all)
+    if (region.contains(pixel & 0xffffu, pixel >> 16)) within.push_back(pixel);
+  EXPECT_EQ(morton_pixel_order(region), within);
+  EXPECT_EQ(within.size(), region.pixels());
+}
+
 TEST(WaveGroups, CoverThePlanOnceAndFillWaves) {
-  const std::vector<uint32_t> order = morton_pixel_order(100, 70);
+  const std::vector<uint32_t> order = morton_pixel_order({0, 0, 100, 70});
   for (const uint32_t wave_size : {64u, 1000u, 4096u, 65536u})
     for (const uint32_t samples : {1u, 16u, 100u, 5000u})
       for (const uint32_t threads : {1u, 2u, 16u}) {
@@ -150,7 +170,7 @@ TEST(WaveGroups, CoverThePlanOnceAndFillWaves) {
 }
 
 TEST(WaveGroups, FewPixelsKeepAllWorkersBusy) {
-  const std::vector<uint32_t> order = morton_pixel_order(5, 4);
+  const std::vector<uint32_t> order = morton_pixel_order({0, 0, 5, 4});
   const PassPlan plan = plan_pass(order, 5, std::vector<uint32_t>(20, 0), {4096, {}});
   EXPECT_GE(wave_groups(plan, 65536, 4).size(), 10u);
 }

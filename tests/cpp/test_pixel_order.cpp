@@ -13,7 +13,7 @@ TEST(PixelOrder, EveryPixelOnce) {
   constexpr std::array<std::array<uint32_t, 2>, 9> kSizes = {
       {{1, 1}, {1, 200}, {200, 1}, {64, 64}, {65, 63}, {130, 70}, {3, 5}, {65535, 1}, {1, 65535}}};
   for (const auto& [width, height] : kSizes) {
-    const std::vector<uint32_t> order = morton_pixel_order(width, height);
+    const std::vector<uint32_t> order = morton_pixel_order({0, 0, width, height});
     ASSERT_EQ(order.size(), size_t{width} * height);
     std::vector<bool> seen(order.size(), false);
     for (const uint32_t p : order) {
@@ -28,7 +28,7 @@ TEST(PixelOrder, EveryPixelOnce) {
 }
 
 TEST(PixelOrder, RunsAreCompact) {
-  const std::vector<uint32_t> order = morton_pixel_order(256, 192);
+  const std::vector<uint32_t> order = morton_pixel_order({0, 0, 256, 192});
   for (size_t first = 0; first < order.size(); first += 256) {
     uint32_t lo_x = ~0u, lo_y = ~0u, hi_x = 0, hi_y = 0;
     for (size_t i = first; i < first + 256; ++i) {

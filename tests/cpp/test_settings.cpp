@@ -38,6 +38,24 @@ TEST(Settings, DefaultsAreValid) {
   EXPECT_EQ(complaint(Settings{}), "");
 }
 
+TEST(Settings, RegionsAreWithinThePicture) {
+  Settings s;
+  s.width = 20;
+  s.height = 10;
+  for (const Region good : {Region{0, 0, 20, 10}, Region{19, 9, 20, 10}, Region{3, 2, 7, 9}}) {
+    s.region = good;
+    EXPECT_EQ(complaint(s), "");
+  }
+  for (const Region empty : {Region{5, 2, 5, 8}, Region{6, 2, 5, 8}, Region{1, 8, 2, 8}}) {
+    s.region = empty;
+    EXPECT_NE(complaint(s).find("no pixels"), std::string::npos);
+  }
+  for (const Region outside : {Region{0, 0, 21, 10}, Region{0, 0, 20, 11}, Region{30, 0, 40, 5}}) {
+    s.region = outside;
+    EXPECT_NE(complaint(s).find("not within"), std::string::npos);
+  }
+}
+
 TEST(Settings, EachOptionIsChecked) {
   expect_refused<uint32_t>(&Settings::width, 0, "width");
   expect_refused<uint32_t>(&Settings::width, 65536, "width");

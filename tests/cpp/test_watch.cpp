@@ -33,6 +33,38 @@ TEST(Watch, StopsWork) {
   EXPECT_TRUE(watch.stopped());
 }
 
+TEST(Watch, AnotherThreadStopsWorkWithoutWaitingForALook) {
+  Watch watch(3600);
+  std::thread other([&] {
+    std::this_thread::sleep_for(5ms);
+    watch.stop();
+  });
+  watch.run(
+      [&] {
+        while (!watch.halted()) std::this_thread::sleep_for(1ms);
+      },
+      [] { return Request::kGoOn; }, {});
+  other.join();
+  EXPECT_TRUE(watch.stopped());
+}
+
+TEST(Watch, AStopDuringASnapshotIsNotLost) {
+  Watch watch(0.001);
+  int snapshots = 0;
+  watch.run(
+      [&] {
+        while (!watch.stopped()) {
+          while (!watch.halted()) std::this_thread::sleep_for(100us);
+          watch.rest();
+        }
+      },
+      [] { return Request::kSnapshot; },
+      [&] {
+        if (++snapshots == 2) watch.stop();
+      });
+  EXPECT_EQ(snapshots, 2);
+}
+
 TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
   Watch watch;
   uint64_t steps = 0;  // no atomic: the snapshot may read it

@@ -33,7 +33,7 @@ class WaveRun {
         costs_(model_costs(*scene_)),
         aovs_(*scene_, case_.settings),
         film_(case_.settings.width, case_.settings.height, aovs_.layout),
-        pixels_(morton_pixel_order(case_.settings.width, case_.settings.height)) {
+        pixels_(morton_pixel_order(case_.settings.rendered())) {
     // "adaptive" chooses among all others.
     for (const std::string& name : policy_names())
       if (name != "adaptive" &&

@@ -64,6 +64,13 @@ _INTEGERS = click.IntRange(min=0)
     help="Pixels.  [default: 600 600]",
 )
 @click.option(
+    "--region",
+    nargs=4,
+    type=int,
+    metavar="X0 Y0 X1 Y1",
+    help="Pixels to render, the end excluded; others have no samples.  [default: all]",
+)
+@click.option(
     "--spp",
     type=int,
     metavar="N",

@@ -78,10 +78,12 @@ def run(
 
 def how_far(picture: Any) -> str:
     """How much is done, as can be said of a render without and with a fixed end."""
+    from wavecomb.stats import rendered_pixels
+
     stats = picture.stats
     settings = stats["settings"]
     samples = stats["counts"]["samples"] + stats["resumed_samples"]
-    mean = samples / (settings["width"] * settings["height"])
+    mean = samples / rendered_pixels(settings)
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         return f"with {mean:.3g} samples a pixel"
     return f"at {100.0 * mean / settings['spp']:.0f} %"

@@ -61,6 +61,7 @@ def _memory(parts: Mapping[str, int]) -> str:
 def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
     """Of adaptive, timed and resumed renders."""
     from wavecomb.progress import count_text, time_text
+    from wavecomb.stats import rendered_pixels
 
     lines: list[str] = []
     settings, before = stats["settings"], stats["resumed_samples"]
@@ -70,11 +71,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
             f"{count_text(before)} samples"
         )
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
-        pixels = settings["width"] * settings["height"]
-        line = (
-            f"{stats['passes']} passes, "
-            f"{(before + stats['counts']['samples']) / pixels:.3g} samples a pixel"
-        )
+        mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
+        line = f"{stats['passes']} passes, {mean:.3g} samples a pixel"
         if stats["error"] is not None:
             line += f"; mean relative error {_percent(stats['error'])}"
         lines.append(line)

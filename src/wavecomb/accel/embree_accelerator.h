@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Ray traversal by Embree. The .cpp beside this is the only file that includes it.
+/// Ray traversal by Embree, which only .cpp files and embree_*.h of this folder include.
 #pragma once
 
 #include <cstdint>
@@ -56,6 +56,11 @@ class EmbreeAccelerator {
   /// ...).
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
                     HitRule rule = HitRule::kCanonical);
+  /// For a scene that was edited out of origin's: shares the hierarchy, or those groups of it whose
+  /// meshes are as they were. Built anew are groups with meshes that begin or cease to be partly
+  /// present, and then, or where a light's shape or place is another, the top level.
+  EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
+                    uint32_t threads);
   ~EmbreeAccelerator();
 
   /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent`: the rays of a packet go
@@ -72,7 +77,7 @@ class EmbreeAccelerator {
   size_t bytes() const;
   /// Widest packets that Embree traces natively here.
   uint32_t native_width() const;
-  /// The top level, as an RTCScene.
+  /// The top level, as an RTCScene. The same for scenes that share it.
   RTCSceneTy* embree_scene() const;
 
  private:

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "wavecomb/accel/curve_shapes.h"
-#include "wavecomb/accel/embree_query.h"
+#include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/presence.h"
 
 namespace wavecomb {
@@ -83,14 +83,7 @@ void occlude_curves(const RTCOccludedFunctionNArguments* args) {
 }
 
 void curve_box(const RTCBoundsFunctionArguments* args) {
-  const Bounds b = curve_bounds(*curves_of(args->geometryUserPtr).mesh, args->primID);
-  RTCBounds& out = *args->bounds_o;
-  out.lower_x = b.lo.x;
-  out.lower_y = b.lo.y;
-  out.lower_z = b.lo.z;
-  out.upper_x = b.hi.x;
-  out.upper_y = b.hi.y;
-  out.upper_z = b.hi.z;
+  put_bounds(curve_bounds(*curves_of(args->geometryUserPtr).mesh, args->primID), *args->bounds_o);
 }
 
 }  // namespace

@@ -27,6 +27,17 @@ void Settings::check() const {
   check_range("width", width, 1, kMaxSize);
   check_range("height", height, 1, kMaxSize);
   check_range("width x height", static_cast<double>(width) * height, 1, kMaxPixels);
+  if (region) {
+    const auto text = [](uint32_t v) { return std::to_string(v); };
+    const Region& r = *region;
+    const std::string given =
+        "region " + text(r.x0) + " " + text(r.y0) + " " + text(r.x1) + " " + text(r.y1);
+    if (r.x0 >= r.x1 || r.y0 >= r.y1)
+      throw Error(given + " has no pixels; give X0 Y0 X1 Y1 with X0 < X1 and Y0 < Y1");
+    if (r.x1 > width || r.y1 > height)
+      throw Error(given + " is not within the picture; X1 is at most " + text(width) +
+                  " and Y1 at most " + text(height));
+  }
   check_range("spp", spp, 1, 1 << 20);
   check_range("max_depth", max_depth, 0, 4096);
   check_range("filter_width", filter_width, 0.01f, 32);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,14 @@ enum class Materialize : uint8_t { kAuto, kOn, kOff };
 /// Largest picture.
 inline constexpr uint32_t kMaxSize = 65535;
 inline constexpr uint32_t kMaxPixels = 1u << 28;
+
+/// Pixels x0 to x1 - 1 of rows y0 to y1 - 1, row 0 at the top.
+struct Region {
+  uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+
+  bool contains(uint32_t x, uint32_t y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
+  uint64_t pixels() const { return uint64_t{x1 - x0} * (y1 - y0); }
+};
 
 /// Settings of a render. The picture depends on those above the line only.
 struct Settings {
@@ -56,6 +65,9 @@ struct Settings {
   /// The most seconds that rendering may take; 0: no limit. What is done by then is the picture.
   float time_limit = 0;
   bool error = false;  ///< keep errors and variances where nothing else asks for them
+  /// The pixels that are rendered; all others have no samples. Without: all. A pixel of it is the
+  /// same as in the whole picture, but in adaptive renders, which see errors within it only.
+  std::optional<Region> region;
   // ---- below: how it is computed; never changes the picture ----
   uint32_t threads = 0;    ///< 0: all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0: default
@@ -66,9 +78,13 @@ struct Settings {
   Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster
   RayOrder ray_order = RayOrder::kAuto;          ///< of bounce rays
   RayOrder shadow_order = RayOrder::kAuto;       ///< of shadow rays
+  /// Passes of 1, 1, 2, 4 ... samples a pixel, so that the whole picture is there soon.
+  bool progressive = false;
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
+  /// Pixels that are rendered.
+  Region rendered() const { return region.value_or(Region{0, 0, width, height}); }
   bool keeps_error() const { return error || is_adaptive(); }
   /// Throws Error naming the option and what it may be.
   void check() const;

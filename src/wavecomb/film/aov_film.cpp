@@ -3,12 +3,27 @@
 
 #include <algorithm>
 #include <bit>
+#include <initializer_list>
 
 namespace wavecomb {
 namespace {
 
 double inverse(uint32_t n) {
   return n == 0 ? 0.0 : 1.0 / n;
+}
+
+/// Before the names of light groups' layers.
+constexpr const char* kLightPrefix = "light_";
+
+/// The layers beyond albedo, normal, depth and light groups.
+constexpr Aov kFurther[] = {
+    Aov::kPosition,       Aov::kUv,          Aov::kMaterialId, Aov::kInstanceId, Aov::kCryptoObject,
+    Aov::kCryptoMaterial, Aov::kCryptoAsset, Aov::kEmission,   Aov::kDirect,     Aov::kIndirect,
+    Aov::kCost,           Aov::kGuideAlbedo, Aov::kGuideNormal};
+
+/// The mean of `n` samples out of their sums, rgb.
+void put_mean(const double* sums, uint32_t n, float* out) {
+  for (size_t c = 0; c < 3; ++c) out[c] = static_cast<float>(sums[c] * inverse(n));
 }
 
 /// Ids are counted from 1 in pictures; 0 is nothing.
@@ -84,40 +99,83 @@ AovLayer AovFilm::crypto_layer(Aov level, const std::vector<uint32_t>& samples) 
   });
 }
 
+AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
+  const auto make = [&](uint32_t channels, const auto& write) {
+    return make_layer(aov_name(aov), channels, pixels_, write);
+  };
+  const auto means = [&](const auto& values, auto sums) {
+    return make(3, [&](size_t i, float* v) { put_mean(values[i].*sums, samples[i], v); });
+  };
+  switch (aov) {
+    case Aov::kPosition:
+      return make(3, [&](size_t i, float* v) { std::copy_n(nearest_[i].position, 3, v); });
+    case Aov::kUv:
+      return make(2, [&](size_t i, float* v) { std::copy_n(nearest_[i].uv, 2, v); });
+    case Aov::kMaterialId:
+      return make(1, [&](size_t i, float* v) { *v = id_value(nearest_[i].material); });
+    case Aov::kInstanceId:
+      return make(1, [&](size_t i, float* v) { *v = id_value(nearest_[i].instance); });
+    case Aov::kCryptoObject:
+    case Aov::kCryptoMaterial:
+    case Aov::kCryptoAsset:
+      return crypto_layer(aov, samples);
+    case Aov::kEmission:
+      return means(parts_, &Parts::emission);
+    case Aov::kDirect:
+      return means(parts_, &Parts::direct);
+    case Aov::kIndirect:
+      return means(parts_, &Parts::indirect);
+    case Aov::kCost:
+      return make(1, [&](size_t i, float* v) { *v = static_cast<float>(cost_ns_[i]); });
+    case Aov::kGuideAlbedo:
+      return means(guides_, &Guides::albedo);
+    case Aov::kGuideNormal:
+      return means(guides_, &Guides::normal);
+    default:
+      return {};
+  }
+}
+
+AovLayer AovFilm::group_layer(uint32_t group, const std::string& name,
+                              const std::vector<uint32_t>& samples) const {
+  return make_layer(kLightPrefix + name, 3, pixels_, [&](size_t i, float* v) {
+    put_mean(groups_.data() + 3 * (i * layout_.light_groups + group), samples[i], v);
+  });
+}
+
+AovLayer AovFilm::layer(const std::string& name, const std::vector<uint32_t>& samples,
+                        const std::vector<std::string>& group_names) const {
+  if (layout_.set.has(Aov::kLightGroups))
+    for (uint32_t g = 0; g < layout_.light_groups; ++g)
+      if (name == kLightPrefix + group_names[g]) return group_layer(g, group_names[g], samples);
+  for (const Aov aov : kFurther)
+    if (name == aov_name(aov) && layout_.set.has(aov)) return layer(aov, samples);
+  return {};
+}
+
 std::vector<AovLayer> AovFilm::finish(const std::vector<uint32_t>& samples,
                                       const std::vector<std::string>& group_names) && {
-  const AovSet& set = layout_.set;
   release(first_);
   std::vector<AovLayer> out;
-  const auto add = [&](Aov aov, uint32_t channels, const auto& write) {
-    if (set.has(aov)) out.push_back(make_layer(aov_name(aov), channels, pixels_, write));
+  const auto add = [&](std::initializer_list<Aov> aovs) {
+    for (const Aov aov : aovs)
+      if (layout_.set.has(aov)) out.push_back(layer(aov, samples));
   };
-  add(Aov::kPosition, 3, [&](size_t i, float* v) { std::copy_n(nearest_[i].position, 3, v); });
-  add(Aov::kUv, 2, [&](size_t i, float* v) { std::copy_n(nearest_[i].uv, 2, v); });
-  add(Aov::kMaterialId, 1, [&](size_t i, float* v) { *v = id_value(nearest_[i].material); });
-  add(Aov::kInstanceId, 1, [&](size_t i, float* v) { *v = id_value(nearest_[i].instance); });
+  add({Aov::kPosition, Aov::kUv, Aov::kMaterialId, Aov::kInstanceId});
   release(nearest_);
   for (const Aov level : {Aov::kCryptoObject, Aov::kCryptoMaterial, Aov::kCryptoAsset}) {
-    if (set.has(level)) out.push_back(crypto_layer(level, samples));
+    add({level});
     release(crypto_[level_index(level)]);
   }
-  const auto mean = [&](size_t i, const double* sums, float* v) {
-    for (size_t c = 0; c < 3; ++c) v[c] = static_cast<float>(sums[c] * inverse(samples[i]));
-  };
-  add(Aov::kEmission, 3, [&](size_t i, float* v) { mean(i, parts_[i].emission, v); });
-  add(Aov::kDirect, 3, [&](size_t i, float* v) { mean(i, parts_[i].direct, v); });
-  add(Aov::kIndirect, 3, [&](size_t i, float* v) { mean(i, parts_[i].indirect, v); });
+  add({Aov::kEmission, Aov::kDirect, Aov::kIndirect});
   release(parts_);
-  if (set.has(Aov::kLightGroups))
+  if (layout_.set.has(Aov::kLightGroups))
     for (uint32_t g = 0; g < layout_.light_groups; ++g)
-      out.push_back(make_layer("light_" + group_names[g], 3, pixels_, [&](size_t i, float* v) {
-        mean(i, groups_.data() + 3 * (i * layout_.light_groups + g), v);
-      }));
+      out.push_back(group_layer(g, group_names[g], samples));
   release(groups_);
-  add(Aov::kCost, 1, [&](size_t i, float* v) { *v = static_cast<float>(cost_ns_[i]); });
+  add({Aov::kCost});
   release(cost_ns_);
-  add(Aov::kGuideAlbedo, 3, [&](size_t i, float* v) { mean(i, guides_[i].albedo, v); });
-  add(Aov::kGuideNormal, 3, [&](size_t i, float* v) { mean(i, guides_[i].normal, v); });
+  add({Aov::kGuideAlbedo, Aov::kGuideNormal});
   release(guides_);
   return out;
 }

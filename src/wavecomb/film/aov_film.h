@@ -121,6 +121,9 @@ class AovFilm {
   }
   /// Means over the samples that hit something; infinite where none did.
   std::vector<float> depth() const;
+  /// A layer that the set asks for, "light_NAME" among them; no name where it does not.
+  AovLayer layer(const std::string& name, const std::vector<uint32_t>& samples,
+                 const std::vector<std::string>& group_names) const;
   /// The layers that the set asks for beyond albedo, normal and depth, and the end of the film:
   /// sums are freed as soon as they were used. Light groups are called "light_" and their name.
   /// `samples` is by pixel.
@@ -146,6 +149,10 @@ class AovFilm {
     return level == Aov::kCryptoObject ? 0 : level == Aov::kCryptoMaterial ? 1 : 2;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
+  /// One of the set beyond albedo, normal, depth and light groups.
+  AovLayer layer(Aov aov, const std::vector<uint32_t>& samples) const;
+  AovLayer group_layer(uint32_t group, const std::string& name,
+                       const std::vector<uint32_t>& samples) const;
   template <typename Count>
   std::vector<float> means(double (First::*sum)[3], const Count& count) const {
     std::vector<float> out(3 * first_.size());

@@ -54,17 +54,16 @@ inline F centre_distance2(const CameraSetup& camera, const Sample4<F>& r, const 
   return fma(dx, dx, F(dy * dy));
 }
 
-/// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set.
+/// The ray through a point of the picture, in pixels, y down from the top; `u`, `v` choose a point
+/// of the lens.
 template <typename F>
-inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y,
-                               const Sample4<F>& r, const Mask<F>& active) {
-  const F fx = x + 0.5f + filter_offset<F>(camera.filter, r.x, active);
-  const F fy = y + 0.5f + filter_offset<F>(camera.filter, r.y, active);
+inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F& fy, const F& u,
+                                const F& v) {
   Vec3<F> d{fma(fx, F(camera.step_x), F(camera.x0)), fma(fy, F(-camera.step_y), F(camera.y1)),
             F(-1.f)};
   Vec3<F> o(F(0.f));
   if (camera.lens_radius > 0) {
-    const Vec2<F> lens = square_to_disk(r.z, r.w);
+    const Vec2<F> lens = square_to_disk(u, v);
     o = {lens.x * camera.lens_radius, lens.y * camera.lens_radius, F(0.f)};
     // Through the point in focus: d * focus_distance, seen from the lens, scaled back to z = -1.
     d = {fma(o.x, F(-1.f / camera.focus_distance), d.x),
@@ -72,9 +71,7 @@ inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y
   }
   o = fma(d, F(camera.near_clip), o);
   const Affine& m = camera.to_world;
-  const auto rotate = [&](const Vec3<float>& row, const Vec3<F>& v) {
-    return dot(Vec3<F>(row), v);
-  };
+  const auto rotate = [](const Vec3<float>& row, const Vec3<F>& w) { return dot(Vec3<F>(row), w); };
   const Vec3<F> world{rotate(m.row[0], d), rotate(m.row[1], d), rotate(m.row[2], d)};
   const F len = length(world);
   CameraRay<F> ray;
@@ -83,6 +80,14 @@ inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y
   ray.spread = F(kConeShare * camera.step_y);
   ray.tfar = len * (camera.far_clip - camera.near_clip);
   return ray;
+}
+
+/// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set.
+template <typename F>
+inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y,
+                               const Sample4<F>& r, const Mask<F>& active) {
+  return ray_through<F>(camera, F(x + 0.5f + filter_offset<F>(camera.filter, r.x, active)),
+                        F(y + 0.5f + filter_offset<F>(camera.filter, r.y, active)), r.z, r.w);
 }
 
 }  // namespace wavecomb

@@ -32,18 +32,22 @@ double error_threshold(const ErrorMap& map, const Settings& settings) {
 AdaptiveCheck check_adaptive(const ErrorMap& map, uint32_t width, std::span<const uint32_t> samples,
                              const Settings& settings, const PassRules& rules) {
   const size_t count = samples.size(), height = count / width;
+  const Region region = settings.rendered();
+  const auto is_rendered = [&](size_t i) {
+    return region.contains(static_cast<uint32_t>(i % width), static_cast<uint32_t>(i / width));
+  };
   const double threshold = error_threshold(map, settings);
   const bool done = settings.noise > 0 && map.mean_relative <= settings.noise;
   AdaptiveCheck check;
   check.active.resize(count);
   if (!done) {
-    for (size_t i = 0; i < count; ++i) check.active[i] = map.error[i] > threshold;
+    for (size_t i = 0; i < count; ++i) check.active[i] = is_rendered(i) && map.error[i] > threshold;
     dilate_along(check.active, height, width, width, 1);
     dilate_along(check.active, width, 1, height, width);
   }
   for (size_t i = 0; i < count; ++i) {
     check.expected_samples += samples[i];
-    if (samples[i] >= rules.spp) check.active[i] = 0;
+    if (samples[i] >= rules.spp || !is_rendered(i)) check.active[i] = 0;
     if (check.active[i] == 0) continue;
     ++check.active_count;
     const double ratio = threshold > 0 ? map.error[i] / threshold : 2.0;

@@ -12,18 +12,20 @@ namespace wavecomb {
 PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film& film,
                    PassRunner& runner, RenderCosts& costs, Watch& watch)
     : settings_(settings),
-      rules_{settings.spp, settings.min_spp, settings.is_adaptive(), settings.time_limit > 0, step},
+      rules_{settings.spp, settings.min_spp,    settings.is_adaptive(), settings.time_limit > 0,
+             step,         settings.progressive},
       pass_(std::move(pass)),
       film_(film),
       runner_(runner),
       costs_(costs),
       watch_(watch),
-      order_(morton_pixel_order(settings.width, settings.height)) {
+      order_(morton_pixel_order(settings.rendered())) {
   const std::vector<uint32_t> samples = film.samples();
   resumed_samples_ = std::accumulate(samples.begin(), samples.end(), uint64_t{0});
-  for (size_t i = 0; i < samples.size(); ++i) active_pixels_ += pass_.is_active(i) ? 1 : 0;
+  for (const uint32_t pixel : order_)
+    active_pixels_ += pass_.is_active(film.index(pixel & 0xffffu, pixel >> 16)) ? 1 : 0;
   expected_samples_ =
-      uint64_t{rules_.adaptive ? next_check(0, rules_) : rules_.spp} * samples.size();
+      uint64_t{rules_.adaptive ? next_check(0, rules_) : rules_.spp} * order_.size();
 }
 
 void PassLoop::run() {

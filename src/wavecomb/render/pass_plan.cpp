@@ -36,8 +36,9 @@ uint32_t next_check(uint32_t done, const PassRules& rules) {
 uint32_t next_target(uint32_t done, const PassRules& rules, const TimeLeft& left, uint64_t pixels) {
   const uint32_t target =
       rules.adaptive ? next_check(done, rules) : std::min(rules.spp, done + rules.step);
-  if (!rules.timed) return target;
+  if (!rules.timed && !rules.progressive) return target;
   uint32_t samples = std::min(target - done, done == 0 ? 1u : std::bit_floor(done));
+  if (!rules.timed) return done + samples;
   const double affordable = kPassShare * left.seconds * left.samples_per_s /
                             static_cast<double>(std::max<uint64_t>(1, pixels));
   if (affordable < samples)

@@ -27,8 +27,9 @@ struct PassRules {
   uint32_t spp = 1;      ///< samples a pixel at most
   uint32_t min_spp = 0;  ///< adaptive: before the first look at errors
   bool adaptive = false;
-  bool timed = false;  ///< there is a limit: passes must fit
-  uint32_t step = 16;  ///< not adaptive: samples that a pass adds
+  bool timed = false;        ///< there is a limit: passes must fit
+  uint32_t step = 16;        ///< not adaptive: samples that a pass adds
+  bool progressive = false;  ///< passes double from one sample on
 };
 
 /// Time until the limit, and the speed so far.
@@ -47,8 +48,8 @@ bool is_check(uint32_t n, const PassRules& rules);
 uint32_t next_check(uint32_t done, const PassRules& rules);
 
 /// Samples that pixels have at the end of the pass that begins when they have `done` (< spp);
-/// `pixels` are active. Timed: passes double from one sample on, and shrink by powers of two as the
-/// limit comes near, so that the last one, which the limit cuts, is short.
+/// `pixels` are active. Timed and progressive: passes double from one sample on. Timed: they shrink
+/// by powers of two as the limit comes near, so that the last one, which the limit cuts, is short.
 uint32_t next_target(uint32_t done, const PassRules& rules, const TimeLeft& left, uint64_t pixels);
 
 /// Pixels [begin, end) of a plan; each has samples [0, first_sample) and is to get `samples` more.
@@ -66,8 +67,8 @@ struct PassPlan {
 /// What is left of a pass: its pixels below the target, those of one sample count together, fewest
 /// samples first.
 ///
-/// Args: `order`: all pixels (x | y << 16); `width` of the picture; `samples` each pixel has, row
-/// by row. Empty batches: the pass is done.
+/// Args: `order`: the pixels that are rendered (x | y << 16); `width` of the picture; `samples`
+/// each pixel has, row by row. Empty batches: the pass is done.
 PassPlan plan_pass(std::span<const uint32_t> order, uint32_t width,
                    std::span<const uint32_t> samples, const PassState& pass);
 

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "wavecomb/core/settings.h"
+
 namespace wavecomb {
 
-/// All pixels of a picture (x | y << 16) along a Morton curve, so that a wave covers a compact
+/// The pixels of a region (x | y << 16) along a Morton curve, so that a wave covers a compact
 /// patch.
-std::vector<uint32_t> morton_pixel_order(uint32_t width, uint32_t height);
+std::vector<uint32_t> morton_pixel_order(const Region& region);
 
 }  // namespace wavecomb

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <unordered_map>
 
 #include "wavecomb/core/denormals.h"
 
@@ -10,12 +11,14 @@ namespace wavecomb {
 namespace {
 
 /// Costs measured on synthetic hits: the quickest of three runs each.
-CostSnapshot calibrate(const Scene& scene, const WaveContext& context, const LaneKernels& kernels) {
+CostSnapshot calibrate(const Scene& scene, const WaveContext& context, const LaneKernels& kernels,
+                       const std::function<bool()>& halted) {
   constexpr uint32_t kRecords = 256;
   Wave wave(kRecords, context);
   CostSnapshot costs = model_costs(scene);
   CostTracker tracker(context.traits.size());
   for (CalibrationHits& hits : find_calibration_hits(scene)) {
+    if (halted()) break;
     hits.count = kRecords;
     double ns = kernels.time_material(wave, context, hits);
     for (int repeat = 0; repeat < 2; ++repeat)
@@ -45,15 +48,16 @@ RenderCosts::RenderCosts(const Scene& scene, std::span<const MaterialTraits> tra
       calibrated_(order) {}
 
 void RenderCosts::start(const WaveContext& context, const LaneKernels& kernels,
-                        const CostProfile* profile) {
-  if (measures_) {
+                        const CostProfile* profile, const std::function<bool()>& halted) {
+  const bool knows_all = profile && apply(*profile);
+  if (measures_ && !knows_all) {
     const DenormalsOff denormals_off;
     const auto begin = std::chrono::steady_clock::now();
-    order = calibrate(scene_, context, kernels);
+    order = calibrate(scene_, context, kernels, halted);
     calibration_s_ =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (profile) apply(*profile);
   }
-  if (profile) apply(*profile);
   calibrated_ = order;
   // Roulette decides over the picture: it keeps to costs that do not vary, unless told otherwise.
   if (settings_.costs == CostSource::kMeasured || profile) roulette = order;
@@ -80,21 +84,27 @@ CostProfile RenderCosts::profile() const {
   return profile;
 }
 
-void RenderCosts::apply(const CostProfile& profile) {
-  const auto find = [](const auto& entries, const std::string& name) {
-    for (const auto& [entry, ns] : entries)
-      if (entry == name) return ns;
-    return 0.f;
-  };
-  for (size_t m = 0; m < order.material_ns.size(); ++m)
-    if (const float ns = find(profile.materials, scene_.materials()[m].name); ns > 0)
-      order.material_ns[m] = ns;
-  for (size_t t = 0; t < order.texture_ns.size(); ++t)
-    if (const float ns = find(profile.textures, scene_.textures()[t]->name()); ns > 0)
-      order.texture_ns[t] = ns;
+bool RenderCosts::apply(const CostProfile& profile) {
+  using Costs = std::unordered_map<std::string, float>;
+  const Costs materials(profile.materials.begin(), profile.materials.end());
+  const Costs textures(profile.textures.begin(), profile.textures.end());
+  bool knows_all = true;
+  for (size_t m = 0; m < order.material_ns.size(); ++m) {
+    const auto at = materials.find(scene_.materials()[m].name);
+    const bool known = at != materials.end() && at->second > 0;
+    if (known) order.material_ns[m] = at->second;
+    knows_all = knows_all && known;
+  }
+  for (size_t t = 0; t < order.texture_ns.size(); ++t) {
+    const auto at = textures.find(scene_.textures()[t]->name());
+    const bool known = at != textures.end() && at->second >= 0;  // 0: too little to be measured
+    if (known) order.texture_ns[t] = at->second;
+    knows_all = knows_all && known;
+  }
   double sum = 0;
   for (float ns : order.material_ns) sum += ns;
   order.mean_ns = static_cast<float>(sum / static_cast<double>(order.material_ns.size()));
+  return knows_all;
 }
 
 }  // namespace wavecomb

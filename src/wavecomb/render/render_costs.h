@@ -2,6 +2,7 @@
 /// Costs of materials over a render: where they start, and what each pass teaches.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,9 +27,10 @@ class RenderCosts {
   CostSnapshot roulette;  ///< for cost-aware roulette
   bool measures() const { return measures_; }
 
-  /// Before the first pass: measures synthetic hits, unless a model is asked for, and takes over
-  /// what a profile knows.
-  void start(const WaveContext& context, const LaneKernels& kernels, const CostProfile* profile);
+  /// Before the first pass: takes over what a profile knows, and measures synthetic hits unless
+  /// that is all or a model is asked for. Ends early where `halted` says so.
+  void start(const WaveContext& context, const LaneKernels& kernels, const CostProfile* profile,
+             const std::function<bool()>& halted);
   /// After a pass: what a worker measured. Empties the worker's tracker.
   void take(CostTracker& worker) { measured_.take(worker); }
   /// Then once for all workers.
@@ -45,7 +47,8 @@ class RenderCosts {
   const std::vector<uint64_t>& total_timed() const { return total_timed_; }
 
  private:
-  void apply(const CostProfile& profile);
+  /// Returns whether the profile knows all materials and textures.
+  bool apply(const CostProfile& profile);
 
   const Scene& scene_;
   std::span<const MaterialTraits> traits_;

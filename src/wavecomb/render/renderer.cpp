@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <mutex>
 #include <utility>
 
+#include "wavecomb/core/error.h"
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
 
@@ -85,22 +87,106 @@ std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
 }  // namespace
 
 struct WavefrontRenderer::Impl {
+  // Replaced by edits, under the mutex.
   std::shared_ptr<const Scene> scene;
-  std::unique_ptr<EmbreeAccelerator> accel;
+  std::shared_ptr<const EmbreeAccelerator> accel;
+  uint64_t version = 0;
+  Watch* watch = nullptr;  ///< of the render that goes on
+  mutable std::mutex mutex;
+
+  uint32_t threads = 0;
+  double build_s = 0;
   RenderStatistics statistics;
   CostProfile profile;  ///< after the last render
-  double build_s = 0;
 };
+
+namespace {
+
+/// Says that a render goes on, for as long as it lives.
+template <typename Impl>
+class Running {
+ public:
+  Running(Impl& impl, Watch& watch) : impl_(impl) {
+    const std::lock_guard lock(impl_.mutex);
+    if (impl_.watch) throw Error("a render goes on; stop it first, or use a twin");
+    impl_.watch = &watch;
+  }
+  ~Running() {
+    const std::lock_guard lock(impl_.mutex);
+    impl_.watch = nullptr;
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+ private:
+  Impl& impl_;
+};
+
+}  // namespace
 
 WavefrontRenderer::WavefrontRenderer(std::shared_ptr<const Scene> scene, uint32_t threads)
     : impl_(std::make_unique<Impl>()) {
   const Clock::time_point start = Clock::now();
   impl_->scene = std::move(scene);
-  impl_->accel = std::make_unique<EmbreeAccelerator>(impl_->scene, threads);
+  impl_->threads = threads;
+  impl_->accel = std::make_shared<const EmbreeAccelerator>(impl_->scene, threads);
   impl_->build_s = seconds_since(start);
 }
 
+WavefrontRenderer::WavefrontRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
 WavefrontRenderer::~WavefrontRenderer() = default;
+
+std::unique_ptr<WavefrontRenderer> WavefrontRenderer::twin() const {
+  auto impl = std::make_unique<Impl>();
+  const std::lock_guard lock(impl_->mutex);
+  impl->scene = impl_->scene;
+  impl->accel = impl_->accel;
+  impl->threads = impl_->threads;
+  impl->build_s = impl_->build_s;
+  return std::unique_ptr<WavefrontRenderer>(new WavefrontRenderer(std::move(impl)));
+}
+
+void WavefrontRenderer::edit(const SceneEdit& change) {
+  const auto check_idle = [&] {
+    if (impl_->watch) throw Error("a render goes on; stop it before the scene is edited");
+  };
+  {
+    const std::lock_guard lock(impl_->mutex);
+    check_idle();
+  }
+  std::shared_ptr<const Scene> scene = impl_->scene->edited(change, impl_->threads);
+  auto accel = std::make_shared<const EmbreeAccelerator>(scene, *impl_->accel, impl_->threads);
+  const std::lock_guard lock(impl_->mutex);
+  check_idle();
+  impl_->scene = std::move(scene);
+  impl_->accel = std::move(accel);
+  ++impl_->version;
+}
+
+void WavefrontRenderer::stop() {
+  const std::lock_guard lock(impl_->mutex);
+  if (impl_->watch) impl_->watch->stop();
+}
+
+std::shared_ptr<const Scene> WavefrontRenderer::scene() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->scene;
+}
+
+uint64_t WavefrontRenderer::version() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->version;
+}
+
+std::optional<Pick> WavefrontRenderer::pick(float x, float y, uint32_t width,
+                                            uint32_t height) const {
+  std::unique_lock lock(impl_->mutex);
+  const auto scene = impl_->scene;
+  const auto accel = impl_->accel;
+  lock.unlock();
+  return wavecomb::pick(*scene, *accel, x, y, width, height);
+}
 
 const RenderStatistics& WavefrontRenderer::statistics() const {
   return impl_->statistics;
@@ -112,6 +198,8 @@ const CostProfile& WavefrontRenderer::cost_profile() const {
 
 Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions& options) {
   settings.check();
+  Watch watch(options.interval_s);
+  const Running running(*impl_, watch);
   const Scene& scene = *impl_->scene;
   const uint32_t lanes = choose_lanes(settings.lanes);
   const LaneKernels kernels = lane_kernels(lanes);
@@ -136,7 +224,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   Film film(settings.width, settings.height, aovs.layout, settings.keeps_error());
   PassState pass;
   if (options.resume) options.resume(film, pass);
-  const uint32_t wave_size = wave_size_for(settings, film.pixel_count());
+  const uint64_t pixels = settings.rendered().pixels();
+  const uint32_t wave_size = wave_size_for(settings, pixels);
   const WaveContext context{
       scene.view(),
       impl_->accel.get(),
@@ -155,16 +244,37 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
       &aovs};
 
   const Clock::time_point start = Clock::now();
-  Watch watch;
   PassRunner runner(context, kernels, reference, threads, wave_size);
-  PassLoop loop(settings, pass_step(settings, film.pixel_count(), wave_size), std::move(pass), film,
-                runner, costs, watch);
+  PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), film, runner,
+                costs, watch);
   const auto work = [&] {
-    costs.start(context, kernels, options.profile);
+    costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
     loop.run();
   };
+  // The workers stand still meanwhile.
+  const auto statistics = [&] {
+    RenderStatistics s;
+    s.build_s = impl_->build_s;
+    s.render_s = seconds_since(start);
+    s.first_samples_s = runner.first_samples_s();
+    s.threads = threads;
+    s.wave_size = wave_size;
+    s.lanes = reference ? 1 : lanes;
+    s.cancelled = watch.stopped();
+    const RenderStatus status = loop.status();
+    s.passes = status.passes;
+    s.resumed_samples = status.resumed_samples;
+    s.error = status.error;
+    add_up(runner.workers(), context, scene, costs, s);
+    s.scene_bytes = scene.bytes();
+    s.accelerator_bytes = impl_->accel->bytes();
+    s.film_bytes = film.bytes();
+    s.peak_rss_bytes = peak_rss_bytes();
+    return s;
+  };
   const auto snapshot = [&](bool finished) {
-    if (options.snapshot) options.snapshot({film, loop.pass(), loop.status(), finished});
+    if (options.snapshot)
+      options.snapshot({film, loop.pass(), loop.status(), finished, aovs.kept_names, statistics});
   };
   const tbb::global_control parallelism(
       tbb::global_control::max_allowed_parallelism,
@@ -175,27 +285,13 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   if (options.progress && !watch.stopped()) options.progress(loop.status());
   snapshot(true);
 
-  RenderStatistics& s = impl_->statistics;
-  s = {};
-  s.build_s = impl_->build_s;
-  s.render_s = seconds_since(start);
-  s.first_samples_s = runner.first_samples_s();
-  s.threads = threads;
-  s.wave_size = wave_size;
-  s.lanes = reference ? 1 : lanes;
-  s.cancelled = watch.stopped();
-  const RenderStatus status = loop.status();
-  s.passes = status.passes;
-  s.resumed_samples = status.resumed_samples;
+  RenderStatistics& s = impl_->statistics = statistics();
+  impl_->profile = costs.profile();
+  if (!options.wants_picture) return {settings.width, settings.height, {}, {}, {}, {}, {}};
   ErrorMap error;
   error.mean_relative = std::numeric_limits<double>::infinity();
   if (film.has_error()) error = measure_error(film);
   s.error = error.mean_relative;
-  add_up(runner.workers(), context, scene, costs, s);
-  s.scene_bytes = scene.bytes();
-  s.accelerator_bytes = impl_->accel->bytes();
-  s.film_bytes = film.bytes();
-  impl_->profile = costs.profile();
   Film::Layers layers = std::move(film).finish(aovs.kept_names);
   s.peak_rss_bytes = peak_rss_bytes();
   Picture picture{settings.width,

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "wavecomb/core/settings.h"
@@ -12,8 +13,10 @@
 #include "wavecomb/film/film.h"
 #include "wavecomb/integrate/ray_recorder.h"
 #include "wavecomb/render/pass_loop.h"
+#include "wavecomb/render/pick.h"
 #include "wavecomb/render/process_memory.h"
 #include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/snapshot.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
 
@@ -40,18 +43,10 @@ struct Picture {
   std::vector<CryptoManifest> manifests{};
 };
 
-/// A render that stands still. Valid while the callback that gets it runs.
-struct Snapshot {
-  Film& film;
-  const PassState& pass;
-  RenderStatus status;
-  bool finished;  ///< done, cancelled or out of time: there is no more to come
-};
-
 /// What a render may be given beside its settings. Callbacks are called on the thread that called
 /// render(); what they throw ends it.
 struct RenderOptions {
-  /// Called some ten times a second, and once at the end unless the render was cancelled.
+  /// Called every interval, and once at the end unless the render was cancelled.
   std::function<Request(const RenderStatus&)> progress{};
   /// Called where progress asked for it, and at the end in any case.
   std::function<void(const Snapshot&)> snapshot{};
@@ -59,16 +54,22 @@ struct RenderOptions {
   std::function<void(Film&, PassState&)> resume{};
   /// Replaces the one that the settings name.
   const SchedulingPolicy* policy = nullptr;
-  /// Costs to start from, for the order and for roulette; without, they are measured on synthetic
-  /// hits or modelled.
+  /// Costs to start from, for the order and for roulette; what it does not know is measured on
+  /// synthetic hits or modelled.
   const CostProfile* profile = nullptr;
   /// Gets the rays of the wavefront integrator; what it throws ends the render.
   RayRecorder* recorder = nullptr;
+  double interval_s = 0.1;  ///< seconds between calls of progress
+  /// False: the picture is empty, for who took what it needs from snapshots. A stopped render of a
+  /// large picture ends sooner then.
+  bool wants_picture = true;
 };
 
-/// A scene ready to be rendered: its acceleration structure is built here, once.
+/// A scene ready to be rendered, and to be changed: its acceleration structure is built here, and
+/// again only as far as edits ask for it.
 ///
-/// Contract: render() may be called any number of times, one at a time.
+/// Contract: render() may be called any number of times, one at a time; edit() between renders, and
+/// both by one thread at a time. All else may be called by any thread at any time.
 class WavefrontRenderer {
  public:
   /// `threads`: for building; 0: all.
@@ -79,6 +80,22 @@ class WavefrontRenderer {
   /// on threads, wave size, lanes or policy, nor on whether the render was resumed; but with a time
   /// limit, on how many samples there was time for. Throws Error for settings that cannot be.
   Picture render(const Settings& settings, const RenderOptions& options = {});
+  /// Ends the render that goes on, if there is one, within a wave; it returns what was done.
+  void stop();
+
+  /// Changes the scene: `scene()` is another one then, which shares what did not change. Throws
+  /// Error for bad values, as Scene::edited does, and while a render goes on; nothing is changed
+  /// then.
+  void edit(const SceneEdit& change);
+  /// Another renderer of the same scene, to be edited and run by itself. They share hierarchy and
+  /// geometry.
+  std::unique_ptr<WavefrontRenderer> twin() const;
+  std::shared_ptr<const Scene> scene() const;
+  /// Edits so far.
+  uint64_t version() const;
+  /// wavecomb::pick for the scene as it is.
+  std::optional<Pick> pick(float x, float y, uint32_t width, uint32_t height) const;
+
   /// Costs after the last render().
   const CostProfile& cost_profile() const;
   /// Of the last render().
@@ -86,6 +103,7 @@ class WavefrontRenderer {
 
  private:
   struct Impl;
+  explicit WavefrontRenderer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -24,7 +24,7 @@ void Watch::run(const std::function<void()>& work, const std::function<Request()
   });
   std::unique_lock lock(mutex_);
   while (!finished_) {
-    const bool is_called = changed_.wait_for(lock, std::chrono::milliseconds(100),
+    const bool is_called = changed_.wait_for(lock, std::chrono::duration<double>(interval_s_),
                                              [&] { return finished_ || resting_; });
     if (finished_) break;
     if (!is_called && wanted_) continue;  // it has been asked to come to rest
@@ -44,7 +44,7 @@ void Watch::run(const std::function<void()>& work, const std::function<Request()
     if (request == Request::kStop) stop();
     if (takes_snapshot) {
       wanted_ = resting_ = false;
-      halted_ = stopped_.load();
+      halted_ = false;
       changed_.notify_all();
     } else if (request == Request::kSnapshot && snapshot) {
       wanted_ = halted_ = true;
@@ -62,10 +62,6 @@ void Watch::rest() {
   resting_ = true;
   changed_.notify_all();
   changed_.wait(lock, [&] { return !resting_; });
-}
-
-void Watch::stop() {
-  stopped_ = halted_ = true;
 }
 
 }  // namespace wavecomb

@@ -96,8 +96,7 @@ double accumulate(std::span<const double> weights, uint16_t* cumulative) {
 
 }  // namespace
 
-Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color,
-                                       double* mean_luminance) {
+Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color) {
   const uint32_t width = texture.levels[0].width, height = texture.levels[0].height;
   Distribution2D d;
   d.width = std::min(width, kMaxWidth);
@@ -143,16 +142,14 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
     }
   };
   std::vector<double> rows(d.height);
-  double mean = 0;
   for (uint32_t y = 0; y < d.height; ++y) {
     // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
     const double ring = std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height);
     const std::span<const double> weights(cells.data() + size_t{y} * d.width, d.width);
     rows[y] = ring * accumulate(weights, line.data()) / d.width;
     put(y, d.width);
-    mean += rows[y] / 2;
+    d.mean_luminance += rows[y] / 2;
   }
-  if (mean_luminance) *mean_luminance = mean;
   if (!(accumulate(rows, line.data()) > 0)) return {};
   put(d.height, d.height);
   return d;

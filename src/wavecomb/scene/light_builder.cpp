@@ -157,8 +157,21 @@ void make_distant(Made& made, const Light& light, const Double3& color, double m
   made.power = kPiD * scene_radius * scene_radius * solid_angle * scale * mean;
 }
 
+/// The density of a dome with that texture and radiance: of `before` where it is there.
+Distribution2D dome_distribution(const LightRecord& dome, const LightSet* before,
+                                 std::span<const std::unique_ptr<Texture>> textures) {
+  if (before)
+    for (const LightRecord& other : before->records)
+      if (other.kind == dome.kind && other.texture == dome.texture &&
+          std::ranges::equal(other.radiance, dome.radiance))
+        return before->distributions[other.distribution];
+  return build_dome_distribution(textures[dome.texture]->view(),
+                                 {dome.radiance[0], dome.radiance[1], dome.radiance[2]});
+}
+
 void make_dome(Made& made, LightSet& set, const Light& light, const Double3& color, double mean,
-               double scene_radius, std::span<const std::unique_ptr<Texture>> textures) {
+               double scene_radius, std::span<const std::unique_ptr<Texture>> textures,
+               const LightSet* before) {
   const Affine& m = light.to_world;
   // Turned and mirrored, never stretched: axes orthonormal, the pole first.
   const Double3 y = unit(to_double(m.axis(1)));
@@ -177,10 +190,8 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
   double mean_radiance = mean;
   if (light.texture != kNoTexture) {
     made.record.distribution = static_cast<uint32_t>(set.distributions.size());
-    set.distributions.push_back(build_dome_distribution(
-        textures[light.texture]->view(),
-        {made.record.radiance[0], made.record.radiance[1], made.record.radiance[2]},
-        &mean_radiance));
+    set.distributions.push_back(dome_distribution(made.record, before, textures));
+    mean_radiance = set.distributions.back().mean_luminance;
     if (set.distributions.back().width == 0) {  // black
       set.distributions.pop_back();
       made.record.texture = kNoTexture;
@@ -191,7 +202,7 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
 }
 
 Made make_light(LightSet& set, const Light& light, double scene_radius,
-                std::span<const std::unique_ptr<Texture>> textures) {
+                std::span<const std::unique_ptr<Texture>> textures, const LightSet* before) {
   Made made;
   LightRecord& r = made.record;
   r.kind = static_cast<uint32_t>(light.kind);
@@ -231,7 +242,7 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
       make_distant(made, light, color, mean, scene_radius);
       break;
     case LightKind::kDome:
-      make_dome(made, set, light, color, mean, scene_radius, textures);
+      make_dome(made, set, light, color, mean, scene_radius, textures, before);
       break;
     case LightKind::kTriangle:
       break;
@@ -339,7 +350,7 @@ LightView LightSet::view(const MaterialView& materials) const {
 
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const std::unique_ptr<Texture>> textures) {
+                      std::span<const std::unique_ptr<Texture>> textures, const LightSet* before) {
   (void)centre;  // directions of infinite lights do not depend on it
   if (lights.size() + triangle_count > kMaxLights) {
     throw Error("the scene has " + std::to_string(lights.size() + triangle_count) +
@@ -356,7 +367,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
       if (infinite) check(lights[i], textures.size());
       if (is_infinite(lights[i].kind) != infinite) continue;
       set.of_input[i] = static_cast<uint32_t>(set.records.size());
-      const Made made = make_light(set, lights[i], scene_radius, textures);
+      const Made made = make_light(set, lights[i], scene_radius, textures, before);
       set.records.push_back(made.record);
       powers.push_back(sane_power(made.power));
     }

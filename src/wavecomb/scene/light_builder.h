@@ -71,19 +71,19 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 /// mapped to, also where the transform mirrors. Negative colours count as 0.
 ///
 /// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
-/// the power that they send through it. Throws Error naming the light for values that are not
-/// finite, unknown textures and more than kMaxLights lights.
+/// the power that they send through it. `before`: lights with the same textures, whose densities of
+/// domes are taken over where they fit, or null. Throws Error naming the light for values that are
+/// not finite, unknown textures and more than kMaxLights lights.
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const std::unique_ptr<Texture>> textures);
+                      std::span<const std::unique_ptr<Texture>> textures,
+                      const LightSet* before = nullptr);
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,
 /// times the sine of the polar angle. Row 0 is the top (the pole +y). Positive wherever the
-/// bilinear texture is. `mean_luminance` receives the mean over the sphere. An all-black texture
-/// gives width 0.
-Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color,
-                                       double* mean_luminance);
+/// bilinear texture is. An all-black texture gives width 0.
+Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color);
 
 /// The table that chooses among lights of the given weights (>= 0), of which those before
 /// `first_triangle` are one group, and how many of the 2^24 numbers choose each light. Lights of

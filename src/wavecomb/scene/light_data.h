@@ -91,7 +91,8 @@ struct Distribution2D {
     uint16_t value[kLine];
   };
   uint32_t width = 0, height = 0;
-  uint32_t row_lines = 0;  ///< lines of a row of `cumulative`
+  uint32_t row_lines = 0;     ///< lines of a row of `cumulative`
+  double mean_luminance = 0;  ///< over the sphere
   /// `height` rows of `width` values, each from 0 upwards; then the marginal, `height` values in as
   /// many lines as they need. Each row starts a line.
   std::vector<Line> cumulative;

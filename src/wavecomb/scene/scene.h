@@ -2,32 +2,17 @@
 /// An immutable scene, and the builder that is the only way to make one.
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
-#include <span>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "wavecomb/scene/camera.h"
-#include "wavecomb/scene/light_builder.h"
-#include "wavecomb/scene/light_data.h"
-#include "wavecomb/scene/material_data.h"
-#include "wavecomb/scene/mesh.h"
-#include "wavecomb/scene/names.h"
-#include "wavecomb/texture/texture.h"
+#include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
-
-/// An instance as lanes read it: one cache line. Instance 0 is the world itself (identity).
-struct alignas(64) InstanceRecord {
-  float to_world[12];  ///< rows of A, each followed by its translation
-  uint32_t geometry;   ///< first of its group's entries in SceneView::geometry_mesh
-  uint32_t material;   ///< for meshes whose material is kInheritMaterial
-  uint32_t emissive;   ///< first of its entries in SceneView::emissive_lights
-  float side;          ///< sign of det A: -1 where the transform mirrors
-};
-static_assert(sizeof(InstanceRecord) == 64);
 
 /// What kernels need of a scene: plain pointers, valid as long as the Scene.
 struct SceneView {
@@ -45,40 +30,18 @@ struct SceneView {
   bool has_curves = false;  ///< curves or points
 };
 
-struct Bounds {
-  Vec3<float> lo{1e30f, 1e30f, 1e30f}, hi{-1e30f, -1e30f, -1e30f};
-  bool empty() const { return lo.x > hi.x; }
-  void add(const Vec3<float>& p) {
-    lo = {p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z};
-    hi = {p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z};
-  }
-};
-
-/// A group of meshes that is committed once and instanced any number of times.
-struct Group {
-  std::string name;
-  std::vector<uint32_t> meshes;
-  std::string root;  ///< prim path that its meshes' names begin with
-};
-
-/// One placement of a group.
-struct Instance {
-  uint32_t group = 0;
-  Affine to_world;
-  uint32_t material = kInheritMaterial;
-  uint32_t placement = kNoName;  ///< index into Scene::placements
-};
-
-/// Light groups that a stage may have, with that of lights without one.
-inline constexpr uint32_t kMaxLightGroups = 64;
-/// The group of lights without one, group 0.
-inline constexpr const char* kOtherLights = "other";
-
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
   uint64_t meshes = 0;    ///< points, indices, radii, normals, texture coordinates, materials of faces
   uint64_t textures = 0;  ///< all mip levels
   uint64_t records = 0;   ///< instances, materials, lights
+};
+
+/// What is to be other in a scene: values that take the place of those there.
+struct SceneEdit {
+  std::optional<Camera> camera{};
+  std::map<uint32_t, Material> materials{};  ///< by id
+  std::map<uint32_t, Light> lights{};        ///< by index into Scene::lights
 };
 
 class SceneBuilder;
@@ -91,24 +54,24 @@ class Scene {
   Scene& operator=(const Scene&) = delete;
 
   SceneView view() const { return view_; }
-  const std::vector<Mesh>& meshes() const { return meshes_; }
+  const std::vector<Mesh>& meshes() const { return geometry_->meshes; }
   /// Group 0 is the world: its meshes are in world space and not instanced.
-  const std::vector<Group>& groups() const { return groups_; }
+  const std::vector<Group>& groups() const { return geometry_->groups; }
   /// Flattened: every entry places a group of meshes (never group 0) in the world.
-  const std::vector<Instance>& instances() const { return instances_; }
-  const std::vector<Material>& materials() const { return materials_; }
-  const std::vector<std::unique_ptr<Texture>>& textures() const { return textures_; }
-  const std::vector<Light>& lights() const { return lights_; }
+  const std::vector<Instance>& instances() const { return geometry_->instances; }
+  const std::vector<Material>& materials() const { return materials_->materials; }
+  const std::vector<std::unique_ptr<Texture>>& textures() const { return geometry_->textures; }
+  const std::vector<Light>& lights() const { return lights_->lights; }
   /// Names of light groups; the first is kOtherLights.
-  const std::vector<std::string>& light_groups() const { return light_groups_; }
+  const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
   /// Index into light_groups() of every light that kernels know, triangles last.
   std::vector<uint32_t> groups_of_lights() const;
   /// The ways from the world to the instances, and the names on them.
-  const std::vector<Placement>& placements() const { return placements_; }
-  const NameTable& names() const { return names_; }
-  const LightSet& light_set() const { return light_set_; }
+  const std::vector<Placement>& placements() const { return geometry_->placements; }
+  const NameTable& names() const { return geometry_->names; }
+  const LightSet& light_set() const { return lights_->set; }
   const Camera& camera() const { return camera_; }
-  const Bounds& bounds() const { return bounds_; }
+  const Bounds& bounds() const { return geometry_->bounds; }
   /// Triangles of all meshes, each counted once, and with every instance counted.
   uint64_t unique_triangles() const;
   uint64_t instanced_triangles() const;
@@ -117,37 +80,31 @@ class Scene {
   uint64_t points() const;
   SceneBytes bytes() const;
   /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::vector<std::string>& warnings() const { return geometry_->warnings; }
+
+  /// A scene with other values, which shares with this one what did not change; equal to one built
+  /// anew with them. `threads`: 0: all.
+  ///
+  /// Costs microseconds for a camera, copies of the materials for a material, and the light set
+  /// where lights or emission change. Throws Error naming the object for bad values, as
+  /// SceneBuilder does, and for ids that are not there.
+  std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
+
+  /// The parts, to be compared with those of scenes that were made from one another.
+  const std::shared_ptr<const SceneGeometry>& geometry() const { return geometry_; }
+  const std::shared_ptr<const SceneMaterials>& material_part() const { return materials_; }
+  const std::shared_ptr<const SceneLights>& light_part() const { return lights_; }
 
  private:
   friend class SceneBuilder;
-  Scene() = default;
+  Scene(std::shared_ptr<const SceneGeometry> geometry,
+        std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
+        const Camera& camera);
 
-  std::vector<Mesh> meshes_;
-  std::vector<Group> groups_;
-  std::vector<Instance> instances_;
-  std::vector<Material> materials_;
-  std::vector<std::unique_ptr<Texture>> textures_;
-  std::vector<Light> lights_;
-  std::vector<std::string> light_groups_;
-  /// Of the triangle lights from `first` on, up to those of the next entry.
-  struct TriangleGroup {
-    uint32_t first, group;
-  };
-  std::vector<TriangleGroup> triangle_groups_;
-  std::vector<Placement> placements_;
-  NameTable names_;
-  LightSet light_set_;
+  std::shared_ptr<const SceneGeometry> geometry_;
+  std::shared_ptr<const SceneMaterials> materials_;
+  std::shared_ptr<const SceneLights> lights_;
   Camera camera_;
-  Bounds bounds_;
-  std::vector<std::string> warnings_;
-
-  std::vector<MeshRecord> mesh_records_;
-  std::vector<InstanceRecord> instance_records_;
-  std::vector<uint32_t> geometry_mesh_, emissive_lights_, material_program_;
-  std::vector<MaterialRecord> material_records_;
-  std::vector<TextureUseRecord> use_records_;
-  std::vector<TextureView> texture_views_;
   SceneView view_;
 };
 
@@ -203,8 +160,7 @@ class SceneBuilder {
   uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
   void flatten(uint32_t group, const Instance& here, const std::vector<uint64_t>& counts,
                std::vector<Instance>& out, std::vector<Placement>& placements) const;
-  void make_records(Scene& scene) const;
-  void make_lights(Scene& scene) const;
+  void make_records(SceneGeometry& geometry, uint32_t grey) const;
 
   uint32_t threads_;
   std::vector<Mesh> meshes_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneBuilder::make_lights: the lights of a scene, emissive meshes among them.
+/// SceneLights: the lights of a scene, emissive meshes among them.
 #include <algorithm>
 #include <cmath>
 
@@ -22,15 +22,16 @@ struct EmissiveMesh {
 };
 
 /// Face `face` of an emissive mesh as a light; radiance 0 where it does not emit.
-EmissiveTriangle emissive_triangle(const Scene& scene, const EmissiveMesh& source, size_t face) {
+EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMaterials& materials,
+                                   const EmissiveMesh& source, size_t face) {
   const Mesh& mesh = *source.mesh;
   const uint32_t material = material_of(mesh, *source.instance, face);
   EmissiveTriangle t{};
-  const Material& m = scene.materials()[material];
+  const Material& m = materials.materials[material];
   Vec3<float> radiance = m.emission;
   if (m.has_texture(Slot::kEmission)) {
     const TextureUse& use = m.textures[static_cast<size_t>(Slot::kEmission)];
-    const float* mean = scene.textures()[use.texture]->mean();
+    const float* mean = geometry.textures[use.texture]->mean();
     const auto value = [&](uint32_t c) {
       const uint32_t from = use.channel == 4 ? c : use.channel;
       return std::max(0.f, mean[from] * use.scale[from] + use.bias[from]);
@@ -62,32 +63,26 @@ EmissiveTriangle emissive_triangle(const Scene& scene, const EmissiveMesh& sourc
 
 }  // namespace
 
-void SceneBuilder::make_lights(Scene& scene) const {
+SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
+                         const SceneMaterials& materials, const SceneLights* before)
+    : lights(std::move(all)) {
   // Triangles of meshes whose material emits become lights of their own.
   std::vector<EmissiveMesh> sources;
   size_t triangle_count = 0;
-  std::vector<uint32_t>& table = scene.emissive_lights_;
-  const auto emits = [&](uint32_t material) { return scene.materials_[material].emits(); };
-  const bool any_emissive = std::any_of(scene.materials_.begin(), scene.materials_.end(),
-                                        [](const Material& m) { return m.emits(); });
+  const auto emits = [&](uint32_t material) { return materials.materials[material].emits(); };
   const Affine identity{};
-
-  for (size_t i = 0; any_emissive && i < scene.instance_records_.size(); ++i) {
-    InstanceRecord& record = scene.instance_records_[i];
-    const Group& group = scene.groups_[i == 0 ? 0 : scene.instances_[i - 1].group];
-    record.emissive = static_cast<uint32_t>(table.size());
+  for (size_t i = 0; materials.has_emission && i < geometry.instance_records.size(); ++i) {
+    const InstanceRecord& record = geometry.instance_records[i];
+    const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
     for (uint32_t mesh_id : group.meshes) {
-      const Mesh& mesh = scene.meshes_[mesh_id];
-      bool emissive = false;
-      for (size_t f = 0; f < mesh.triangle_count() && !emissive; ++f) {
-        emissive = emits(material_of(mesh, record, f));
-        if (mesh.face_materials.empty()) break;
-      }
-      table.push_back(emissive ? static_cast<uint32_t>(triangle_count) : kNoLight);
-      if (!emissive) continue;
-      sources.push_back(
-          {triangle_count, &mesh, &record, i == 0 ? &identity : &scene.instances_[i - 1].to_world});
-      scene.triangle_groups_.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
+      const Mesh& mesh = geometry.meshes[mesh_id];
+      const bool shines =
+          mesh.triangle_count() > 0 && geometry.any_material(mesh_id, record.material, emits);
+      emissive.push_back(shines ? static_cast<uint32_t>(triangle_count) : kNoLight);
+      if (!shines) continue;
+      sources.push_back({triangle_count, &mesh, &record,
+                         i == 0 ? &identity : &geometry.instances[i - 1].to_world});
+      triangle_groups.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
       triangle_count += mesh.triangle_count();
     }
   }
@@ -95,51 +90,28 @@ void SceneBuilder::make_lights(Scene& scene) const {
     const auto next = std::upper_bound(sources.begin(), sources.end(), i,
                                        [](size_t n, const EmissiveMesh& m) { return n < m.first; });
     const EmissiveMesh& source = *std::prev(next);
-    return emissive_triangle(scene, source, i - source.first);
+    return emissive_triangle(geometry, materials, source, i - source.first);
   };
-
-  const Bounds& b = scene.bounds_;
-  Vec3<float> center{0, 0, 0};
-  float radius = 1;
-  if (!b.empty()) {
-    center = (b.lo + b.hi) * 0.5f;
-    const Vec3<float> d = b.hi - center;
-    radius = std::max(1e-20f, std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z));
-  }
-  scene.light_set_ =
-      build_lights(scene.lights_, triangle_count, triangle, center, radius, scene.textures_);
+  const Bounds& b = geometry.bounds;
+  const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
+  set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
+                     before ? &before->set : nullptr);
   // Table entries now point at the first triangle; make them light ids.
-  for (uint32_t& entry : table)
-    if (entry != kNoLight) entry += scene.light_set_.first_triangle();
-
-  SceneView& v = scene.view_;
-  v.meshes = scene.mesh_records_.data();
-  v.instances = scene.instance_records_.data();
-  v.geometry_mesh = scene.geometry_mesh_.data();
-  v.emissive_lights = table.data();
-  v.material_program = scene.material_program_.data();
-  v.materials.materials = scene.material_records_.data();
-  v.materials.uses = scene.use_records_.data();
-  v.materials.textures = scene.texture_views_.data();
-  v.lights = scene.light_set_.view(v.materials);
-  v.scale = radius;
-  v.has_emissive_meshes = any_emissive;
-  v.has_curves = std::any_of(scene.meshes_.begin(), scene.meshes_.end(),
-                             [](const Mesh& mesh) { return mesh.is_curved(); });
-  v.has_presence = std::any_of(scene.materials_.begin(), scene.materials_.end(),
-                               [](const Material& m) { return m.needs_presence(); });
+  for (uint32_t& entry : emissive)
+    if (entry != kNoLight) entry += set.first_triangle();
 }
 
 std::vector<uint32_t> Scene::groups_of_lights() const {
-  std::vector<uint32_t> groups(light_set_.size());
-  for (size_t i = 0; i < lights_.size(); ++i) groups[light_set_.of_input[i]] = lights_[i].group;
-  for (size_t run = 0; run < triangle_groups_.size(); ++run) {
-    const size_t first = light_set_.first_triangle() + triangle_groups_[run].first;
-    const size_t end = run + 1 < triangle_groups_.size()
-                           ? light_set_.first_triangle() + triangle_groups_[run + 1].first
-                           : groups.size();
+  const LightSet& set = lights_->set;
+  const auto& runs = lights_->triangle_groups;
+  std::vector<uint32_t> groups(set.size());
+  for (size_t i = 0; i < lights().size(); ++i) groups[set.of_input[i]] = lights()[i].group;
+  for (size_t run = 0; run < runs.size(); ++run) {
+    const size_t first = set.first_triangle() + runs[run].first;
+    const size_t end =
+        run + 1 < runs.size() ? set.first_triangle() + runs[run + 1].first : groups.size();
     std::fill(groups.begin() + static_cast<std::ptrdiff_t>(first),
-              groups.begin() + static_cast<std::ptrdiff_t>(end), triangle_groups_[run].group);
+              groups.begin() + static_cast<std::ptrdiff_t>(end), runs[run].group);
   }
   return groups;
 }

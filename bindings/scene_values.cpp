@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene_values.h"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <string>
+#include <utility>
+
+#include "wavecomb/core/error.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace wavecomb;
+
+namespace {
+
+// Parameters by the names that Python gives them.
+template <typename Class, typename Value>
+using Members = std::vector<std::pair<const char*, Value Class::*>>;
+
+const Members<Material, Vec3<float>> kMaterialColors{{"base_color", &Material::base_color},
+                                                     {"specular_color", &Material::specular_color},
+                                                     {"emission", &Material::emission},
+                                                     {"conductor_eta", &Material::conductor_eta},
+                                                     {"conductor_k", &Material::conductor_k}};
+const Members<Material, float> kMaterialNumbers{
+    {"roughness", &Material::roughness},
+    {"metallic", &Material::metallic},
+    {"clearcoat", &Material::clearcoat},
+    {"clearcoat_roughness", &Material::clearcoat_roughness},
+    {"opacity", &Material::opacity},
+    {"ior", &Material::ior},
+    {"opacity_threshold", &Material::opacity_threshold}};
+const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material::specular_workflow},
+                                                {"presence", &Material::presence}};
+const Members<Material, uint32_t> kMaterialCounts{{"evaluations", &Material::evaluations}};
+const Members<Light, Vec3<float>> kLightColors{{"color", &Light::color}};
+const Members<Light, float> kLightNumbers{{"width", &Light::width},
+                                          {"height", &Light::height},
+                                          {"radius", &Light::radius},
+                                          {"angle", &Light::angle}};
+const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize}};
+const Members<Camera, float> kCameraNumbers{{"lens_radius", &Camera::lens_radius},
+                                            {"focus_distance", &Camera::focus_distance},
+                                            {"near_clip", &Camera::near_clip},
+                                            {"far_clip", &Camera::far_clip}};
+
+nb::object to_python(const Vec3<float>& v) {
+  return nb::make_tuple(v.x, v.y, v.z);
+}
+template <typename T>
+nb::object to_python(T value) {
+  return nb::cast(value);
+}
+
+template <typename Class, typename Value>
+void put(nb::dict& d, const Class& object, const Members<Class, Value>& members) {
+  for (const auto& [name, member] : members) d[name] = to_python(object.*member);
+}
+
+/// Values out of a dict; errors begin with what it is of.
+class Reader {
+ public:
+  Reader(std::string what, nb::dict values) : what_(std::move(what)), values_(std::move(values)) {}
+
+  template <typename Class, typename Value>
+  void take(Class& object, const Members<Class, Value>& members) {
+    for (const auto& [name, member] : members)
+      if (const nb::object value = next(name); value.is_valid()) read(name, value, object.*member);
+  }
+  template <size_t N>
+  void take(const char* name, float (&to)[N]) {
+    if (const nb::object value = next(name); value.is_valid()) read_numbers(name, value, to, N);
+  }
+  void take(const char* name, Affine& to) {
+    const nb::object value = next(name);
+    if (!value.is_valid()) return;
+    try {
+      const nb::object array =
+          nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float64");
+      to = affine(nb::cast<nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>>(array));
+    } catch (const std::exception&) {
+      fail(name, "4 x 4 numbers");
+    }
+  }
+  /// Throws where there was more than has been taken.
+  void end() const {
+    if (nb::len(values_) == taken_) return;
+    for (const auto& [key, value] : values_) {
+      const std::string name = nb::cast<std::string>(nb::str(key));
+      if (known_.find("'" + name + "'") == std::string::npos)
+        throw Error(what_ + " has no parameter '" + name + "' that can be changed; there are " +
+                    known_);
+    }
+  }
+
+ private:
+  nb::object next(const char* name) {
+    known_ += std::string(known_.empty() ? "" : ", ") + "'" + name + "'";
+    if (!values_.contains(name)) return {};
+    ++taken_;
+    return values_[name];
+  }
+  [[noreturn]] void fail(const char* name, const char* wanted) const {
+    throw Error(what_ + ": " + name + " must be " + wanted);
+  }
+  void read_numbers(const char* name, const nb::object& value, float* to, size_t n) const {
+    std::vector<float> numbers;
+    if (!nb::try_cast(value, numbers) || numbers.size() != n)
+      fail(name, n == 3 ? "3 numbers" : "4 numbers");
+    std::copy(numbers.begin(), numbers.end(), to);
+  }
+  void read(const char* name, const nb::object& value, Vec3<float>& to) const {
+    float numbers[3];
+    read_numbers(name, value, numbers, 3);
+    to = {numbers[0], numbers[1], numbers[2]};
+  }
+  void read(const char* name, const nb::object& value, float& to) const {
+    if (!nb::try_cast(value, to)) fail(name, "a number");
+  }
+  void read(const char* name, const nb::object& value, bool& to) const {
+    if (!nb::try_cast(value, to)) fail(name, "True or False");
+  }
+  void read(const char* name, const nb::object& value, uint32_t& to) const {
+    if (!nb::try_cast(value, to)) fail(name, "a whole number of 0 or more");
+  }
+
+  std::string what_;
+  nb::dict values_;
+  std::string known_;
+  size_t taken_ = 0;
+};
+
+nb::list matrix(const Affine& m) {
+  nb::list rows;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<float> axis = m.axis(i);
+    rows.append(std::vector<float>{axis.x, axis.y, axis.z, 0});
+  }
+  rows.append(std::vector<float>{m.t.x, m.t.y, m.t.z, 1});
+  return rows;
+}
+
+void check_index(const char* kind, uint32_t i, size_t count) {
+  if (i >= count)
+    throw Error(std::string(kind) + " " + std::to_string(i) + " is not there; the scene has " +
+                std::to_string(count));
+}
+
+nb::dict texture_use_dict(const Scene& scene, const TextureUse& use) {
+  constexpr const char* kChannels[] = {"r", "g", "b", "a", "rgb"};
+  const auto list = [](const auto& values) {
+    return std::vector<float>(values.begin(), values.end());
+  };
+  nb::dict d;
+  d["texture"] = use.texture;
+  d["name"] = scene.textures()[use.texture]->name();
+  d["channel"] = kChannels[use.channel];
+  d["scale"] = list(use.scale);
+  d["bias"] = list(use.bias);
+  d["uv"] = list(use.uv);
+  return d;
+}
+
+/// Key and value of each entry: an id and a dict.
+template <typename Change>
+void for_each_change(const char* kind, const nb::dict& changes, const Change& change) {
+  for (const auto& [key, value] : changes) {
+    uint32_t id = 0;
+    if (!nb::try_cast(key, id) || !nb::isinstance<nb::dict>(value))
+      throw Error(std::string("what is edited must be {number of the ") + kind +
+                  ": {parameter: value}}");
+    change(id, nb::cast<nb::dict>(value));
+  }
+}
+
+}  // namespace
+
+Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
+  if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4) throw Error("a transform must be 4 x 4");
+  if (m.dtype() == nb::dtype<double>()) return affine(static_cast<const double*>(m.data()));
+  if (m.dtype() == nb::dtype<float>()) return affine(static_cast<const float*>(m.data()));
+  throw Error("a transform must be of float32 or float64");
+}
+
+const char* light_kind_name(LightKind kind) {
+  constexpr const char* kKinds[kLightKindCount] = {"rect",    "disk", "sphere",
+                                                   "distant", "dome", "triangle"};
+  return kKinds[static_cast<size_t>(kind)];
+}
+
+nb::dict material_dict(const Scene& scene, uint32_t material) {
+  check_index("material", material, scene.materials().size());
+  const Material& m = scene.materials()[material];
+  nb::dict d, textures;
+  d["name"] = m.name;
+  d["program"] = kProgramNames[static_cast<size_t>(m.program)];
+  put(d, m, kMaterialColors);
+  put(d, m, kMaterialNumbers);
+  put(d, m, kMaterialSwitches);
+  put(d, m, kMaterialCounts);
+  for (uint32_t s = 0; s < kSlotCount; ++s)
+    if (m.has_texture(static_cast<Slot>(s)))
+      textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
+  d["textures"] = textures;
+  return d;
+}
+
+nb::dict light_dict(const Scene& scene, uint32_t light) {
+  check_index("light", light, scene.lights().size());
+  const Light& l = scene.lights()[light];
+  nb::dict d;
+  d["name"] = l.name;
+  d["kind"] = light_kind_name(l.kind);
+  d["transform"] = matrix(l.to_world);
+  put(d, l, kLightColors);
+  put(d, l, kLightNumbers);
+  put(d, l, kLightSwitches);
+  d["group"] = scene.light_groups()[l.group];
+  d["texture"] =
+      l.texture == kNoTexture ? nb::none() : nb::cast(scene.textures()[l.texture]->name());
+  return d;
+}
+
+nb::dict camera_dict(const Scene& scene) {
+  const Camera& c = scene.camera();
+  nb::dict d;
+  d["to_world"] = matrix(c.to_world);
+  d["window"] = nb::make_tuple(c.window[0], c.window[1], c.window[2], c.window[3]);
+  put(d, c, kCameraNumbers);
+  return d;
+}
+
+SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dict& materials,
+                     const nb::dict& lights) {
+  SceneEdit edit;
+  if (!camera.is_none()) {
+    Camera changed = scene.camera();
+    Reader reader("the camera", nb::cast<nb::dict>(camera));
+    reader.take("transform", changed.to_world);
+    reader.take("to_world", changed.to_world);
+    reader.take("window", changed.window);
+    reader.take(changed, kCameraNumbers);
+    reader.end();
+    edit.camera = changed;
+  }
+  for_each_change("material", materials, [&](uint32_t id, const nb::dict& values) {
+    check_index("material", id, scene.materials().size());
+    Material changed = scene.materials()[id];
+    Reader reader("material '" + changed.name + "'", values);
+    reader.take(changed, kMaterialColors);
+    reader.take(changed, kMaterialNumbers);
+    reader.take(changed, kMaterialSwitches);
+    reader.take(changed, kMaterialCounts);
+    reader.end();
+    edit.materials[id] = std::move(changed);
+  });
+  for_each_change("light", lights, [&](uint32_t i, const nb::dict& values) {
+    check_index("light", i, scene.lights().size());
+    Light changed = scene.lights()[i];
+    Reader reader("light '" + changed.name + "'", values);
+    reader.take("transform", changed.to_world);
+    reader.take(changed, kLightColors);
+    reader.take(changed, kLightNumbers);
+    reader.take(changed, kLightSwitches);
+    reader.end();
+    edit.lights[i] = std::move(changed);
+  });
+  return edit;
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Values of a scene as Python writes them: to be read, and to be changed.
+#pragma once
+
+#include <nanobind/ndarray.h>
+
+#include "wavecomb/scene/scene.h"
+
+/// USD's row-vector matrix at `m` as a column-vector map.
+template <typename T>
+wavecomb::Affine affine(const T* m) {
+  const auto at = [m](int row, int column) { return static_cast<float>(m[4 * row + column]); };
+  wavecomb::Affine a;
+  for (int i = 0; i < 3; ++i) a.row[i] = {at(0, i), at(1, i), at(2, i)};
+  a.t = {at(3, 0), at(3, 1), at(3, 2)};
+  return a;
+}
+/// Likewise of a 4 x 4 array; throws Error for any other.
+wavecomb::Affine affine(
+    const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& m);
+
+const char* light_kind_name(wavecomb::LightKind kind);
+
+/// As add_material, add_light and set_camera take them. Throw Error for ids that are not there.
+nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
+nanobind::dict light_dict(const wavecomb::Scene& scene, uint32_t light);
+nanobind::dict camera_dict(const wavecomb::Scene& scene);
+
+/// What Renderer.edit() is told. Values that are not given stay as they are. Throws Error that
+/// names the object and the value.
+wavecomb::SceneEdit scene_edit(const wavecomb::Scene& scene, const nanobind::object& camera,
+                               const nanobind::dict& materials, const nanobind::dict& lights);

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "statistics.h"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <map>
+
+namespace nb = nanobind;
+using namespace wavecomb;
+
+namespace {
+
+/// Lists by depth: rays, shadow rays, records, and how many paths ended there.
+nb::dict depths_dict(const RenderStatistics& s) {
+  nb::dict d;
+  std::vector<uint64_t> ended;
+  for (size_t i = 0; i < s.rays_at.size(); ++i)
+    ended.push_back(s.rays_at[i] - (i + 1 < s.rays_at.size() ? s.rays_at[i + 1] : 0));
+  d["rays"] = s.rays_at;
+  d["shadow_rays"] = s.shadow_rays_at;
+  d["records"] = s.records_at;
+  d["paths_ended"] = ended;
+  return d;
+}
+
+nb::list materials_list(const RenderStatistics& s) {
+  nb::list out;
+  for (const MaterialStatistics& m : s.materials) {
+    nb::dict d;
+    d["name"] = m.name;
+    d["program"] = m.program;
+    d["records"] = m.records;
+    d["timed_records"] = m.timed_records;
+    d["ns_per_record"] = m.measured_ns;
+    d["calibrated_ns"] = m.calibrated_ns;
+    d["predicted_ns"] = m.predicted_ns;
+    out.append(d);
+  }
+  return out;
+}
+
+/// Sums over the materials of each program that shaded anything.
+nb::dict programs_dict(const RenderStatistics& s) {
+  struct Sum {
+    uint64_t records = 0, timed = 0;
+    double ns = 0;
+  };
+  std::map<std::string, Sum> sums;
+  for (const MaterialStatistics& m : s.materials) {
+    Sum& sum = sums[m.program];
+    sum.records += m.records;
+    sum.timed += m.timed_records;
+    sum.ns += m.measured_ns * static_cast<double>(m.timed_records);
+  }
+  nb::dict out;
+  for (const auto& [name, sum] : sums) {
+    if (sum.records == 0) continue;
+    nb::dict d;
+    d["records"] = sum.records;
+    d["ns_per_record"] = sum.timed > 0 ? sum.ns / static_cast<double>(sum.timed) : 0.0;
+    out[name.c_str()] = d;
+  }
+  return out;
+}
+
+}  // namespace
+
+nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
+                         size_t picture_bytes) {
+  nb::dict d, seconds, phases, counts, memory;
+  d["settings"] = settings;
+  seconds["build"] = s.build_s;
+  seconds["render"] = s.render_s;
+  seconds["first_samples"] = s.first_samples_s;
+  d["seconds"] = seconds;
+  for (const auto& [name, value] : s.phases_s) phases[name.c_str()] = value;
+  d["phases_s"] = phases;
+  counts["samples"] = s.samples;
+  counts["rays"] = s.rays;
+  counts["shadow_rays"] = s.shadow_rays;
+  counts["records"] = s.records;
+  counts["packets"] = s.packets;
+  counts["packet_lanes"] = s.packet_lanes;
+  d["counts"] = counts;
+  const auto rate = [&](uint64_t n) {
+    return s.render_s > 0 ? static_cast<double>(n) / s.render_s : 0.0;
+  };
+  d["samples_per_s"] = rate(s.samples);
+  d["rays_per_s"] = rate(s.rays + s.shadow_rays);
+  d["lane_utilisation"] = s.packet_lanes > 0
+                              ? static_cast<double>(s.records) / static_cast<double>(s.packet_lanes)
+                              : 1.0;
+  d["depths"] = depths_dict(s);
+  nb::dict coherence, costs;
+  coherence["run_length"] = s.run_length;
+  coherence["material_homogeneity"] = s.material_homogeneity;
+  coherence["texture_homogeneity"] = s.texture_homogeneity;
+  d["coherence"] = coherence;
+  d["materials"] = materials_list(s);
+  d["programs"] = programs_dict(s);
+  costs["r2"] = s.cost_r2;
+  costs["mean_error"] = s.cost_mean_error;
+  costs["materials"] = s.cost_materials;
+  costs["calibration_s"] = s.calibration_s;
+  d["cost_prediction"] = costs;
+  nb::dict uses;
+  for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
+  d["policy_uses"] = uses;
+  d["threads"] = s.threads;
+  d["wave_size"] = s.wave_size;
+  d["lanes"] = s.lanes;
+  memory["accelerator"] = s.accelerator_bytes;
+  memory["waves"] = s.wave_bytes;
+  memory["film"] = s.film_bytes;
+  memory["picture"] = picture_bytes;
+  memory["meshes"] = s.scene_bytes.meshes;
+  memory["textures"] = s.scene_bytes.textures;
+  memory["records"] = s.scene_bytes.records;
+  d["memory_bytes"] = memory;
+  d["peak_rss_bytes"] = s.peak_rss_bytes;
+  d["passes"] = s.passes;
+  d["resumed_samples"] = s.resumed_samples;
+  d["error"] = s.error;
+  d["cancelled"] = s.cancelled;
+  return d;
+}

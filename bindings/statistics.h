@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What a render took, as a dict.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include "wavecomb/render/render_statistics.h"
+
+/// The keys of docs/statistics.md that the core knows of. `picture_bytes`: 0 where there is no
+/// picture yet.
+nanobind::dict statistics_dict(const wavecomb::RenderStatistics& statistics,
+                               const nanobind::dict& settings, size_t picture_bytes);

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/accel/embree_filters.h"
+
+#include <limits>
+
+#include "wavecomb/accel/light_shapes.h"
+#include "wavecomb/accel/presence.h"
+#include "wavecomb/core/lanes.h"
+
+namespace wavecomb {
+namespace {
+
+/// Makes the closest hit independent of the order in which triangles are tried. Embree keeps
+/// whichever of two hits it tries last when they are equally far up to rounding (on shared edges,
+/// where surfaces cross or lie in one another), and in a packet that order depends on the other
+/// rays. Here the smaller distance wins, and of equal ones the smaller id. So that no candidate is
+/// missed, the search goes on a little beyond the closest hit: tfar is put back by `slack`.
+template <unsigned N>
+inline void keep_closest(const RTCFilterFunctionNArguments* args) {
+  auto* best = reinterpret_cast<QueryContext*>(args->context);
+  int* valid = args->valid;
+  float* tfar = &RTCRayN_tfar(args->ray, N, 0);
+  using F = Lanes<N>;
+  using U = UInt<F>;
+  const F t = load<F>(tfar), best_t = load<F>(best->t);
+  Mask<F> take = t < best_t;
+  const Mask<F> tie = t == best_t;
+  if (any(tie)) {
+    const U i = load<U>(&RTCHitN_instID(args->hit, N, 0, 0)), bi = load<U>(best->inst);
+    const U g = load<U>(&RTCHitN_geomID(args->hit, N, 0)), bg = load<U>(best->geom);
+    const U p = load<U>(&RTCHitN_primID(args->hit, N, 0)), bp = load<U>(best->prim);
+    take = take | (tie & Mask<F>((i < bi) | ((i == bi) & ((g < bg) | ((g == bg) & (p < bp))))));
+  }
+  take = take & Mask<F>(load<U>(valid) != U(0u));
+  store(best->t, select(take, t, best_t));
+  store(tfar, select(take, F(t * kSlack), t));
+  store(valid, select(Mask<U>(take), U(0xffffffffu), U(0u)));
+}
+
+/// Ray i of a packet against the round light that a geometry's user pointer names; 0: missed.
+float meet_round_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
+  const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
+  const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
+  const float t = intersect_round_light(*static_cast<const LightRecord*>(user), o, d);
+  return t > 0.f && t <= RTCRayN_tfar(ray, n, i) ? t : 0.f;
+}
+
+}  // namespace
+
+void presence_filter(const RTCFilterFunctionNArguments* args) {
+  const auto mesh = static_cast<uint32_t>(reinterpret_cast<uintptr_t>(args->geometryUserPtr));
+  const auto* context = reinterpret_cast<const QueryContext*>(args->context);
+  const unsigned n = args->N;
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] != -1) continue;
+    const unsigned inst = RTCHitN_instID(args->hit, n, i, 0);
+    const bool present =
+        is_present(*context->scene, inst == RTC_INVALID_GEOMETRY_ID ? 0 : inst, mesh,
+                   RTCHitN_primID(args->hit, n, i), RTCHitN_u(args->hit, n, i),
+                   RTCHitN_v(args->hit, n, i), RTCRayN_id(args->ray, n, i), *context->keys);
+    if (!present) args->valid[i] = 0;
+  }
+}
+
+void closest_filter(const RTCFilterFunctionNArguments* args) {
+  switch (args->N) {
+    case 16:
+      return keep_closest<16>(args);
+    case 8:
+      return keep_closest<8>(args);
+    case 4:
+      return keep_closest<4>(args);
+    default:
+      return keep_closest<1>(args);
+  }
+}
+
+void intersect_round_lights(const RTCIntersectFunctionNArguments* args) {
+  auto* best = reinterpret_cast<QueryContext*>(args->context);
+  const unsigned n = args->N;
+  RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
+  RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] == 0) continue;
+    const float t = meet_round_light(args->geometryUserPtr, ray, n, i);
+    if (t == 0.f || t > best->t[i]) continue;
+    // A tie goes to the smaller instance, which the world's is not, then to the smaller geometry.
+    if (t == best->t[i] && (RTCHitN_instID(hit, n, i, 0) != RTC_INVALID_GEOMETRY_ID ||
+                            RTCHitN_geomID(hit, n, i) < args->geomID))
+      continue;
+    best->t[i] = t;
+    RTCRayN_tfar(ray, n, i) = t * kSlack;
+    RTCHitN_u(hit, n, i) = RTCHitN_v(hit, n, i) = 0.f;
+    RTCHitN_primID(hit, n, i) = 0;
+    RTCHitN_geomID(hit, n, i) = args->geomID;
+    RTCHitN_instID(hit, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+void intersect_round_lights_bare(const RTCIntersectFunctionNArguments* args) {
+  const unsigned n = args->N;
+  RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
+  RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] == 0) continue;
+    const float t = meet_round_light(args->geometryUserPtr, ray, n, i);
+    if (t == 0.f) continue;
+    RTCRayN_tfar(ray, n, i) = t;
+    RTCHitN_primID(hit, n, i) = 0;
+    RTCHitN_geomID(hit, n, i) = args->geomID;
+    RTCHitN_instID(hit, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+void occlude_round_lights(const RTCOccludedFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] != 0 && meet_round_light(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
+      RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
+}
+
+void put_bounds(const Bounds& b, RTCBounds& out) {
+  out.lower_x = b.lo.x;
+  out.lower_y = b.lo.y;
+  out.lower_z = b.lo.z;
+  out.upper_x = b.hi.x;
+  out.upper_y = b.hi.y;
+  out.upper_z = b.hi.z;
+}
+
+void round_light_box(const RTCBoundsFunctionArguments* args) {
+  const Bounds b = round_light_bounds(*static_cast<const LightRecord*>(args->geometryUserPtr));
+  put_bounds(b, *args->bounds_o);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pick.h"
+
+#include <algorithm>
+
+#include "wavecomb/film/filter.h"
+#include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/integrate/surface.h"
+#include "wavecomb/scene/names.h"
+
+namespace wavecomb {
+namespace {
+
+/// A hit, in columns of one.
+struct OneHit {
+  float t, u, v;
+  uint32_t prim, geom, inst;
+};
+
+OneHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {
+  OneHit hit{};
+  const uint32_t path = 0;  // partly present surfaces are there for some paths: for this one
+  accel.intersect(
+      {&ray.o.x, &ray.o.y, &ray.o.z, &ray.d.x, &ray.d.y, &ray.d.z, &ray.tfar, nullptr, 1},
+      {&hit.t, &hit.u, &hit.v, &hit.prim, &hit.geom, &hit.inst}, 1, false, {&path, &path, 1, 0});
+  return hit;
+}
+
+uint32_t light_of_record(const LightSet& set, uint32_t record) {
+  const auto at = std::find(set.of_input.begin(), set.of_input.end(), record);
+  return static_cast<uint32_t>(at - set.of_input.begin());
+}
+
+}  // namespace
+
+std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, float x, float y,
+                         uint32_t width, uint32_t height) {
+  const FilterTable filter(FilterKind::kBox, 1.f);
+  const CameraSetup camera(scene.camera(), width, height, filter);
+  const CameraRay<float> ray = ray_through<float>(camera, x, y, 0.5f, 0.5f);
+  const OneHit hit = trace(accel, ray);
+  if (hit.inst == kNoHit) return std::nullopt;
+
+  Pick out;
+  const ObjectNames names(scene);
+  uint32_t object;
+  if (hit.inst == kLightShape) {
+    object = names.first_light() + hit.geom;
+    out.light = light_of_record(scene.light_set(), hit.geom);
+    out.position = ray.o + ray.d * hit.t;
+  } else {
+    object = names.first_object()[hit.inst] + hit.geom;
+    const SceneView view = scene.view();
+    const InstanceRecord& instance = view.instances[hit.inst];
+    const uint32_t mesh_id = view.geometry_mesh[instance.geometry + hit.geom];
+    const Mesh& mesh = scene.meshes()[mesh_id];
+    out.instance = hit.inst;
+    out.material = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[hit.prim];
+    if (out.material == kInheritMaterial) out.material = instance.material;
+    const Surface<float> surface = setup_surface<float>(
+        view, {hit.inst, mesh_id, hit.prim, hit.u, hit.v}, ray.d, true, false, true);
+    out.position = surface.p;
+    out.normal = surface.ns;
+    out.uv = surface.uv;
+  }
+  out.object = names.object(object);
+  out.asset = names.asset(object);
+  const Vec3<float> from_camera = out.position - camera.to_world.t;
+  out.depth = -dot(from_camera, camera.backward);
+  out.distance = length(from_camera);
+  return out;
+}
+
+}  // namespace wavecomb

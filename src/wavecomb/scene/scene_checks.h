@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What values of a scene may be: for SceneBuilder and for edits. All throw Error with one line
+/// that names the object.
+#pragma once
+
+#include <cmath>
+#include <string>
+
+#include "wavecomb/scene/camera.h"
+#include "wavecomb/scene/light_data.h"
+#include "wavecomb/scene/material_data.h"
+
+namespace wavecomb {
+
+inline bool finite(const Vec3<float>& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+inline bool finite(const Affine& m) {
+  return finite(m.row[0]) && finite(m.row[1]) && finite(m.row[2]) && finite(m.t);
+}
+
+/// "mesh '/World/Box'", or "mesh" where it has no name.
+std::string quoted(const std::string& kind, const std::string& name);
+
+/// `texture_count`: textures that there are.
+void check_material(const Material& material, size_t texture_count);
+void check_light(const Light& light, size_t texture_count);
+void check_camera(const Camera& camera);
+
+}  // namespace wavecomb

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The parts of a scene. Each is immutable and shared by all scenes that edits made of one another
+/// without changing it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/scene/light_data.h"
+#include "wavecomb/scene/material_data.h"
+#include "wavecomb/scene/mesh.h"
+#include "wavecomb/scene/names.h"
+#include "wavecomb/texture/texture.h"
+
+namespace wavecomb {
+
+/// An instance as lanes read it: one cache line. Instance 0 is the world itself (identity).
+struct alignas(64) InstanceRecord {
+  float to_world[12];  ///< rows of A, each followed by its translation
+  uint32_t geometry;   ///< first of its group's entries in SceneView::geometry_mesh
+  uint32_t material;   ///< for meshes whose material is kInheritMaterial
+  uint32_t emissive;   ///< first of its entries in SceneView::emissive_lights, if there are any
+  float side;          ///< sign of det A: -1 where the transform mirrors
+};
+static_assert(sizeof(InstanceRecord) == 64);
+
+struct Bounds {
+  Vec3<float> lo{1e30f, 1e30f, 1e30f}, hi{-1e30f, -1e30f, -1e30f};
+  bool empty() const { return lo.x > hi.x; }
+  void add(const Vec3<float>& p) {
+    lo = {p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z};
+    hi = {p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z};
+  }
+};
+
+/// A group of meshes that is committed once and instanced any number of times.
+struct Group {
+  std::string name;
+  std::vector<uint32_t> meshes;
+  std::string root;  ///< prim path that its meshes' names begin with
+};
+
+/// One placement of a group.
+struct Instance {
+  uint32_t group = 0;
+  Affine to_world;
+  uint32_t material = kInheritMaterial;
+  uint32_t placement = kNoName;  ///< index into Scene::placements
+};
+
+/// Light groups that a stage may have, with that of lights without one.
+inline constexpr uint32_t kMaxLightGroups = 64;
+/// The group of lights without one, group 0.
+inline constexpr const char* kOtherLights = "other";
+
+/// What no edit changes: shapes and where they are, textures, names.
+struct SceneGeometry {
+  std::vector<Mesh> meshes;
+  /// By mesh with materials of faces: which ones, each once. Empty for other meshes.
+  std::vector<std::vector<uint32_t>> face_materials;
+  std::vector<Group> groups;
+  std::vector<Instance> instances;
+  std::vector<std::unique_ptr<Texture>> textures;
+  std::vector<std::string> light_groups;
+  std::vector<Placement> placements;
+  NameTable names;
+  Bounds bounds;
+  float radius = 1;  ///< of the bounding sphere
+  std::vector<std::string> warnings;
+
+  std::vector<MeshRecord> mesh_records;
+  std::vector<InstanceRecord> instance_records;
+  std::vector<uint32_t> geometry_mesh;
+  std::vector<TextureView> texture_views;
+
+  /// Runs test(material) for what faces of `mesh` wear where the instance's own is `inherited`,
+  /// until it says yes.
+  template <typename Test>
+  bool any_material(uint32_t mesh, uint32_t inherited, const Test& test) const {
+    const auto worn = [&](uint32_t m) { return test(m == kInheritMaterial ? inherited : m); };
+    if (meshes[mesh].face_materials.empty()) return worn(meshes[mesh].material);
+    for (uint32_t m : face_materials[mesh])
+      if (worn(m)) return true;
+    return false;
+  }
+};
+
+/// Materials, and as lanes read them.
+struct SceneMaterials {
+  explicit SceneMaterials(std::vector<Material> materials);
+
+  std::vector<Material> materials;
+  std::vector<MaterialRecord> records;
+  std::vector<TextureUseRecord> uses;
+  std::vector<uint32_t> programs;
+  bool has_presence = false, has_emission = false;
+};
+
+/// Lights of the stage and emissive triangles.
+struct SceneLights {
+  /// Triangles of all meshes whose materials emit become lights. `before`: of a scene with the same
+  /// geometry, to take over what is the same; or null.
+  SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
+              const SceneMaterials& materials, const SceneLights* before);
+
+  std::vector<Light> lights;
+  LightSet set;
+  std::vector<uint32_t> emissive;  ///< SceneView::emissive_lights; empty where nothing emits
+  /// Of the triangle lights from `first` on, up to those of the next entry.
+  struct TriangleGroup {
+    uint32_t first, group;
+  };
+  std::vector<TriangleGroup> triangle_groups;
+};
+
+}  // namespace wavecomb
