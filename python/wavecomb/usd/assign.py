@@ -114,7 +114,9 @@ class Assigner:
             result[which == k] = ids[which == k]
         return result
 
-    def _bound(self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface) -> tuple[int, FaceIds | None]:
+    def _bound(
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface
+    ) -> tuple[int, FaceIds | None]:
         """Ids of a surface; one that reads primvars is made anew with this mesh's values."""
         faces: FaceIds | None = None
         for slot, name in surface.primvars.items():

@@ -17,7 +17,7 @@ MAX_COLOURS = 256
 
 
 def face_values(primvar: Primvar, topology: Topology | Strands, width: int) -> NDArray[np.float32]:
-    """Mean of a primvar on each triangle or segment: (m, width); (1, width) where it is constant."""
+    """Mean of a primvar on each triangle (segment): (m, width); (1, width) where constant."""
     if isinstance(topology, Strands):
         return topology.means(primvar, width)
     values, at = spread(primvar, topology, width)

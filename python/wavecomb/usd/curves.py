@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -200,10 +201,8 @@ def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
 def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
     """``primvars:name``, else the attribute ``name``; None where neither has values."""
     primvar = None
-    try:
+    with contextlib.suppress(PrimvarError):
         primvar = read_primvar(prim, name, time)
-    except PrimvarError:
-        pass
     if primvar is None:
         attribute = prim.GetAttribute(name)
         if not attribute or not attribute.HasAuthoredValue():

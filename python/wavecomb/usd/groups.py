@@ -220,9 +220,7 @@ class GroupBuilder:
         group.grow(shape.bounds)
         self.report.tally(_COUNTS[kind])
 
-    def _read(
-        self, kind: str, draw: Draw, names: Sequence[str]
-    ) -> MeshArrays | CurveArrays | None:
+    def _read(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | CurveArrays | None:
         """The arrays of a gprim, in its group's space."""
         if kind == "shape":
             return self.meshes.shape(draw.prim, draw.matrix)
@@ -252,8 +250,7 @@ class GroupBuilder:
         )
 
     def _draw_skewed(self, group: Group, draw: Draw, scope: Scope) -> None:
-        """Adds curves or points whose transform would make their round sections oval: a group of
-        their own that the transform places."""
+        """Adds curves or points that a transform makes oval: a group of their own, placed by it."""
         path = draw.prim.GetPath()
         child = Group(str(path), self.report.place(path))
         own = replace(draw, matrix=IDENTITY)

@@ -197,8 +197,10 @@ class Strands:
         ]
 
     def _pack(self, points: list[NDArray[np.float64]]) -> Array:
-        """Control points of segments as runs that neighbours share, closed curves with one more
-        at either end."""
+        """Control points of segments as runs that neighbours share.
+
+        Closed curves have one more at either end.
+        """
         step, lead = len(points) - 1, (1 if self.periodic else 0)
         sizes = step * self.segments + 1 + 2 * lead
         base = np.cumsum(sizes) - sizes + lead

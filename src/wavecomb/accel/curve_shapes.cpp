@@ -151,7 +151,7 @@ class SegmentTest {
   void search(const Bezier& piece, double u0, double u1, int halvings) {
     const double r = *std::max_element(piece.r, piece.r + 4);
     if (passes_by(piece, r)) return;
-    const auto misses = [&](double V::*axis, double lo, double hi) {
+    const auto misses = [&](double V::* axis, double lo, double hi) {
       double least = piece.p[0].*axis, most = least;
       for (int k = 1; k < 4; ++k) {
         least = std::min(least, piece.p[k].*axis);

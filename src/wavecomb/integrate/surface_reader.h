@@ -49,17 +49,17 @@ class MeshReader {
 
   /// Row `index` of N words of one of a mesh's arrays.
   template <size_t N>
-  std::array<F, N> row(uint64_t MeshRecord::*array, const UInt<F>& index,
+  std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
                        const Mask<F>& active) const {
     return load_rows_of<N, F>(
         [&](size_t lane) { return reinterpret_cast<const void*>(records_[lane]->*array); },
         index * static_cast<uint32_t>(N), active);
   }
-  Vec3<F> vec3(uint64_t MeshRecord::*array, const UInt<F>& index, const Mask<F>& active) const {
+  Vec3<F> vec3(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
     const auto r = row<3>(array, index, active);
     return {r[0], r[1], r[2]};
   }
-  Vec2<F> vec2(uint64_t MeshRecord::*array, const UInt<F>& index, const Mask<F>& active) const {
+  Vec2<F> vec2(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
     const auto r = row<2>(array, index, active);
     return {r[0], r[1]};
   }
@@ -70,7 +70,7 @@ class MeshReader {
   }
 
   /// Word `index` of one of a mesh's arrays.
-  UInt<F> word(uint64_t MeshRecord::*array, const UInt<F>& index, const Mask<F>& active) const {
+  UInt<F> word(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
     const InMemory<UInt<F>> at(index);
     InMemory<UInt<F>> out(UInt<F>(0u));
     const uint32_t bits = lane_bits<F>(active);

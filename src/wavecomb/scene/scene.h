@@ -32,7 +32,8 @@ struct SceneView {
 
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
-  uint64_t meshes = 0;    ///< points, indices, radii, normals, texture coordinates, materials of faces
+  uint64_t meshes =
+      0;  ///< points, indices, radii, normals, texture coordinates, materials of faces
   uint64_t textures = 0;  ///< all mip levels
   uint64_t records = 0;   ///< instances, materials, lights
 };
@@ -122,8 +123,8 @@ class SceneBuilder {
   uint32_t add_texture(const TextureDesc& desc);
   /// Texture ids in the material must exist.
   uint32_t add_material(Material material);
-  /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name; faces
-  /// without area stay (they are never hit).
+  /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name;
+  /// faces without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
   /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.
   /// `root` is the prim path that names of its meshes and of placements in it begin with, which
