@@ -9,6 +9,9 @@ namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The native core of Wavecomb.";
+  // What lives when the interpreter ends, a window's last picture or an exception's, is no news to
+  // those who render; the list would also name other modules' objects.
+  nb::set_leak_warnings(false);
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_scene(m);
   bind_recording(m);

@@ -126,6 +126,14 @@ uint32_t add_texture(SceneBuilder& builder,
   return builder.add_texture(desc);
 }
 
+uint32_t share_texture(SceneBuilder& builder, const Scene& scene, uint32_t texture) {
+  const auto& textures = scene.textures();
+  if (texture >= textures.size())
+    throw Error("texture " + std::to_string(texture) + " is not in a scene of " +
+                std::to_string(textures.size()) + " textures");
+  return builder.add_texture(textures[texture]);
+}
+
 uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
                       const std::string& name, const Color3& base_color,
                       const Color3& specular_color, const Color3& emission, float roughness,
@@ -394,16 +402,18 @@ void bind_scene(nb::module_& m) {
                        out.emplace_back(names.object(i), names.asset(i));
                      return out;
                    })
-      .def("fingerprint",
-           [](const Scene& s) {
-             nb::dict d;
-             for (const auto& [part, hash] : fingerprint(s)) {
-               char text[17];
-               std::snprintf(text, sizeof(text), "%016" PRIx64, hash);
-               d[part.c_str()] = text;
-             }
-             return d;
-           })
+      .def(
+          "fingerprint",
+          [](const Scene& s, bool arrays) {
+            nb::dict d;
+            for (const auto& [part, hash] : fingerprint(s, arrays)) {
+              char text[17];
+              std::snprintf(text, sizeof(text), "%016" PRIx64, hash);
+              d[part.c_str()] = text;
+            }
+            return d;
+          },
+          "arrays"_a = true)
       .def_prop_ro("warnings", &Scene::warnings)
       .def_prop_ro("bounds", [](const Scene& s) {
         const Bounds& b = s.bounds();
@@ -415,6 +425,7 @@ void bind_scene(nb::module_& m) {
       .def(nb::init<uint32_t>(), "threads"_a = 0)
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
+      .def("share_texture", &share_texture, "scene"_a, "texture"_a)
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
            "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
            "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,

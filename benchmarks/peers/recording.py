@@ -45,8 +45,9 @@ class RecordingBuilder(Recorded):
         face_materials: NDArray[np.uint32] | None = None,
         material: int = INHERIT,
         name: str = "",
+        **labels: Any,
     ) -> int:
-        """Keeps a mesh."""
+        """Keeps a mesh; labels, as for AOVs, are passed on."""
         number = self._native.add_mesh(
             positions,
             indices,
@@ -55,14 +56,15 @@ class RecordingBuilder(Recorded):
             face_materials=face_materials,
             material=material,
             name=name,
+            **labels,
         )
         self.meshes.append(Mesh(positions, indices, normals, uvs, face_materials, material, name))
         return number
 
-    def add_group(self, name: str = "") -> int:
+    def add_group(self, name: str = "", root: str = "") -> int:
         """Keeps an empty group."""
         self.groups.append(Group())
-        return self._native.add_group(name)
+        return self._native.add_group(name, root)
 
     def add_to_group(self, group: int, mesh: int) -> None:
         """Keeps a mesh in a group."""
@@ -75,10 +77,11 @@ class RecordingBuilder(Recorded):
         child: int,
         transforms: NDArray[Any],
         materials: NDArray[np.uint32] | None = None,
+        **labels: Any,
     ) -> None:
-        """Keeps placements of a group."""
+        """Keeps placements of a group; labels are passed on."""
         self.groups[parent].children.append((child, np.asarray(transforms), materials))
-        self._native.add_instances(parent, child, transforms, materials)
+        self._native.add_instances(parent, child, transforms, materials, **labels)
 
     def add_light(self, kind: str, transform: NDArray[Any], **options: Any) -> int:
         """Keeps a light."""

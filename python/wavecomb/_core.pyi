@@ -45,10 +45,11 @@ class Scene:
     @property
     def textures(self) -> list[tuple[str, int]]:
         """(name, bytes) of every texture."""
-    def fingerprint(self) -> dict[str, str]:
-        """Hashes of what decides over the picture: geometry, materials, textures, lights, camera.
+    def fingerprint(self, arrays: bool = True) -> dict[str, str]:
+        """Hashes of what decides over the picture, and of names: geometry, materials, textures,
+        lights, camera, names.
 
-        Reads every array once."""
+        arrays: geometry and textures, too, of which every byte is read."""
     @property
     def camera(self) -> dict[str, Any]:
         """As set_camera takes it: to_world (4, 4), window, lens_radius, focus_distance, near_clip,
@@ -93,6 +94,8 @@ class SceneBuilder:
         wrap: repeat, clamp, mirror, black. srgb matters for uint8 only.
         Tiled and mip-mapped inside.
         """
+    def share_texture(self, scene: Scene, texture: int) -> int:
+        """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
     def add_material(
         self,
         program: str,

@@ -62,13 +62,6 @@ def expand(names: Iterable[str]) -> tuple[str, ...]:
     return known + tuple(name for name in wanted if name not in NAMES)
 
 
-def of_core(names: Iterable[str] | None) -> tuple[str, ...]:
-    """The AOVs of a picture that the core made room for these for; None: for the default."""
-    if names is None or list(names) == for_core(DEFAULT):
-        return DEFAULT
-    return expand([*names, "samples"])
-
-
 def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]:
     """``aovs`` with those that a denoiser needs."""
     missing = [name for name in guides if name not in aovs]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -213,7 +214,13 @@ def load(
     Raises:
         WavecombError: The stage cannot be rendered; one line that names the file or prim.
     """
-    from wavecomb.usd import load_stage
+    from wavecomb.progress import Interrupt
+
+    # USD's module loader swallows what a Ctrl-C raises within it, and leaves half a library.
+    with Interrupt() as interrupt:
+        from wavecomb.usd import load_stage
+    if interrupt.signal is not None:
+        signal.raise_signal(interrupt.signal)
 
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
     return load_stage(
@@ -297,7 +304,7 @@ def render(
     scene, loaded, stage = _resolve(source, camera, frame, chosen.threads)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
-    watcher, state = _keeping(scene, chosen, stage, checkpoint, every, resume)
+    watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
     result = _render(scene, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats, scene=scene, aovs=names)
@@ -398,6 +405,7 @@ def keeps_error(settings: Settings) -> bool:
 def _keeping(
     scene: Scene,
     settings: Settings,
+    aovs: Sequence[str],
     stage: str | None,
     checkpoint: str | os.PathLike[str] | None,
     every: float,
@@ -409,7 +417,7 @@ def _keeping(
     from wavecomb.checkpoint import check_fits, load_checkpoint, make_header
     from wavecomb.watcher import CheckpointSink, Watcher
 
-    header = make_header(scene, settings, stage=stage, source={})
+    header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
     before = load_checkpoint(resume) if resume is not None else None
     if before is not None:
         check_fits(before, header)

@@ -12,7 +12,7 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 _KIND = "wavecomb-checkpoint"
+_KEYS = {"version", "library", "stage", "source", "aovs", "settings", "scene", "seconds"}
 
 _HOW = (
     "threads",
@@ -66,6 +67,11 @@ class Checkpoint:
         return dict(self.header["source"])
 
     @property
+    def aovs(self) -> tuple[str, ...]:
+        """AOVs of the picture, as ``aovs.expand`` gives them."""
+        return tuple(self.header["aovs"])
+
+    @property
     def seconds(self) -> float:
         """Rendered so far, in all runs."""
         return float(self.header["seconds"])
@@ -86,7 +92,12 @@ def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def make_header(
-    scene: Scene, settings: Settings, *, stage: str | None, source: Mapping[str, Any]
+    scene: Scene,
+    settings: Settings,
+    *,
+    stage: str | None,
+    source: Mapping[str, Any],
+    aovs: Sequence[str],
 ) -> dict[str, Any]:
     """What is the same for all checkpoints of a render."""
     from wavecomb import _core
@@ -98,6 +109,7 @@ def make_header(
         "library": _core.build_info()["library"],
         "stage": stage,
         "source": plain(source),
+        "aovs": list(aovs),
         "settings": plain(picture_settings(settings.to_dict())),
         "scene": _fingerprint(scene, settings),
     }
@@ -142,10 +154,12 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
                     f"{header['version']}; this is {version()}, which reads format {FORMAT}: "
                     "resume with that version, or start anew"
                 )
+            if missing := _KEYS - header.keys():
+                raise KeyError(*missing)
             state = {key: archive[key] for key in archive.files if key != "header"}
+            state["pass.target"] = int(state["pass.target"])
     except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise WavecombError(f"{name}: is no checkpoint, or is damaged; start anew") from error
-    state["pass.target"] = int(state["pass.target"])
     return Checkpoint(name, header, state)
 
 

@@ -48,7 +48,7 @@ _COLOURS = (
     "guide_normal",
 )
 """Layers that are half where halves are asked for, with all that begin with "light_"."""
-_IDS = ("material_id", "instance_id")
+_EXACT = ("position", "material_id", "instance_id")
 BAND = 64
 """Rows that are made ready and written at once: four blocks of an EXR file."""
 
@@ -76,8 +76,12 @@ def channel_names(layer: str, channels: int) -> list[str]:
 
 
 def is_exact(layer: str) -> bool:
-    """Whether a layer is of ids, of which a lossy compression would make others."""
-    return is_crypto(layer) or layer in _IDS
+    """Whether a lossy compression would spoil a layer.
+
+    Of ids it makes others. Positions far from 0 go out of its range: dwaa takes any channel called
+    Y for a brightness.
+    """
+    return is_crypto(layer) or layer in _EXACT
 
 
 def write_exr(
@@ -98,7 +102,7 @@ def write_exr(
         half: 16 bit colours and normals; all else stays 32 bit. Finite values beyond the range of
             a half are clamped to it.
         compression: Of OpenEXR. Those that lose something (pxr24, b44, dwaa ...) are refused for
-            layers of ids.
+            layers of ids and positions.
         tile: Edge of square tiles, pixels, a multiple of 16; 0: scanlines.
         metadata: Attributes of the file: str, int, float, or (4, 4) arrays. "Software" is set if
             it is not given.
@@ -146,8 +150,8 @@ def check_options(name: str, layers: Any, compression: str, tile: int) -> None:
     exact = [layer for layer in layers if is_exact(layer)]
     if compression in _LOSSY and exact:
         raise WavecombError(
-            f"{name}: compression {compression} would make other ids of {exact[0]}; use zip, zips "
-            "or piz, or write one file for each AOV"
+            f"{name}: compression {compression} would spoil {exact[0]}; use zip, zips or piz, or "
+            "write one file for each AOV"
         )
 
 
@@ -208,7 +212,7 @@ def write_bands(
         problem = output.geterror()
         if not (output.close() and ok):
             problem = problem or output.geterror()
-            raise OSError(f"{name}: cannot be written: {one_line(problem, name)}")
+            raise OSError(f"{name}: cannot be written: {one_line(problem, str(part))}")
 
 
 def _values(rows: NDArray[Any], as_half: bool) -> NDArray[np.float32]:

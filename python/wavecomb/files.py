@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -25,9 +26,15 @@ def _target(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def _prefix(target: Path) -> str:
+    """What temporary names begin with. Names stay short, and those of two files differ."""
+    stem = os.fsencode(target.stem)
+    return f".{target.stem if len(stem) <= 100 else hashlib.sha256(stem).hexdigest()[:32]}."
+
+
 def _part(target: Path) -> Path:
     """The temporary name: hidden, in the same folder, with the same ending, of this process."""
-    return target.with_name(f".{target.stem[:100]}.{os.getpid()}.part{target.suffix}")
+    return target.with_name(f"{_prefix(target)}{os.getpid()}.part{target.suffix}")
 
 
 def reason(error: OSError) -> str:
@@ -49,7 +56,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     target = _target(path)
     part = _part(target)
     try:
-        part.open("xb").close()
+        # There may be one: in a container each process can have the number of one that was killed.
+        part.open("wb").close()
         part.unlink()
     except OSError as error:
         raise OSError(f"{os.fspath(path)}: cannot be written: {reason(error)}") from error
@@ -57,7 +65,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 def _remove_leftovers(target: Path) -> None:
     """Removes temporary files of ``target`` whose process is no more: it was killed."""
-    start, end = f".{target.stem[:100]}.", f".part{target.suffix}"
+    start, end = _prefix(target), f".part{target.suffix}"
     for other in target.parent.iterdir():
         pid = other.name[len(start) : -len(end)]
         if not (other.name.startswith(start) and other.name.endswith(end) and pid.isdecimal()):

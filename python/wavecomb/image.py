@@ -52,20 +52,32 @@ def write_png(
         exposure: In stops: the picture is multiplied by 2^exposure first.
         tone_map: "clamp" cuts at 1; "neutral" rolls highlights off towards white. See ``display``.
     """
-    import OpenImageIO as oiio
-
     name = os.fspath(path)
     if Path(name).suffix.lower() != ".png":
         raise ValueError(f"{name}: the name of a PNG file must end in .png")
     linear = _colours(rgb)
-    height, width, channels = linear.shape
+    bands = (
+        display(linear[rows], exposure=exposure, tone_map=tone_map)
+        for rows in bands_of(linear.shape[0])
+    )
+    write_bands(name, _png_spec(linear), bands)
+
+
+def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> None:
+    """Writes 8-bit sRGB codes, (height, width, 3), as they are; whole or not at all."""
+    name = os.fspath(path)
+    pixels = _colours(codes)
+    write_bands(name, _png_spec(pixels), (pixels[rows] for rows in bands_of(pixels.shape[0])))
+
+
+def _png_spec(pixels: NDArray[Any]) -> Any:
+    import OpenImageIO as oiio
+
+    height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, "uint8")
     spec.attribute("oiio:ColorSpace", "sRGB")
     spec.attribute("Software", "Wavecomb")
-    bands = (
-        display(linear[rows], exposure=exposure, tone_map=tone_map) for rows in bands_of(height)
-    )
-    write_bands(name, spec, bands)
+    return spec
 
 
 def _colours(rgb: NDArray[Any]) -> NDArray[Any]:

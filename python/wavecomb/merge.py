@@ -92,12 +92,12 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
     for source in sources:
         _check_fit(first, source)
         for seed in source.seeds:
-            other = seeds.setdefault(seed, source.name)
-            if other != source.name or source.seeds.count(seed) > 1:
+            if seed in seeds:
                 raise WavecombError(
-                    f"{source.name}: has seed {seed}, as {other} has: the same samples twice are "
-                    "no better; render it with another --seed"
+                    f"{source.name}: has seed {seed}, as {seeds[seed]} has: the same samples twice "
+                    "are no better; render it with another --seed"
                 )
+            seeds[seed] = source.name
     sums: dict[str, NDArray[Any]] = {}
     pairs: dict[str, list[NDArray[Any]]] = {}
     names: dict[str, dict[str, int]] = {}
@@ -142,7 +142,8 @@ def _check_fit(first: _Source, other: _Source) -> None:
     a, b = (source.attributes.get("wavecomb:scene") for source in (first, other))
     if a != b:
         raise WavecombError(
-            f"{other.name}: its stage is not that of {first.name}: other prims, camera or frame"
+            f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
+            "camera or frame"
         )
 
 
@@ -183,10 +184,11 @@ def _add(
     for name, layer in layers.items():
         if cryptomatte.is_crypto(name):
             continue
-        values = layer.astype(np.float64)
         if name in NEAREST:
-            sums[name] = np.where(had, sums[name], values) if name in sums else values
+            sums[name] = np.where(had, sums[name], layer) if name in sums else layer
             continue
+        # A pixel without samples may hold anything.
+        values = np.where(samples > 0, layer, 0).astype(np.float64)
         if name in SQUARED:
             values = values * samples**2
         elif name in SPREAD:
@@ -197,9 +199,7 @@ def _add(
             sums["_hits"] = sums.get("_hits", 0) + np.where(hit, samples, 0)
         elif name not in SUMS:
             values = values * samples
-        # A pixel without samples may hold anything.
-        counted = np.where(samples > 0, values, 0)
-        sums[name] = sums[name] + counted if name in sums else counted
+        sums[name] = sums[name] + values if name in sums else values
 
 
 def _means(

@@ -33,7 +33,7 @@ def scene_metadata(scene: Scene, width: int, height: int) -> dict[str, Any]:
     to_world = np.array(camera["to_world"], np.float64)
     to_camera = np.linalg.inv(to_world)
     x0, x1, y0, y1 = fitted_window(camera["window"], width, height)
-    near, far = camera["near_clip"], camera["far_clip"]
+    near, far = camera["near_clip"], min(camera["far_clip"], 1e30)
     near = max(near, 1e-6 * min(far, 1e6))
     projection = np.zeros((4, 4))
     projection[0, 0], projection[1, 1] = 2 / (x1 - x0), 2 / (y1 - y0)
@@ -48,8 +48,11 @@ def scene_metadata(scene: Scene, width: int, height: int) -> dict[str, Any]:
 
 
 def scene_digest(scene: Scene) -> str:
-    """Tells scenes apart: a hash of their counts, names, bounds and camera, not of every point."""
-    facts = [
+    """Tells scenes apart: a hash of counts, bounds, camera, lights, materials, and of their names.
+
+    Not of every point and texel: that would take as long as reading them.
+    """
+    facts: list[Any] = [
         getattr(scene, name)
         for name in (
             "triangles",
@@ -64,6 +67,7 @@ def scene_digest(scene: Scene) -> str:
             "light_groups",
         )
     ]
+    facts.append(scene.fingerprint(arrays=False))
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
 
@@ -115,7 +119,7 @@ def save_layers(
 ) -> list[Path]:
     """Writes layers to one file, or to one for each AOV; all of them whole, or none.
 
-    Where files are split, ids are kept from a lossy compression by zip.
+    Where files are split, ids and positions are kept from a lossy compression by zip.
 
     Returns:
         The files.

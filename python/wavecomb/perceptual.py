@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How different two pictures look: SSIM and FLIP.
+"""How different two pictures look: PSNR, SSIM and FLIP.
 
-Both need the extra "bench". Values that are not finite count as 0 here; ``compare`` counts them.
+The last two need the extra "bench". Values that are not finite count as 0 here; ``compare`` counts
+them.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -18,7 +20,7 @@ from wavecomb.image import srgb_from_linear
 if TYPE_CHECKING:
     from wavecomb.compare import Source
 
-Metric = Literal["ssim", "flip-ldr", "flip-hdr"]
+Metric = Literal["psnr", "ssim", "flip-ldr", "flip-hdr"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 
 _REC709 = (0.2126, 0.7152, 0.0722)
@@ -28,9 +30,24 @@ _SSIM_RADIUS = 5
 
 def measure(metric: Metric, a: Source, b: Source, exposure: float = 0.0) -> float:
     """The mean over the picture of one metric, picture A against the reference B."""
+    if metric == "psnr":
+        return psnr(a, b, exposure)
     if metric == "ssim":
         return ssim(a, b, exposure)
     return float(flip(a, b, high_range=metric == "flip-hdr", exposure=exposure).mean(dtype=float))
+
+
+def psnr(a: Source, b: Source, exposure: float = 0.0) -> float:
+    """Peak signal-to-noise ratio in dB of the pictures as shown: -10 log10(mean (A - B)^2).
+
+    Values are in [0, 1], sRGB encoded, not rounded; infinite where they look equal.
+
+    Raises:
+        ValueError: The sizes differ.
+    """
+    x, y = (shown(p, exposure).astype(np.float64) for p in colour_pair(a, b))
+    error = float(np.mean((x - y) ** 2))
+    return -10.0 * math.log10(error) if error > 0.0 else math.inf
 
 
 def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:

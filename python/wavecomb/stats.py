@@ -163,7 +163,9 @@ def picture_metadata(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
     if stats.get("settings"):
         metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:
-        metadata["wavecomb:render_seconds"] = float(stats["seconds"].get("render", 0.0))
+        seconds = stats["seconds"]  # in all runs of a render that was resumed
+        rendered = seconds.get("render", 0.0) + seconds.get("resumed", 0.0)
+        metadata["wavecomb:render_seconds"] = float(rendered)
     return metadata
 
 

@@ -13,7 +13,7 @@ inline constexpr double kPiD = 3.14159265358979323846;
 
 /// A light set with the textures that it needs.
 struct Lights {
-  std::vector<std::unique_ptr<Texture>> textures;
+  std::vector<TexturePtr> textures;
   std::vector<TextureView> views;
   std::vector<TextureUseRecord> uses;  ///< of materials; only emission slots are set
   LightSet set;

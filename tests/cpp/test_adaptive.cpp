@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -97,6 +98,13 @@ TEST(ErrorMap, IsTheTrueErrorOnAverage) {
   }
 }
 
+TEST(ErrorMap, IsUnknownBelowTwoBlocks) {
+  for (const uint32_t samples : {8u, 9u, 15u})
+    EXPECT_EQ(measure_error(noisy_film(4, samples, [](auto, auto) { return 0.5f; })).error[0],
+              std::numeric_limits<float>::infinity())
+        << samples;
+}
+
 TEST(ErrorMap, FollowsTheNoise) {
   const Film film = noisy_film(64, 64, [](uint32_t x, uint32_t) { return x < 32 ? 0.1f : 0.8f; });
   const ErrorMap map = measure_error(film);
@@ -185,6 +193,30 @@ TEST(Adaptive, NoiseTargetEndsByTheMean) {
       for (double& h : bright.error(x, y).half) h *= 2;
     }
   EXPECT_EQ(check(bright, settings).active, c.active);
+}
+
+TEST(Adaptive, NoiseTargetIsMetByPicturesOfFewBrightPixels) {
+  // Stars in the dark: a window spreads a star's error over 25 pixels, so each is within the share
+  // that evenly spread noise would give it long before the picture is.
+  const auto is_star = [](uint32_t x, uint32_t y) { return x % 16 == 8 && y % 16 == 8; };
+  std::mt19937 rng(7);
+  Film film(32, 32, {AovSet{0}}, true);
+  for (uint32_t y = 0; y < 32; ++y)
+    for (uint32_t x = 0; x < 32; ++x) {
+      std::gamma_distribution<float> light(1.f, is_star(x, y) ? 100.f : 0.f);
+      add_samples(film, x, y, 64, [&](float* rgb) {
+        for (int c = 0; c < 3; ++c) rgb[c] = is_star(x, y) ? light(rng) : 0.001f;
+      });
+    }
+  const ErrorMap map = measure_error(film);
+  Settings settings;
+  settings.spp = 1 << 20;
+  settings.noise = static_cast<float>(0.5 * map.mean_relative);
+  const float worst = *std::max_element(map.error.begin(), map.error.end());
+  ASSERT_LT(worst, settings.noise * map.even_error) << "or it would show nothing";
+  const AdaptiveCheck c = check(film, settings);
+  EXPECT_GT(c.active_count, 0u) << "the picture's error is twice what it may be";
+  EXPECT_LT(c.active_count, 4u * 81 + 1) << "stars and their windows only";
 }
 
 }  // namespace

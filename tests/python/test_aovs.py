@@ -184,6 +184,14 @@ def test_positions_lie_where_the_matrices_say(picture: wavecomb.Picture) -> None
     assert inside.mean() > 0.9
 
 
+def test_matrices_are_finite_without_a_far_plane() -> None:
+    from wavecomb.output import scene_metadata
+
+    builder = wavecomb.SceneBuilder()
+    builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5), far_clip=float("inf"))
+    assert np.isfinite(scene_metadata(builder.build(), 4, 3)["worldToNDC"]).all()
+
+
 def test_cryptomatte_in_a_file(picture: wavecomb.Picture, tmp_path: Path) -> None:
     file = tmp_path / "a.exr"
     picture.save(file, compression="piz", tile=32, half=True)
@@ -246,6 +254,14 @@ def test_one_file_each(picture: wavecomb.Picture, tmp_path: Path) -> None:
     pairs = cryptomatte.gather(read_layers(crypto))["crypto_object"]
     assert pairs.tobytes() == picture.aovs["crypto_object"].tobytes()
     assert list(cryptomatte.manifests(read_metadata(crypto))) == ["crypto_object"]
+    position = read_layers(tmp_path / "a.position.exr")["position"]
+    assert position.tobytes() == picture.aovs["position"].tobytes()
+
+
+def test_one_file_each_of_a_long_name(picture: wavecomb.Picture, tmp_path: Path) -> None:
+    path = tmp_path / ("n" * 200 + ".exr")
+    for file in picture.save(path, split=True):
+        assert read_layers(file)
 
 
 def test_split_files_are_all_there_or_none(picture: wavecomb.Picture, tmp_path: Path) -> None:
@@ -260,7 +276,8 @@ def test_split_files_are_all_there_or_none(picture: wavecomb.Picture, tmp_path: 
     [
         (["--aov", "albdo"], "AOV 'albdo' is not known"),
         (["--aov", "light_rim"], "the scene has no light group 'rim'"),
-        (["--aov", "crypto", "--compression", "dwaa"], "compression dwaa would make other ids"),
+        (["--aov", "crypto", "--compression", "dwaa"], "compression dwaa would spoil Crypto"),
+        (["--aov", "position", "--compression", "dwaa"], "compression dwaa would spoil position"),
         (["--tile", "20"], "tiles of 20 pixels: must be a multiple of 16"),
     ],
 )
@@ -303,6 +320,43 @@ def test_objects_are_named_by_their_instances(tmp_path: Path) -> None:
     assert ("/World/Chair_2/Body/Seat", "/World/Chair_2") in objects
     points = sorted(pair for pair in objects if "Points" in pair[0])
     assert points == [(f"/World/Points[{i}]/Blade", f"/World/Points[{i}]") for i in (1, 2)]
+
+
+def test_light_groups_that_cannot_be_told_apart(tmp_path: Path) -> None:
+    """Names that become one, and more groups than there is room for, are said; no mesh goes."""
+    glow = """
+    def Material "Glow" {
+        token outputs:surface.connect = </World/Glow/S.outputs:surface>
+        def Shader "S" {
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:emissiveColor = (3, 1, 0.5)
+            token outputs:surface
+        }
+    }"""
+
+    def scene(names: list[str], bound: int) -> tuple[Any, str]:
+        meshes = "".join(
+            f"""def Mesh "M{i}" {{
+                {QUAD}
+                string primvars:arnold:aov = "{name}"
+                {"rel material:binding = </World/Glow>" if i < bound else ""}
+            }}
+            """
+            for i, name in enumerate(names)
+        )
+        loaded = wavecomb.load(write(tmp_path, f'def Xform "World" {{ {glow}\n{meshes} }}'))
+        return loaded.scene, "\n".join(finding.line() for finding in loaded.report.warnings)
+
+    both, said = scene(["rig 1", "rig-1", "rim"], 3)
+    assert sorted(both.light_groups) == ["other", "rig_1", "rim"]
+    assert "light groups 'rig 1' and 'rig-1' are one: channels call both 'rig_1': /World/M1" in said
+    many, said = scene([f"g{i}" for i in range(70)], 70)
+    assert many.mesh_count == 70
+    assert len(many.light_groups) == 64
+    assert "more than 63 light groups: light of the rest is in 'other': /World/M63" in said
+    dark, said = scene([f"g{i}" for i in range(70)], 1)
+    assert sorted(dark.light_groups) == ["g0", "other"], "only meshes that shine have one"
+    assert "light groups" not in said
 
 
 def test_light_groups_reach_the_builder(tmp_path: Path) -> None:

@@ -312,7 +312,7 @@ def test_dry_run_does_nothing_and_estimates(results: Path, tmp_path: Path) -> No
     assert "matches none" in bench("run", suite, "-o", other, "--only", "x", "--dry-run").stderr
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     suite, out = written(tmp_path, text), tmp_path / "out"
@@ -330,7 +330,7 @@ def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
             break
         time.sleep(0.02)
     process.send_signal(how)
-    assert process.wait() == (130 if how == signal.SIGINT else -9)
+    assert process.wait() == (-9 if how == signal.SIGKILL else 130)
     done = csv.read_text().splitlines()
     assert 2 <= len(done) < 5
     with jsonl.open("a") as file:
@@ -360,6 +360,24 @@ def test_a_run_that_fails_is_a_row_and_is_tried_again(tmp_path: Path) -> None:
     assert bench("run", suite, "-o", tmp_path / "out", "--resume", "--quiet").exit_code == 0
     (row,) = columns.read_rows(tmp_path / "out" / "runs.csv")
     assert row["status"] == "ok"
+
+
+def test_events_for_programs_and_only_some_stages(tmp_path: Path) -> None:
+    text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
+    suite = written(tmp_path, text + '[stage.other]\nfile = "missing.usda"\n')
+    words = ("run", suite, "-o", tmp_path / "out", "--repetitions", 1)
+    result = bench(*words, "--stage", "box", "--progress", "json")
+    assert result.exit_code == 0, result.stderr
+    events = [json.loads(line) for line in result.stdout.splitlines()]
+    kinds = [event["event"] for event in events]
+    assert kinds == ["prepare", "plan", "begin", "run", "begin", "run", "done"]
+    assert events[0]["what"] == "stage" and events[0]["name"] == "box"
+    assert events[1]["runs"] == 2 and events[1]["done"] == 0 and events[1]["seconds_left"] > 0.0
+    assert [event["number"] for event in events[2:6]] == [1, 1, 2, 2]
+    assert events[3]["run"] == events[2]["run"] and events[3]["status"] == "ok"
+    assert events[-1] == {**events[-1], "whole": True, "failed": 0}
+    unknown = bench(*words, "--stage", "boxx")
+    assert unknown.exit_code == 2 and "--stage boxx: no such stage" in unknown.stderr
 
 
 def test_time_limit(tmp_path: Path) -> None:

@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
 import wavecomb
 from wavecomb.checkpoint import load_checkpoint, save_checkpoint
+from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 from wavecomb.image import read_layers
 
@@ -105,6 +107,46 @@ def test_snapshots_change_nothing(cornell: Any) -> None:
     watched = _core.render(cornell.scene, settings, watcher=watcher)
     assert watcher.taken > 2
     assert watched.beauty.tobytes() == _core.render(cornell.scene, settings).beauty.tobytes()
+
+
+def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
+    """What was begun without a limit is a pass of 2^14 samples: it is cut, or taken in steps."""
+    settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15}
+    begun = StopAt(0)
+    _core.render(cornell.scene, _core.Settings(**settings), watcher=begun)
+    pixels = np.dtype([("sum", "f8", 3), ("samples", "u4"), ("", "u4")])
+    done = begun.state["film.pixels"].view(pixels)["samples"]
+    assert begun.state["pass.target"] == 1 << 14 and done.max() > 0
+    limited = _core.Settings(**settings, time_limit=0.5)
+    state, least = begun.state, done.min()
+    for _ in range(2):  # from pixels that have no samples yet; from pixels that all have
+        ended = StopAt(1000)
+        result = _core.render(cornell.scene, limited, watcher=ended, state=state)
+        assert result.stats["seconds"]["render"] < 2
+        assert result.samples.min() > least
+        state, least = ended.state, result.samples.min()
+
+
+def test_more_is_to_come_when_a_render_goes_on(cornell: Any) -> None:
+    settings = _core.Settings(width=48, height=40, noise=0.0001, spp=1 << 16)
+    begun = StopAt(2)
+    _core.render(cornell.scene, settings, watcher=begun)
+    begun.state["pass.target"] = 1 << 14  # as later on in a long render
+
+    class First:
+        def __init__(self) -> None:
+            self.status: dict[str, Any] = {}
+
+        def progress(self, status: dict[str, Any]) -> str:
+            self.status = self.status or status
+            return "stop"
+
+        def snapshot(self, snapshot: Any) -> None:
+            pass
+
+    first = First()
+    _core.render(cornell.scene, settings, watcher=first, state=begun.state)
+    assert first.status["samples_total"] == 48 * 40 << 14
 
 
 def test_what_a_watcher_throws_comes_out(cornell: Any) -> None:
@@ -246,6 +288,13 @@ def run(*words: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command(*words), capture_output=True, text=True, timeout=300)
 
 
+def invoke(*words: Any, code: int = 0) -> Result:
+    """As ``run``, in this process."""
+    result = CliRunner().invoke(main, command(*words)[3:])
+    assert result.exit_code == code, result.output
+    return result
+
+
 def test_signals_save(stage: Path, tmp_path: Path) -> None:
     out, file = tmp_path / "a.exr", tmp_path / "a.ckpt"
     for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
@@ -289,6 +338,28 @@ def test_resume_takes_settings_from_the_checkpoint(stage: Path, tmp_path: Path) 
     assert refused.stderr == (
         f"error: {file}: was made with seed 9, and this render has 8; give that, or start anew\n"
     )
+
+
+def test_resumed_files_have_the_same_layers(stage: Path, tmp_path: Path) -> None:
+    one, two, file = tmp_path / "1.exr", tmp_path / "2.exr", tmp_path / "a.ckpt"
+    for aovs in (["error", "uv"], ["guide_albedo"], ["crypto"]):
+        chosen = [word for aov in aovs for word in ("--aov", aov)]
+        invoke(stage, "-o", one, "--spp", 16, *chosen, "--checkpoint", file)
+        invoke(stage, "-o", two, "--resume", file)
+        assert list(read_layers(one)) == list(read_layers(two))
+    more = ["--compression", "dwaa", "--spp", 1 << 20]
+    refused = invoke(stage, "-o", two, "--resume", file, *more, code=2)  # before the render
+    assert "compression dwaa would spoil CryptoObject00" in refused.stderr
+
+
+def test_a_timed_render_is_not_resumed_without_end(stage: Path, tmp_path: Path) -> None:
+    out, file = tmp_path / "a.exr", tmp_path / "a.ckpt"
+    invoke(stage, "-o", out, "--time-limit", 0.1, "--checkpoint", file)
+    refused = invoke(stage, "-o", out, "--resume", file, code=2)
+    assert refused.stderr == (
+        f"error: {file}: is of a render that a time limit was to end: give --time-limit or --spp\n"
+    )
+    invoke(stage, "-o", out, "--resume", file, "--time-limit", 0.1)
 
 
 def kill_and_resume(stage: Path, folder: Path, kills: int, seed: int) -> None:

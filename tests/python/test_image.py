@@ -192,6 +192,24 @@ def test_links_are_followed(tmp_path: Path) -> None:
     assert (tmp_path / "real" / "a.txt").read_text() == "new"
 
 
+def test_what_another_process_of_this_number_left_is_no_obstacle(tmp_path: Path) -> None:
+    """In a container each process may have the number of the one that was killed before."""
+    (tmp_path / f".a.{os.getpid()}.part.exr").write_text("cut off")
+    check_writable(tmp_path / "a.exr")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("stem", ["n" * 251, "\u9375" * 80])
+def test_temporary_names_of_long_names(tmp_path: Path, stem: str) -> None:
+    path = tmp_path / f"{stem}.exr"
+    check_writable(path)
+    with replacing(path) as part, replacing(path.with_name(f"{stem[:-1]}x.exr")) as other:
+        assert part != other
+        part.write_text("a")
+        other.write_text("b")
+    assert path.read_text() == "a"
+
+
 def test_check_writable_leaves_nothing(tmp_path: Path) -> None:
     check_writable(tmp_path / "a.exr")
     assert os.listdir(tmp_path) == []

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,72 @@ def test_variance_is_of_the_sum(tmp_path: Path) -> None:
     assert merged["beauty"].var() == pytest.approx(0.25 / 32, rel=0.03)
 
 
+def test_pixels_without_samples_or_errors_say_nothing(tmp_path: Path) -> None:
+    """A pixel without samples counts for nothing; an error that is not known stays so."""
+    inf, nan = np.inf, np.nan
+    names = []
+    for seed, (samples, beauty, variance) in enumerate(
+        [((4, 0, 8), (1, nan, 3), (inf, inf, 0.5)), ((4, 8, 0), (2, 5, inf), (1, 0.25, inf))]
+    ):
+        names.append(tmp_path / f"{seed}.exr")
+        layers = {
+            "beauty": np.repeat(np.array(beauty, np.float32).reshape(1, 3, 1), 3, axis=2),
+            "variance": np.repeat(np.array(variance, np.float32).reshape(1, 3, 1), 3, axis=2),
+            "error": np.array([variance], np.float32),
+            "samples": np.array([samples], np.float32),
+        }
+        settings = {"seed": seed, "width": 3, "height": 1}
+        write_exr(names[-1], layers, metadata={"wavecomb:settings": json.dumps(settings)})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        merged = merge(names).layers
+    assert merged["beauty"][0, :, 0].tolist() == [1.5, 5.0, 3.0]
+    assert merged["variance"][0, :, 0].tolist() == [inf, 0.25, 0.5]
+    assert merged["error"].ravel().tolist() == [inf, 0.25, 0.5]
+
+
+def test_parts_are_as_good_as_the_whole(stage: Path, tmp_path: Path) -> None:
+    """Of independent samples: mean, variance and error of four renders are those of a long one."""
+    names = []
+    settings: dict[str, Any] = {"size": (32, 24), "error": True, "sampler": "independent"}
+    for seed, spp in enumerate((16, 48, 64, 128)):
+        names.append(tmp_path / f"{seed}.exr")
+        wavecomb.render(stage, spp=spp, seed=seed, **settings).save(names[-1])
+    merged = merge(names).layers
+    whole = wavecomb.render(stage, spp=256, seed=9, **settings)
+    assert whole.variance is not None and whole.error is not None
+    assert (merged["samples"] == 256).all()
+    seen = whole.variance > 0
+    difference = merged["beauty"] - whole.beauty
+    z = difference[seen] / np.sqrt((merged["variance"] + whole.variance)[seen])
+    assert abs(z.mean()) < 0.15
+    assert z.var() == pytest.approx(1, rel=0.15)
+    assert np.median(merged["variance"]) == pytest.approx(np.median(whole.variance), rel=0.1)
+    assert merged["error"].mean() == pytest.approx(whole.error.mean(), rel=0.1)
+
+
+def test_a_stage_that_was_edited_is_refused(tmp_path: Path) -> None:
+    names = []
+    for seed, (light, grey) in enumerate(((2, 0.5), (3, 0.5), (2, 0.6))):
+        stage = tmp_path / str(seed) / "shot.usda"
+        stage.parent.mkdir()
+        stage.write_text(
+            f"""#usda 1.0
+            def DomeLight "Sky" {{
+                float inputs:intensity = {light}
+            }}
+            def Sphere "Ball" {{
+                color3f[] primvars:displayColor = [({grey}, 0.5, 0.5)]
+            }}
+            """
+        )
+        names.append(tmp_path / f"{seed}.exr")
+        wavecomb.render(stage, size=(8, 8), spp=1, seed=seed).save(names[-1])
+    for other in names[1:]:
+        with pytest.raises(WavecombError, match=r"other prims, lights, materials, camera or frame"):
+            merge([names[0], other])
+
+
 def change(settings: dict[str, Any]) -> Any:
     def edit(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
         old = json.loads(metadata["wavecomb:settings"])
@@ -167,6 +234,7 @@ def test_files_are_kept_from_harm(files: list[Path]) -> None:
         ([*map(str, files), "-o", str(files[0])], "is one of the pictures"),
         ([str(files[0]), "-o", "out.exr"], "two pictures or more"),
         ([*map(str, files), "-o", "out.png"], "must end in .exr"),
+        ([str(files[0])] * 2 + ["-o", "out.exr"], "has seed 1, as "),
     ):
         result = CliRunner().invoke(main, ["merge", *arguments])
         assert result.exit_code == 2 and message in result.stderr

@@ -16,7 +16,7 @@ from wavecomb.cli import main
 from wavecomb.compare import compare, trimmed_mean
 from wavecomb.heatmap import KINDS
 from wavecomb.image import linear_from_srgb, write_exr
-from wavecomb.perceptual import METRICS, flip, measure, ssim
+from wavecomb.perceptual import METRICS, flip, measure, psnr, ssim
 from wavecomb.ztest import sidak, z_test
 
 RNG = np.random.default_rng
@@ -53,7 +53,17 @@ def test_one_firefly_decides_the_mean_and_not_the_trimmed_one() -> None:
 @pytest.mark.parametrize("metric", METRICS)
 def test_equal_pictures(metric: str) -> None:
     a = picture()
-    assert measure(metric, a, a.copy()) == pytest.approx(1.0 if metric == "ssim" else 0.0)
+    best = {"psnr": np.inf, "ssim": 1.0}.get(metric, 0.0)
+    assert measure(metric, a, a.copy()) == pytest.approx(best)
+
+
+def test_psnr_of_a_known_error_as_shown() -> None:
+    grey = linear_from_srgb(np.full((8, 8, 3), 0.5, np.float32))
+    other = linear_from_srgb(np.full((8, 8, 3), 0.51, np.float32))
+    assert psnr(other, grey) == pytest.approx(40.0, abs=1e-3)  # 0.01 of 1
+    # What is above the display's white is not seen, unless the exposure brings it down.
+    assert psnr(grey + 2, grey + 3) == np.inf
+    assert psnr(grey + 2, grey + 3, exposure=-3) < 30.0
 
 
 def test_ssim_of_flat_pictures_is_the_luminance_term() -> None:

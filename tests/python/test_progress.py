@@ -5,6 +5,8 @@ import io
 import json
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +139,8 @@ def test_samples_that_an_ending_asks_for(
         (["--noise", 0.1, "--spp", 4, "--max-spp", 5], "--spp is 4 and --max-spp 5"),
         (["--noise", 0], "must be above 0"),
         (["--time-limit", -1], "must be above 0"),
+        (["--every", 5], "--every is for checkpoints: give --checkpoint or --resume, too"),
+        (["--preview-every", 5], "--preview-every is for previews: give --preview, too"),
         (["--preview", "a.exr"], "--preview a.exr: the name must end in .png"),
         (["--resume", "none.ckpt"], "none.ckpt: no such file"),
         (["--checkpoint", "no/such/a.ckpt"], "does not exist"),
@@ -168,3 +172,22 @@ def test_preview_grows(tmp_path: Path) -> None:
     wrote = [line for line in result.stdout.splitlines() if '"wrote"' in line]
     assert len(wrote) >= 3
     assert (read_image(preview) == read_image(tmp_path / "a.png")).all(), "the last is the picture"
+
+
+def test_ctrl_c_while_usd_is_loaded_is_not_lost(tmp_path: Path) -> None:
+    stage = tmp_path / "ball.usda"
+    stage.write_text('#usda 1.0\ndef Sphere "Ball" {\n}\n')
+    code = """
+import os, signal, sys
+class AtGf:
+    def find_spec(self, name, path=None, target=None):
+        if name == "pxr.Gf":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, AtGf())
+from wavecomb.cli import main
+main(sys.argv[1:])
+"""
+    words = ["render", str(stage), "-o", str(tmp_path / "a.exr"), "--size", "8", "8", "--spp", "1"]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.strip()) == (130, "stopped")
+    assert not (tmp_path / "a.exr").exists()

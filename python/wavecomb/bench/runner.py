@@ -23,6 +23,7 @@ from wavecomb.bench.process import Outcome, run_worker
 from wavecomb.bench.recordings import make_profile
 from wavecomb.bench.results import ResultFolder
 from wavecomb.bench.rows import run_row
+from wavecomb.bench.stage_folder import only_stages
 from wavecomb.bench.stages import check_files, generate
 from wavecomb.bench.suite_model import WAVECOMB, Suite
 from wavecomb.bench.worker import judge_picture
@@ -30,6 +31,10 @@ from wavecomb.errors import WavecombError
 from wavecomb.progress import time_text
 
 Say = Callable[[str], None]
+
+
+def _no_event(name: str, /, **values: Any) -> None:
+    """Nobody listens."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,7 @@ class Options:
         seed: Of the order, in place of the suite's.
         time_limit_s: No run is begun that would end after it.
         resume: Go on with the folder.
+        stages: Names of stages to run; all where it is empty.
     """
 
     repetitions: int | None = None
@@ -51,11 +57,14 @@ class Options:
     seed: int | None = None
     time_limit_s: float | None = None
     resume: bool = False
+    stages: tuple[str, ...] = ()
 
 
 @dataclass
 class Sitting:
     """One call of ``wavecomb bench run``.
+
+    ``event`` is told what ``say`` says, for programs: docs/bench.md lists names and values.
 
     Contract: ``run`` may be stopped at any moment, by a signal too; what is done is kept.
     """
@@ -64,6 +73,7 @@ class Sitting:
     folder: ResultFolder
     options: Options
     say: Say
+    event: Callable[..., None] = _no_event
     events: dict[str, str] = field(default_factory=dict)
     spins: list[float] = field(default_factory=list)
 
@@ -74,7 +84,8 @@ class Sitting:
             raise WavecombError(
                 f"--threads {self.options.threads}: this process may use {limits.threads} cores"
             )
-        every = configurations(self.suite, limits, self.options.threads)
+        suite = only_stages(self.suite, self.options.stages)
+        every = configurations(suite, limits, self.options.threads)
         self.configs = chosen(every, self.options.only)
         repetitions = self.options.repetitions or self.suite.repetitions
         seed = self.suite.seed if self.options.seed is None else self.options.seed
@@ -107,7 +118,9 @@ class Sitting:
         if left:
             self._prepare(left)
             estimator = self.estimator()
-            self.say(f"{len(left)} runs, about {time_text(estimator.total(left))}")
+            total = estimator.total(left)
+            self.say(f"{len(left)} runs, about {time_text(total)}")
+            self.event("plan", runs=len(left), done=len(self.plan) - len(left), seconds_left=total)
         whole = True
         for index, run in enumerate(left):
             rest = estimator.seconds(run.config)
@@ -116,10 +129,12 @@ class Sitting:
                 self.say(f"time limit: {len(left) - index} runs are left; --resume goes on")
                 whole = False
                 break
+            self.event("begin", number=index + 1, run=run.run_id, seconds=rest)
             row = self._one(run)
             estimator.learn(run.config, row["wall_s"])
             self._tell(row, index + 1, left, estimator)
         self._end()
+        self.event("done", folder=str(self.folder.path), whole=whole, failed=self._failed())
         return whole
 
     # ---- before the first run ------------------------------------------------------------------
@@ -165,24 +180,30 @@ class Sitting:
         stages = {self.jobs.stage(config): config for config in configs}
         for path, config in stages.items():
             if not path.exists():
-                self.say(f"stage {config.stage}")
+                self._prepares("stage", config.stage)
                 generate(config.source, path)
         # The last of a family makes its golden picture: Mitsuba's llvm, not its scalar variant.
         by_name = sorted(configs, key=lambda config: config.renderer, reverse=True)
         goldens = {self.jobs.golden(c): c for c in by_name if c.golden}
         for path, config in goldens.items():
             if not path.exists():
-                self.say(f"golden {path.stem}: {self.suite.golden.spp} samples per pixel")
+                spp = self.suite.golden.spp
+                self._prepares("golden", f"{path.stem}: {spp} samples per pixel")
                 self._converge(config, path)
         profiles = {self.jobs.profile(c): c for c in configs if c.settings.get("policy") in ORACLES}
         for path, config in profiles.items():
             if not path.exists():
-                self.say(f"trace {path.stem}")
+                self._prepares("trace", path.stem)
                 make_profile(self.jobs, config, self.folder.path)
         for _ in range(self.suite.warm_up):
             for config in stages.values():
                 if config.renderer == WAVECOMB:
+                    self.event("prepare", what="warm-up", name=config.stage)
                     run_worker(self.jobs.warm_up(config), {}, self.folder.path)
+
+    def _prepares(self, what: str, name: str) -> None:
+        self.say(f"{what} {name}")
+        self.event("prepare", what=what, name=name)
 
     def _converge(self, config: Config, path: Path) -> None:
         if config.renderer == WAVECOMB:
@@ -253,10 +274,13 @@ class Sitting:
     def _tell(
         self, row: dict[str, Any], number: int, left: Sequence[Run], estimator: Estimator
     ) -> None:
-        rest = time_text(estimator.total(left[number:]))
+        seconds_left = estimator.total(left[number:])
+        rest = time_text(seconds_left)
         what = f"{row['render_s']:.3f} s" if row["status"] == "ok" else f"FAILED: {row['error']}"
         busy = " (noisy)" if row["noisy"] else ""
         self.say(f"{number}/{len(left)} {row['run_id']}: {what}{busy}; {rest} left")
+        told = {key: row[key] for key in ("status", "render_s", "error", "noisy") if key in row}
+        self.event("run", number=number, run=row["run_id"], seconds_left=seconds_left, **told)
 
     # ---- after the last ------------------------------------------------------------------------
 
@@ -267,9 +291,14 @@ class Sitting:
         self._keep_machine()
         for line in verdict.lines:
             self.say(f"warning: noisy machine: {line}")
+        failed = self._failed()
+        if failed:
+            self.say(f"warning: {failed} runs failed; --resume tries them again")
+
+    def _failed(self) -> int:
+        """Runs without a good end, of this sitting or an earlier one."""
         failed = {o["row"]["run_id"] for o in self.folder.objects if o["row"]["status"] != "ok"}
-        if failed - self.folder.done():
-            self.say(f"warning: {len(failed)} runs failed; --resume tries them again")
+        return len(failed - self.folder.done())
 
     def _keep_machine(self) -> None:
         self._document["spins_s"] = self.spins[-200:]

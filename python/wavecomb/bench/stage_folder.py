@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages of a folder that the user names, beside those of a suite."""
+"""Which stages a suite is run on: those of a folder besides, or only some."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,3 +43,22 @@ def naming_folder(suite: Suite, folder: Path) -> Suite:
     # A JSON string is a basic string of TOML.
     key = f"stages_folder = {json.dumps(folder.resolve().as_posix(), ensure_ascii=False)}\n"
     return replace(more, text=key + suite.text)
+
+
+def only_stages(suite: Suite, names: Sequence[str]) -> Suite:
+    """The suite with these stages alone; all of them where no name is given.
+
+    Raises:
+        WavecombError: The suite has no such stage.
+    """
+    if not names:
+        return suite
+    for name in names:
+        if name not in suite.stages:
+            there = ", ".join(suite.stages)
+            raise WavecombError(f"--stage {name}: no such stage in {suite.path}; it has {there}")
+    experiments = (
+        replace(experiment, stages=tuple(name for name in experiment.stages if name in names))
+        for experiment in suite.experiments
+    )
+    return replace(suite, experiments=tuple(e for e in experiments if e.stages))

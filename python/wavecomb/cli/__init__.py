@@ -15,6 +15,7 @@ from wavecomb.cli.merge import merge_command
 from wavecomb.cli.options import examples
 from wavecomb.cli.render import render_command
 from wavecomb.cli.scene import scene_command
+from wavecomb.cli.view import view_command
 
 __all__ = ["main"]
 
@@ -24,6 +25,7 @@ __all__ = ["main"]
     epilog=examples(
         "wavecomb scene mixed -o mixed.usdc",
         "wavecomb info mixed.usdc",
+        "wavecomb view mixed.usdc",
         "wavecomb render mixed.usdc -o mixed.exr --png mixed.png",
         "wavecomb compare mixed.exr other.exr --heatmap difference.png",
     ),
@@ -48,6 +50,7 @@ def main() -> None:
 
 
 main.add_command(render_command)
+main.add_command(view_command)
 main.add_command(info_command)
 main.add_command(scene_command)
 main.add_command(compare_command)

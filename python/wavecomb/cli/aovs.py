@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
@@ -82,18 +82,22 @@ class AovOptions:
         """The AOVs, expanded; raises WavecombError for one that is not known."""
         return aov_names.expand(self.aovs) if self.aovs else aov_names.DEFAULT
 
-    def check(self, output: str) -> None:
-        """Raises, in one line, what would else come up when files are written."""
+    def check(self, output: str, aovs: Sequence[str]) -> None:
+        """Raises, in one line, what would else come up when files of these AOVs are written.
+
+        The names of light groups are known once a stage is loaded: those of all are not checked.
+        """
         from wavecomb import cryptomatte
         from wavecomb.exr import check_options
         from wavecomb.files import check_writable
         from wavecomb.output import split_names
 
-        layers = [cryptomatte.LEVELS.get(name, name) for name in self.names]
+        layers = [cryptomatte.LEVELS.get(name, name) for name in aovs]
         layers = [f"{name}00" if name in cryptomatte.LEVELS.values() else name for name in layers]
         check_options(output, () if self.split else layers, self.compression, self.tile)
         if self.split:
-            for file in split_names(output, self.names).values():
+            known = [name for name in aovs if name != "light_groups"]
+            for file in split_names(output, known).values():
                 check_writable(file)
 
     def file_options(self) -> dict[str, Any]:

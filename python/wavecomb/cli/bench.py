@@ -3,12 +3,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
+import signal
+import threading
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
 import click
 
 from wavecomb.cli.options import Real, examples
+
+_METRICS = (
+    *("render_s", "shade_and_order_s", "shade_s", "load_s", "build_s"),
+    *("samples_per_s", "peak_rss_mb", "rel_mse", "efficiency"),
+)
 
 
 @click.group(
@@ -21,6 +31,7 @@ from wavecomb.cli.options import Real, examples
         "wavecomb bench run my.toml -o results --only 'orders.*'",
         "wavecomb bench report results",
         "wavecomb bench report results --markdown docs/results/quick.md",
+        "wavecomb bench compare results-before results-after",
     ),
 )
 def bench_command() -> None:
@@ -52,12 +63,22 @@ def list_command() -> None:
     "--repetitions", type=click.IntRange(min=1), metavar="N", help="In place of the suite's."
 )
 @click.option("--only", metavar="GLOB", help="Only configurations whose name matches.")
+@click.option(
+    "--stage", "only_these", multiple=True, metavar="NAME", help="Only this stage; repeat for more."
+)
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="In place of the suite's.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of the order of the runs.")
 @click.option(
     "--time-limit", type=Real(0, above=True), metavar="MINUTES", help="Begin no run past it."
 )
 @click.option("--stages", type=click.Path(), metavar="FOLDER", help="More stages, of a folder.")
+@click.option(
+    "--progress",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="json: also lines on stdout, for programs (docs/bench.md).",
+)
 @click.option("--quiet", is_flag=True, help="Only warnings and errors.")
 def run_command(
     suite: str,
@@ -66,16 +87,18 @@ def run_command(
     resume: bool,
     repetitions: int | None,
     only: str | None,
+    only_these: tuple[str, ...],
     threads: int | None,
     seed: int | None,
     time_limit: float | None,
     stages: str | None,
+    progress: str,
     quiet: bool,
 ) -> None:
     """Run SUITE, a name of `wavecomb bench list` or a TOML file.
 
     Each run is a process of its own, on cores of its own. Results are in DIR as soon as a run is
-    done; after Ctrl-C or a kill, --resume goes on.
+    done; after Ctrl-C, SIGTERM or a kill, --resume goes on.
     """
     from wavecomb.bench.results import ResultFolder
     from wavecomb.bench.runner import Options, Sitting
@@ -86,19 +109,44 @@ def run_command(
     if stages is not None:
         chosen = naming_folder(chosen, Path(stages))
     limit = time_limit * 60.0 if time_limit is not None else None
-    options = Options(repetitions, only, threads, seed, limit, resume)
+    options = Options(repetitions, only, threads, seed, limit, resume, only_these)
 
     def say(line: str) -> None:
         if not quiet or line.startswith("warning"):
             click.echo(line, err=True)
 
     sitting = Sitting(chosen, ResultFolder(Path(output)), options, say)
+    if progress == "json":
+        sitting.event = _event
     if dry_run:
         _dry_run(sitting)
         return
-    sitting.run()
-    if not quiet:
+    with _stopped_by_sigterm():
+        sitting.run()
+    if not quiet and progress == "text":
         click.echo(f"results are in {output}; `wavecomb bench report {output}` shows them")
+
+
+def _event(name: str, /, **values: object) -> None:
+    """A line of JSON on stdout."""
+    click.echo(json.dumps({"event": name, **values}))
+
+
+@contextlib.contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """SIGTERM ends a sitting as Ctrl-C does, so that the run that goes on ends with it."""
+
+    def stop(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _dry_run(sitting: object) -> None:
@@ -147,3 +195,31 @@ def report_command(folder: str, markdown: str | None) -> None:
     click.echo(f"wrote {build(Path(folder), page)}")
     if page is not None:
         click.echo(f"wrote {page}")
+
+
+@bench_command.command("compare")
+@click.argument("before", type=click.Path(), metavar="BEFORE")
+@click.argument("after", type=click.Path(), metavar="AFTER")
+@click.option(
+    "--metric",
+    type=click.Choice(_METRICS),
+    default="render_s",
+    show_default=True,
+    help="The column of runs.csv that is compared.",
+)
+@click.option("--json", "as_json", is_flag=True, help="For programs.")
+def compare_command(before: str, after: str, metric: str, as_json: bool) -> None:
+    """Say what changed from the results in BEFORE to those in AFTER.
+
+    Configurations that both have are compared, AFTER / BEFORE, with 95 % intervals. Two sittings
+    do not share their rounds: what the machine did between them is in the ratios, and warnings say
+    what is known of it.
+    """
+    from wavecomb.bench.folders import compare_folders, lines_of
+
+    found = compare_folders(Path(before), Path(after), metric)
+    if as_json:
+        click.echo(json.dumps(found.to_dict(), indent=2))
+        return
+    for line in lines_of(found):
+        click.echo(line)

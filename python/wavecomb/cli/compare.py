@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import click
 
 from wavecomb.cli.options import Real, examples
 
-_METRICS = ("ssim", "flip-ldr", "flip-hdr")
+_METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")
 _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
 
 
@@ -38,7 +39,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     type=Real(),
     default=0.0,
     metavar="STOPS",
-    help="For ssim and flip-ldr: pictures times 2^STOPS.  [default: 0]",
+    help="For psnr, ssim and flip-ldr: pictures times 2^STOPS.  [default: 0]",
 )
 @click.option(
     "--variance-a",
@@ -126,7 +127,8 @@ def compare_command(
     passed = passed or (test is not None and test.agrees and result.not_finite_differ == 0)
     if as_json:
         document = {"a": a, "b": b, "tolerance": tolerance, "passed": passed, **result.to_dict()}
-        document |= {"metrics": measured, "z_test": test.to_dict() if test is not None else None}
+        finite = {k: v if math.isfinite(v) else None for k, v in measured.items()}
+        document |= {"metrics": finite, "z_test": test.to_dict() if test is not None else None}
         click.echo(json.dumps(document, indent=2))
     else:
         for line in (*_lines(result), *_metric_lines(measured, test)):

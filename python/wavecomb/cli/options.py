@@ -114,21 +114,30 @@ class StageOptions:
 
         if self.camera == "":
             raise WavecombError("--camera is empty: give the path of a camera prim")
+        return load(
+            stage,
+            camera=self.camera,
+            frame=self.frame,
+            purposes=self.all_purposes(),
+            variants=self.selections() or None,
+            threads=threads,
+        )
+
+    def selections(self) -> dict[str, str]:
+        """Variants as ``wavecomb.load`` takes them."""
+        from wavecomb.errors import WavecombError
+
         variants: dict[str, str] = {}
         for text in self.variants:
             key, equals, value = text.rpartition("=")
             if not (key and equals and value):
                 raise WavecombError(f"--variant {text}: must be PRIM{{SET}}=NAME or SET=NAME")
             variants[key] = value
-        purposes = tuple(dict.fromkeys(("default", *self.purposes))) if self.purposes else None
-        return load(
-            stage,
-            camera=self.camera,
-            frame=self.frame,
-            purposes=purposes,
-            variants=variants or None,
-            threads=threads,
-        )
+        return variants
+
+    def all_purposes(self) -> tuple[str, ...] | None:
+        """Purposes with "default"; None where none was chosen."""
+        return tuple(dict.fromkeys(("default", *self.purposes))) if self.purposes else None
 
 
 def warn(lines: list[str]) -> None:

@@ -67,7 +67,6 @@ def purpose_options(command: F) -> F:
             click.option(
                 "--every",
                 type=Real(0, above=True),
-                default=120.0,
                 metavar="S",
                 help="Seconds between checkpoints.  [default: 120]",
             ),
@@ -83,7 +82,6 @@ def purpose_options(command: F) -> F:
             click.option(
                 "--preview-every",
                 type=Real(0, above=True),
-                default=10.0,
                 metavar="S",
                 help="Seconds between previews.  [default: 10]",
             ),
@@ -123,6 +121,13 @@ class PurposeOptions:
     @classmethod
     def take(cls, options: dict[str, Any]) -> PurposeOptions:
         """Moves them out of a command's arguments."""
+        every, preview_every = options["every"], options["preview_every"]
+        if every is not None and options["checkpoint"] is None and options["resume"] is None:
+            raise WavecombError("--every is for checkpoints: give --checkpoint or --resume, too")
+        if preview_every is not None and options["preview"] is None:
+            raise WavecombError("--preview-every is for previews: give --preview, too")
+        options["every"] = 120.0 if every is None else every
+        options["preview_every"] = 10.0 if preview_every is None else preview_every
         return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
 
     @property
@@ -156,6 +161,12 @@ class PurposeOptions:
         if None not in (spp, self.max_spp) and spp != self.max_spp:
             raise WavecombError(f"--spp is {spp} and --max-spp {self.max_spp}; give one of them")
         asked = spp if spp is not None else self.max_spp
+        was_timed = before.get("spp") == UNLIMITED_SPP and not is_adaptive
+        if was_timed and asked is None and self.time_limit is None:
+            raise WavecombError(
+                f"{self.resume}: is of a render that a time limit was to end: "
+                "give --time-limit or --spp"
+            )
         if asked is None and "spp" not in before:
             if self.time_limit is not None:
                 asked = UNLIMITED_SPP

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,9 +16,6 @@ from wavecomb.cli.reporting import make_reporter
 from wavecomb.cli.run import how_far, run
 from wavecomb.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
-
-if TYPE_CHECKING:
-    pass
 
 DEFAULT_SIZE = (600, 600)
 
@@ -176,7 +173,7 @@ def render_command(
     SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
     all. docs/render.md and docs/aovs.md say more.
     """
-    from wavecomb.api import make_settings
+    from wavecomb.api import keeps_error, make_settings
 
     source = StageOptions.take(options)
     purpose = PurposeOptions.take(options)
@@ -193,7 +190,6 @@ def render_command(
             (purpose.checkpoint_file, "--checkpoint", None),
         ],
     )
-    layers.check(output)
     if purpose.denoise:
         from wavecomb.denoise import check_denoiser
 
@@ -214,13 +210,15 @@ def render_command(
         chosen = {**resumed.settings, **chosen}
         source = source.completed(resumed.source)
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
-    shown = [name for name in kept if name not in aov_names.GUIDES]
-    aovs = layers.names if layers.aovs else aov_names.of_core(shown)
+    aovs = layers.names if layers.aovs or resumed is None else resumed.aovs
     size = chosen.pop("width", DEFAULT_SIZE[0]), chosen.pop("height", DEFAULT_SIZE[1])
-    guides = aov_names.GUIDES if purpose.denoise or len(shown) < len(kept) else ()
+    guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
     settings = make_settings(
         size, chosen.pop("spp"), aovs=aov_names.with_guides(aovs, guides), **chosen
     )
+    shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
+    further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
+    layers.check(output, (*aovs, *further))
 
     reporter = make_reporter(purpose.progress, quiet)
     picture, stopped, report = run(

@@ -48,7 +48,9 @@ def run(
     if purpose.checkpoint_file is not None:
         from wavecomb.checkpoint import build_note, check_fits, make_header
 
-        header = make_header(loaded.scene, settings, stage=stage, source=source.as_dict())
+        header = make_header(
+            loaded.scene, settings, stage=stage, source=source.as_dict(), aovs=aovs
+        )
         if resumed is not None:
             check_fits(resumed, header)
             warn([note] if (note := build_note(resumed, header)) else [])

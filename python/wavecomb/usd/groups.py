@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
 from wavecomb.usd.curves import CurveArrays, CurveReader, uniform_scale
-from wavecomb.usd.identity import Assets, light_group
+from wavecomb.usd.identity import Assets, LightGroups
 from wavecomb.usd.instancing import read_instances, sound
 from wavecomb.usd.light import Light
 from wavecomb.usd.material import (
@@ -109,6 +109,7 @@ class GroupBuilder:
         traversal: Traversal,
         builder: _core.SceneBuilder,
         materials: MaterialTable,
+        light_groups: LightGroups,
         report: LoadReport,
     ) -> None:
         self.stage = stage
@@ -116,6 +117,7 @@ class GroupBuilder:
         self.time = traversal.time
         self.builder = builder
         self.materials = materials
+        self.light_groups = light_groups
         self.report = report
         self.meshes = MeshReader(self.time, report)
         self.curves = CurveReader(self.time, report)
@@ -203,12 +205,12 @@ class GroupBuilder:
             return
         material, faces = self._materials(draw, shape, scope)
         name = self.report.place(draw.prim.GetPath())
-        may_shine = self.materials.emits or material == INHERIT_MATERIAL
+        may_shine = material == INHERIT_MATERIAL or self.materials.any_emits(material, faces)
         options: dict[str, Any] = {
             "face_materials": faces,
             "material": material,
             "name": name,
-            "light_group": light_group(draw.prim, draw.inherited) if may_shine else "",
+            "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
             "asset_length": self._asset_length(draw.prim, name),
         }
         try:

@@ -9,6 +9,12 @@ from typing import Any
 
 from pxr import Kind, Sdf, Usd, UsdGeom
 
+from wavecomb.usd.report import LoadReport
+
+OTHER = "other"
+"""The group of lights that have none."""
+MAX_LIGHT_GROUPS = 63
+"""Beside that: what the core has room for."""
 PRIMVAR = "wavecomb:lightGroup"
 _LIGHT_GROUPS = (
     "wavecomb:lightGroup",
@@ -26,8 +32,7 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
     """The light group of a light, or of a mesh that may shine; "" where it has none.
 
     ``primvars:wavecomb:lightGroup`` counts on the prim and, like all primvars, on its ancestors;
-    of other renderers what they call so is read on the prim itself. What a channel's name cannot
-    hold becomes "_".
+    of other renderers what they call so is read on the prim itself.
 
     Args:
         prim: The light or mesh.
@@ -47,7 +52,31 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
         value = attribute.Get() if attribute else None
         if value:
             break
-    return re.sub(r"[^A-Za-z0-9_]", "_", str(value)) if value else ""
+    return str(value) if value else ""
+
+
+class LightGroups:
+    """The light groups of a stage by names that channels can have, and no more than fit."""
+
+    def __init__(self, report: LoadReport) -> None:
+        self._report = report
+        self._names: dict[str, str] = {}
+
+    def of(self, prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
+        """``light_group``, with "_" for what a channel's name cannot hold; "" where it has none."""
+        name = light_group(prim, inherited)
+        channel = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        if channel in ("", OTHER):
+            return ""
+        if channel not in self._names and len(self._names) == MAX_LIGHT_GROUPS:
+            what = f"more than {MAX_LIGHT_GROUPS} light groups: light of the rest is in {OTHER!r}"
+            self._report.warn(what, prim.GetPath())
+            return ""
+        first = self._names.setdefault(channel, name)
+        if first != name:
+            what = f"light groups {first!r} and {name!r} are one: channels call both {channel!r}"
+            self._report.warn(what, prim.GetPath())
+        return channel
 
 
 class Assets:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdLux
 
-from wavecomb.usd.identity import light_group
+from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import TextureTable, asset_file
@@ -49,11 +49,18 @@ class LightReader:
     """Reads the lights of one stage."""
 
     def __init__(
-        self, time: Usd.TimeCode, up_axis: str, textures: TextureTable, report: LoadReport
+        self,
+        time: Usd.TimeCode,
+        up_axis: str,
+        textures: TextureTable | None,
+        groups: LightGroups,
+        report: LoadReport,
     ) -> None:
+        """``textures``: None: lights are read without theirs."""
         self.time = time
         self.up_axis = up_axis
         self.textures = textures
+        self.groups = groups
         self.report = report
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
@@ -65,7 +72,7 @@ class LightReader:
             self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
             radiance = (0.0, 0.0, 0.0)
         options: dict[str, Any] = {"name": self.report.place(prim.GetPath()), "color": radiance}
-        if group := light_group(prim):
+        if group := self.groups.of(prim):
             options["group"] = group
         normalize = bool(self._get(prim, "normalize", False))
         local = np.eye(4)
@@ -130,7 +137,7 @@ class LightReader:
         attribute = prim.GetAttribute("inputs:texture:file")
         value = attribute.Get(self.time) if attribute else None
         path = asset_file(value, attribute, self.report) if value is not None else ""
-        if not path:
+        if not path or self.textures is None:
             return None
         form = prim.GetAttribute("inputs:texture:format")
         layout = form.Get(self.time) if form else None

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.usd.materialx import MaterialXReader, model_of
@@ -25,6 +28,9 @@ DEFAULT_COLOUR = (0.5, 0.5, 0.5)
 """Of what has neither a material nor a display colour."""
 
 
+PREVIEW = "preview"
+"""``surface_source`` of UsdPreviewSurface."""
+
 LAMP = 1.0
 """Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
 
@@ -41,6 +47,23 @@ def bound_materials(prims: Sequence[Usd.Prim]) -> list[UsdShade.Material | None]
         for i, material in zip(bare, preview, strict=True):
             found[i] = material
     return [material if material else None for material in found]
+
+
+def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
+    """What reads the surface of a material, and its shader.
+
+    ``PREVIEW``, or a shading model of MaterialX; "" where nothing does.
+    """
+    shader = material.ComputeSurfaceSource()[0]
+    if shader_id(shader) == "UsdPreviewSurface":
+        return PREVIEW, shader
+    for candidate in (material.ComputeSurfaceSource("mtlx")[0], shader):
+        name = shader_id(candidate)
+        if name.startswith("ND_UsdPreviewSurface"):
+            return PREVIEW, candidate
+        if model := model_of(name):
+            return model, candidate
+    return "", shader
 
 
 class BindingScan:
@@ -76,7 +99,11 @@ class MaterialTable:
         textures: TextureTable,
         time: Usd.TimeCode,
         report: LoadReport,
+        apart: bool = False,
     ) -> None:
+        """``apart``: those of different prims stay apart even where they are equal."""
+        self._apart = apart
+        self._names: list[str] = []
         self._builder = builder
         self._textures = textures
         self._time = time
@@ -87,8 +114,7 @@ class MaterialTable:
         self._plain: dict[tuple[float, ...], int] = {}
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
-        self.emits = False
-        """Whether a material is in use that emits anything."""
+        self._emitting: set[int] = set()
 
     def expect(self, material: UsdShade.Material) -> None:
         """Starts what takes long for a material that will be used: reading its images."""
@@ -105,6 +131,8 @@ class MaterialTable:
             except (Tf.ErrorException, RecursionError):
                 self._report.warn("material network cannot be read: drawn grey", path)
                 surface = fallback_surface(DEFAULT_COLOUR, name=str(path))
+            if str(path).startswith("/__Prototype_"):
+                surface = replace(surface, name=self._report.place(path))
             self._surfaces[path] = surface
             self._report.tally("materials")
         return surface
@@ -114,12 +142,11 @@ class MaterialTable:
         known = self._surface_ids.get(id(surface))
         if known is not None:
             return known[1]
-        key = surface.key()
+        key = surface.key() + (surface.name if self._apart else "")
         number = self._ids.get(key)
         if number is None:
             brightest = surface.brightest()
             self.glows = self.glows or brightest >= LAMP
-            self.emits = self.emits or brightest > 0
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,
@@ -127,9 +154,22 @@ class MaterialTable:
                 textures=surface.textures,
             )
             self._ids[key] = number
+            self._names.append(surface.name)
+            if brightest > 0:
+                self._emitting.add(number)
         # Holding the surface keeps its address from being used again.
         self._surface_ids[id(surface)] = (surface, number)
         return number
+
+    def paths(self) -> tuple[str, ...]:
+        """Prim of each material by id, "" of display colours."""
+        return tuple(name if name.startswith("/") else "" for name in self._names)
+
+    def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
+        """Whether a mesh with this material, or with these of its faces, emits anything."""
+        if faces is None or not self._emitting:
+            return material in self._emitting
+        return bool(np.isin(faces, list(self._emitting)).any())
 
     def plain(self, colour: Iterable[float] = DEFAULT_COLOUR, opacity: float = 1.0) -> int:
         """Material id of a display colour."""
@@ -142,20 +182,13 @@ class MaterialTable:
 
     def _convert(self, material: UsdShade.Material) -> Surface:
         prim = material.GetPrim()
-        shader = material.ComputeSurfaceSource()[0]
-        identifier = shader_id(shader)
-        if identifier == "UsdPreviewSurface":
+        kind, shader = surface_source(material)
+        if kind == PREVIEW:
             return PreviewReader(prim, self._time, self._textures, self._report).read(shader)
-        foreign = material.ComputeSurfaceSource("mtlx")[0]
-        for candidate in (foreign, shader):
-            name = shader_id(candidate)
-            if name.startswith("ND_UsdPreviewSurface"):
-                reader = PreviewReader(prim, self._time, self._textures, self._report)
-                return reader.read(candidate)
-            if model := model_of(name):
-                reader_x = MaterialXReader(prim, self._time, self._textures, self._report)
-                return reader_x.read(candidate, model)
-        what = identifier or shader_id(foreign)
+        if kind:
+            reader = MaterialXReader(prim, self._time, self._textures, self._report)
+            return reader.read(shader, kind)
+        what = shader_id(shader) or shader_id(material.ComputeSurfaceSource("mtlx")[0])
         if what:
             self._report.missing(f"surface shader {what} (drawn grey)", prim.GetPath())
         elif not material.GetSurfaceOutputs():

@@ -23,6 +23,10 @@ MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
 
 
+Stamp = tuple[int, int]
+"""When a file was changed, in ns, and its size in bytes."""
+
+
 class TextureError(ValueError):
     """An image that cannot be used; says why in a few words."""
 
@@ -33,9 +37,11 @@ class Image:
     Attributes:
         channels: Channels of each pixel.
         dtype: Of the pixels.
+        stamp: Of its file before it was read; None: not known.
     """
 
-    def __init__(self, pixels: NDArray[Any]) -> None:
+    def __init__(self, pixels: NDArray[Any], stamp: Stamp | None = None) -> None:
+        self.stamp = stamp
         self._pixels: NDArray[Any] | None = pixels
         self.channels = int(pixels.shape[2])
         self.dtype = pixels.dtype
@@ -58,6 +64,17 @@ class Image:
         return self.dtype == np.uint8 and self.channels >= 3
 
 
+def stamp_of(path: str) -> Stamp | None:
+    """The stamp of a file, or of the package that it is in; None: it is not there."""
+    if Ar.IsPackageRelativePath(path):
+        path = Ar.SplitPackageRelativePathOuter(path)[0]
+    try:
+        state = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return state.st_mtime_ns, state.st_size
+
+
 def read_image(path: str) -> Image:
     """Reads the first image of a file, or of a file in a package (``a.usdz[b.png]``).
 
@@ -66,10 +83,11 @@ def read_image(path: str) -> Image:
     """
     if not path:
         raise TextureError("no file name")
+    stamp = stamp_of(path)
     if not Ar.IsPackageRelativePath(path):
         if not os.path.isfile(path):
             raise TextureError("no such file")
-        return _read_file(path)
+        return Image(_read_file(path), stamp)
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise TextureError("no such file in the package")
@@ -79,12 +97,12 @@ def read_image(path: str) -> Image:
     try:
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)
-        return _read_file(name)
+        return Image(_read_file(name), stamp)
     finally:
         os.unlink(name)
 
 
-def _read_file(path: str) -> Image:
+def _read_file(path: str) -> NDArray[Any]:
     # Not before an image is read: the library takes 30 MB as soon as it is loaded.
     import OpenImageIO as oiio
 
@@ -116,7 +134,7 @@ def _read_file(path: str) -> Image:
     if pixels.dtype != np.uint8:
         limit = 65504.0 if dtype == np.float16 else 3.4e38
         pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=limit, neginf=-limit)
-    return Image(np.ascontiguousarray(pixels, dtype))
+    return np.ascontiguousarray(pixels, dtype)
 
 
 class ReadAhead:

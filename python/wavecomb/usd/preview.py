@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.report import LoadReport
     from wavecomb.usd.texture import TextureTable
 
-_INPUTS: dict[str, tuple[str, Any]] = {
+INPUTS: dict[str, tuple[str, Any]] = {
     "diffuseColor": ("base_color", (0.18, 0.18, 0.18)),
     "specularColor": ("specular_color", (0.0, 0.0, 0.0)),
     "emissiveColor": ("emission", (0.0, 0.0, 0.0)),
@@ -29,6 +29,8 @@ _INPUTS: dict[str, tuple[str, Any]] = {
     "ior": ("ior", 1.5),
     "opacityThreshold": ("opacity_threshold", 0.0),
 }
+"""Input of a UsdPreviewSurface -> parameter of a program, and its default."""
+
 _UNIT = (
     "roughness",
     "metallic",
@@ -37,14 +39,16 @@ _UNIT = (
     "opacity",
     "opacity_threshold",
 )
-_USES: dict[str, tuple[str, ...]] = {
+USES: dict[str, tuple[str, ...]] = {
     "diffuse": ("base_color", "normal"),
     "metal": ("base_color", "specular_color", "roughness", "normal"),
     "dielectric": ("base_color", "roughness", "ior", "normal"),
     "plastic": ("base_color", "roughness", "ior", "normal"),
     "emissive": ("emission",),
 }
-PROGRAMS = (*_USES, "principled")
+"""Parameters that a program reads; principled reads all."""
+
+PROGRAMS = (*USES, "principled")
 """What ``wavecomb:program`` may say."""
 
 MAX_EVALUATIONS = 1 << 16
@@ -80,6 +84,14 @@ def evaluations_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -
     return value
 
 
+def constant(slot: str, value: Any, default: Any) -> Any:
+    """What an authored value gives a parameter: finite, in range."""
+    if isinstance(default, tuple):
+        return colour(value, default)
+    result = number(value, default)
+    return min(max(result, 0.0), 1.0) if slot in _UNIT else result
+
+
 class PreviewReader:
     """Reads one UsdPreviewSurface network."""
 
@@ -97,9 +109,9 @@ class PreviewReader:
     def read(self, shader: UsdShade.Shader) -> Surface:
         """The surface of a UsdPreviewSurface shader."""
         program = program_of(self.material, self.time, self.report)
-        wanted = _USES.get(program)
+        wanted = USES.get(program)
         parameters: dict[str, Any] = {}
-        for name, (slot, default) in _INPUTS.items():
+        for name, (slot, default) in INPUTS.items():
             if wanted is not None and slot not in wanted:
                 continue
             source = source_of(shader, name, self.time)
@@ -142,7 +154,7 @@ class PreviewReader:
     def _input(self, slot: str, source: Source, default: Any) -> Any:
         """A constant for a slot, None for its default; a texture goes to ``slots``."""
         if source.is_value:
-            return self._constant(slot, source.value, default)
+            return constant(slot, source.value, default)
         shader = source.shader
         identifier = shader_id(shader) if shader else ""
         if shader is not None and identifier == "UsdUVTexture":
@@ -155,16 +167,10 @@ class PreviewReader:
             fallback = value_of(shader, "fallback", self.time)
             if name and slot != "normal":
                 self.primvars[slot] = str(name)
-            return self._constant(slot, fallback, default)
+            return constant(slot, fallback, default)
         what = identifier or "a shader without info:id"
         self.report.missing(f"shading node {what}", self.material.GetPath())
         return default
-
-    def _constant(self, slot: str, value: Any, default: Any) -> Any:
-        if isinstance(default, tuple):
-            return colour(value, default)
-        result = number(value, default)
-        return min(max(result, 0.0), 1.0) if slot in _UNIT else result
 
     def _texture(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """Adds a texture use; gives a constant where there is no image."""
@@ -232,7 +238,7 @@ class PreviewReader:
             value = [t * s + b for t, s, b in zip(texel, scale, bias, strict=True)]
             if isinstance(default, tuple):
                 return tuple(value[:3]) if channel == "rgb" else (value["rgba".index(channel)],) * 3
-            return self._constant(slot, value["rgba".index(channel[0])], default)
+            return constant(slot, value["rgba".index(channel[0])], default)
         if slot == "base_color":
             self.slots[slot] = {
                 "texture": self.textures.missing(),

@@ -7,7 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 MAX_PLACES = 3
-"""Prims named for each finding; the rest is counted."""
+"""Prims named for each finding in a line; the rest is counted."""
+
+MAX_KEPT = 500
+"""Prims kept for each finding, for who lists them all."""
 
 
 @dataclass
@@ -17,29 +20,37 @@ class Finding:
     Attributes:
         what: One line, lower case, no full stop.
         count: How often it came up.
-        places: The first prims or files it concerns.
+        all_places: Prims or files it concerns, up to ``MAX_KEPT``.
     """
 
     what: str
     count: int = 0
-    places: list[str] = field(default_factory=list)
+    all_places: list[str] = field(default_factory=list)
+    _known: set[str] = field(default_factory=set, repr=False, compare=False)
 
     def add(self, place: str, count: int = 1) -> None:
         """Counts it once more."""
         self.count += count
-        if place and len(self.places) < MAX_PLACES and place not in self.places:
-            self.places.append(place)
+        if place and len(self._known) < MAX_KEPT and place not in self._known:
+            self._known.add(place)
+            self.all_places.append(place)
+
+    @property
+    def places(self) -> list[str]:
+        """The first of ``all_places``."""
+        return self.all_places[:MAX_PLACES]
 
     def line(self) -> str:
         """The finding as one line."""
         if not self.places:
             return self.what
-        more = self.count - len(self.places)
-        return f"{self.what}: {', '.join(self.places)}" + (f" and {more} more" if more > 0 else "")
+        places = self.places
+        more = self.count - len(places)
+        return f"{self.what}: {', '.join(places)}" + (f" and {more} more" if more > 0 else "")
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {"what": self.what, "count": self.count, "places": list(self.places)}
+        return {"what": self.what, "count": self.count, "places": self.places}
 
 
 class LoadReport:

@@ -10,17 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.camera import all_cameras, find_camera, frame_bounds, read_camera
-from wavecomb.usd.diagnostics import captured, commentary
+from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
+from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, placed_lights
-from wavecomb.usd.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
+from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
-from wavecomb.usd.texture import TextureTable
+from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
 
 if TYPE_CHECKING:
@@ -42,6 +43,13 @@ class LoadedStage:
         seconds: Time taken.
         stage_path: The file.
         cameras: Prims of all cameras that could be chosen.
+        lights: Prims of all lights that Wavecomb knows, invisible ones too.
+        material_paths: Prim of each material of the scene, by id; "" where the loader made it (of a
+            display colour). One prim has several where meshes bring values of their own.
+        light_paths: Prim of each light of the scene, by index; "" of the soft dome. In instances
+            both are named by the first instance.
+        frame: Time code that was read; None: default values.
+        textures: What the next read of the stage can share; None unless it was read ``editable``.
     """
 
     scene: _core.Scene
@@ -50,22 +58,41 @@ class LoadedStage:
     seconds: float
     stage_path: Path
     cameras: tuple[str, ...] = ()
+    lights: tuple[str, ...] = ()
+    material_paths: tuple[str, ...] = ()
+    light_paths: tuple[str, ...] = ()
+    frame: float | None = None
+    textures: TextureStock | None = None
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """What was found while the builder was filled."""
+
+    camera: str | None
+    survey: Survey
+    materials: tuple[str, ...]
+    lights: tuple[str, ...]
+    frame: float | None
 
 
 def load_stage(
-    path: str | Path,
+    source: str | Path | Usd.Stage,
     *,
     frame: float | None = None,
     camera: str | None = None,
     purposes: Sequence[str] = ("default", "render"),
     variants: Mapping[str, str] | None = None,
     threads: int = 0,
+    editable: bool = False,
+    reuse: TextureStock | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
 
     Args:
-        path: .usd, .usda, .usdc or .usdz.
+        source: A .usd, .usda, .usdc or .usdz file, or a stage that is open. That stays open, and is
+            only written to where ``variants`` are chosen. It must not change meanwhile.
         frame: Time code; None: the stage's start, else default values.
         camera: Prim path or unique name of a camera; None: the render settings', the stage's first,
             or a view that frames all.
@@ -73,6 +100,9 @@ def load_stage(
         variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
             prim's.
         threads: For images and textures; 0: all.
+        editable: For programs that change what was read: materials that look alike stay apart, and
+            the result has ``textures``. Changes no picture.
+        reuse: ``textures`` of an earlier read: those whose files did not change are shared.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -85,38 +115,67 @@ def load_stage(
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
     report = LoadReport()
-    file = Path(path)
+    file = _file_of(source)
     with captured(report):
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
-        textures = TextureTable(builder, report, threads)
+        textures = TextureTable(builder, report, threads, reuse)
         try:
-            camera_path, cameras = _fill(
-                builder, file, frame, camera, purposes, variants or {}, textures, report
+            filled = _fill(
+                builder, source, frame, camera, purposes, variants or {}, textures, report, editable
             )
         finally:
             textures.release()
         scene = _build(builder, file)
     if builder_factory is None:
         _give_back_memory()
-    return LoadedStage(scene, report, camera_path, clock.perf_counter() - started, file, cameras)
+    return LoadedStage(
+        scene,
+        report,
+        filled.camera,
+        clock.perf_counter() - started,
+        file,
+        filled.survey.cameras,
+        filled.survey.lights,
+        filled.materials,
+        filled.lights,
+        filled.frame,
+        textures.stock(scene) if editable else None,
+    )
+
+
+def _file_of(source: str | Path | Usd.Stage) -> Path:
+    """The file of a stage; of one in memory its layer's name."""
+    if not isinstance(source, Usd.Stage):
+        return Path(source)
+    layer = source.GetRootLayer()
+    return Path(layer.realPath or layer.identifier)
 
 
 def _fill(
     builder: _core.SceneBuilder,
-    file: Path,
+    source: str | Path | Usd.Stage,
     frame: float | None,
     camera: str | None,
     purposes: Sequence[str],
     variants: Mapping[str, str],
     textures: TextureTable,
     report: LoadReport,
-) -> tuple[str | None, tuple[str, ...]]:
-    """Fills the builder; gives the camera's path and those of all. The stage is closed then."""
-    stage = _open(file)
-    if variants:
-        _select(stage, variants)
-    chosen = _read(stage, _time(stage, frame), camera, purposes, builder, textures, report)
-    return chosen, tuple(str(prim.GetPath()) for prim in all_cameras(stage))
+    editable: bool,
+) -> _Filled:
+    """Fills the builder. A stage that was opened here is closed then."""
+    if isinstance(source, Usd.Stage):
+        stage = source
+        select_variants(stage, variants)
+    else:
+        stage = open_stage(Path(source), variants)
+    time = time_code(stage, frame)
+    found = survey(stage)
+    materials = MaterialTable(builder, textures, time, report, apart=editable)
+    chosen, lights = _read(
+        stage, time, camera, purposes, builder, textures, materials, bool(found.lights), report
+    )
+    used = None if time.IsDefault() else float(time.GetValue())
+    return _Filled(chosen, found, materials.paths(), lights, used)
 
 
 def _native_builder(threads: int) -> _core.SceneBuilder:
@@ -131,53 +190,6 @@ def _give_back_memory() -> None:
     _core.give_back_memory()
 
 
-def _open(file: Path) -> Usd.Stage:
-    """The stage of a file, with all payloads."""
-    if not file.exists():
-        raise WavecombError(f"{file}: no such file")
-    if file.is_dir():
-        raise WavecombError(f"{file}: is a folder; name the stage in it")
-    if not Usd.Stage.IsSupportedFile(str(file)):
-        raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
-    try:
-        stage = Usd.Stage.Open(str(file), Usd.Stage.LoadAll)
-    except Tf.ErrorException as error:
-        raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
-    if not stage:
-        raise WavecombError(f"{file}: cannot be read as USD")
-    return stage
-
-
-def _select(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
-    """Makes variant selections in the session layer."""
-    stage.SetEditTarget(stage.GetSessionLayer())
-    for key, choice in variants.items():
-        where, _, name = key.rpartition("{") if "{" in key else ("", "", key)
-        name = name.rstrip("}")
-        if where and not Sdf.Path.IsValidPathString(where):
-            raise WavecombError(f"variant {key}: {where} is not a prim path")
-        prim = stage.GetPrimAtPath(where) if where else stage.GetDefaultPrim()
-        if not prim:
-            raise WavecombError(f"variant {key}: no prim {where or '(the stage has no default)'}")
-        sets = prim.GetVariantSets()
-        if name not in sets.GetNames():
-            known = ", ".join(sets.GetNames()) or "none"
-            raise WavecombError(f"variant {key}: {prim.GetPath()} has the sets: {known}")
-        variant_set = sets.GetVariantSet(name)
-        if choice not in variant_set.GetVariantNames():
-            known = ", ".join(variant_set.GetVariantNames()) or "none"
-            raise WavecombError(f"variant {key}={choice}: there are {known}")
-        variant_set.SetVariantSelection(choice)
-
-
-def _time(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
-    if frame is not None:
-        return Usd.TimeCode(frame)
-    if stage.HasAuthoredTimeCodeRange():
-        return Usd.TimeCode(stage.GetStartTimeCode())
-    return Usd.TimeCode.Default()
-
-
 def _read(
     stage: Usd.Stage,
     time: Usd.TimeCode,
@@ -185,17 +197,19 @@ def _read(
     purposes: Sequence[str],
     builder: _core.SceneBuilder,
     textures: TextureTable,
+    materials: MaterialTable,
+    has_lights: bool,
     report: LoadReport,
-) -> str | None:
-    """Fills the builder; gives the camera's path."""
+) -> tuple[str | None, tuple[str, ...]]:
+    """Fills the builder; gives the paths of the camera and of the lights."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = find_camera(stage, camera)
-    materials = MaterialTable(builder, textures, time, report)
-    lights = LightReader(time, up_axis, textures, report)
+    groups = LightGroups(report)
+    lights = LightReader(time, up_axis, textures, groups, report)
     traversal = Traversal(time, purposes, lights, report)
-    world = GroupBuilder(stage, traversal, builder, materials, report).world()
-    lit = materials.glows or _has_lights(stage)
-    _add_lights(world, lit, up_axis, textures, builder, report)
+    world = GroupBuilder(stage, traversal, builder, materials, groups, report).world()
+    lit = materials.glows or has_lights
+    light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")
     view = None
@@ -207,13 +221,7 @@ def _read(
         report.note("no camera: framed the bounds")
         view = frame_bounds(world.bounds, up_axis)
     builder.set_camera(view.transform, **view.options)
-    return chosen
-
-
-def _has_lights(stage: Usd.Stage) -> bool:
-    """Whether the stage holds lights that Wavecomb knows, seen or not."""
-    every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
-    return any(prim.GetTypeName() in LIGHT_KINDS for prim in every)
+    return chosen, light_paths
 
 
 def _add_lights(
@@ -223,20 +231,23 @@ def _add_lights(
     textures: TextureTable,
     builder: _core.SceneBuilder,
     report: LoadReport,
-) -> None:
-    """Adds all lights, or a soft dome where nothing else gives light (``lit``)."""
+) -> tuple[str, ...]:
+    """Adds all lights, or a soft dome where nothing else gives light (``lit``); their paths."""
     lights = placed_lights(world, MAX_LIGHTS + 1)
     if len(lights) > MAX_LIGHTS:
         report.warn(f"more than {MAX_LIGHTS} lights: the rest is left out")
         lights = lights[:MAX_LIGHTS]
     for light, transform in lights:
         builder.add_light(light.kind, transform, **light.options)
-    if not lights and lit:
+    if lights:
+        return tuple(light.options["name"] for light, _ in lights)
+    if lit:
         report.note("no visible light; the scene is lit by emissive materials or not at all")
-    elif not lights:
-        report.note("no light: added a soft dome")
-        texture = textures.add_pixels("soft dome", soft_dome())
-        builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
+        return ()
+    report.note("no light: added a soft dome")
+    texture = textures.add_pixels("soft dome", soft_dome())
+    builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
+    return ("",)
 
 
 def _build(builder: _core.SceneBuilder, file: Path) -> _core.Scene:

@@ -11,8 +11,12 @@ template <typename F>
 struct Frame {
   Vec3<F> s, t, n;
 
-  Vec3<F> to_local(const Vec3<F>& v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
-  Vec3<F> to_world(const Vec3<F>& v) const { return fma(s, v.x, fma(t, v.y, Vec3<F>(n * v.z))); }
+  WAVECOMB_INLINE Vec3<F> to_local(const Vec3<F>& v) const {
+    return {dot(v, s), dot(v, t), dot(v, n)};
+  }
+  WAVECOMB_INLINE Vec3<F> to_world(const Vec3<F>& v) const {
+    return fma(s, v.x, fma(t, v.y, Vec3<F>(n * v.z)));
+  }
 };
 
 /// A frame around the unit vector `n`, without a branch (Duff et al., "Building an Orthonormal

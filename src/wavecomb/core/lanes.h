@@ -215,7 +215,7 @@ inline F bits_float(const UInt<F>& x) {
 
 /// |x| with the sign of `sign` (signed zero counts as its sign).
 template <LaneValue F>
-inline F copysign(const F& x, const F& sign) {
+WAVECOMB_INLINE F copysign(const F& x, const F& sign) {
   return bits_float<F>((float_bits<F>(x) & 0x7fffffffu) | (float_bits<F>(sign) & 0x80000000u));
 }
 

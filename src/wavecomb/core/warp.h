@@ -23,7 +23,7 @@ inline Vec2<F> square_to_disk(const F& u, const F& v) {
 
 /// Cosine-weighted hemisphere around +z; pdf = cos_theta / pi.
 template <typename F>
-inline Vec3<F> square_to_cosine_hemisphere(const F& u, const F& v) {
+WAVECOMB_INLINE Vec3<F> square_to_cosine_hemisphere(const F& u, const F& v) {
   const Vec2<F> d = square_to_disk(u, v);
   const F r2 = fma(d.x, d.x, F(d.y * d.y));
   return {d.x, d.y, safe_sqrt(F(1.f - r2))};

@@ -16,7 +16,7 @@ struct PixelError {
 
 PixelError pixel_error(const Film::Pixel& p, const ErrorSums& e) {
   const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
-  if (in_half == n) return {};  // there is no other half
+  if (n < 2 * ErrorSums::kHalfBlock) return {};  // there is no other half, or not all of it
   const double sums[3] = {p.r, p.g, p.b};
   // Var(I - A) = var (1 / half - 1 / n), and var / n is asked for: the same where half = n / 2.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));

@@ -92,25 +92,28 @@ class PathTracer {
         }
         path.throughput *= 1.f / q;
       }
-      const VertexResult<F> v = shade(key, depth, hit, mesh, material, path);
+      VertexAovs<F> aovs;
+      aovs.wants_uv = depth == 0;
+      aovs.wants_lights = !groups_.empty();
+      const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
       result.radiance += v.emitted;
-      add_light(v.emitter, v.emitted);
+      add_light(aovs.emitter, v.emitted);
       keep_parts(depth, depth);
       if (depth == 0) {
-        result.uv[0] = v.uv.x;
-        result.uv[1] = v.uv.y;
-        result.albedo = v.albedo;
-        result.normal = v.normal;
+        result.uv[0] = aovs.uv.x;
+        result.uv[1] = aovs.uv.y;
+        result.albedo = aovs.albedo;
+        result.normal = aovs.normal;
       }
       if (wants_guides_ && is_seen) {
-        result.guides = guides_of<F>(v, path);
-        is_seen = v.is_clear;
+        result.guides = guides_of<F>(aovs, path);
+        is_seen = aovs.is_clear;
       }
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth)) {
           result.radiance += v.direct;
-          add_light(v.lit_by, v.direct);
+          add_light(aovs.lit_by, v.direct);
         }
       }
       if (!v.alive) {
@@ -185,16 +188,15 @@ class PathTracer {
   }
 
   VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const Hit& hit, uint32_t mesh,
-                        uint32_t material, const PathState<F>& path) {
+                        uint32_t material, const PathState<F>& path, VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v};
     VertexResult<F> v{};
     visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
                      [&]<typename Bsdf>() {
-                       v = shade_vertex<Bsdf, F>(
-                           scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path,
-                           {depth == 0 || wants_guides_, depth == 0, !groups_.empty()}, true);
+                       v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom,
+                                                 hit.t, material, path, &aovs, true);
                      });
     return v;
   }

@@ -67,22 +67,24 @@ struct VertexResult {
   Mask<F> alive;    ///< the path goes on
   Vec3<F> o;        ///< of the next ray; its direction and the rest is in `next`
   PathState<F> next;
-  Color<F> albedo;  ///< AOVs, where asked for
-  Vec3<F> normal;
-  Vec2<F> uv;
-  Mask<F> is_clear;         ///< nothing but what is mirrored or refracted is seen here
-  UInt<F> emitter, lit_by;  ///< lights behind `emitted` and `direct`, or kNoLight; where asked for
 };
 
-/// AOVs that shading is to give.
+/// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
+/// and values that live to the end of shading cost registers.
+template <typename F>
 struct VertexAovs {
-  bool any = false, uv = false, lights = false;
+  bool wants_uv = false, wants_lights = false;  ///< asked for; the others are always given
+  Color<F> albedo;
+  Vec3<F> normal;
+  Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
+  Vec2<F> uv;
+  UInt<F> emitter, lit_by;  ///< lights behind `emitted` and `direct`, or kNoLight
 };
 
 /// What guides a denoiser, of a path that has reached a vertex: albedo, tinted by the mirrors and
 /// glass before it, and normal. Both are replaced by the next vertex where this one is clear.
 template <typename F>
-inline std::array<F, 6> guides_of(const VertexResult<F>& v, const PathState<F>& path) {
+inline std::array<F, 6> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
   const auto tinted = [&](const F& albedo, const F& throughput) {
     // Without the scaling of radiance by indices of refraction; roulette may have made it larger.
     return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
@@ -186,7 +188,7 @@ template <typename Bsdf, typename F>
 inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings& settings,
                                     const SampleKey<F>& key, uint32_t depth, const MeshHit<F>& hit,
                                     const UInt<F>& geom, const F& t, const UInt<F>& material,
-                                    const PathState<F>& path, VertexAovs aovs,
+                                    const PathState<F>& path, VertexAovs<F>* aovs,
                                     const Mask<F>& active) {
   using U = UInt<F>;
   VertexResult<F> out;
@@ -194,7 +196,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.direct = Color<F>(F(0.f));
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
-  if (aovs.lights) out.emitter = out.lit_by = U(kNoLight);
+  const bool wants_lights = aovs && aovs->wants_lights;
+  if (wants_lights) aovs->emitter = aovs->lit_by = U(kNoLight);
 
   // Programs that emit read one slot more than their BSDF does.
   constexpr bool kEmits =
@@ -209,7 +212,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   const Mask<F> reads_texture = active & Mask<F>((slots & kSlots) != U(0u));
   const bool textured = any(reads_texture);
   constexpr bool kOpaque = Bsdf::kProgram != ProgramId::kDielectric;
-  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, textured || aovs.uv, kOpaque, active);
+  const bool wants_uv = textured || (aovs && aovs->wants_uv);
+  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, wants_uv, kOpaque, active);
   const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
   const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
 
@@ -230,8 +234,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
             hit.inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
             Mask<U>(emits));
         const U base = gather<U>(scene.emissive_lights, first + geom, Mask<U>(emits));
-        if (aovs.lights)
-          out.emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
+        if (wants_lights)
+          aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
         const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
         if (any(sampled))
           light_pdf = select(
@@ -264,11 +268,11 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   const Frame<F> frame = textured ? make_frame<F>(n, tangent) : make_frame<F>(n);
   const Vec3<F> wo = frame.to_local(-path.dir);
 
-  if (aovs.any) {
-    out.uv = s.uv;
-    out.albedo = bsdf.albedo();
-    out.normal = select<F>(dot(path.dir, s.ng) > 0.f, -frame.n, frame.n);
-    out.is_clear = not_(bsdf.has_non_delta());
+  if (aovs) {
+    aovs->albedo = bsdf.albedo();
+    aovs->normal = select<F>(dot(path.dir, s.ng) > 0.f, -frame.n, frame.n);
+    aovs->is_clear = not_(bsdf.has_non_delta());
+    if (aovs->wants_uv) aovs->uv = s.uv;
   }
   if (depth >= settings.max_depth) return out;
 
@@ -295,7 +299,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
-    if (aovs.lights) out.lit_by = chosen_light<F>(scene.lights, rl.x, lit);
+    if (wants_lights) aovs->lit_by = chosen_light<F>(scene.lights, rl.x, lit);
     out.shadow_o = spawn_origin<F>(s, l.wi);
     out.shadow_d = l.wi;
     out.shadow_tfar = l.distance * 0.9999f;

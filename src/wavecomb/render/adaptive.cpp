@@ -26,7 +26,11 @@ void dilate_along(std::vector<uint8_t>& marks, size_t lines, size_t line_step, s
 }  // namespace
 
 double error_threshold(const ErrorMap& map, const Settings& settings) {
-  return settings.adaptive > 0 ? double{settings.adaptive} : settings.noise * map.even_error;
+  if (settings.adaptive > 0) return double{settings.adaptive};
+  const double even = settings.noise * map.even_error;
+  if (map.mean_relative <= settings.noise || map.error.empty()) return even;
+  const double worst = *std::max_element(map.error.begin(), map.error.end());
+  return worst > even ? even : 0.5 * worst;
 }
 
 AdaptiveCheck check_adaptive(const ErrorMap& map, uint32_t width, std::span<const uint32_t> samples,

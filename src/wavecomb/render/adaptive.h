@@ -15,7 +15,9 @@ namespace wavecomb {
 inline constexpr uint32_t kDilation = 2;
 
 /// The error that a pixel may have: the setting, or what a picture of this light and of the mean
-/// relative error that is asked for would have everywhere, were its noise spread evenly.
+/// relative error that is asked for would have everywhere, were its noise spread evenly. Where no
+/// pixel is above that and the picture still is (few bright pixels in the dark have most of the
+/// error, which their windows spread over many): half of the largest error, so that it goes on.
 double error_threshold(const ErrorMap& map, const Settings& settings);
 
 /// What a look at the errors says.

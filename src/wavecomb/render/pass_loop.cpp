@@ -22,10 +22,19 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film
       order_(morton_pixel_order(settings.rendered())) {
   const std::vector<uint32_t> samples = film.samples();
   resumed_samples_ = std::accumulate(samples.begin(), samples.end(), uint64_t{0});
-  for (const uint32_t pixel : order_)
-    active_pixels_ += pass_.is_active(film.index(pixel & 0xffffu, pixel >> 16)) ? 1 : 0;
-  expected_samples_ =
-      uint64_t{rules_.adaptive ? next_check(0, rules_) : rules_.spp} * order_.size();
+  const uint32_t target =
+      rules_.adaptive ? std::max(pass_.target, next_check(0, rules_)) : rules_.spp;
+  bool all_begun = true;
+  for (const uint32_t pixel : order_) {
+    const size_t i = film.index(pixel & 0xffffu, pixel >> 16);
+    const bool active = pass_.is_active(i);
+    active_pixels_ += active ? 1 : 0;
+    expected_samples_ += active ? std::max(samples[i], target) : samples[i];
+    all_begun &= samples[i] > 0;
+  }
+  may_be_cut_ = all_begun;
+  // What a render without a limit has begun may be a long pass: here one sample each comes first.
+  if (rules_.timed && !all_begun) pass_.target = std::min(pass_.target, 1u);
 }
 
 void PassLoop::run() {
@@ -66,7 +75,7 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
   // Pixels of an adaptive render that go on late catch up.
   pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
-  may_be_cut_ = done > 0;
+  may_be_cut_ = may_be_cut_ || done > 0;
   ++passes_;
   return true;
 }

@@ -144,10 +144,15 @@ uint64_t hash_camera(const Scene& scene) {
 
 }  // namespace
 
-std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene) {
-  return {{"geometry", hash_geometry(scene)}, {"materials", hash_materials(scene)},
-          {"textures", hash_textures(scene)}, {"lights", hash_lights(scene)},
-          {"camera", hash_camera(scene)},     {"names", hash_names(scene)}};
+std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene, bool arrays) {
+  std::vector<std::pair<std::string, uint64_t>> parts;
+  if (arrays) parts.emplace_back("geometry", hash_geometry(scene));
+  parts.emplace_back("materials", hash_materials(scene));
+  if (arrays) parts.emplace_back("textures", hash_textures(scene));
+  parts.emplace_back("lights", hash_lights(scene));
+  parts.emplace_back("camera", hash_camera(scene));
+  parts.emplace_back("names", hash_names(scene));
+  return parts;
 }
 
 }  // namespace wavecomb

@@ -12,7 +12,8 @@
 namespace wavecomb {
 
 /// Hashes of what decides over the picture: "geometry", "materials", "textures", "lights",
-/// "camera". Names are not part of it. Reads every array of the scene once.
-std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene);
+/// "camera", and of the "names" that show in AOVs. `arrays`: geometry and textures, too, of which
+/// every byte is read.
+std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene, bool arrays = true);
 
 }  // namespace wavecomb

@@ -159,7 +159,7 @@ void make_distant(Made& made, const Light& light, const Double3& color, double m
 
 /// The density of a dome with that texture and radiance: of `before` where it is there.
 Distribution2D dome_distribution(const LightRecord& dome, const LightSet* before,
-                                 std::span<const std::unique_ptr<Texture>> textures) {
+                                 std::span<const TexturePtr> textures) {
   if (before)
     for (const LightRecord& other : before->records)
       if (other.kind == dome.kind && other.texture == dome.texture &&
@@ -170,8 +170,7 @@ Distribution2D dome_distribution(const LightRecord& dome, const LightSet* before
 }
 
 void make_dome(Made& made, LightSet& set, const Light& light, const Double3& color, double mean,
-               double scene_radius, std::span<const std::unique_ptr<Texture>> textures,
-               const LightSet* before) {
+               double scene_radius, std::span<const TexturePtr> textures, const LightSet* before) {
   const Affine& m = light.to_world;
   // Turned and mirrored, never stretched: axes orthonormal, the pole first.
   const Double3 y = unit(to_double(m.axis(1)));
@@ -202,7 +201,7 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
 }
 
 Made make_light(LightSet& set, const Light& light, double scene_radius,
-                std::span<const std::unique_ptr<Texture>> textures, const LightSet* before) {
+                std::span<const TexturePtr> textures, const LightSet* before) {
   Made made;
   LightRecord& r = made.record;
   r.kind = static_cast<uint32_t>(light.kind);
@@ -350,7 +349,7 @@ LightView LightSet::view(const MaterialView& materials) const {
 
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const std::unique_ptr<Texture>> textures, const LightSet* before) {
+                      std::span<const TexturePtr> textures, const LightSet* before) {
   (void)centre;  // directions of infinite lights do not depend on it
   if (lights.size() + triangle_count > kMaxLights) {
     throw Error("the scene has " + std::to_string(lights.size() + triangle_count) +

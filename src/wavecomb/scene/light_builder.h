@@ -76,8 +76,7 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 /// not finite, unknown textures and more than kMaxLights lights.
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const std::unique_ptr<Texture>> textures,
-                      const LightSet* before = nullptr);
+                      std::span<const TexturePtr> textures, const LightSet* before = nullptr);
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,

@@ -61,7 +61,7 @@ class Scene {
   /// Flattened: every entry places a group of meshes (never group 0) in the world.
   const std::vector<Instance>& instances() const { return geometry_->instances; }
   const std::vector<Material>& materials() const { return materials_->materials; }
-  const std::vector<std::unique_ptr<Texture>>& textures() const { return geometry_->textures; }
+  const std::vector<TexturePtr>& textures() const { return geometry_->textures; }
   const std::vector<Light>& lights() const { return lights_->lights; }
   /// Names of light groups; the first is kOtherLights.
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
@@ -121,6 +121,8 @@ class SceneBuilder {
   SceneBuilder& operator=(SceneBuilder&&) = default;
 
   uint32_t add_texture(const TextureDesc& desc);
+  /// A texture of another scene, which may end before this one.
+  uint32_t add_texture(TexturePtr texture);
   /// Texture ids in the material must exist.
   uint32_t add_material(Material material);
   /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name;
@@ -168,7 +170,7 @@ class SceneBuilder {
   std::vector<Group> groups_;
   std::vector<std::vector<Node>> children_;
   std::vector<Material> materials_;
-  std::vector<std::unique_ptr<Texture>> textures_;
+  std::vector<TexturePtr> textures_;
   std::vector<Light> lights_;
   std::vector<std::string> light_groups_{kOtherLights};
   NameTable names_;

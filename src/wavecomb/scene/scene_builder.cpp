@@ -108,7 +108,12 @@ SceneBuilder::SceneBuilder(uint32_t threads) : threads_(threads), groups_(1), ch
 
 uint32_t SceneBuilder::add_texture(const TextureDesc& desc) {
   with_threads(threads_,
-               [&] { textures_.push_back(std::make_unique<Texture>(desc, parallel_for)); });
+               [&] { textures_.push_back(std::make_shared<const Texture>(desc, parallel_for)); });
+  return static_cast<uint32_t>(textures_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_texture(TexturePtr texture) {
+  textures_.push_back(std::move(texture));
   return static_cast<uint32_t>(textures_.size() - 1);
 }
 

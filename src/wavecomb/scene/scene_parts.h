@@ -64,7 +64,7 @@ struct SceneGeometry {
   std::vector<std::vector<uint32_t>> face_materials;
   std::vector<Group> groups;
   std::vector<Instance> instances;
-  std::vector<std::unique_ptr<Texture>> textures;
+  std::vector<TexturePtr> textures;
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;

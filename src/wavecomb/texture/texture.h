@@ -103,4 +103,7 @@ class Texture {
   float mean_[4] = {0, 0, 0, 1};
 };
 
+/// Scenes may share textures.
+using TexturePtr = std::shared_ptr<const Texture>;
+
 }  // namespace wavecomb

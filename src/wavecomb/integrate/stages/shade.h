@@ -12,7 +12,7 @@ namespace wavecomb {
 
 /// Notes what guides a denoiser, of paths that have met clear surfaces only so far.
 template <typename F>
-void store_guides(const PathPool& pool, const UInt<F>& slot, const VertexResult<F>& v,
+void store_guides(const PathPool& pool, const UInt<F>& slot, const VertexAovs<F>& v,
                   const PathState<F>& path, const Mask<F>& active) {
   constexpr uint32_t kWords = PathPool::kGuideWords;
   const UInt<F> word = slot * kWords;
@@ -35,8 +35,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
   const bool wants_first = depth == 0 && pool.first;
-  const bool wants_groups = pool.groups;
-  const VertexAovs aovs{wants_first || pool.guides, depth == 0 && pool.wants_uv, wants_groups};
+  VertexAovs<F> aovs;
+  aovs.wants_uv = depth == 0 && pool.wants_uv;
+  aovs.wants_lights = pool.groups != nullptr;
+  aovs.uv = {F(0.f), F(0.f)};
+  const bool wants_aovs = wants_first || pool.guides || pool.groups;
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
@@ -57,24 +60,26 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                              path.eta_scale,
                              fma(path.cone_spread, t, path.cone_width),
                              path.cone_spread};
-    const VertexResult<F> v = shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit,
-                                                    id(Q::kGeom), t, material, state, aovs, active);
+    const VertexResult<F> v =
+        shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, id(Q::kGeom), t,
+                              material, state, wants_aovs ? &aovs : nullptr, active);
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
     F lit_by(0.f);
-    if (wants_groups) {
+    if (aovs.wants_lights) {
       const uint32_t* kept = context.aovs->kept_group.data();
-      add_group_radiance<F>(pool, slot, kept_group<F>(kept, v.emitter, emits), v.emitted, emits);
-      lit_by = bits_float<F>(kept_group<F>(kept, v.lit_by, v.has_shadow));
+      add_group_radiance<F>(pool, slot, kept_group<F>(kept, aovs.emitter, emits), v.emitted, emits);
+      lit_by = bits_float<F>(kept_group<F>(kept, aovs.lit_by, v.has_shadow));
     }
     if (wants_first) {
       store_rows<PathPool::kFirstWords, F>(
           pool.first, slot * PathPool::kFirstWords,
-          {v.albedo.x, v.albedo.y, v.albedo.z, v.normal.x, v.normal.y, v.normal.z, v.uv.x, v.uv.y},
+          {aovs.albedo.x, aovs.albedo.y, aovs.albedo.z, aovs.normal.x, aovs.normal.y, aovs.normal.z,
+           aovs.uv.x, aovs.uv.y},
           active);
     }
-    if (pool.guides) store_guides<F>(pool, slot, v, state, active);
+    if (pool.guides) store_guides<F>(pool, slot, aovs, state, active);
     const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
                       select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
                       (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |

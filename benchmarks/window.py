@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""How quick the window is.
+
+Prints, for each stage, seconds from the moment it is read to the first picture on the screen and
+to the first whole one, pictures a second while the camera turns, milliseconds from stop to
+standstill (median and most of ten), and the longest time that the window did not answer. Works
+without a display.
+"""
+
+import argparse
+import os
+import statistics
+import sys
+import tempfile
+import time
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+
+class Run:
+    """One window with one stage."""
+
+    def __init__(self, application, stage, size, scratch):
+        from PySide6.QtCore import QSettings
+
+        from wavecomb.gui.main_window import MainWindow
+        from wavecomb.gui.setup import Setup
+
+        settings = QSettings(os.path.join(scratch, "window.ini"), QSettings.Format.IniFormat)
+        self.application = application
+        self.window = MainWindow(Setup(width=size[0], height=size[1], spp=1 << 16), settings)
+        self.window.resize(1400, 860)
+        self.window.show()
+        self.session, self.viewport = self.window.session, self.window.viewport
+        self.last, self.gap = time.perf_counter(), 0.0
+        self.stage = stage
+
+    def beat(self):
+        """Lets the window work; notes how long it took."""
+        self.application.processEvents()
+        now = time.perf_counter()
+        self.gap = max(self.gap, now - self.last)
+        time.sleep(0.001)
+        self.last = time.perf_counter()
+
+    def until(self, met, seconds=120.0):
+        """Waits; returns when it was."""
+        end = time.perf_counter() + seconds
+        while not met():
+            if time.perf_counter() > end:
+                raise SystemExit(f"{self.stage}: nothing happened for {seconds:.0f} s")
+            self.beat()
+        return time.perf_counter()
+
+    def measure(self):
+        """All figures, by name."""
+        begun = time.perf_counter()
+        opened, moving = [], []
+        self.session.opened.connect(lambda stage: opened.append(time.perf_counter()))
+        self.viewport.shown.connect(lambda frame, look: moving.append(frame.scale))
+        self.window.open(self.stage)
+        first = self.until(lambda: self.viewport.frame_shown is not None)
+        whole = self.until(
+            lambda: (
+                self.viewport.frame_shown.scale == 1
+                and self.viewport.frame_shown.layers["samples"].min() > 0
+            )
+        )
+        self.until(lambda: time.perf_counter() > whole + 1.0)
+        self.gap = 0.0
+        moving.clear()
+        start = time.perf_counter()
+        while time.perf_counter() < start + 3.0:
+            self.viewport.orbit(0.01, 0.0, moving=True)
+            self.beat()
+        shown = [scale for scale in moving if scale >= 1]
+        rate, scale = len(shown) / (time.perf_counter() - start), max(shown, default=0)
+        self.session.settle()
+        stops = [self.stop() for _ in range(10)]
+        return {
+            "load_s": opened[0] - begun,
+            "first_picture_s": first - opened[0],
+            "whole_picture_s": whole - opened[0],
+            "moving_pictures_per_s": rate,
+            "moving_scale": scale,
+            "stop_ms": 1e3 * statistics.median(stops),
+            "stop_most_ms": 1e3 * max(stops),
+            "gap_ms": 1e3 * self.gap,
+        }
+
+    def stop(self):
+        """Seconds from stop to standstill."""
+        engine = self.session._live._engine
+        self.session.restart()
+        end = time.perf_counter() + 0.4
+        self.until(lambda: time.perf_counter() > end)
+        begun = time.perf_counter()
+        self.session.stop()
+        while engine.is_busy():
+            time.sleep(0.0005)
+        seconds = time.perf_counter() - begun
+        self.last = time.perf_counter()
+        return seconds
+
+
+def main():
+    """Measures each stage in turn."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("stages", nargs="+")
+    parser.add_argument("--size", nargs=2, type=int, default=(960, 540))
+    options = parser.parse_args()
+    from wavecomb.gui import theme
+    from wavecomb.gui.app import make_application
+
+    application = make_application()
+    theme.apply("dark")
+    for stage in options.stages:
+        with tempfile.TemporaryDirectory() as scratch:
+            run = Run(application, stage, options.size, scratch)
+            figures = run.measure()
+            run.window.close()
+        sys.stdout.write(f"{os.path.basename(stage)}\n")
+        for name, value in figures.items():
+            sys.stdout.write(f"  {name:24}{value:.3g}\n")
+
+
+if __name__ == "__main__":
+    main()

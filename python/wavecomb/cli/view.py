@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb view``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from wavecomb.cli.options import StageOptions, examples, stage_options
+from wavecomb.scheduling import POLICIES, RAY_ORDERS
+
+_INTEGERS = click.IntRange(min=0)
+
+
+def _optional_stage(command: Any) -> Any:
+    """``stage_options`` with a stage that may be left out."""
+    command = stage_options(command)
+    for parameter in command.__click_params__:
+        if parameter.name == "stage":
+            parameter.required = False
+    return command
+
+
+@click.command(
+    "view",
+    epilog=examples(
+        "wavecomb view shot.usd",
+        "wavecomb view shot.usd --size 1280 720 --spp 256 --camera /World/Cam",
+        "wavecomb view shot.usd --variant '/World/Car{paint}=red' --policy adaptive",
+    ),
+)
+@_optional_stage
+@click.option(
+    "--size",
+    nargs=2,
+    type=int,
+    default=(960, 540),
+    metavar="W H",
+    help="Pixels.  [default: 960 540]",
+)
+@click.option("--spp", type=int, metavar="N", help="Samples per pixel.  [default: 64]")
+@click.option("--max-depth", type=_INTEGERS, metavar="N", help="Longest path, in scatterings.")
+@click.option("--seed", type=_INTEGERS, metavar="N", help="[default: 0]")
+@click.option("--threads", type=_INTEGERS, metavar="N", help="0 is all.  [default: 0]")
+@click.option("--policy", type=click.Choice(POLICIES), help="Order of shading.  [default: program]")
+@click.option(
+    "--ray-order", type=click.Choice(RAY_ORDERS), help="Order of bounce rays.  [default: auto]"
+)
+@click.option(
+    "--roulette",
+    type=click.Choice(["off", "throughput", "cost-aware"]),
+    help="How paths end early.  [default: throughput]",
+)
+@click.option("--denoise", is_flag=True, help="Show the picture without its noise.")
+def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **options: Any) -> None:
+    """Open a window on STAGE: look, steer and compare.
+
+    Without STAGE the window opens empty. docs/window.md says more.
+    """
+    from wavecomb.extras import needed
+
+    needed("PySide6.QtWidgets", "the window", extra="gui")
+    needed("pyqtgraph", "the window", extra="gui")
+    if denoise:
+        from wavecomb.denoise import check_denoiser
+
+        check_denoiser()
+    from wavecomb.gui.setup import Setup
+
+    source = StageOptions.take(options)
+    chosen = {name: value for name, value in options.items() if value is not None}
+    setup = Setup().changed(width=size[0], height=size[1], denoise=denoise, **chosen)
+    from wavecomb.gui.app import run
+
+    code = run(
+        stage,
+        setup,
+        camera=source.camera,
+        time=source.frame,
+        variants=source.selections() or None,
+        purposes=source.all_purposes(),
+    )
+    raise click.exceptions.Exit(code)

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Starts the window and runs it to its end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Mapping
+
+from PySide6.QtCore import QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication
+
+from wavecomb.errors import WavecombError
+from wavecomb.gui import theme
+from wavecomb.gui.messages import install_hooks
+from wavecomb.gui.setup import Setup
+
+_NO_DISPLAY = (
+    "no display to open a window on: set DISPLAY or WAYLAND_DISPLAY (over ssh: ssh -X), "
+    "or use `wavecomb render`"
+)
+
+
+def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
+    """Qt's own messages: what ends the process becomes one line, the rest is for developers."""
+    if kind == QtMsgType.QtFatalMsg:
+        line = " ".join(text.split())
+        if "platform plugin" in line and not _has_display():
+            line = _NO_DISPLAY
+        elif "platform plugin" in line or "display" in line:
+            line = f"no window can be opened: {line}"
+        sys.stderr.write(f"error: {line}\n")
+        sys.stderr.flush()
+        os._exit(2)
+    if os.environ.get("WAVECOMB_DEBUG"):
+        sys.stderr.write(f"qt: {text}\n")
+
+
+def _has_display() -> bool:
+    return any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
+
+
+def make_application() -> QApplication:
+    """The application; raises WavecombError where there is no display."""
+    if sys.platform.startswith("linux") and not _has_display():
+        raise WavecombError(_NO_DISPLAY)
+    qInstallMessageHandler(_qt_says)
+    QGuiApplication.setHighDpiScaleFactorRoundingPolicy(
+        Qt.HighDpiScaleFactorRoundingPolicy.PassThrough
+    )
+    application = QApplication(["wavecomb"])
+    application.setApplicationName("Wavecomb")
+    application.setOrganizationName("Wavecomb")
+    application.setDesktopFileName("wavecomb")
+    return application
+
+
+def run(
+    stage: str | None,
+    setup: Setup,
+    *,
+    camera: str | None = None,
+    time: float | None = None,
+    variants: Mapping[str, str] | None = None,
+    purposes: tuple[str, ...] | None = None,
+) -> int:
+    """Shows the window; returns the exit code when it is closed."""
+    application = make_application()
+    from wavecomb.gui.main_window import MainWindow
+
+    window = MainWindow(setup)
+    theme.apply(str(window.settings.value("theme", theme.SYSTEM)))
+    remove = install_hooks(window.message.show_error)
+    signal.signal(signal.SIGINT, lambda *_: window.close())
+    signal.signal(signal.SIGTERM, lambda *_: window.close())
+    # Python looks at signals only while it runs.
+    beat = QTimer(window)
+    beat.start(200)
+    beat.timeout.connect(lambda: None)
+    window.show()
+    if stage is not None:
+        window.open(stage, camera, time, variants, purposes)
+    try:
+        return application.exec()
+    finally:
+        remove()

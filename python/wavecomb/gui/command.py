@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A `wavecomb` command in a process of its own, so that the window never waits for it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Sequence
+
+from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
+
+KILL_MS = 8000
+"""After a stop: what has not ended by then is killed."""
+
+
+class Command(QObject):
+    """One process at a time.
+
+    Signals:
+        event(dict): A line of JSON with a key "event" that it wrote to stdout.
+        said(str): Another line, of stdout or stderr.
+        finished(code, text, error): How it ended; all of stdout; the last line of stderr that is
+            an error, or "". A process that was stopped has the code 130.
+    """
+
+    event = Signal(dict)
+    said = Signal(str)
+    finished = Signal(int, str, str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._process: QProcess | None = None
+        self._out = self._err = ""
+        self._text = ""
+        self._last = ""
+        self._stopping = False
+
+    @property
+    def running(self) -> bool:
+        """Whether there is a process."""
+        return self._process is not None
+
+    def start(self, arguments: Sequence[str]) -> None:
+        """Runs ``wavecomb`` with these arguments."""
+        assert self._process is None, "one at a time"
+        process = QProcess(self)
+        environment = QProcessEnvironment.systemEnvironment()
+        environment.insert("PYTHONUNBUFFERED", "1")
+        environment.insert("PYTHONIOENCODING", "utf-8")
+        process.setProcessEnvironment(environment)
+        process.readyReadStandardOutput.connect(self._read_out)
+        process.readyReadStandardError.connect(self._read_err)
+        process.finished.connect(self._end)
+        process.errorOccurred.connect(self._fail)
+        self._process = process
+        self._out = self._err = self._text = self._last = ""
+        self._stopping = False
+        process.start(sys.executable, ["-m", "wavecomb", *arguments])
+        process.closeWriteChannel()
+
+    def stop(self) -> None:
+        """Asks it to end (SIGTERM); kills it if it does not."""
+        process = self._process
+        if process is None:
+            return
+        if self._stopping:
+            process.kill()
+            return
+        self._stopping = True
+        process.terminate()
+        QTimer.singleShot(KILL_MS, process, process.kill)
+
+    def shutdown(self) -> None:
+        """Asks it to end and waits for that, three seconds at most: the window is closing."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.blockSignals(True)
+            process.terminate()
+            if not process.waitForFinished(3000):
+                process.kill()
+                process.waitForFinished(1000)
+
+    # ---- inside --------------------------------------------------------------------------------
+
+    def _read_out(self) -> None:
+        if self._process is None:
+            return
+        text = bytes(self._process.readAllStandardOutput().data()).decode("utf-8", "replace")
+        self._text += text
+        *lines, self._out = (self._out + text).split("\n")
+        for line in lines:
+            self._take(line)
+
+    def _read_err(self) -> None:
+        if self._process is None:
+            return
+        text = bytes(self._process.readAllStandardError().data()).decode("utf-8", "replace")
+        *lines, self._err = (self._err + text).split("\n")
+        for line in lines:
+            self._say(line)
+
+    def _take(self, line: str) -> None:
+        if line.startswith("{"):
+            with contextlib.suppress(ValueError):
+                event = json.loads(line)
+                if isinstance(event, dict) and "event" in event:
+                    self.event.emit(event)
+                    return
+        self.said.emit(line)
+
+    def _say(self, line: str) -> None:
+        if line.strip():
+            self._last = line
+            self.said.emit(line)
+
+    def _end(self, code: int, status: QProcess.ExitStatus) -> None:
+        if self._process is None:
+            return
+        self._read_out()
+        self._read_err()
+        self._say(self._err)
+        crashed = status == QProcess.ExitStatus.CrashExit
+        code = 130 if self._stopping and (crashed or code != 0) else code
+        error = ""
+        if code not in (0, 130):
+            error = self._last.removeprefix("error: ") or f"ended with code {code}"
+            if crashed:
+                error = f"the process was killed by signal {code}: {self._last}"
+        self._process.deleteLater()
+        self._process = None
+        self.finished.emit(code, self._text, error)
+
+    def _fail(self, error: QProcess.ProcessError) -> None:
+        if error == QProcess.ProcessError.FailedToStart and self._process is not None:
+            message = self._process.errorString()
+            self._process.deleteLater()
+            self._process = None
+            self.finished.emit(127, "", f"{sys.executable}: cannot be started: {message}")

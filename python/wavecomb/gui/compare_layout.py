@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the pictures of a comparison lie: panes, zoom and pan, which all panes share."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSizeF
+
+SIDE, WIPE, FLIP, DIFFERENCE, THREE = "side", "wipe", "flip", "difference", "three"
+MODES = {
+    SIDE: "Side by side",
+    WIPE: "Wipe",
+    FLIP: "Flip",
+    DIFFERENCE: "Difference",
+    THREE: "A, B and difference",
+}
+A, B, D = "A", "B", "D"
+MOST_ZOOM = 64.0
+
+
+class Layout:
+    """Geometry in device-independent points of the widget.
+
+    Attributes:
+        mode: One of ``MODES``.
+        shown: A or B: which a flip shows.
+        area: Of the widget.
+        size: Of a picture in pixels; of two sizes that of A; None: there is none.
+        gap: Between panes.
+        bar: Height kept free below the difference.
+        zoom: Points per pixel; None: the whole picture.
+        centre: What is in the middle of a pane, as a share of the picture.
+    """
+
+    def __init__(self) -> None:
+        self.mode = SIDE
+        self.shown = A
+        self.area = QRectF(0, 0, 1, 1)
+        self.size: QSizeF | None = None
+        self.gap = 0.0
+        self.bar = 0.0
+        self.zoom: float | None = None
+        self.centre = QPointF(0.5, 0.5)
+
+    def panes(self) -> list[tuple[str, QRectF]]:
+        """What is drawn where."""
+        which = {SIDE: (A, B), WIPE: (A,), FLIP: (self.shown,), DIFFERENCE: (D,), THREE: (A, B, D)}
+        kinds = which[self.mode]
+        gap = self.gap if len(kinds) > 1 else 0.0
+        width = (self.area.width() - gap * (len(kinds) - 1)) / len(kinds)
+        height = max(self.area.height() - (self.bar if D in kinds else 0.0), 1.0)
+        return [(k, QRectF(i * (width + gap), 0, width, height)) for i, k in enumerate(kinds)]
+
+    def pane_at(self, at: QPointF) -> QRectF:
+        """The pane under a point; the first where there is none."""
+        panes = [rect for _, rect in self.panes()]
+        return next((rect for rect in panes if rect.contains(at)), panes[0])
+
+    def points_per_pixel(self) -> float:
+        """The zoom as it is."""
+        if self.zoom is not None or self.size is None:
+            return self.zoom or 1.0
+        pane = self.panes()[0][1]
+        return min(pane.width() / self.size.width(), pane.height() / self.size.height())
+
+    def target(self, pane: QRectF, size: QSizeF | None = None) -> QRectF:
+        """Where a whole picture lies; one of another size has its corner where A has it."""
+        reference = self.size or size or QSizeF(1, 1)
+        scale = self.points_per_pixel()
+        width, height = reference.width() * scale, reference.height() * scale
+        corner = pane.center() - QPointF(self.centre.x() * width, self.centre.y() * height)
+        own = size or reference
+        return QRectF(corner, QSizeF(own.width() * scale, own.height() * scale))
+
+    def share(self, at: QPointF, pane: QRectF) -> QPointF:
+        """A point as a share of the picture in its pane."""
+        target = self.target(pane)
+        offset = at - target.topLeft()
+        return QPointF(offset.x() / target.width(), offset.y() / target.height())
+
+    def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
+        """Column and row under a point."""
+        if self.size is None:
+            return None
+        share = self.share(at, self.pane_at(at))
+        if not (0.0 <= share.x() < 1.0 and 0.0 <= share.y() < 1.0):
+            return None
+        return int(share.x() * self.size.width()), int(share.y() * self.size.height())
+
+    def fit(self) -> None:
+        """The whole picture."""
+        self.zoom, self.centre = None, QPointF(0.5, 0.5)
+
+    def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
+        """So many points per pixel; what is at a point stays there."""
+        pane = self.pane_at(at) if at is not None else None
+        before = self.share(at, pane) if at is not None and pane is not None else None
+        self.zoom = min(max(zoom, 1.0 / MOST_ZOOM), MOST_ZOOM)
+        if before is not None and at is not None and pane is not None:
+            self._centre(self.centre + before - self.share(at, pane))
+
+    def pan(self, dx: float, dy: float) -> None:
+        """By points of the screen."""
+        if self.size is not None:
+            scale = self.zoom = self.points_per_pixel()
+            step = QPointF(dx / (self.size.width() * scale), dy / (self.size.height() * scale))
+            self._centre(self.centre - step)
+
+    def _centre(self, centre: QPointF) -> None:
+        self.centre = QPointF(min(max(centre.x(), 0.0), 1.0), min(max(centre.y(), 0.0), 1.0))

@@ -1,0 +1,391 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The window: puts viewport, bars and panels together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QByteArray, QSettings, Qt, QTimer
+from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QFileDialog,
+    QMainWindow,
+    QMenu,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.about import make_about
+from wavecomb.gui.actions import make_action
+from wavecomb.gui.display_bar import DisplayBar
+from wavecomb.gui.inspector import Inspector
+from wavecomb.gui.menus import CHECKED, MENUS, entries
+from wavecomb.gui.messages import MessageBar
+from wavecomb.gui.panels import make_panels
+from wavecomb.gui.render_bar import RenderBar
+from wavecomb.gui.scene_panel import ScenePanel
+from wavecomb.gui.session import Session, Setup
+from wavecomb.gui.shortcuts import ShortcutsDialog
+from wavecomb.gui.status import StatusLine
+from wavecomb.gui.viewport import Viewport
+
+RECENT = 10
+ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
+_STATE_VERSION = 1
+
+
+class MainWindow(QMainWindow):
+    """The window of `wavecomb view`.
+
+    Args:
+        setup: To begin with.
+        settings: Where the window's state is kept; None: the user's.
+    """
+
+    def __init__(self, setup: Setup | None = None, settings: QSettings | None = None) -> None:
+        super().__init__()
+        self.setObjectName("window")
+        self.settings = settings or QSettings("Wavecomb", "Wavecomb")
+        self.session = Session(setup, self)
+        self.viewport = Viewport(self.session)
+        self.message = MessageBar()
+        self.display = DisplayBar(self.session, self.viewport)
+        self.render_bar = RenderBar(self.session, self)
+        self.inspector = Inspector(self.session)
+        self.status = StatusLine(self.session, self)
+        self.docks: dict[str, QDockWidget] = {}
+        self._save_path: str | None = None
+        self._bottom_sized = False
+        self._dialog: QWidget | None = None
+        self._lay_out()
+        self.actions_by_name: dict[str, QAction] = {}
+        self._make_menus()
+        self._connect()
+        self._restore()
+        self._retitle()
+
+    # ---- parts -----------------------------------------------------------------------------------
+
+    def _lay_out(self) -> None:
+        centre = QWidget()
+        column = QVBoxLayout(centre)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.message)
+        column.addWidget(self.viewport, 1)
+        column.addWidget(self.display)
+        self.setCentralWidget(centre)
+        self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.render_bar)
+        self.setStatusBar(self.status)
+        self.setDockNestingEnabled(True)
+        self.setAcceptDrops(True)
+        self.resize(theme.em(100), theme.em(60))
+        areas = Qt.DockWidgetArea
+        self.setCorner(Qt.Corner.BottomLeftCorner, areas.LeftDockWidgetArea)
+        self.setCorner(Qt.Corner.BottomRightCorner, areas.RightDockWidgetArea)
+        right = Qt.DockWidgetArea.RightDockWidgetArea
+        self._add_dock("inspector", "Pixel", self.inspector, right)
+        for panel in make_panels(self.session):
+            dock = self._add_dock(
+                panel.name, panel.title, panel.widget, panel.area, hidden=panel.hidden
+            )
+            if panel.hidden:
+                dock.visibilityChanged.connect(self._size_bottom)
+        sides = [self.docks["scene"], self.docks["inspector"]]
+        self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
+
+    def _add_dock(
+        self,
+        name: str,
+        title: str,
+        widget: QWidget,
+        area: Qt.DockWidgetArea,
+        *,
+        hidden: bool = False,
+    ) -> QDockWidget:
+        dock = QDockWidget(title, self)
+        dock.setObjectName(f"dock.{name}")
+        dock.setWidget(widget)
+        dock.setHidden(hidden)
+        others = [d for d in self.docks.values() if self.dockWidgetArea(d) == area]
+        self.addDockWidget(area, dock)
+        if others:
+            self.tabifyDockWidget(others[0], dock)
+            if not others[0].isHidden():
+                others[0].raise_()
+        self.docks[name] = dock
+        return dock
+
+    def _size_bottom(self, visible: bool) -> None:
+        """A panel below the picture gets room when shown first, not all that it would like."""
+        if visible and not self._bottom_sized:
+            self._bottom_sized = True
+            shown = [dock for dock in self.docks.values() if dock is self.sender()]
+            high = round(0.42 * self.height())
+            QTimer.singleShot(
+                0, self, lambda: self.resizeDocks(shown, [high], Qt.Orientation.Vertical)
+            )
+
+    def _make_menus(self) -> None:
+        by_name = {entry.name: entry for entry in entries(self)}
+        for title, names in MENUS:
+            menu = self.menuBar().addMenu(title)
+            menu.setObjectName("menu." + title.replace("&", "").lower())
+            menu.setToolTipsVisible(True)
+            for name in names:
+                if name == "-":
+                    menu.addSeparator()
+                elif name == "recent":
+                    self._recent_menu = menu.addMenu("Open &recent")
+                elif name == "theme":
+                    self._add_theme_menu(menu)
+                elif name == "panels":
+                    for dock in self.docks.values():
+                        menu.addAction(dock.toggleViewAction())
+                elif name in by_name:
+                    action = make_action(by_name[name], self, self.viewport)
+                    self.actions_by_name[name] = action
+                    menu.addAction(action)
+        for name in ("pause", "stop", "restart", "region", "clear_region"):
+            self.render_bar.addAction(self.actions_by_name[name])
+        self._fill_recent()
+
+    def _add_theme_menu(self, menu: QMenu) -> None:
+        inner = menu.addMenu("&Colours")
+        group = QActionGroup(self)
+        for choice in theme.CHOICES:
+            action = inner.addAction(choice.capitalize())
+            action.setObjectName(f"theme.{choice}")
+            action.setCheckable(True)
+            action.setChecked(theme.choice() == choice)
+            action.triggered.connect(lambda checked=False, choice=choice: self.set_theme(choice))
+            group.addAction(action)
+
+    @property
+    def scene(self) -> ScenePanel:
+        """The scene panel."""
+        panel = self.docks["scene"].widget()
+        assert isinstance(panel, ScenePanel)
+        return panel
+
+    def _connect(self) -> None:
+        session, viewport = self.session, self.viewport
+        self.scene.frame_wanted.connect(viewport.frame_selected)
+        for told in (session.failed, viewport.failed):
+            told.connect(self.message.show_error)
+        session.warned.connect(self.message.show_warning)
+        session.opened.connect(lambda stage: self._opened())
+        session.busy.connect(self._busy)
+        session.state_changed.connect(self._state_changed)
+        session.setup_changed.connect(self._setup_changed)
+        session.saved.connect(lambda path: self.status.showMessage(f"wrote {path}", 5000))
+        viewport.hovered.connect(self.inspector.hover)
+        viewport.picked.connect(self.inspector.pick)
+        viewport.region_mode_changed.connect(self.actions_by_name["region"].setChecked)
+        self._state_changed(session.state)
+        self._setup_changed(session.setup)
+
+    # ---- stages ----------------------------------------------------------------------------------
+
+    def open(
+        self,
+        path: str | os.PathLike[str],
+        camera: str | None = None,
+        time: float | None = None,
+        variants: Mapping[str, str] | None = None,
+        purposes: tuple[str, ...] | None = None,
+    ) -> None:
+        """Reads a stage."""
+        self.message.hide()
+        self.session.open(path, camera, time, variants, purposes)
+
+    def ask_open(self) -> None:
+        """Lets the user choose a file."""
+        folder = str(self.session.path.parent) if self.session.path is not None else ""
+        kinds = " ".join(f"*{ending}" for ending in ENDINGS)
+        path, _ = QFileDialog.getOpenFileName(self, "Open a stage", folder, f"USD ({kinds})")
+        if path:
+            self.open(path)
+
+    def reload(self) -> None:
+        """Reads the stage from the disk again."""
+        self.message.hide()
+        self.session.reload()
+
+    def recent(self) -> list[str]:
+        """Files that were opened, the last first."""
+        value: Any = self.settings.value("recent", [])
+        return [value] if isinstance(value, str) else [str(path) for path in value or []]
+
+    def _opened(self) -> None:
+        path = self.session.path
+        if path is not None:
+            name = str(path.resolve())
+            others = [other for other in self.recent() if other != name]
+            self.settings.setValue("recent", [name, *others][:RECENT])
+            self._fill_recent()
+        self._retitle()
+
+    def _fill_recent(self) -> None:
+        self._recent_menu.clear()
+        names = self.recent()
+        self._recent_menu.setEnabled(bool(names))
+        for name in names:
+            action = self._recent_menu.addAction(name.replace("&", "&&"))
+            action.triggered.connect(lambda checked=False, name=name: self.open(name))
+
+    def _retitle(self) -> None:
+        path = self.session.path
+        self.setWindowTitle("Wavecomb" if path is None else f"{path.name} \u2014 Wavecomb")
+
+    def _busy(self, what: str) -> None:
+        if self.session.stage is None:
+            self.viewport.set_message(f"{what} \u2026" if what else "")
+            if not what:
+                self.viewport.set_message()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Takes files that are stages."""
+        if self._dropped(event):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Opens the first of them."""
+        paths = self._dropped(event)
+        if paths:
+            event.acceptProposedAction()
+            self.open(paths[0])
+
+    def _dropped(self, event: QDropEvent) -> list[str]:
+        paths = [url.toLocalFile() for url in event.mimeData().urls()]
+        return [path for path in paths if path.lower().endswith(ENDINGS)]
+
+    # ---- the picture -----------------------------------------------------------------------------
+
+    def save(self) -> None:
+        """To the file of the last time."""
+        if self._save_path is None:
+            self.save_as()
+        else:
+            self.save_to(self._save_path)
+
+    def save_as(self) -> None:
+        """Lets the user choose a file."""
+        path = self.session.path
+        start = str(path.with_suffix(".exr")) if path is not None else "picture.exr"
+        name, chosen = QFileDialog.getSaveFileName(
+            self, "Save the picture", start, "OpenEXR, all layers (*.exr);;PNG, as shown (*.png)"
+        )
+        if name:
+            if not Path(name).suffix:
+                name += ".png" if "png" in chosen else ".exr"
+            self.save_to(name)
+
+    def save_to(self, path: str) -> None:
+        """Writes .exr (all layers) or .png (as shown)."""
+        self._save_path = path
+        self.session.save(path, self.viewport.look)
+
+    def toggle_pause(self) -> None:
+        """Stands still, goes on, or begins again."""
+        if self.session.state == "rendering":
+            self.session.pause()
+        else:
+            self.session.resume()
+
+    def fit_size(self) -> None:
+        """Renders at the size of the viewport, a pixel for each of the screen."""
+        ratio = self.viewport.devicePixelRatioF()
+        wide, high = self.viewport.width() * ratio, self.viewport.height() * ratio
+        self.session.change(width=round(wide), height=round(high))
+        self.viewport.set_zoom(None)
+
+    def look_through_camera(self) -> None:
+        """The stage's own camera."""
+        stage = self.session.stage
+        if stage is not None and (stage.camera_path or stage.cameras):
+            self.session.use_camera(stage.camera_path or stage.cameras[0])
+
+    def _state_changed(self, state: str) -> None:
+        pause = self.actions_by_name["pause"]
+        pause.setText({"paused": "&Go on", "stopped": "&Go on"}.get(state, "&Pause"))
+        pause.setEnabled(state in ("rendering", "paused", "stopped"))
+        self.actions_by_name["stop"].setEnabled(state in ("rendering", "paused"))
+        self.actions_by_name["restart"].setEnabled(self.session.stage is not None)
+
+    def _setup_changed(self, setup: Setup) -> None:
+        self.actions_by_name["clear_region"].setEnabled(setup.region is not None)
+
+    # ---- help, colours, state --------------------------------------------------------------------
+
+    def set_theme(self, choice: str) -> None:
+        """Dark, light, or as the system has it."""
+        theme.apply(choice)
+        self.settings.setValue("theme", choice)
+
+    def show_shortcuts(self) -> None:
+        """The list of keys."""
+        self._open_dialog(ShortcutsDialog(self))
+
+    def show_about(self) -> None:
+        """Versions."""
+        self._open_dialog(make_about(self))
+
+    def _open_dialog(self, dialog: QWidget) -> None:
+        if self._dialog is not None:
+            self._dialog.close()
+        self._dialog = dialog
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.destroyed.connect(self._dialog_gone)
+        dialog.show()
+
+    def _dialog_gone(self) -> None:
+        self._dialog = None
+
+    def show_compare(self) -> None:
+        """The window in which pictures and settings are compared."""
+        dock = self.docks["compare"]
+        if not self._bottom_sized and dock.isHidden():
+            dock.setFloating(True)
+            dock.resize(round(0.8 * self.width()), round(0.8 * self.height()))
+        dock.show()
+        dock.raise_()
+        dock.activateWindow()
+
+    def toggle_full_screen(self) -> None:
+        """All of the screen, or not."""
+        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
+
+    def reset_layout(self) -> None:
+        """All panels where they were at first."""
+        self.restoreState(self._first_state, _STATE_VERSION)
+
+    def _restore(self) -> None:
+        self._first_state = self.saveState(_STATE_VERSION)
+        geometry, state = self.settings.value("geometry"), self.settings.value("state")
+        if isinstance(geometry, QByteArray):
+            self.restoreGeometry(geometry)
+        if isinstance(state, QByteArray):
+            self._bottom_sized = True
+            self.restoreState(state, _STATE_VERSION)
+        self.display.restore(self.settings)
+        for name in CHECKED:
+            self.actions_by_name[name].setChecked(False)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Keeps the state, ends the threads."""
+        self.settings.setValue("geometry", self.saveGeometry())
+        self.settings.setValue("state", self.saveState(_STATE_VERSION))
+        self.display.keep(self.settings)
+        for dock in self.docks.values():
+            close = getattr(dock.widget(), "shutdown", None)
+            if close is not None:
+                close()
+        self.viewport.close_threads()
+        self.session.shutdown()
+        super().closeEvent(event)

@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials of the scene, with their parameters edited live."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFormLayout,
+    QHeaderView,
+    QLabel,
+    QScrollArea,
+    QSplitter,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.value_fields import (
+    UNIT,
+    ColourField,
+    DrivenField,
+    Field,
+    NumberField,
+    Range,
+    swatch,
+)
+
+if TYPE_CHECKING:
+    from wavecomb._core import Scene
+    from wavecomb.gui.scene_edits import SceneEdits
+    from wavecomb.usd.parameters import Parameter
+
+RANGES = {
+    "emission": Range(0.0, 1e6, 0.0, 10.0),
+    "ior": Range(0.01, 100.0, 1.0, 3.0),
+    "conductor_eta": Range(0.0, 100.0, 0.0, 5.0),
+    "conductor_k": Range(0.0, 100.0, 0.0, 10.0),
+}
+"""Of parameters that are not within 0 and 1."""
+
+LABELS = {"ior": "index of refraction", "conductor_eta": "eta", "conductor_k": "k"}
+NAME, PROGRAM, RECORDS, COST = range(4)
+HEADERS = ("Material", "Program", "Records", "ns")
+TIPS = (
+    "Prim of the material",
+    "Shading code that it runs",
+    "Hits that were shaded with it (statistics: records)",
+    "Nanoseconds for each of them, measured (statistics: ns_per_record)",
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the list: a prim, or a material that the loader made.
+
+    Attributes:
+        path: The prim, "" where there is none.
+        name: For people.
+        program: Its shading code.
+        ids: Materials of the scene.
+    """
+
+    path: str
+    name: str
+    program: str
+    ids: tuple[int, ...]
+
+
+def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
+    """One row for each prim, and for each material without one."""
+    by_path: dict[str, list[int]] = {}
+    for number, path in enumerate(paths):
+        by_path.setdefault(path or f"#{number}", []).append(number)
+    out = []
+    for key, ids in by_path.items():
+        name, program = scene.materials[ids[0]]
+        path = "" if key.startswith("#") else key
+        out.append(Row(path, path.rpartition("/")[2] or name or "material", program, tuple(ids)))
+    return out
+
+
+class MaterialsModel(QAbstractTableModel):
+    """The list."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.rows: list[Row] = []
+        self.colours: list[tuple[float, float, float]] = []
+        self._figures: list[dict[str, Any]] = []
+
+    def fill(self, rows: list[Row], colours: list[tuple[float, float, float]]) -> None:
+        """Other rows."""
+        self.beginResetModel()
+        self.rows, self.colours, self._figures = rows, colours, []
+        self.endResetModel()
+
+    def recolour(self, colours: list[tuple[float, float, float]]) -> None:
+        """Swatches after an edit."""
+        if colours != self.colours:
+            self.colours = colours
+            self._tell(NAME, NAME)
+
+    def count(self, figures: list[dict[str, Any]]) -> None:
+        """Records and costs: ``materials`` of the statistics."""
+        self._figures = figures
+        self._tell(RECORDS, COST)
+
+    def _tell(self, first: int, last: int) -> None:
+        if self.rows:
+            self.dataChanged.emit(self.index(0, first), self.index(len(self.rows) - 1, last))
+
+    def rowCount(self, parent: Any = None) -> int:
+        """As Qt has it."""
+        return 0 if parent is not None and parent.isValid() else len(self.rows)
+
+    def columnCount(self, parent: Any = None) -> int:
+        """As Qt has it."""
+        return len(HEADERS)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """As Qt has it."""
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
+            return HEADERS[section]
+        return TIPS[section] if role == Qt.ItemDataRole.ToolTipRole else None
+
+    def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """As Qt has it."""
+        row, column = self.rows[index.row()], index.column()
+        if role == Qt.ItemDataRole.DisplayRole:
+            if column == NAME:
+                return row.name
+            return row.program if column == PROGRAM else self._figure(row, column)
+        if role == Qt.ItemDataRole.DecorationRole and column == NAME:
+            return swatch(self.colours[index.row()], theme.em(1))
+        if role == Qt.ItemDataRole.ToolTipRole:
+            more = f"\n{len(row.ids)} of them: meshes bring values" if len(row.ids) > 1 else ""
+            return (row.path or "made by the loader: of a display colour") + more
+        if role == Qt.ItemDataRole.TextAlignmentRole and column in (RECORDS, COST):
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        return None
+
+    def _figure(self, row: Row, column: int) -> str:
+        known = [self._figures[i] for i in row.ids if i < len(self._figures)]
+        records = sum(one["records"] for one in known)
+        if column == RECORDS:
+            return f"{records:,}" if known else ""
+        timed = sum(one["timed_records"] for one in known)
+        spent = sum(one["timed_records"] * one["ns_per_record"] for one in known)
+        return f"{spent / timed:.0f}" if timed else ""
+
+
+class MaterialsPanel(QWidget):
+    """The list above, the parameters of the chosen one below."""
+
+    def __init__(self, edits: SceneEdits, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._edits = edits
+        self._session = edits.session
+        self._row: Row | None = None
+        self._parameters: dict[str, Parameter] = {}
+        self.fields: dict[str, Field] = {}
+        self.model = MaterialsModel(self)
+        self.view = QTableView()
+        self._make_view()
+        self.form = QScrollArea()
+        self.form.setObjectName("material-form")
+        self.form.setWidgetResizable(True)
+        self.form.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
+        splitter = QSplitter(Qt.Orientation.Vertical)
+        splitter.addWidget(self.view)
+        splitter.addWidget(self.form)
+        splitter.setSizes([theme.em(14), theme.em(18)])
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(splitter)
+        edits.scene_changed.connect(self._fill)
+        self._session.statistics.connect(lambda figures: self.model.count(figures["materials"]))
+        edits.changed.connect(self._on_changed)
+        self._fill()
+
+    def _make_view(self) -> None:
+        view = self.view
+        view.setModel(self.model)
+        view.setObjectName("materials")
+        view.setAccessibleName("Materials")
+        view.setToolTip("Materials that are in use")
+        view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        view.setTabKeyNavigation(False)
+        view.setShowGrid(False)
+        view.setAlternatingRowColors(True)
+        view.verticalHeader().hide()
+        view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
+        header = view.horizontalHeader()
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        for column, wide in ((PROGRAM, 5.5), (RECORDS, 6), (COST, 3)):
+            header.resizeSection(column, theme.em(wide))
+        view.selectionModel().currentRowChanged.connect(lambda now, before: self._on_row(now))
+
+    # ---- what is chosen ------------------------------------------------------------------------
+
+    def choose(self, path: str) -> None:
+        """Chooses the material of a prim, if it is in use."""
+        for number, row in enumerate(self.model.rows):
+            if row.path == path:
+                self.view.selectRow(number)
+                return
+
+    def choose_id(self, material: int) -> None:
+        """Chooses a material by its number in the scene."""
+        for number, row in enumerate(self.model.rows):
+            if material in row.ids:
+                self.view.selectRow(number)
+                return
+
+    @property
+    def chosen(self) -> Row | None:
+        """The row that is chosen."""
+        return self._row
+
+    # ---- rows ----------------------------------------------------------------------------------
+
+    def _colours(self, rows: list[Row]) -> list[tuple[float, float, float]]:
+        scene = self._session.scene
+        if scene is None:
+            return [(0.0, 0.0, 0.0)] * len(rows)
+        out = []
+        for row in rows:
+            values = scene.material(row.ids[0])
+            name = "emission" if row.program == "emissive" else "base_color"
+            r, g, b = values[name]
+            out.append((r, g, b))
+        return out
+
+    def _fill(self) -> None:
+        stage = self._edits.stage
+        rows: list[Row] = []
+        if stage is not None and self._edits.edits is not None:
+            rows = rows_of(stage.scene, stage.material_paths)
+        before = self._row
+        self.model.fill(rows, self._colours(rows))
+        again = None
+        if before is not None:
+            same = [
+                i
+                for i, row in enumerate(rows)
+                if (row.path, row.name) == (before.path, before.name)
+            ]
+            again = same[0] if same else None
+        if again is None and rows:
+            again = 0
+        self._row = None
+        if again is None:
+            self._show(None)
+        else:
+            self.view.selectRow(again)
+
+    def _on_row(self, index: QModelIndex) -> None:
+        self._show(self.model.rows[index.row()] if index.isValid() else None)
+
+    # ---- parameters ----------------------------------------------------------------------------
+
+    def _show(self, row: Row | None) -> None:
+        """Makes the fields of a material."""
+        self._row = row
+        self.fields = {}
+        self._parameters = {}
+        inner = QWidget()
+        form = QFormLayout(inner)
+        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        if row is None:
+            form.addRow(QLabel("No stage is open"))
+        else:
+            title = QLabel(row.path or f"{row.name}: made by the loader")
+            title.setObjectName("material-title")
+            title.setWordWrap(True)
+            title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            form.addRow(title)
+            self._parameters = self._edits.parameters(row.path) if row.path else {}
+            for slot, parameter in self._parameters.items():
+                form.addRow(LABELS.get(slot, slot.replace("_", " ")), self._field(row, parameter))
+            if not self._parameters:
+                form.addRow(QLabel("Nothing to edit: no material prim is there for it."))
+        self.form.setWidget(inner)
+        self._on_changed()
+
+    def _field(self, row: Row, parameter: Parameter) -> QWidget:
+        slot = parameter.slot
+        name = slot.replace("_", " ")
+        if parameter.driven_by:
+            return DrivenField(name, parameter.driven_by)
+        bounds = RANGES.get(slot, UNIT)
+        wide = isinstance(parameter.value, tuple)
+        field = ColourField(name, bounds) if wide else NumberField(name, bounds)
+        field.setToolTip(_tip(parameter))
+        field.changed.connect(partial(self._edits.set_parameter, row.path, slot))
+        field.reset.connect(partial(self._edits.set_parameter, row.path, slot, None))
+        self.fields[slot] = field
+        return field
+
+    def _on_changed(self) -> None:
+        """Brings fields and swatches up to what the stage says now."""
+        self.model.recolour(self._colours(self.model.rows))
+        row = self._row
+        if row is None or not row.path:
+            return
+        now = self._edits.parameters(row.path)
+        for slot, field in self.fields.items():
+            parameter = now.get(slot)
+            if parameter is None or parameter.driven_by:
+                continue
+            value = self._edits.parameter_value(row.path, parameter)
+            if isinstance(field, (ColourField, NumberField)) and _differs(field.value(), value):
+                field.set_value(value)
+            field.set_edited(self._edits.is_edited(row.path, parameter))
+
+
+def _differs(shown: Any, value: Any) -> bool:
+    """Whether a field must be set anew: not for rounding, which would take the cursor away."""
+    if isinstance(value, tuple):
+        return any(abs(a - b) > 1e-6 * max(1.0, abs(b)) for a, b in zip(shown, value, strict=True))
+    return bool(abs(shown - value) > 1e-6 * max(1.0, abs(value)))
+
+
+def _tip(parameter: Parameter) -> str:
+    if parameter.attribute is not None:
+        return f"Edits {parameter.attribute}"
+    return f"In the picture only, edits of it cannot be saved: {parameter.reason}"

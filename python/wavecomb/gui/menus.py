@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the window's actions are and which menu they stand in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wavecomb.gui.actions import Entry, keypad
+
+if TYPE_CHECKING:
+    from wavecomb.gui.main_window import MainWindow
+
+MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (
+        "&File",
+        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_edits", "-", "quit"),
+    ),
+    ("&Edit", ("undo", "redo")),
+    (
+        "&Render",
+        ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise"),
+    ),
+    (
+        "&Camera",
+        ("frame", "frame_all", "stage_camera", "-", "front", "right", "top", "opposite"),
+    ),
+    (
+        "&Picture",
+        (
+            "brighter", "darker", "exposure_0", "-", "next_layer", "last_layer", "beauty", "-",
+            "fit", "full", "zoom_in", "zoom_out",
+        ),
+    ),
+    (
+        "&View",
+        (
+            "panels", "-", "compare", "keep_a", "keep_b", "-",
+            "theme", "full_screen", "reset_layout",
+        ),
+    ),
+    ("&Help", ("shortcuts", "about")),
+)  # fmt: skip
+"""Title and names; "-": a line."""
+CHECKED = ("region",)
+
+
+def entries(window: MainWindow) -> list[Entry]:
+    """All actions."""
+    viewport, display, session = window.viewport, window.display, window.session
+    scene = window.scene
+
+    def view(name: str, digit: int) -> Entry:
+        return Entry(
+            name, f"From the {name}", lambda: viewport.view_from(name), keypad(digit), local=True
+        )
+
+    def expose(by: float) -> None:
+        display.set_exposure(viewport.look.exposure + by)
+
+    return [
+        Entry("open", "&Open\u2026", window.ask_open, ["Ctrl+O"], "Open a USD stage"),
+        Entry(
+            "reload", "Re&load", window.reload, ["Ctrl+R"],
+            "Read the stage from the disk again; edits made here are dropped",
+        ),
+        Entry("save", "&Save", window.save, ["Ctrl+S"], "Write the picture to the same file"),
+        Entry(
+            "save_as", "Save &as\u2026", window.save_as, ["Ctrl+Shift+S"],
+            "Write all layers (EXR) or what is shown (PNG)",
+        ),
+        Entry(
+            "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
+            "Write what was edited as a small USD layer over the stage",
+        ),
+        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Take the last edit back"),
+        Entry(
+            "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
+            "Make the edit again that was taken back",
+        ),
+        Entry("quit", "&Quit", window.close, ["Ctrl+Q"]),
+        Entry(
+            "pause", "&Pause", window.toggle_pause, ["Space"], "Stand still, or go on", local=True
+        ),
+        Entry("stop", "S&top", session.stop, ["Ctrl+."], "End the render; the picture stays"),
+        Entry("restart", "&Restart", session.restart, ["F5"], "Begin again from the first sample"),
+        Entry(
+            "region", "Re&gion", viewport.set_region_mode, ["Ctrl+B"],
+            "Drag a rectangle: only that is rendered", checkable=True,
+        ),
+        Entry(
+            "clear_region", "&Whole picture", viewport.clear_region, ["Ctrl+Alt+B"],
+            "Render all of the picture again",
+        ),
+        Entry(
+            "fit_size", "Si&ze of the viewport", window.fit_size, ["Ctrl+Shift+F"],
+            "Render as many pixels as the viewport has",
+        ),
+        Entry(
+            "denoise", "&Denoise on, off", window.render_bar.denoise.toggle, ["Shift+D"],
+            "By Open Image Denoise",
+        ),
+        Entry("frame", "&Frame selected", viewport.frame_selected, ["F"], local=True),
+        Entry("frame_all", "Frame &all", viewport.frame_all, ["Home", "A"], local=True),
+        Entry(
+            "stage_camera", "The stage's &camera", window.look_through_camera, keypad(0), local=True
+        ),
+        view("front", 1),
+        view("right", 3),
+        view("top", 7),
+        Entry("opposite", "From the other side", viewport.view_opposite, keypad(9), local=True),
+        Entry("brighter", "&Brighter", lambda: expose(0.5), ["]"], "Half a stop", local=True),
+        Entry("darker", "&Darker", lambda: expose(-0.5), ["["], "Half a stop", local=True),
+        Entry(
+            "exposure_0", "Exposure &0", lambda: display.set_exposure(0.0), ["\\"], local=True
+        ),
+        Entry("next_layer", "&Next layer", lambda: display.step_layer(1), ["."], local=True),
+        Entry("last_layer", "&Last layer", lambda: display.step_layer(-1), [","], local=True),
+        Entry("beauty", "Bea&uty", lambda: display.choose_layer("beauty"), ["B"], local=True),
+        Entry("fit", "&Fit the picture", lambda: viewport.set_zoom(None), ["Ctrl+0"]),
+        Entry("full", "&100 %", lambda: viewport.set_zoom(1.0), ["Ctrl+1"]),
+        Entry(
+            "zoom_in", "Zoom &in", lambda: viewport.set_zoom(2.0 * viewport.zoom()),
+            ["Ctrl++", "Ctrl+="],
+        ),
+        Entry(
+            "zoom_out", "Zoom &out", lambda: viewport.set_zoom(0.5 * viewport.zoom()), ["Ctrl+-"]
+        ),
+        Entry(
+            "compare", "&Compare\u2026", window.show_compare, ["Ctrl+D"],
+            "Two pictures or two live settings, side by side or with a wipe",
+        ),
+        *(
+            Entry(
+                f"keep_{which.lower()}", f"Keep as &{which}",
+                lambda which=which: window.docks["compare"].widget().keep(which),
+                [f"Ctrl+Shift+{which}"],
+                f"The picture as it is now becomes {which} of Compare",
+            )
+            for which in "AB"
+        ),
+        Entry("full_screen", "F&ull screen", window.toggle_full_screen, ["F11"]),
+        Entry("reset_layout", "&Reset the panels", window.reset_layout),
+        Entry("shortcuts", "&Keyboard shortcuts", window.show_shortcuts, ["F1"]),
+        Entry("about", "&About Wavecomb", window.show_about),
+    ]  # fmt: skip

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How errors reach a person: a line that stays until it is read, never a traceback."""
+
+from __future__ import annotations
+
+import datetime
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+
+from PySide6.QtCore import QObject, QStandardPaths, Qt, QTimer, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.widgets import named
+
+WARNING_MS = 12000
+
+
+class MessageBar(QFrame):
+    """A line over the picture: an error until it is closed, a warning for a while."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("message")
+        self.setFrameShape(QFrame.Shape.StyledPanel)
+        self.setAutoFillBackground(True)
+        self._label = named(QLabel(), "message.text", "Message", "")
+        self._label.setWordWrap(True)
+        self._label.setTextInteractionFlags(
+            Qt.TextInteractionFlag.TextSelectableByMouse
+            | Qt.TextInteractionFlag.TextSelectableByKeyboard
+        )
+        self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        close = named(QToolButton(), "message.close", "Close the message", "Close (Esc)")
+        close.setText("\u2715")
+        close.setAutoRaise(True)
+        close.clicked.connect(self.hide)
+        row = QHBoxLayout(self)
+        pad = theme.em(0.4)
+        row.setContentsMargins(2 * pad, pad, pad, pad)
+        row.addWidget(self._label, 1)
+        row.addWidget(close, 0, Qt.AlignmentFlag.AlignTop)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self.hide)
+        self._is_error = False
+        theme.on_change(self._colour)
+        self.hide()
+
+    def text(self) -> str:
+        """What it says; "" while it is hidden."""
+        return self._label.text() if not self.isHidden() else ""
+
+    def show_error(self, message: str) -> None:
+        """Stays until it is closed or replaced."""
+        self._timer.stop()
+        self._show("Error: " + message, True)
+
+    def show_warning(self, message: str) -> None:
+        """Goes by itself; never in place of an error."""
+        if self._is_error and not self.isHidden():
+            return
+        self._show(message, False)
+        self._timer.start(WARNING_MS)
+
+    def _show(self, message: str, is_error: bool) -> None:
+        self._is_error = is_error
+        self._label.setText(" ".join(message.split()))
+        self._colour()
+        self.show()
+
+    def _colour(self) -> None:
+        colour = theme.error() if self._is_error else theme.warning()
+        self._label.setStyleSheet(f"color: {colour.name()};")
+
+
+class _Reporter(QObject):
+    """Brings what was caught on any thread to the UI thread."""
+
+    caught = Signal(str)
+
+
+def log_folder() -> Path:
+    """Where reports of faults are written."""
+    place = QStandardPaths.StandardLocation.AppLocalDataLocation
+    return Path(QStandardPaths.writableLocation(place))
+
+
+def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
+    """Faults of our own become one line for ``tell`` and a file to report, on any thread.
+
+    Returns:
+        What takes the hooks away again.
+    """
+    reporter = _Reporter()
+    reporter.caught.connect(tell, Qt.ConnectionType.QueuedConnection)
+    before, before_threads = sys.excepthook, threading.excepthook
+
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if issubclass(kind, KeyboardInterrupt):
+            before(kind, error, trace)
+            return
+        reporter.caught.emit(fault_line(error, write_report(kind, error, trace)))
+
+    def thread_hook(details: threading.ExceptHookArgs) -> None:
+        if details.exc_value is not None:
+            hook(details.exc_type, details.exc_value, details.exc_traceback)
+
+    sys.excepthook, threading.excepthook = hook, thread_hook
+
+    def remove() -> None:
+        sys.excepthook, threading.excepthook = before, before_threads
+        reporter.deleteLater()
+
+    return remove
+
+
+def fault_line(error: BaseException, report: Path | None) -> str:
+    """What to say of a fault of our own."""
+    from wavecomb.cli.group import describe
+
+    core = describe(error) if isinstance(error, Exception) else str(error)
+    if not core.startswith("internal:"):
+        return core
+    where = f"; please report it with {report}" if report is not None else "; please report it"
+    return f"internal: {type(error).__name__}: {' '.join(str(error).split())}{where}"
+
+
+def write_report(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> Path | None:
+    """The traceback into a file that can be sent; None where none can be written."""
+    from wavecomb.version import version
+
+    now = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    text = "".join(traceback.format_exception(kind, error, trace))
+    try:
+        folder = log_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"fault-{now}.txt"
+        with path.open("a", encoding="utf-8") as file:
+            file.write(f"wavecomb {version()}\n{text}\n")
+    except OSError:
+        return None
+    return path

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which panels the window has, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+
+from wavecomb.gui.bench_panel import BenchPanel
+from wavecomb.gui.compare_window import CompareWindow
+from wavecomb.gui.plots_panel import PlotsPanel
+from wavecomb.gui.scene_panel import ScenePanel
+from wavecomb.gui.scheduling_panel import SchedulingPanel
+from wavecomb.gui.session import Session
+
+_LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
+_RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
+_BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel of the window.
+
+    Attributes:
+        name: For its state.
+        title: For people.
+        widget: Takes part in the session.
+        area: Where its dock is at first.
+        hidden: Whether it waits in the View menu at first.
+    """
+
+    name: str
+    title: str
+    widget: QWidget
+    area: Qt.DockWidgetArea
+    hidden: bool = False
+
+
+def make_panels(session: Session) -> list[Panel]:
+    """All of them."""
+    compare, bench = CompareWindow(session), BenchPanel(session)
+    bench.compare.connect(compare.compare)
+    return [
+        Panel("scene", "Scene", ScenePanel(session), _LEFT),
+        Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),
+        Panel("plots", "Plots", PlotsPanel(session), _BOTTOM, hidden=True),
+        Panel("bench", "Bench", bench, _BOTTOM, hidden=True),
+        Panel("compare", "Compare", compare, _BOTTOM, hidden=True),
+    ]

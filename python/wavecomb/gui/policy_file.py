@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scheduling policies of a researcher's own, from a Python file; no Qt."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import sys
+import traceback
+import types
+from pathlib import Path
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.scheduling import SchedulingPolicy, check_policy
+
+
+def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
+    """One object of each SchedulingPolicy that the file defines, in the order of the file.
+
+    The file is run. It is run anew each time, so an edited file can be loaded again.
+
+    Raises:
+        WavecombError: It cannot be read or run, or has no policy that could serve; one line that
+            names the file and, where it is known, the line in it.
+    """
+    path = Path(path)
+    module = _run(path)
+    classes = [
+        value
+        for value in vars(module).values()
+        if inspect.isclass(value)
+        and issubclass(value, SchedulingPolicy)
+        and value.__module__ == module.__name__
+    ]
+    if not classes:
+        raise WavecombError(
+            f"{path}: defines no policy; write class Mine(wavecomb.SchedulingPolicy) with a method "
+            "order(self, queue, costs, keys)"
+        )
+    return [_made(kind, path) for kind in dict.fromkeys(classes)]
+
+
+class OwnPolicy(SchedulingPolicy):
+    """A loaded policy for a live render: what its ``order`` raises is told in one line.
+
+    Attributes:
+        path: Its file.
+        policy: What was loaded.
+    """
+
+    def __init__(self, policy: SchedulingPolicy, path: str | os.PathLike[str], name: str) -> None:
+        self.policy = policy
+        self.path = os.fspath(path)
+        self.name = name
+        self.columns = policy.columns  # type: ignore[misc]
+
+    def order(self, queue: Any, costs: Any, keys: Any) -> bool | None:
+        """Passes on to the policy."""
+        try:
+            return self.policy.order(queue, costs, keys)
+        except Exception as error:
+            message = describe_failure(error, self.path)
+            raise WavecombError(f"{message}; mend it and load it again") from error
+
+
+def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
+    """One line that says what went wrong in a policy, and where in its file if it was there."""
+    name = os.fspath(path)
+    if isinstance(error, SyntaxError):
+        line = error.lineno
+    else:
+        frames = traceback.extract_tb(error.__traceback__)
+        line = next((one.lineno for one in reversed(frames) if one.filename == name), None)
+    text = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
+    what = f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return f"{name}{f', line {line}' if line else ''}: {what}"
+
+
+def first_line(policy: SchedulingPolicy) -> str:
+    """What its docstring says in the first line; its name where there is none."""
+    text = vars(type(policy)).get("__doc__") or ""
+    return text.strip().splitlines()[0] if text.strip() else policy.name
+
+
+def _run(path: Path) -> types.ModuleType:
+    try:
+        source = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise WavecombError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise WavecombError(f"{path}: is no text in UTF-8; choose a Python file") from None
+    module = types.ModuleType(f"wavecomb_policy_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # dataclasses and pickle look there
+    try:
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        sys.modules.pop(module.__name__, None)
+        raise WavecombError(describe_failure(error, path)) from error
+    return module
+
+
+def _made(kind: Any, path: Path) -> SchedulingPolicy:
+    try:
+        policy = kind()
+    except Exception as error:
+        raise WavecombError(describe_failure(error, path)) from error
+    if kind.order is SchedulingPolicy.order:
+        raise WavecombError(f"{path}: {kind.__name__} has no method order(queue, costs, keys)")
+    try:
+        check_policy(policy)
+    except WavecombError as error:
+        raise WavecombError(f"{path}: {error}") from None
+    return policy

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a live render is asked for: the core's settings, and what only a window has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+from wavecomb import aovs as aov_names
+from wavecomb.errors import WavecombError
+from wavecomb.scheduling import POLICIES
+
+if TYPE_CHECKING:
+    from wavecomb._core import Settings
+    from wavecomb.costs import Profile
+    from wavecomb.scheduling import SchedulingPolicy
+
+Region = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Settings of a live render. Fields are those of ``wavecomb.Settings`` but for the last ones.
+
+    Attributes:
+        aovs: Layers to keep beside the beauty, names of docs/aovs.md.
+        denoise: Whether frames come denoised, too.
+        region: x0, y0, x1, y1 in pixels, end excluded: only these are rendered; None: all.
+        own_policy: A policy in Python, in place of ``policy``.
+        profile: Costs to start from, as ``wavecomb.costs.load_costs`` reads them.
+    """
+
+    width: int = 600
+    height: int = 600
+    spp: int = 64
+    max_depth: int = 8
+    seed: int = 0
+    sampler: str = "sobol"
+    filter: str = "blackman-harris"
+    filter_width: float = 3.0
+    roulette: str = "throughput"
+    roulette_depth: int = 2
+    clamp_indirect: float = 0.0
+    fresnel: str = "exact"
+    cosine_sampling: bool = False
+    integrator: str = "wavefront"
+    adaptive: float = 0.0
+    noise: float = 0.0
+    min_spp: int = 16
+    time_limit: float = 0.0
+    error: bool = False
+    threads: int = 0
+    wave_size: int = 0
+    lanes: int = 0
+    traversal: str = "packets"
+    policy: str = "program"
+    materialize: str = "auto"
+    ray_order: str = "auto"
+    shadow_order: str = "auto"
+    costs: str = "auto"
+    cost_weight: float = 0.3
+    aovs: tuple[str, ...] = aov_names.DEFAULT
+    denoise: bool = False
+    region: Region | None = None
+    own_policy: SchedulingPolicy | None = None
+    profile: Profile | None = None
+
+    def changed(self, **values: Any) -> Setup:
+        """With other values, checked.
+
+        Raises:
+            WavecombError: A field is not known.
+            wavecomb._core.Error: A value is no good.
+        """
+        known = {field.name for field in fields(self)}
+        unknown = sorted(set(values) - known)
+        if unknown:
+            raise WavecombError(f"no setting {unknown[0]!r}; there are {', '.join(sorted(known))}")
+        if "aovs" in values:
+            values["aovs"] = aov_names.expand(values["aovs"])
+        if values.keys() & {"width", "height"} and "region" not in values:
+            values["region"] = None
+        new = replace(self, **values)
+        if new.policy not in POLICIES:
+            raise WavecombError(f"no policy {new.policy!r}; there are {', '.join(POLICIES)}")
+        new.settings()
+        return new
+
+    def layers(self) -> tuple[str, ...]:
+        """AOVs to render: those asked for and those that the denoiser needs."""
+        guides = aov_names.GUIDES if self.denoise else ()
+        return aov_names.with_guides(aov_names.expand(self.aovs), guides)
+
+    def settings(self, scale: int = 1, *, preview: bool = False) -> Settings:
+        """The core's settings, checked.
+
+        Args:
+            scale: Edges are divided by it.
+            preview: One sample a pixel and no more.
+
+        Raises:
+            WavecombError, wavecomb._core.Error: A value is no good; one line.
+        """
+        from wavecomb.api import make_settings
+
+        own = {"width", "height", "spp", "aovs", "denoise", "region", "own_policy", "profile"}
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in own}
+        if self.region is not None:
+            values["region"] = scaled_region(self.region, scale, self.width, self.height)
+        if preview:
+            # Measuring what materials cost would take longer than the picture.
+            values |= {"adaptive": 0.0, "noise": 0.0, "time_limit": 0.0, "costs": "model"}
+        else:
+            values["progressive"] = True
+        size = scaled_size(self.width, self.height, scale)
+        return make_settings(size, 1 if preview else self.spp, aovs=self.layers(), **values)
+
+
+def scaled_size(width: int, height: int, scale: int) -> tuple[int, int]:
+    """The size of a picture at 1 / scale, at least one pixel."""
+    if scale == 1:
+        return width, height
+    return max(1, width // scale), max(1, height // scale)
+
+
+def scaled_region(region: Region, scale: int, width: int, height: int) -> Region:
+    """A region at 1 / scale that covers the whole one, within the scaled picture."""
+    x0, y0, x1, y1 = region
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise WavecombError(
+            f"region {x0} {y0} {x1} {y1} is empty or outside the picture of {width} x {height}"
+        )
+    if scale == 1:
+        return region
+    wide, high = scaled_size(width, height, scale)
+    left, top = min(x0 // scale, wide - 1), min(y0 // scale, high - 1)
+    right, bottom = min(-(-x1 // scale), wide), min(-(-y1 // scale), high)
+    return left, top, max(right, left + 1), max(bottom, top + 1)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Help > Keyboard shortcuts: made from the actions themselves, so that it is never out of date."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QDialog,
+    QDialogButtonBox,
+    QHeaderView,
+    QLineEdit,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.widgets import named
+
+MOUSE = (
+    ("Orbit about what is under the cursor", "Middle drag, Alt+Left drag"),
+    ("Pan", "Shift+Middle drag"),
+    ("Dolly", "Wheel, Ctrl+Middle drag, Alt+Right drag"),
+    ("Select what is there", "Left click"),
+    ("Zoom the picture", "Ctrl+Wheel"),
+    ("Shift the picture", "Right drag"),
+    ("Orbit by 15 degrees", "Arrow keys, in the viewport"),
+    ("Pan by a tenth", "Shift+arrow keys, in the viewport"),
+    ("Dolly in, out", "PgUp, PgDown, in the viewport"),
+)
+"""What mouse and viewport do without an action."""
+
+
+def plain_text(action: QAction) -> str:
+    """Without mnemonics and dots."""
+    return action.text().replace("&", "").rstrip(".\u2026")
+
+
+def listed(window: QWidget) -> list[tuple[str, str]]:
+    """What and which keys, of all actions of a window that have any, then the mouse."""
+    rows = []
+    for action in window.findChildren(QAction):
+        keys = [key.toString(QKeySequence.SequenceFormat.NativeText) for key in action.shortcuts()]
+        if keys and action.objectName().startswith("action."):
+            rows.append((plain_text(action), ", ".join(keys)))
+    return [*dict.fromkeys(rows), *MOUSE]
+
+
+class ShortcutsDialog(QDialog):
+    """The list, with a field to search it."""
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        self.setObjectName("shortcuts")
+        self.setWindowTitle("Keyboard shortcuts")
+        self._rows = listed(window)
+        self.search = named(QLineEdit(), "shortcuts.search", "Search", "Show only rows with this")
+        self.search.setPlaceholderText("Search")
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self._filter)
+        self.table = named(QTableWidget(len(self._rows), 2), "shortcuts.table", "Shortcuts", "")
+        self.table.setHorizontalHeaderLabels(["What", "Keys"])
+        self.table.verticalHeader().hide()
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setAlternatingRowColors(True)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
+        for row, texts in enumerate(self._rows):
+            for column, text in enumerate(texts):
+                self.table.setItem(row, column, QTableWidgetItem(text))
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.search)
+        layout.addWidget(self.table)
+        layout.addWidget(buttons)
+        self.resize(theme.em(36), theme.em(34))
+
+    def _filter(self, text: str) -> None:
+        for row, texts in enumerate(self._rows):
+            found = any(text.lower() in each.lower() for each in texts)
+            self.table.setRowHidden(row, not found)

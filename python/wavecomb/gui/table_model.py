@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A table of texts with keys to sort by, replaced as a whole; cheap for thousands of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
+from PySide6.QtGui import QColor, QFont
+from PySide6.QtWidgets import QTableView
+
+Cell = tuple[str, Any]
+"""What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``), whole in a tooltip."""
+
+_NOWHERE = QModelIndex()
+
+
+def compact(view: QTableView) -> None:
+    """Rows of one line; long texts are cut in the middle, where paths say least."""
+    view.setWordWrap(False)
+    view.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+    view.verticalHeader().hide()
+    view.verticalHeader().setDefaultSectionSize(round(1.5 * view.fontMetrics().height()))
+    view.setShowGrid(False)
+
+
+class Table(QAbstractTableModel):
+    """Rows of cells under a header; ``left``: columns of text, others are aligned right."""
+
+    def __init__(
+        self, header: Mapping[str, str], left: Collection[int], parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._header = list(header.items())
+        self._left = left
+        self._rows: list[Sequence[Cell]] = []
+        self._bold: Collection[int] = ()
+        self._colours: Mapping[tuple[int, int], QColor] = {}
+
+    def replace(
+        self,
+        rows: Sequence[Sequence[Cell]],
+        bold: Collection[int] = (),
+        colours: Mapping[tuple[int, int], QColor] | None = None,
+    ) -> None:
+        """Takes new rows; selection and scrolling stay where rows do."""
+        more = len(rows) - len(self._rows)
+        if more > 0:
+            self.beginInsertRows(QModelIndex(), len(self._rows), len(rows) - 1)
+        elif more < 0:
+            self.beginRemoveRows(QModelIndex(), len(rows), len(self._rows) - 1)
+        self._rows, self._bold, self._colours = list(rows), bold, colours or {}
+        if more > 0:
+            self.endInsertRows()
+        elif more < 0:
+            self.endRemoveRows()
+        if rows:
+            self.dataChanged.emit(
+                self.index(0, 0), self.index(len(rows) - 1, len(self._header) - 1)
+            )
+
+    def rowCount(self, parent: QModelIndex = _NOWHERE) -> int:
+        """Rows."""
+        return 0 if parent.isValid() else len(self._rows)
+
+    def columnCount(self, parent: QModelIndex = _NOWHERE) -> int:
+        """Columns."""
+        return 0 if parent.isValid() else len(self._header)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """Names and tooltips of columns."""
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._header[section][0]
+        return self._header[section][1] if role == Qt.ItemDataRole.ToolTipRole else None
+
+    def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """Of one cell."""
+        row, column = index.row(), index.column()
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._rows[row][column][0]
+        if role == Qt.ItemDataRole.UserRole:
+            return self._rows[row][column][1]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return str(self._rows[row][column][1]) if column in self._left else None
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            side = (
+                Qt.AlignmentFlag.AlignLeft if column in self._left else Qt.AlignmentFlag.AlignRight
+            )
+            return int(side | Qt.AlignmentFlag.AlignVCenter)
+        if role == Qt.ItemDataRole.FontRole and row in self._bold:
+            font = QFont()
+            font.setBold(True)
+            return font
+        if role == Qt.ItemDataRole.ForegroundRole:
+            return self._colours.get((row, column))
+        return None

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Dark and light: palettes, colours of plots, sizes that follow the font."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPalette
+from PySide6.QtWidgets import QApplication, QToolTip
+
+SYSTEM, DARK, LIGHT = "system", "dark", "light"
+CHOICES = (SYSTEM, DARK, LIGHT)
+
+# Window, base, alternate base, button, text, dimmed text, lines, highlight, link.
+_COLOURS = {
+    DARK: (
+        "#34373c", "#1e2023", "#25272b", "#45494f", "#e4e6ea", "#8d939c", "#17181a", "#3d7ede",
+        "#7db0ff",
+    ),
+    LIGHT: (
+        "#f2f3f5", "#ffffff", "#f6f7f9", "#e6e8ec", "#1b1d21", "#767c86", "#b9bec7", "#2f6fd6",
+        "#1a5cc8",
+    ),
+}  # fmt: skip
+# Told apart in greyscale and with the common colour deficiencies (Okabe and Ito 2008, adapted).
+_SERIES = {
+    DARK: ("#56b4e9", "#e69f00", "#2fbf8f", "#f0e442", "#d98cc0", "#ff7f50", "#9aa7ff", "#c0c5cc"),
+    LIGHT: ("#0072b2", "#c67a00", "#00835f", "#8a7d00", "#a8508a", "#c04a00", "#4a54c4", "#5a6068"),
+}
+
+
+class _Theme(QObject):
+    """Tells widgets that colours changed."""
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.choice = SYSTEM
+
+
+_theme: _Theme | None = None
+
+
+def _the() -> _Theme:
+    global _theme
+    if _theme is None:
+        _theme = _Theme()
+        QGuiApplication.styleHints().colorSchemeChanged.connect(lambda scheme: _follow())
+    return _theme
+
+
+def _follow() -> None:
+    if _the().choice == SYSTEM:
+        apply(SYSTEM)
+
+
+def on_change(call: Callable[[], None]) -> None:
+    """Calls a method of a QObject whenever colours change; ends with that object."""
+    _the().changed.connect(call)
+
+
+def choice() -> str:
+    """What was applied last: "system", "dark" or "light"."""
+    return _the().choice
+
+
+def is_dark() -> bool:
+    """Whether colours are dark now."""
+    if _the().choice != SYSTEM:
+        return _the().choice == DARK
+    return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
+
+
+def apply(chosen: str) -> None:
+    """Gives the application the colours: "system" follows the desktop."""
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    theme = _the()
+    theme.choice = chosen
+    if application.style().objectName() != "fusion":
+        application.setStyle("Fusion")
+    application.setPalette(palette(is_dark()))
+    QToolTip.setPalette(application.palette())
+    theme.changed.emit()
+
+
+def _name() -> str:
+    return DARK if is_dark() else LIGHT
+
+
+def palette(dark: bool) -> QPalette:
+    """All roles, for enabled and disabled widgets."""
+    window, base, alternate, button, text, dim, line, highlight, link = map(
+        QColor, _COLOURS[DARK if dark else LIGHT]
+    )
+    out = QPalette()
+    role = QPalette.ColorRole
+    for which, colour in (
+        (role.Window, window), (role.WindowText, text), (role.Base, base),
+        (role.AlternateBase, alternate), (role.Text, text), (role.Button, button),
+        (role.ButtonText, text), (role.BrightText, QColor("white")), (role.ToolTipBase, base),
+        (role.ToolTipText, text), (role.PlaceholderText, dim), (role.Highlight, highlight),
+        (role.HighlightedText, QColor("white")), (role.Link, link),
+        (role.Light, button.lighter(115)), (role.Midlight, button.lighter(107)),
+        (role.Mid, line), (role.Dark, line), (role.Shadow, QColor("black")),
+        (role.Accent, highlight),
+    ):  # fmt: skip
+        out.setColor(which, colour)
+    disabled = QPalette.ColorGroup.Disabled
+    for which in (role.WindowText, role.Text, role.ButtonText, role.HighlightedText):
+        out.setColor(disabled, which, dim)
+    out.setColor(disabled, role.Highlight, line)
+    return out
+
+
+def series(n: int) -> QColor:
+    """The colour of the n-th curve, told apart from its neighbours also in greyscale."""
+    colours = _SERIES[_name()]
+    return QColor(colours[n % len(colours)])
+
+
+def text() -> QColor:
+    """Of text in plots."""
+    return QColor(_COLOURS[_name()][4])
+
+
+def dim() -> QColor:
+    """Of text that matters less."""
+    return QColor(_COLOURS[_name()][5])
+
+
+def grid() -> QColor:
+    """Of lines behind curves."""
+    colour = QColor(text())
+    colour.setAlphaF(0.18)
+    return colour
+
+
+def surface() -> QColor:
+    """Behind plots and lists."""
+    return QColor(_COLOURS[_name()][1])
+
+
+def surround() -> QColor:
+    """Around pictures: neutral, so that it does not tint what is judged."""
+    return QColor("#181818" if is_dark() else "#777777")
+
+
+def accent() -> QColor:
+    """Of what is chosen."""
+    return QColor(_COLOURS[_name()][7])
+
+
+def warning() -> QColor:
+    """Of text that warns."""
+    return QColor("#e8a33d" if is_dark() else "#9a5b00")
+
+
+def error() -> QColor:
+    """Of text that tells of an error."""
+    return QColor("#ff7b72" if is_dark() else "#b3261e")
+
+
+def em(count: float = 1.0) -> int:
+    """So many heights of the application's font, in device-independent pixels."""
+    return round(QFontMetricsF(QApplication.font()).height() * count)

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Edits in the session layer: as USD would make them, undone, and back as a layer."""
+
+import itertools
+
+import pytest
+from pxr import Sdf, Usd, UsdGeom
+
+import wavecomb
+from wavecomb.errors import WavecombError
+from wavecomb.gui.edit_layer import save_edits
+from wavecomb.gui.stage_edits import Opinion, StageEdits
+from wavecomb.gui.visibility import state
+from wavecomb.usd import load_stage, open_stage
+
+STAGE = """#usda 1.0
+(
+    defaultPrim = "World"
+    upAxis = "Z"
+    metersPerUnit = 0.01
+    startTimeCode = 7
+)
+def Xform "World" (
+    variants = { string look = "ball" }
+    prepend variantSets = "look"
+)
+{
+    variantSet "look" = {
+        "ball" { def Sphere "Thing" { double radius = 1 } }
+        "box" { def Cube "Thing" { double size = 2 } }
+    }
+    def Xform "A"
+    {
+        token visibility = "invisible"
+        def Xform "B" { def Cube "One" { double3 xformOp:translate = (3, 0, 0)
+            uniform token[] xformOpOrder = ["xformOp:translate"] } def Cube "Two" { } }
+        def Xform "C" { def Sphere "Three" { } }
+        def Material "Look" { }
+    }
+    def Xform "Deep" { token visibility.timeSamples = { 7: "invisible" } def Cube "Four" { } }
+}
+class Xform "_Part" { def Cube "Cube" { double3 xformOp:translate = (0, 4, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"] } }
+def "I1" ( instanceable = true
+    prepend inherits = </_Part> ) { }
+def "I2" ( instanceable = true
+    prepend inherits = </_Part> ) { }
+"""
+PRIMS = [
+    "/World",
+    "/World/A",
+    "/World/A/B",
+    "/World/A/B/One",
+    "/World/A/C/Three",
+    "/World/Deep/Four",
+]
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "stage.usda"
+    file.write_text(STAGE.replace("{", "{\n").replace("}", "\n}\n"))
+    return file
+
+
+@pytest.fixture
+def edits(path):
+    ticks = itertools.count(step=10.0)
+    return StageEdits(open_stage(path), Usd.TimeCode(7), now=lambda: next(ticks))
+
+
+def visible(stage):
+    time = Usd.TimeCode(7)
+    return {
+        str(prim.GetPath()): UsdGeom.Imageable(prim).ComputeVisibility(time) != "invisible"
+        for prim in stage.Traverse()
+        if prim.IsA(UsdGeom.Imageable)
+    }
+
+
+@pytest.mark.parametrize("name", PRIMS)
+@pytest.mark.parametrize("shown", [True, False])
+def test_visibility_is_what_usd_would_make(path, edits, name, shown):
+    edits.set_visible([Sdf.Path(name)], shown)
+    other = open_stage(path)
+    other.SetEditTarget(other.GetSessionLayer())
+    prim = UsdGeom.Imageable.Get(other, name)
+    # At the time itself, since one is animated; ours are default values, which win over the file.
+    (prim.MakeVisible if shown else prim.MakeInvisible)(Usd.TimeCode(7))
+    assert visible(edits.stage) == visible(other)
+    for prim_path, seen in visible(edits.stage).items():
+        found = state(edits.stage.GetPrimAtPath(prim_path), edits.time)[0]
+        assert (found == "visible") == seen
+
+
+def test_several_at_once_and_back(edits):
+    before = edits.stage.GetSessionLayer().ExportToString()
+    start = visible(edits.stage)
+    step = edits.set_visible([Sdf.Path("/World/A/B/One"), Sdf.Path("/World/A/C")], True)
+    assert step.structural
+    now = visible(edits.stage)
+    assert now["/World/A/B/One"] and now["/World/A/C/Three"] and not now["/World/A/B/Two"]
+    assert edits.undo_label == "show 2 prims"
+    edits.undo()
+    assert visible(edits.stage) == start
+    assert edits.stage.GetSessionLayer().ExportToString() == before
+    edits.redo()
+    assert visible(edits.stage) == now
+    assert edits.undo() and edits.undo() is None
+
+
+def test_variants(edits):
+    world = Sdf.Path("/World")
+    (look,) = edits.variant_sets(world)
+    assert (look.name, look.choices, look.choice) == ("look", ("ball", "box"), "ball")
+    assert edits.select_variant(world, "look", "box").structural
+    assert edits.stage.GetPrimAtPath("/World/Thing").GetTypeName() == "Cube"
+    assert edits.lines() == ["/World{look} = box"]
+    edits.select_variant(world, "look", None)
+    assert edits.stage.GetPrimAtPath("/World/Thing").GetTypeName() == "Sphere"
+    assert edits.lines() == []
+    with pytest.raises(WavecombError, match=r"look=cone.*ball, box"):
+        edits.select_variant(world, "look", "cone")
+
+
+def test_inside_instances_nothing_can_be_edited(edits):
+    inside = Sdf.Path("/I1/Cube")
+    assert edits.stage.GetPrimAtPath(inside).IsInstanceProxy()
+    with pytest.raises(WavecombError, match=r"/I1/Cube.*inside an instance"):
+        edits.set_visible([inside], False)
+    with pytest.raises(WavecombError, match="inside an instance"):
+        edits.select_variant(inside, "look", "box")
+    assert edits.set_visible([Sdf.Path("/I1")], False)
+    assert edits.edited() == [(Sdf.Path("/I1"), ".visibility")]
+
+
+def test_a_drag_is_one_step(path):
+    moment = [0.0]
+    edits = StageEdits(open_stage(path), Usd.TimeCode(7), now=lambda: moment[0])
+    key = (Sdf.Path("/World/A/B/One"), ".size")
+    for size in (3.0, 4.0, 5.0):
+        edits.change("size", {key: Opinion(size, Sdf.ValueTypeNames.Double)})
+        moment[0] += 0.1
+    moment[0] += 5
+    edits.change("size", {key: Opinion(6.0, Sdf.ValueTypeNames.Double)})
+    size = edits.stage.GetAttributeAtPath("/World/A/B/One.size")
+    assert size.Get() == 6
+    edits.undo()
+    assert size.Get() == 5
+    edits.undo()
+    assert size.Get() == 2 and not edits.edited()
+    assert edits.change("nothing", {key: None}) is None
+
+
+def test_saved_edits_give_the_same_picture(edits, path, tmp_path):
+    edits.set_visible([Sdf.Path("/World/A/B/One")], True)
+    edits.select_variant(Sdf.Path("/World"), "look", "box")
+    edits.set_visible([Sdf.Path("/I2")], False)
+    (tmp_path / "sub").mkdir()
+    saved = save_edits(edits.stage, tmp_path / "sub" / "edits.usda")
+    text = saved.read_text()
+    assert "@../stage.usda@" in text and len(text) < 2000
+    size = {"size": (48, 48), "spp": 2}
+    shown = wavecomb.render(load_stage(edits.stage), **size).beauty
+    again = wavecomb.render(saved, **size).beauty
+    assert (shown == again).all()
+    assert (shown != wavecomb.render(path, **size).beauty).any()
+    stage = Usd.Stage.Open(str(saved))
+    assert UsdGeom.GetStageUpAxis(stage) == "Z" and stage.GetDefaultPrim().GetName() == "World"
+    # Over the edits further ones can be made.
+    more = StageEdits(open_stage(saved), Usd.TimeCode(7))
+    more.set_visible([Sdf.Path("/World/A/C")], True)
+    third = save_edits(more.stage, tmp_path / "sub" / "third.usda")
+    assert "@./edits.usda@" in third.read_text()
+
+
+def test_what_cannot_be_saved_says_so(edits, path, tmp_path):
+    with pytest.raises(WavecombError, match="file of the stage"):
+        save_edits(edits.stage, path)
+    with pytest.raises(WavecombError, match=r"ends in \.usda"):
+        save_edits(edits.stage, tmp_path / "edits.json")
+    with pytest.raises(WavecombError, match="does not exist"):
+        save_edits(edits.stage, tmp_path / "none" / "edits.usda")
+    with pytest.raises(WavecombError, match="no file"):
+        save_edits(Usd.Stage.CreateInMemory(), tmp_path / "edits.usda")
