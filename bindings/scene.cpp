@@ -237,6 +237,74 @@ void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positi
                        make_mesh(positions, indices, normals, uvs, face_materials, material, ""));
 }
 
+/// What curves and points have in common, ready but for primitive, segments and normals. `owners`
+/// collects their arrays.
+Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
+                 const std::optional<Array<float>>& uvs,
+                 const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                 const std::string& name, const std::string& light_group, uint32_t asset_length,
+                 nb::list& owners) {
+  Mesh mesh;
+  mesh.name = name;
+  mesh.light_group = builder.light_group(light_group);
+  mesh.asset_length = asset_length;
+  mesh.material = material;
+  if (positions.ndim() != 2 || positions.shape(1) != 3)
+    throw Error("mesh '" + name + "' needs positions of shape (n, 3)");
+  mesh.positions = {positions.data(), positions.size()};
+  mesh.radii = {radii.data(), radii.size()};
+  owners.append(nb::cast(positions));
+  owners.append(nb::cast(radii));
+  if (uvs) {
+    mesh.uvs = {uvs->data(), uvs->size()};
+    mesh.uvs_at = Attribute::kCorner;
+    owners.append(nb::cast(*uvs));
+  }
+  if (face_materials) {
+    mesh.face_materials = {face_materials->data(), face_materials->size()};
+    owners.append(nb::cast(*face_materials));
+  }
+  return mesh;
+}
+
+uint32_t add_curves(SceneBuilder& builder, const std::string& kind, const Array<float>& positions,
+                    const Array<uint32_t>& segments, const Array<float>& radii,
+                    const std::optional<Array<float>>& normals,
+                    const std::optional<Array<float>>& uvs,
+                    const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                    const std::string& name, const std::string& light_group,
+                    uint32_t asset_length) {
+  nb::list owners;
+  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, name,
+                          light_group, asset_length, owners);
+  mesh.primitive = choose<Primitive>("kind of curves", kind,
+                                     {{"linear-tube", Primitive::kLinearTube},
+                                      {"cubic-tube", Primitive::kCubicTube},
+                                      {"linear-ribbon", Primitive::kLinearRibbon},
+                                      {"cubic-ribbon", Primitive::kCubicRibbon}});
+  mesh.indices = {segments.data(), segments.size()};
+  owners.append(nb::cast(segments));
+  if (normals) {
+    mesh.normals = {normals->data(), normals->size()};
+    owners.append(nb::cast(*normals));
+  }
+  mesh.owner = hold(std::move(owners));
+  return builder.add_mesh(std::move(mesh));
+}
+
+uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
+                    const std::optional<Array<float>>& uvs,
+                    const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                    const std::string& name, const std::string& light_group,
+                    uint32_t asset_length) {
+  nb::list owners;
+  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, name,
+                          light_group, asset_length, owners);
+  mesh.primitive = Primitive::kSphere;
+  mesh.owner = hold(std::move(owners));
+  return builder.add_mesh(std::move(mesh));
+}
+
 void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
                    const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transforms,
                    const std::optional<Array<uint32_t>>& materials,
@@ -318,6 +386,8 @@ void bind_scene(nb::module_& m) {
   nb::class_<Scene>(m, "Scene")
       .def_prop_ro("triangles", &Scene::unique_triangles)
       .def_prop_ro("instanced_triangles", &Scene::instanced_triangles)
+      .def_prop_ro("curve_segments", &Scene::curve_segments)
+      .def_prop_ro("points", &Scene::points)
       .def_prop_ro("mesh_count", [](const Scene& s) { return s.meshes().size(); })
       .def_prop_ro("instance_count", [](const Scene& s) { return s.instances().size(); })
       .def_prop_ro("light_count", [](const Scene& s) { return s.lights().size(); })
@@ -394,6 +464,13 @@ void bind_scene(nb::module_& m) {
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial)
       .def("make_surfaces", &make_surfaces, "descriptions"_a, "threads"_a = 0)
+      .def("add_curves", &add_curves, "kind"_a, "positions"_a, "segments"_a, "radii"_a,
+           nb::kw_only(), "normals"_a = nb::none(), "uvs"_a = nb::none(),
+           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial, "name"_a = "",
+           "light_group"_a = "", "asset_length"_a = 0)
+      .def("add_points", &add_points, "positions"_a, "radii"_a, nb::kw_only(), "uvs"_a = nb::none(),
+           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial, "name"_a = "",
+           "light_group"_a = "", "asset_length"_a = 0)
       .def("add_group", &SceneBuilder::add_group, "name"_a = "", "root"_a = "")
       .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,

@@ -26,7 +26,12 @@ class Scene:
     def instanced_triangles(self) -> int:
         """Triangles as seen, every instance counted."""
     @property
-    def mesh_count(self) -> int: ...
+    def curve_segments(self) -> int: ...
+    @property
+    def points(self) -> int: ...
+    @property
+    def mesh_count(self) -> int:
+        """Meshes, and prims of curves and points."""
     @property
     def instance_count(self) -> int: ...
     @property
@@ -174,6 +179,41 @@ class SceneBuilder:
         (or None), triangles, faces (m,): face of the cage of each triangle, primvars: mean of each
         on each triangle, and manifold: false where edges or points had to be kept sharp.
         """
+    def add_curves(
+        self,
+        kind: str,
+        positions: NDArray[np.float32],
+        segments: NDArray[np.uint32],
+        radii: NDArray[np.float32],
+        *,
+        normals: NDArray[np.float32] | None = None,
+        uvs: NDArray[np.float32] | None = None,
+        face_materials: NDArray[np.uint32] | None = None,
+        material: int = ...,
+        name: str = "",
+        light_group: str = "",
+        asset_length: int = 0,
+    ) -> int:
+        """Kinds: linear-tube, cubic-tube, linear-ribbon, cubic-ribbon. Positions (n, 3) of Bezier
+        control points (points of lines), radii (n,), normals (n, 3) of ribbons. segments (m,): the
+        first of four (two) points in a row, plus 2^31 where the curve goes on before it and 2^30
+        where it goes on after it: then the point before (after) those of the segment says in which
+        direction. uvs (m, 2, 2) at both ends; face_materials (m,). Counts as a mesh; arrays are
+        kept as in add_mesh."""
+    def add_points(
+        self,
+        positions: NDArray[np.float32],
+        radii: NDArray[np.float32],
+        *,
+        uvs: NDArray[np.float32] | None = None,
+        face_materials: NDArray[np.uint32] | None = None,
+        material: int = ...,
+        name: str = "",
+        light_group: str = "",
+        asset_length: int = 0,
+    ) -> int:
+        """Spheres: positions (n, 3), radii (n,), uvs (n, 2), face_materials (n,). Counts as a
+        mesh; arrays are kept as in add_mesh."""
     def add_group(self, name: str = "", root: str = "") -> int:
         """A new empty group; group 0, the world, is there. root: the prim path that names of what
         is in it begin with, and that names of its instances take the place of."""

@@ -29,6 +29,8 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
         "camera": loaded.camera_path,
         "seconds": {"load": float(loaded.seconds)},
         "triangles": {"unique": scene.triangles, "instanced": scene.instanced_triangles},
+        "curve_segments": scene.curve_segments,
+        "points": scene.points,
         "meshes": scene.mesh_count,
         "instances": scene.instance_count,
         "bounds": [list(low), list(high)],
@@ -71,6 +73,10 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
     row("stage", info["stage"])
     row("camera", str(info["camera"] or "none: one that sees everything"))
     row("triangles", f"{triangles['unique']:,} ({triangles['instanced']:,} with instances)")
+    if info["curve_segments"]:
+        row("curve segments", f"{info['curve_segments']:,}")
+    if info["points"]:
+        row("points", f"{info['points']:,}")
     row("meshes", f"{info['meshes']:,}")
     row("instances", f"{info['instances']:,}")
     low, high = info["bounds"]

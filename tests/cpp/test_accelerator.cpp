@@ -4,7 +4,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "scene_testing.h"
+#include "curve_testing.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/integrate/stages/order_rays.h"
@@ -323,6 +323,11 @@ TEST(Accelerator, HitsDoNotDependOnPackets) {
   const auto scene = soup_scene(3000);
   const EmbreeAccelerator accel(scene, 2);
   expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(30000), 3, 5));
+}
+
+TEST(Accelerator, CurvesAndPointsDoNotDependOnPackets) {
+  const EmbreeAccelerator accel(curve_testing::hairy(), 1);
+  expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(30000), 2, 41));
 }
 
 TEST(Accelerator, CameraRaysDoNotDependOnPackets) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes whose radiance is known: the whole renderer against formulas.
-#include "scene_testing.h"
+#include "curve_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/integrate/surface.h"
@@ -184,6 +184,21 @@ TEST(ClosedForm, WhiteFurnace) {
     s.max_depth = 400;
     expect_radiance(WavefrontRenderer(b.build()).render(s), 1, open_box ? "open box" : "sphere",
                     open_box ? 0.005 : 0.001);
+  }
+}
+
+TEST(ClosedForm, WhiteFurnaceOfCurves) {
+  // Tubes and spheres are closed, so all light that meets them comes back: ribbons too.
+  for (const Primitive primitive : curve_testing::curved_primitives()) {
+    SceneBuilder b;
+    const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {1, 1, 1}));
+    b.add_to_group(0, b.add_mesh(curve_testing::make_curves(
+                          curve_testing::strands(primitive, 200, 3, 0.5f, 0.03f, 4), white)));
+    b.add_light(make_light(LightKind::kDome, {1, 1, 1}));
+    b.set_camera(make_camera({0, 0, 4}, {0, 0, 0}, 0.2f));
+    Settings s = settings(16, 64);
+    s.max_depth = 400;
+    expect_radiance(WavefrontRenderer(b.build()).render(s), 1, "curves", 0.002);
   }
 }
 

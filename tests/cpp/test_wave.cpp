@@ -2,6 +2,7 @@
 // The first promise: any schedule gives the same picture, bit for bit.
 #include <bit>
 
+#include "curve_testing.h"
 #include "wave_testing.h"
 
 namespace wavecomb {
@@ -65,6 +66,10 @@ TEST(Wave, EmissiveMeshesAreOnePicture) {
 }
 TEST(Wave, PresenceIsOnePicture) {
   expect_one_picture(presence(), small_settings());
+}
+
+TEST(Wave, CurvesAndPointsAreOnePicture) {
+  expect_one_picture(curve_testing::hairy(), small_settings());
 }
 
 TEST(Wave, EverySettingIsOnePicture) {

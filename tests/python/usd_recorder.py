@@ -87,6 +87,32 @@ class Recorder:
                 wrap_s=texture["wrap"][0], wrap_t=texture["wrap"][1],
             )  # fmt: skip
         return builder.make_surfaces(descriptions, threads)
+    def add_curves(self, kind, positions, segments, radii, *, normals=None, **options):
+        assert segments.dtype == np.uint32 and segments.ndim == 1 and len(segments) > 0
+        first = segments & 0x3FFFFFFF
+        points = 4 if kind.startswith("cubic") else 2
+        before = (segments >> 31).astype(np.int64)
+        after = (segments >> 30 & 1).astype(np.int64)
+        assert (first >= before).all() and (first + points + after <= len(positions)).all()
+        assert (normals is not None) == kind.endswith("ribbon")
+        assert normals is None or normals.shape == positions.shape
+        return self._add_curved(
+            len(segments), (2, 2), positions, radii, options, kind=kind, segments=segments,
+            normals=normals,
+        )  # fmt: skip
+
+    def add_points(self, positions, radii, **options):
+        return self._add_curved(len(positions), (2,), positions, radii, options, kind="sphere")
+
+    def _add_curved(self, count, uv_shape, positions, radii, options, **what):
+        assert positions.dtype == radii.dtype == np.float32 and positions.flags.c_contiguous
+        assert positions.shape == (len(radii), 3) and radii.shape == (len(radii),)
+        assert np.isfinite(positions).all() and (radii >= 0).all() and np.isfinite(radii).all()
+        uvs, faces = options["uvs"], options["face_materials"]
+        assert uvs is None or (uvs.dtype == np.float32 and uvs.shape == (count, *uv_shape))
+        assert faces is None or (faces.dtype == np.uint32 and faces.shape == (count,))
+        self.meshes.append({"positions": positions, "radii": radii, **what, **options})
+        return len(self.meshes) - 1
 
     def add_group(self, name="", root=""):
         self.groups.append({"name": name, "meshes": [], "children": []})

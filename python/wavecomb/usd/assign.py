@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from pxr import Gf, Usd, UsdShade
 
 from wavecomb.usd.colour import face_values, quantise
+from wavecomb.usd.curves import CurveArrays
 from wavecomb.usd.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.mesh import MeshArrays, find_primvar
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.primvar import Primvar, PrimvarError, as_integers
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.strands import Strands
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.triangulate import Topology
 
@@ -28,7 +30,7 @@ class Draw:
     """A gprim to draw.
 
     Attributes:
-        prim: Mesh or implicit shape.
+        prim: Mesh, implicit shape, curves or points.
         matrix: From it to its group.
         inherited: Constant primvars of its ancestors.
         subsets: GeomSubset prims that bind materials.
@@ -65,7 +67,7 @@ class Assigner:
         return unique
 
     def assign(
-        self, draw: Draw, mesh: MeshArrays, otherwise: int | None
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None
     ) -> tuple[int, FaceIds | None]:
         """The material of a mesh, and one for each triangle where they differ.
 
@@ -78,7 +80,7 @@ class Assigner:
             base, faces = self._display(draw, mesh, otherwise)
         else:
             base, faces = self._bound(draw, mesh, self.table.surface(draw.material))
-        if draw.subsets and mesh.topology is not None:
+        if draw.subsets and isinstance(mesh, MeshArrays) and mesh.topology is not None:
             faces = self._subsets(draw, mesh, base, faces)
         return base, faces
 
@@ -111,7 +113,9 @@ class Assigner:
             result[which == k] = ids[which == k]
         return result
 
-    def _bound(self, draw: Draw, mesh: MeshArrays, surface: Surface) -> tuple[int, FaceIds | None]:
+    def _bound(
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface
+    ) -> tuple[int, FaceIds | None]:
         """Ids of a surface; one that reads primvars is made anew with this mesh's values."""
         faces: FaceIds | None = None
         for slot, name in surface.primvars.items():
@@ -135,7 +139,7 @@ class Assigner:
         return self.table.add(surface), faces
 
     def _display(
-        self, draw: Draw, mesh: MeshArrays, otherwise: int | None
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None
     ) -> tuple[int, FaceIds | None]:
         """Ids for displayColor and displayOpacity."""
         colours = self._values(draw, "displayColor", mesh.topology, 3)
@@ -151,7 +155,7 @@ class Assigner:
         ids = np.array([self.table.plain(entry, opacity) for entry in palette], np.uint32)
         return int(ids[0]), ids[index] if len(ids) > 1 else None
 
-    def _opacity(self, draw: Draw, topology: Topology | None) -> float:
+    def _opacity(self, draw: Draw, topology: Topology | Strands | None) -> float:
         values = self._values(draw, "displayOpacity", topology, 1)
         if values is None or len(values) == 0:
             return 1.0
@@ -161,7 +165,7 @@ class Assigner:
         return min(max(number(float(values.mean()), 1.0), 0.0), 1.0)
 
     def _values(
-        self, draw: Draw, name: str, topology: Topology | None, width: int
+        self, draw: Draw, name: str, topology: Topology | Strands | None, width: int
     ) -> NDArray[Any] | None:
         """A primvar on each triangle, (m, width) or (1, width); None where there is none."""
         try:

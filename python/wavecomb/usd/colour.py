@@ -9,14 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.primvar import Primvar, spread
+from wavecomb.usd.strands import Strands
 from wavecomb.usd.triangulate import RefinedTopology, Topology
 
 MAX_COLOURS = 256
 """Materials that one varying colour may turn into."""
 
 
-def face_values(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:
-    """Mean of a primvar on each triangle: (m, width); (1, width) where it is constant."""
+def face_values(primvar: Primvar, topology: Topology | Strands, width: int) -> NDArray[np.float32]:
+    """Mean of a primvar on each triangle (segment): (m, width); (1, width) where constant."""
+    if isinstance(topology, Strands):
+        return topology.means(primvar, width)
     if isinstance(topology, RefinedTopology) and primvar.name in topology.means:
         return np.ascontiguousarray(topology.means[primvar.name][:, :width])
     values, at = spread(primvar, topology, width)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,8 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from wavecomb.isolate import trail
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
+from wavecomb.usd.curves import CurveArrays, uniform_scale
+from wavecomb.usd.gprims import GprimReader, add_shape
 from wavecomb.usd.identity import Assets, LightGroups
 from wavecomb.usd.instancing import read_instances, sound
 from wavecomb.usd.light import Light
@@ -24,13 +26,13 @@ from wavecomb.usd.material import (
     MaterialTable,
     bound_materials,
 )
-from wavecomb.usd.mesh import IDENTITY, UV_NAMES, MeshArrays, MeshReader
+from wavecomb.usd.mesh import IDENTITY, UV_NAMES, MeshArrays
 from wavecomb.usd.network import colour
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.stock import MeshStock
 from wavecomb.usd.surfaces import Repaint, Surfaces
-from wavecomb.usd.traverse import Gathered, Placed, Traversal
+from wavecomb.usd.traverse import STRANDS, Gathered, Placed, Traversal
 from wavecomb.usd.triangulate import MeshError
 
 if TYPE_CHECKING:
@@ -44,6 +46,12 @@ STEP = 512
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
+
+
+_WORDS = {"mesh": "mesh", "shape": "mesh", "curves": "curves", "points": "points"}
+_COUNTS = {"mesh": "meshes", "shape": "shapes", "curves": "curves", "points": "points"}
+DRAWN_COUNTS = tuple(_COUNTS.values())
+"""Counts of ``LoadReport`` for what is drawn."""
 
 
 @dataclass
@@ -130,7 +138,7 @@ class GroupBuilder:
         self.light_groups = light_groups
         self.report = report
         self.surfaces = surfaces
-        self.stock = stock
+        self.gprims = GprimReader(self.time, report, surfaces, stock)
         self.progress = progress
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(materials, self.time, report)
@@ -197,73 +205,73 @@ class GroupBuilder:
 
     def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
         """Adds one gprim to a group."""
+        kind = self.traversal.kind(draw.prim)
+        if kind in STRANDS.values() and uniform_scale(draw.matrix) is None:
+            return self._draw_skewed(group, draw, scope)
         if scope.override:
             draw.subsets = ()
         names = self.assigner.uv_names(draw)
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
-        kind = self.traversal.kind(draw.prim)
         if trail.is_expendable():
             trail.note("reading", draw.prim.GetPath())
         try:
-            mesh = self._arrays(kind, draw, names)
+            shape = self.gprims.read(kind, draw, names)
         except MeshError as error:
-            self.report.warn(f"mesh left out: {error}", draw.prim.GetPath())
+            self.report.warn(f"{_WORDS[kind]} left out: {error}", draw.prim.GetPath())
             return
         except (Tf.ErrorException, MemoryError) as error:
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
-            self.report.warn(f"mesh left out: {what}", draw.prim.GetPath())
+            self.report.warn(f"{_WORDS[kind]} left out: {what}", draw.prim.GetPath())
             return
-        if mesh is None:
-            self.report.note("mesh without faces", draw.prim.GetPath())
+        if shape is None:
+            what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
+            self.report.note(what, draw.prim.GetPath())
             return
-        material, faces = self._materials(draw, mesh, scope)
+        material, faces = self._materials(draw, shape, scope)
         name = self.report.place(draw.prim.GetPath())
         may_shine = material == INHERIT_MATERIAL or self.materials.any_emits(material, faces)
+        options: dict[str, Any] = {
+            "face_materials": faces,
+            "material": material,
+            "name": name,
+            "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
+            "asset_length": self._asset_length(draw.prim, name),
+        }
         try:
-            number = self.builder.add_mesh(
-                mesh.positions,
-                mesh.triangles,
-                normals=mesh.normals,
-                uvs=mesh.uvs,
-                face_materials=faces,
-                material=material,
-                name=name,
-                light_group=self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
-                asset_length=self._asset_length(draw.prim, name),
-            )
+            number = add_shape(self.builder, shape, options)
         except ValueError as error:
-            self.report.warn(f"mesh left out: {error}")
+            self.report.warn(f"{_WORDS[kind]} left out: {error}")
             return
         self.builder.add_to_group(self._number(group), number)
-        group.grow(mesh.bounds)
-        if mesh.cage is not None:
+        group.grow(shape.bounds)
+        if isinstance(shape, MeshArrays) and shape.cage is not None:
             repaint = self._repainter(draw, scope) if faces is not None else None
-            self.surfaces.add(group, number, draw, mesh, material, repaint)
-        self.report.tally("meshes" if kind == "mesh" else "shapes")
-
-    def _arrays(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | None:
-        """The arrays of a gprim, of the frame before where they are the same."""
-        displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
-
-        def read(report: LoadReport) -> MeshArrays | None:
-            reader = MeshReader(self.time, report, self.surfaces.subdivide)
-            if kind == "shape":
-                return reader.shape(draw.prim, draw.matrix)
-            return reader.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
-
-        if self.stock is None:
-            return read(self.report)
-        options = (tuple(names), names is UV_NAMES, displaced)
-        return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
+            self.surfaces.add(group, number, draw, shape, material, repaint)
+        self.report.tally(_COUNTS[kind])
 
     def _repainter(self, draw: Draw, scope: Scope) -> Repaint:
         """Materials of the same mesh once its triangles are others; says nothing twice."""
         quiet = Assigner(self.materials, self.time, LoadReport())
         return lambda mesh: self._materials(draw, mesh, scope, quiet)
 
+    def _draw_skewed(self, group: Group, draw: Draw, scope: Scope) -> None:
+        """Adds curves or points that a transform makes oval: a group of their own, placed by it."""
+        path = draw.prim.GetPath()
+        child = Group(str(path), self.report.place(path))
+        own = replace(draw, matrix=IDENTITY)
+        self._draw(child, own, scope)
+        if child.empty:
+            return
+        inherit = np.array([INHERIT_MATERIAL], np.uint32)
+        self._add(group, child, np.array(draw.matrix)[None], inherit, [draw.prim])
+
     def _materials(
-        self, draw: Draw, mesh: MeshArrays, scope: Scope, assigner: Assigner | None = None
+        self,
+        draw: Draw,
+        mesh: MeshArrays | CurveArrays,
+        scope: Scope,
+        assigner: Assigner | None = None,
     ) -> tuple[int, Any]:
         if scope.override:
             return INHERIT_MATERIAL, None

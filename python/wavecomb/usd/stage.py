@@ -17,7 +17,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.isolate import trail
 from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
-from wavecomb.usd.groups import Group, GroupBuilder, LoadProgress, placed_lights
+from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
@@ -299,7 +299,7 @@ def _read(
     ).world()
     lit = materials.glows or has_lights
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
-    if not any(report.counts.get(kind) for kind in ("meshes", "shapes")):
+    if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")
     view = None
     if view_prim is not None:

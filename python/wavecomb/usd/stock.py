@@ -15,34 +15,35 @@ from wavecomb.usd.varying import Varying
 if TYPE_CHECKING:
     from wavecomb.usd.cage import Cage
     from wavecomb.usd.camera import View
+    from wavecomb.usd.curves import CurveArrays
     from wavecomb.usd.mesh import MeshArrays
 
 
 class MeshStock:
-    """Arrays of meshes that no frame changes, with what there was to say of them.
+    """Arrays of gprims that no frame changes, with what there was to say of them.
 
     Those that a frame does not ask for are forgotten at its end.
     """
 
     def __init__(self, varying: Varying) -> None:
         self._varying = varying
-        self._kept: dict[Any, tuple[MeshArrays | None, LoadReport]] = {}
-        self._used: dict[Any, tuple[MeshArrays | None, LoadReport]] = {}
+        self._kept: dict[Any, tuple[MeshArrays | CurveArrays | None, LoadReport]] = {}
+        self._used: dict[Any, tuple[MeshArrays | CurveArrays | None, LoadReport]] = {}
 
     def get(
         self,
-        read: Callable[[LoadReport], MeshArrays | None],
+        read: Callable[[LoadReport], MeshArrays | CurveArrays | None],
         prim: Usd.Prim,
         matrix: Gf.Matrix4d,
         options: tuple[Any, ...],
         inherited: Sequence[Any],
         report: LoadReport,
-    ) -> MeshArrays | None:
-        """The arrays of a mesh: those of the frame before where they are the same.
+    ) -> MeshArrays | CurveArrays | None:
+        """The arrays of a gprim: those of the frame before where they are the same.
 
         Args:
             read: Makes them, and tells a report.
-            prim: The mesh.
+            prim: The gprim.
             matrix: From it to its group.
             options: What else decides over the arrays; hashable.
             inherited: Primvars of its ancestors.

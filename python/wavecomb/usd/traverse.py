@@ -22,9 +22,12 @@ from wavecomb.usd.shapes import SHAPES
 
 Matrices = NDArray[np.float64]
 
-_UNSUPPORTED = (
-    "BasisCurves", "NurbsCurves", "HermiteCurves", "Points", "NurbsPatch", "TetMesh", "Volume",
-)  # fmt: skip
+_UNSUPPORTED = ("NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh", "Volume")
+
+
+STRANDS = {"BasisCurves": "curves", "Points": "points"}
+DRAWN = frozenset(("mesh", "shape", *STRANDS.values()))
+"""Kinds of prims that become geometry."""
 
 
 @dataclass
@@ -71,6 +74,8 @@ class Traversal:
                 kind = "mesh"
             elif name in SHAPES:
                 kind = "shape"
+            elif name in STRANDS:
+                kind = STRANDS[name]
             elif name in LIGHT_KINDS:
                 kind = "light"
             elif prim.IsA(UsdGeom.PointInstancer):
@@ -131,7 +136,7 @@ class Traversal:
                     continue
                 pick = proxies
             children = prim.GetChildren() if pick is None else prim.GetFilteredChildren(pick)
-            if kind == "mesh" or kind == "shape":
+            if kind in DRAWN:
                 if shown:
                     subsets = [c for c in children if _binds(c)] if children else ()
                     found.draws.append(Draw(prim, matrix, inherited, subsets))

@@ -10,9 +10,6 @@
 namespace wavecomb {
 namespace {
 
-/// Hits farther than the closest by less than this fraction are looked at still.
-constexpr float kSlack = 1.f + 0x1p-20f;
-
 /// Makes the closest hit independent of the order in which triangles are tried. Embree keeps
 /// whichever of two hits it tries last when they are equally far up to rounding (on shared edges,
 /// where surfaces cross or lie in one another), and in a packet that order depends on the other
@@ -121,15 +118,18 @@ void occlude_round_lights(const RTCOccludedFunctionNArguments* args) {
       RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
 }
 
-void round_light_box(const RTCBoundsFunctionArguments* args) {
-  const Bounds b = round_light_bounds(*static_cast<const LightRecord*>(args->geometryUserPtr));
-  RTCBounds& out = *args->bounds_o;
+void put_bounds(const Bounds& b, RTCBounds& out) {
   out.lower_x = b.lo.x;
   out.lower_y = b.lo.y;
   out.lower_z = b.lo.z;
   out.upper_x = b.hi.x;
   out.upper_y = b.hi.y;
   out.upper_z = b.hi.z;
+}
+
+void round_light_box(const RTCBoundsFunctionArguments* args) {
+  const Bounds b = round_light_bounds(*static_cast<const LightRecord*>(args->geometryUserPtr));
+  put_bounds(b, *args->bounds_o);
 }
 
 }  // namespace wavecomb

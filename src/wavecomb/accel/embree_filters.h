@@ -19,11 +19,17 @@ struct alignas(64) QueryContext {
   alignas(64) float t[16];             ///< their true distances
 };
 
+/// Hits farther than the closest by less than this fraction are looked at still.
+inline constexpr float kSlack = 1.f + 0x1p-20f;
+
 /// Filter of geometries with partly present materials, whose user pointer is the number of the
 /// mesh.
 void presence_filter(const RTCFilterFunctionNArguments* args);
 /// Filter of queries: makes the closest hit independent of the order in which triangles are tried.
 void closest_filter(const RTCFilterFunctionNArguments* args);
+
+/// A box as Embree takes it.
+void put_bounds(const Bounds& b, RTCBounds& out);
 
 // Round lights: user geometries whose user pointer is a LightRecord.
 void round_light_box(const RTCBoundsFunctionArguments* args);

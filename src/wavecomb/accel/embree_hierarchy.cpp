@@ -129,8 +129,9 @@ bool EmbreeHierarchy::fits(const Scene& scene) const {
 void EmbreeHierarchy::check(const char* doing) const {
   const RTCError error = rtcGetDeviceError(device());
   if (error == RTC_ERROR_NONE) return;
-  const char* why = error == RTC_ERROR_OUT_OF_MEMORY ? "out of memory; use fewer triangles"
-                                                     : rtcGetDeviceLastErrorMessage(device());
+  const char* why = error == RTC_ERROR_OUT_OF_MEMORY
+                        ? "out of memory; use fewer triangles, curves or points"
+                        : rtcGetDeviceLastErrorMessage(device());
   throw Error(std::string("the ray tracer failed while ") + doing + ": " + (why ? why : "unknown"));
 }
 
@@ -146,6 +147,12 @@ RTCScene EmbreeHierarchy::new_scene() const {
 
 RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
   const Mesh& mesh = geometry_->meshes[mesh_id];
+  if (mesh.is_curved()) {
+    auto& curves = curves_[mesh_id];
+    curves = std::make_shared<const CurveGeometry>(
+        CurveGeometry{&mesh, mesh_id, filtered_[mesh_id] != 0});
+    return make_curve_geometry(device(), *curves, rule_);
+  }
   RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   const float* positions = mesh.positions.data();
   // Embree loads 16 bytes per vertex. A last vertex that ends at the end of a page is copied.
@@ -208,7 +215,10 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   const auto is_kept = [&](uint32_t mesh) {
     return origin && origin->filtered_[mesh] == filtered_[mesh];
   };
-  if (origin) padded_ = origin->padded_;
+  if (origin) {
+    padded_ = origin->padded_;
+    curves_ = origin->curves_;
+  }
   mesh_geometries_.resize(geometry_->meshes.size(), nullptr);
   for (const Group& group : groups)
     for (uint32_t mesh : group.meshes) {

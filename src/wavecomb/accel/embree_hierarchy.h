@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/accel/embree_curves.h"
 
 namespace wavecomb {
 
@@ -58,6 +59,7 @@ class EmbreeHierarchy {
   std::vector<RTCGeometry> mesh_geometries_;
   /// By mesh: copies of arrays that end at a page boundary.
   std::map<uint32_t, std::shared_ptr<const std::vector<float>>> padded_;
+  std::map<uint32_t, std::shared_ptr<const CurveGeometry>> curves_;  ///< by mesh
   uint32_t first_world_ = 0, first_light_ = 0;
 };
 

@@ -1,14 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/accel/presence.h"
 
+#include <algorithm>
+
 #include "wavecomb/core/hash.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb {
 namespace {
 
+/// Texture coordinates of a hit on a curve or point; its own where the mesh has none.
+Vec2<float> curved_uv(const MeshRecord& mesh, uint32_t prim, float u, float v) {
+  const float along = std::min(std::max(u, 0.f), 1.f);
+  if ((mesh.flags & kUvsPerCorner) == 0) return {along, v};
+  const auto* uvs = reinterpret_cast<const float*>(mesh.uvs);
+  if ((mesh.flags & kIsSphere) != 0) return {uvs[2 * prim], uvs[2 * prim + 1]};
+  const float* end = uvs + 4 * size_t{prim};
+  return {fma(end[2] - end[0], along, end[0]), fma(end[3] - end[1], along, end[1])};
+}
+
 /// Texture coordinates of a hit; barycentrics where the mesh has none.
 Vec2<float> hit_uv(const MeshRecord& mesh, uint32_t prim, float u, float v) {
+  if ((mesh.flags & kIsCurved) != 0) return curved_uv(mesh, prim, u, v);
   if ((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) == 0) return {u, v};
   const auto* indices = reinterpret_cast<const uint32_t*>(mesh.indices);
   const auto* uvs = reinterpret_cast<const float*>(mesh.uvs);

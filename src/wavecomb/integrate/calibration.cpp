@@ -23,7 +23,7 @@ std::vector<CalibrationHits> find_calibration_hits(const Scene& scene) {
     for (uint32_t geom = 0; geom < group.meshes.size(); ++geom) {
       const uint32_t mesh_id = group.meshes[geom];
       const Mesh& mesh = scene.meshes()[mesh_id];
-      const size_t faces = mesh.triangle_count();
+      const size_t faces = mesh.primitive_count();
       const size_t step = std::max<size_t>(1, faces / kFaces);
       for (size_t f = 0; f < faces; f += step) {
         uint32_t material = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[f];

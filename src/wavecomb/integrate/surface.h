@@ -2,121 +2,10 @@
 /// From a hit to what shading needs of the surface there.
 #pragma once
 
-#include "wavecomb/core/frame.h"
-#include "wavecomb/core/math.h"
-#include "wavecomb/core/rows.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/integrate/curve_surface.h"
+#include "wavecomb/integrate/surface_reader.h"
 
 namespace wavecomb {
-
-/// A hit on a mesh: instance (index into SceneView::instances), mesh, triangle and barycentrics of
-/// vertices 1 and 2.
-template <typename F>
-struct MeshHit {
-  UInt<F> inst, mesh, prim;
-  F u, v;
-};
-
-/// A surface point in world space.
-template <typename F>
-struct Surface {
-  Vec3<F> p;
-  Vec3<F> ng;    ///< unit geometric normal, outside by winding
-  Vec3<F> ns;    ///< unit shading normal on the same side as ng
-  Vec3<F> dpdu;  ///< tangent along u, any length; zero where uv is not asked for
-  Vec2<F> uv;
-  F uv_per_length;     ///< sqrt(uv area / world area) of the triangle
-  F offset;            ///< bound of the error of p along ng
-  Vec3<F> terminator;  ///< from p to the smooth surface that the vertex normals suggest, along ng
-};
-
-namespace detail {
-
-/// The meshes of the lanes, read row by row.
-template <typename F>
-class MeshReader {
- public:
-  MeshReader(const SceneView& scene, const UInt<F>& mesh, const Mask<F>& active) {
-    const InMemory<UInt<F>> index(mesh);
-    const uint32_t bits = lane_bits<F>(active);
-    for (size_t i = 0; i < kWidth<F>; ++i)
-      records_[i] = scene.meshes + ((bits >> i & 1u) != 0 ? index.value[i] : 0u);
-    flags = gather<UInt<F>>(scene.meshes,
-                            mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
-                                static_cast<uint32_t>(offsetof(MeshRecord, flags) / 4),
-                            Mask<UInt<F>>(active));
-  }
-
-  /// Row `index` of N words of one of a mesh's arrays.
-  template <size_t N>
-  std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
-                       const Mask<F>& active) const {
-    return load_rows_of<N, F>(
-        [&](size_t lane) { return reinterpret_cast<const void*>(records_[lane]->*array); },
-        index * static_cast<uint32_t>(N), active);
-  }
-  Vec3<F> vec3(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
-    const auto r = row<3>(array, index, active);
-    return {r[0], r[1], r[2]};
-  }
-  Vec2<F> vec2(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
-    const auto r = row<2>(array, index, active);
-    return {r[0], r[1]};
-  }
-  /// Vertices of triangle `prim`.
-  std::array<UInt<F>, 3> corners(const UInt<F>& prim, const Mask<F>& active) const {
-    const auto r = row<3>(&MeshRecord::indices, prim, active);
-    return {float_bits<F>(r[0]), float_bits<F>(r[1]), float_bits<F>(r[2])};
-  }
-
-  UInt<F> flags;
-
- private:
-  const MeshRecord* records_[kWidth<F>];
-};
-
-/// The transforms of the lanes' instances.
-template <typename F>
-struct InstanceMaps {
-  Vec3<F> row[3], t;
-  F side;  ///< sign of the determinant
-
-  InstanceMaps(const SceneView& scene, const UInt<F>& inst, const Mask<F>& active) {
-    std::array<F, 16> r;
-    if (!kIsScalar<F> && any(active) && is_uniform<F>(inst, active)) {
-      const auto* shared = reinterpret_cast<const float*>(
-          scene.instances + first_active(inst, Mask<UInt<F>>(active)));
-      for (size_t k = 0; k < 16; ++k) r[k] = F(shared[k]);
-    } else {
-      r = load_rows<16, F>(scene.instances, inst * 16u, active);
-    }
-    for (uint32_t i = 0; i < 3; ++i) row[i] = {r[4 * i], r[4 * i + 1], r[4 * i + 2]};
-    t = {r[3], r[7], r[11]};
-    side = r[15];
-  }
-
-  Vec3<F> point(const Vec3<F>& p) const {
-    return {fma(row[0].z, p.z, fma(row[0].y, p.y, fma(row[0].x, p.x, t.x))),
-            fma(row[1].z, p.z, fma(row[1].y, p.y, fma(row[1].x, p.x, t.y))),
-            fma(row[2].z, p.z, fma(row[2].y, p.y, fma(row[2].x, p.x, t.z)))};
-  }
-  Vec3<F> vector(const Vec3<F>& v) const {
-    return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
-  }
-  /// Normals go by the cofactors, whose rows are the cross products of the other two rows.
-  Vec3<F> map_normal(const Vec3<F>& n) const {
-    return Vec3<F>(dot(cross(row[1], row[2]), n), dot(cross(row[2], row[0]), n),
-                   dot(cross(row[0], row[1]), n)) *
-           side;
-  }
-};
-
-template <typename F>
-inline Vec3<F> abs3(const Vec3<F>& v) {
-  return {abs(v.x), abs(v.y), abs(v.z)};
-}
-
-}  // namespace detail
 
 /// Everything about the surface at a hit. `with_uv`: uv, dpdu and uv_per_length are wanted.
 /// `dir` is the unit direction of the ray that hit.
@@ -128,8 +17,10 @@ inline Vec3<F> abs3(const Vec3<F>& v) {
 template <typename F>
 WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
                                          const Vec3<F>& dir, bool with_uv, bool with_terminator,
-                                         const Mask<F>& active) {
+                                         const Mask<F>& lanes) {
   using U = UInt<F>;
+  Mask<F> active = lanes;
+  if (scene.has_curves) active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
   const detail::MeshReader<F> mesh(scene, hit.mesh, active);
   const detail::InstanceMaps<F> maps(scene, hit.inst, active);
   const U corner = hit.prim * 3u;
@@ -190,16 +81,6 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
       s.terminator = select<F>(outward, world, Vec3<F>(F(0.f)));
     }
   }
-  // A shading normal that looks away from the viewer is bent until it is seen edge-on.
-  const F towards = select(dot(dir, s.ng) < 0.f, F(1.f), F(-1.f));  // +1: seen from outside
-  const F seen = -dot(dir, s.ns) * towards;
-  constexpr float kEdge = 1e-3f;
-  const Mask<F> away = seen < kEdge;
-  if (any(away & active)) {
-    const Vec3<F> bent = normalize(fma(dir, F(-towards * (kEdge - seen)), s.ns));
-    s.ns = select<F>(away, bent, s.ns);
-  }
-
   s.uv = {b1, b2};
   s.dpdu = Vec3<F>(F(0.f));
   s.uv_per_length = F(0.f);
@@ -224,6 +105,19 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     // dp/du = (d2.v e1 - d1.v e2) / det; only its direction is used.
     const Vec3<F> tangent = maps.vector(e1 * d2.y - e2 * d1.y);
     s.dpdu = select<F>(det < 0.f, -tangent, tangent);
+  }
+  if (scene.has_curves) {
+    const Mask<F> curved = lanes & not_(active);
+    if (any(curved)) detail::setup_curved<F>(scene, hit, with_uv, curved, s);
+  }
+  // A shading normal that looks away from the viewer is bent until it is seen edge-on.
+  const F towards = select(dot(dir, s.ng) < 0.f, F(1.f), F(-1.f));  // +1: seen from outside
+  const F seen = -dot(dir, s.ns) * towards;
+  constexpr float kEdge = 1e-3f;
+  const Mask<F> away = seen < kEdge;
+  if (any(away & lanes)) {
+    const Vec3<F> bent = normalize(fma(dir, F(-towards * (kEdge - seen)), s.ns));
+    s.ns = select<F>(away, bent, s.ns);
   }
   return s;
 }

@@ -68,7 +68,8 @@ uint64_t hash_geometry(const Scene& scene) {
     h.add_array(m.normals);
     h.add_array(m.uvs);
     h.add_array(m.face_materials);
-    h.add(m.normals_at, m.uvs_at, m.material);
+    h.add_array(m.radii);
+    h.add(m.primitive, m.normals_at, m.uvs_at, m.material);
   }
   for (const Group& group : scene.groups()) h.add_array(std::span<const uint32_t>(group.meshes));
   for (const Instance& i : scene.instances()) h.add(i.group, i.to_world, i.material);

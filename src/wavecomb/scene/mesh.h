@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Triangle meshes as data.
+/// Triangle meshes, curves and points as data.
 #pragma once
 
 #include <cstdint>
@@ -15,26 +15,55 @@ inline constexpr uint32_t kInheritMaterial = 0xffffffffu;
 enum class Attribute : uint8_t {
   kNone,
   kVertex,  ///< one value per vertex, addressed by the triangle's indices
-  kCorner,  ///< one value per corner, 3 per triangle in order
+  kCorner,  ///< one value per corner, 3 per triangle in order; 2 per segment of a curve, its ends;
+            ///< 1 per point
 };
 
-/// An indexed triangle mesh. Arrays belong to the caller and are not copied; `owner` keeps them
-/// alive for as long as a Scene uses them.
+/// What a mesh is made of.
+enum class Primitive : uint8_t {
+  kTriangle,
+  kLinearTube,
+  kCubicTube,
+  kLinearRibbon,
+  kCubicRibbon,
+  kSphere
+};
+
+/// An indexed triangle mesh, or curves, or points (scene/curve.h). Arrays belong to the caller and
+/// are not copied; `owner` keeps them alive for as long as a Scene uses them.
 struct Mesh {
   std::string name;
-  std::span<const float> positions;   ///< 3 per vertex
-  std::span<const uint32_t> indices;  ///< 3 per triangle, counter-clockwise from outside
-  std::span<const float> normals;     ///< 3 per vertex or corner; empty: flat
+  Primitive primitive = Primitive::kTriangle;
+  std::span<const float> positions;   ///< 3 per vertex, Bezier control point or point
+  std::span<const uint32_t> indices;  ///< 3 per triangle, counter-clockwise from outside; 1 per
+                                      ///< segment (kCurveFirstPoint); none for points
+  std::span<const float> radii;       ///< 1 per control point or point; none for triangles
+  std::span<const float> normals;     ///< 3 per vertex or corner; empty: flat. 3 per control point
+                                      ///< of ribbons
   Attribute normals_at = Attribute::kNone;
   std::span<const float> uvs;  ///< 2 per vertex or corner; empty: uv = barycentrics
   Attribute uvs_at = Attribute::kNone;
-  std::span<const uint32_t> face_materials;  ///< one per triangle, or empty
+  std::span<const uint32_t> face_materials;  ///< one per primitive, or empty
   uint32_t material = kInheritMaterial;      ///< where face_materials is empty
   uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
   uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
   std::shared_ptr<const void> owner;
 
-  size_t triangle_count() const { return indices.size() / 3; }
+  bool is_curved() const { return primitive != Primitive::kTriangle; }
+  bool is_ribbon() const {
+    return primitive == Primitive::kLinearRibbon || primitive == Primitive::kCubicRibbon;
+  }
+  bool is_cubic() const {
+    return primitive == Primitive::kCubicTube || primitive == Primitive::kCubicRibbon;
+  }
+  /// Control points of a segment.
+  size_t segment_points() const { return is_cubic() ? 4 : 2; }
+  size_t triangle_count() const { return is_curved() ? 0 : indices.size() / 3; }
+  /// Triangles, segments of curves, or points.
+  size_t primitive_count() const {
+    if (primitive == Primitive::kSphere) return vertex_count();
+    return is_curved() ? indices.size() : indices.size() / 3;
+  }
   size_t vertex_count() const { return positions.size() / 3; }
 };
 
@@ -44,7 +73,8 @@ struct alignas(64) MeshRecord {
   uint32_t material;
   uint32_t flags;
   float uv_density;  ///< sqrt(uv area / area) over all triangles, object space; 0 without uvs
-  uint32_t pad[3];
+  uint32_t pad;
+  uint64_t radii;
 };
 static_assert(sizeof(MeshRecord) == 64);
 enum MeshFlags : uint32_t {
@@ -52,6 +82,11 @@ enum MeshFlags : uint32_t {
   kNormalsPerCorner = 2,
   kUvsPerVertex = 4,
   kUvsPerCorner = 8,
+  kIsTube = 16,
+  kIsRibbon = 32,
+  kIsSphere = 64,
+  kIsCubic = 128,
+  kIsCurved = kIsTube | kIsRibbon | kIsSphere,
 };
 
 }  // namespace wavecomb

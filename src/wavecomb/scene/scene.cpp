@@ -49,6 +49,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.lights = lights_->set.view(v.materials);
   v.scale = geometry_->radius;
   v.has_emissive_meshes = materials_->has_emission;
+  v.has_curves = std::any_of(meshes().begin(), meshes().end(),
+                             [](const Mesh& mesh) { return mesh.is_curved(); });
   v.has_presence = materials_->has_presence;
 }
 
@@ -94,11 +96,25 @@ uint64_t Scene::unique_triangles() const {
   return n;
 }
 
+uint64_t Scene::curve_segments() const {
+  uint64_t n = 0;
+  for (const Mesh& mesh : meshes())
+    if (mesh.is_curved() && mesh.primitive != Primitive::kSphere) n += mesh.primitive_count();
+  return n;
+}
+
+uint64_t Scene::points() const {
+  uint64_t n = 0;
+  for (const Mesh& mesh : meshes())
+    if (mesh.primitive == Primitive::kSphere) n += mesh.primitive_count();
+  return n;
+}
+
 SceneBytes Scene::bytes() const {
   SceneBytes b;
   for (const Mesh& m : meshes())
     b.meshes += m.positions.size_bytes() + m.indices.size_bytes() + m.normals.size_bytes() +
-                m.uvs.size_bytes() + m.face_materials.size_bytes();
+                m.uvs.size_bytes() + m.face_materials.size_bytes() + m.radii.size_bytes();
   for (const auto& texture : textures()) b.textures += texture->bytes();
   const auto of = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   const SceneGeometry& g = *geometry_;

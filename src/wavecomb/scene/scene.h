@@ -27,11 +27,13 @@ struct SceneView {
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;
+  bool has_curves = false;  ///< curves or points
 };
 
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
-  uint64_t meshes = 0;    ///< points, indices, normals, texture coordinates, materials of faces
+  uint64_t meshes =
+      0;  ///< points, indices, radii, normals, texture coordinates, materials of faces
   uint64_t textures = 0;  ///< all mip levels
   uint64_t records = 0;   ///< instances, materials, lights
 };
@@ -74,6 +76,9 @@ class Scene {
   /// Triangles of all meshes, each counted once, and with every instance counted.
   uint64_t unique_triangles() const;
   uint64_t instanced_triangles() const;
+  /// Segments of curves and points, each counted once.
+  uint64_t curve_segments() const;
+  uint64_t points() const;
   SceneBytes bytes() const;
   /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }
@@ -122,8 +127,8 @@ class SceneBuilder {
   const Texture& texture(uint32_t id) const;
   /// Texture ids in the material must exist.
   uint32_t add_material(Material material);
-  /// Checks sizes and indices. Faces with points that are not finite are refused by name; faces
-  /// without area stay (they are never hit).
+  /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name;
+  /// faces without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
   /// Gives a mesh other arrays, checked as those of add_mesh; its name, its light group and its
   /// place in groups stay.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/check_curves.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
@@ -44,7 +45,7 @@ uint64_t address(const void* p) {
 
 /// sqrt(uv area / area) of the whole mesh, 0 where it has no uvs.
 float uv_density(const Mesh& mesh) {
-  if (mesh.uvs_at == Attribute::kNone) return 0;
+  if (mesh.uvs_at == Attribute::kNone || mesh.is_curved()) return 0;
   double area = 0, uv_area = 0;
   for (size_t f = 0; f < mesh.triangle_count(); ++f) {
     const float *p[3], *t[3];
@@ -74,12 +75,14 @@ MeshRecord make_mesh_record(const Mesh& mesh) {
   r.normals = address(mesh.normals.data());
   r.uvs = address(mesh.uvs.data());
   r.face_materials = address(mesh.face_materials.empty() ? nullptr : mesh.face_materials.data());
+  r.radii = address(mesh.radii.data());
   r.material = mesh.material;
   r.uv_density = uv_density(mesh);
   if (mesh.normals_at == Attribute::kVertex) r.flags |= kNormalsPerVertex;
   if (mesh.normals_at == Attribute::kCorner) r.flags |= kNormalsPerCorner;
   if (mesh.uvs_at == Attribute::kVertex) r.flags |= kUvsPerVertex;
   if (mesh.uvs_at == Attribute::kCorner) r.flags |= kUvsPerCorner;
+  if (mesh.is_curved()) r.flags |= curve_flags(mesh);
   return r;
 }
 
@@ -149,6 +152,11 @@ namespace {
 void check_mesh(const Mesh& mesh) {
   const auto name = quoted("mesh", mesh.name);
   if (mesh.positions.size() % 3 != 0) throw Error(name + ": positions must be triples");
+  if (mesh.is_curved()) {
+    check_curves(mesh, name);
+    meshes_.push_back(std::move(mesh));
+    return static_cast<uint32_t>(meshes_.size() - 1);
+  }
   if (mesh.indices.size() % 3 != 0) throw Error(name + ": indices must be triples");
   if (mesh.vertex_count() > 0x7fffffffu / 3 || mesh.triangle_count() > 0x7fffffffu / 9)
     throw Error(name + " has too many points or triangles for 32-bit offsets; split it");
@@ -351,7 +359,12 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
   parallel_for(geometry.groups.size(), [&](size_t g) {
     for (uint32_t mesh : geometry.groups[g].meshes) {
       const auto& p = meshes[mesh].positions;
-      for (size_t i = 0; i + 2 < p.size(); i += 3) bounds[g].add({p[i], p[i + 1], p[i + 2]});
+      const auto& radii = meshes[mesh].radii;
+      for (size_t i = 0; i + 2 < p.size(); i += 3) {
+        const float r = radii.empty() ? 0.f : radii[i / 3];
+        bounds[g].add({p[i] - r, p[i + 1] - r, p[i + 2] - r});
+        bounds[g].add({p[i] + r, p[i + 1] + r, p[i + 2] + r});
+      }
     }
   });
   geometry.instance_records.reserve(geometry.instances.size() + 1);

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads gprims of every kind into arrays, and hands those to the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from pxr import Usd
+
+from wavecomb.usd.assign import Draw
+from wavecomb.usd.curves import CurveArrays, CurveReader
+from wavecomb.usd.mesh import UV_NAMES, MeshArrays, MeshReader
+from wavecomb.usd.points import PointReader
+from wavecomb.usd.report import LoadReport
+from wavecomb.usd.stock import MeshStock
+from wavecomb.usd.surfaces import Surfaces
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+
+class GprimReader:
+    """Reads the gprims of one stage at one time."""
+
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        report: LoadReport,
+        surfaces: Surfaces,
+        stock: MeshStock | None = None,
+    ) -> None:
+        """``stock``: arrays to take from and leave there."""
+        self.time = time
+        self.report = report
+        self.surfaces = surfaces
+        self.stock = stock
+
+    def read(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | CurveArrays | None:
+        """The arrays of a gprim in its group's space; None where there is nothing to draw.
+
+        Those of the frame before where they are the same.
+
+        Args:
+            kind: mesh, shape, curves or points.
+            draw: The gprim.
+            names: Primvars to take texture coordinates from, the first there is.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
+
+        def read(report: LoadReport) -> MeshArrays | CurveArrays | None:
+            if kind == "curves":
+                curves = CurveReader(self.time, report)
+                return curves.curves(draw.prim, draw.matrix, names, draw.inherited)
+            if kind == "points":
+                points = PointReader(self.time, report)
+                return points.points(draw.prim, draw.matrix, names, draw.inherited)
+            meshes = MeshReader(self.time, report, self.surfaces.subdivide)
+            if kind == "shape":
+                return meshes.shape(draw.prim, draw.matrix)
+            return meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
+
+        if self.stock is None:
+            return read(self.report)
+        options = (tuple(names), names is UV_NAMES, displaced)
+        return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
+
+
+def add_shape(
+    builder: _core.SceneBuilder, shape: MeshArrays | CurveArrays, options: dict[str, Any]
+) -> int:
+    """Adds arrays to the scene; gives their number there.
+
+    ``options``: Keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` all take.
+    """
+    if isinstance(shape, MeshArrays):
+        return builder.add_mesh(
+            shape.positions, shape.triangles, normals=shape.normals, uvs=shape.uvs, **options
+        )
+    if shape.segments is None:
+        return builder.add_points(shape.positions, shape.radii, uvs=shape.uvs, **options)
+    return builder.add_curves(
+        shape.kind,
+        shape.positions,
+        shape.segments,
+        shape.radii,
+        normals=shape.normals,
+        uvs=shape.uvs,
+        **options,
+    )

@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/accel/curve_shapes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/scene/curve.h"
+
+namespace wavecomb {
+namespace {
+
+using V = Vec3<double>;
+
+V vec(const float* p) {
+  return {p[0], p[1], p[2]};
+}
+double dot_d(const V& a, const V& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+V cross_d(const V& a, const V& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+Vec3<float> narrow(const V& a) {
+  return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
+}
+
+/// Right-handed axes with z along the ray, and its origin: there the ray is the z axis.
+struct RaySpace {
+  V o, x, y, z;
+  double length;  ///< of the direction: t is z / length
+
+  RaySpace(const float (&origin)[3], const float (&dir)[3]) : o(vec(origin)) {
+    const V d = vec(dir);
+    length = std::sqrt(dot_d(d, d));
+    z = d * (1 / length);
+    const double sign = std::copysign(1.0, z.z), a = -1 / (sign + z.z), b = z.x * z.y * a;
+    x = {1 + sign * z.x * z.x * a, sign * b, -sign * z.x};
+    y = {b, sign + z.y * z.y * a, -z.y};
+  }
+  V vector(const V& v) const { return {dot_d(v, x), dot_d(v, y), dot_d(v, z)}; }
+  V point(const V& p) const { return vector(p - o); }
+  V back(const V& v) const { return x * v.x + y * v.y + z * v.z; }
+};
+
+/// Control points of a segment, lines as cubics.
+struct Bezier {
+  V p[4];
+  double r[4];
+
+  V at(double u) const { return mix(p, u); }
+  double radius(double u) const { return mix(r, u); }
+  V along(double u) const { return slope(p, u); }
+  double widening(double u) const { return slope(r, u); }
+
+  template <typename T>
+  static T mix(const T* c, double u) {
+    const double w = 1 - u;
+    return c[0] * (w * w * w) + c[1] * (3 * w * w * u) + c[2] * (3 * w * u * u) +
+           c[3] * (u * u * u);
+  }
+  template <typename T>
+  static T slope(const T* c, double u) {
+    const double w = 1 - u;
+    return (c[1] - c[0]) * (3 * w * w) + (c[2] - c[1]) * (6 * w * u) + (c[3] - c[2]) * (3 * u * u);
+  }
+  template <typename T>
+  static void line(T* c) {
+    c[3] = c[1];
+    c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
+    c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
+  }
+  /// De Casteljau's halves.
+  template <typename T>
+  static void split(const T* c, T* a, T* b) {
+    const T m = (c[1] + c[2]) * 0.5;
+    a[0] = c[0];
+    b[3] = c[3];
+    a[1] = (c[0] + c[1]) * 0.5;
+    b[2] = (c[2] + c[3]) * 0.5;
+    a[2] = (a[1] + m) * 0.5;
+    b[1] = (m + b[2]) * 0.5;
+    a[3] = b[0] = (a[2] + b[1]) * 0.5;
+  }
+};
+
+uint32_t first_point(const Mesh& mesh, uint32_t prim) {
+  return mesh.indices[prim] & kCurveFirstPoint;
+}
+
+/// One segment and one ray.
+class SegmentTest {
+ public:
+  SegmentTest(const Mesh& mesh, uint32_t prim, const RaySpace& ray, float tfar, CurveHits& hits)
+      : mesh_(mesh),
+        prim_(prim),
+        first_(first_point(mesh, prim)),
+        cubic_(mesh.is_cubic()),
+        ray_(ray),
+        z_far_(tfar * ray.length),
+        hits_(hits) {
+    const uint32_t n = cubic_ ? 4 : 2;
+    for (uint32_t k = 0; k < n; ++k) {
+      curve_.p[k] = ray.point(vec(&mesh.positions[3 * size_t{first_ + k}]));
+      curve_.r[k] = mesh.radii[first_ + k];
+      if (mesh.is_ribbon()) normal_[k] = ray.vector(vec(&mesh.normals[3 * size_t{first_ + k}]));
+    }
+    if (cubic_) return;
+    Bezier::line(curve_.p);
+    Bezier::line(curve_.r);
+    Bezier::line(normal_);
+  }
+
+  /// `all`: hits behind the first are wanted too.
+  void run(bool all) {
+    if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
+    const int halvings = depth();
+    side_ = -1;
+    search(curve_, 0, 1, halvings);
+    if (mesh_.is_ribbon() || !(may_be_inside_ || (all && hits_.begin() != hits_.end()))) return;
+    side_ = 1;
+    search(curve_, 0, 1, halvings);
+  }
+
+ private:
+  /// Halvings until pieces are straight within a part of the radius (as Wang 1984 bounds them).
+  int depth() const {
+    double bend = 0;
+    for (int i = 0; i < 2; ++i) {
+      const V d = curve_.p[i] - curve_.p[i + 1] * 2.0 + curve_.p[i + 2];
+      bend = std::max(bend, dot_d(d, d));
+    }
+    const double r = *std::max_element(curve_.r, curve_.r + 4);
+    const double pieces4 = 0.75 * std::sqrt(bend) / std::max(kStraight * r, 1e-300);  // pieces^2
+    int halvings = mesh_.is_ribbon() ? kRibbonHalvings : 0;
+    while (halvings < kMostHalvings && pieces4 > static_cast<double>(1u << (2 * halvings)))
+      ++halvings;
+    return halvings;
+  }
+
+  /// Whether the ray passes the hull of a piece on either side of its chord.
+  static bool passes_by(const Bezier& piece, double r) {
+    const double x = piece.p[3].x - piece.p[0].x, y = piece.p[3].y - piece.p[0].y;
+    const auto beside = [&](int k) { return x * piece.p[k].y - y * piece.p[k].x; };
+    const double b0 = beside(0), b1 = beside(1), b2 = beside(2);  // and beside(3) is beside(0)
+    const double least = std::min(b0, std::min(b1, b2)), most = std::max(b0, std::max(b1, b2));
+    const double reach = r * r * (x * x + y * y) * (1 + 1e-9);
+    return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
+  }
+
+  /// Follows the halves of a piece whose hull the ray may meet.
+  void search(const Bezier& piece, double u0, double u1, int halvings) {
+    const double r = *std::max_element(piece.r, piece.r + 4);
+    if (passes_by(piece, r)) return;
+    const auto misses = [&](double V::* axis, double lo, double hi) {
+      double least = piece.p[0].*axis, most = least;
+      for (int k = 1; k < 4; ++k) {
+        least = std::min(least, piece.p[k].*axis);
+        most = std::max(most, piece.p[k].*axis);
+      }
+      return least - r > hi || most + r < lo;
+    };
+    // Where a tube is entered matters behind the ray's origin too: it may start inside.
+    const double z_near = side_ < 0 && !mesh_.is_ribbon() ? -kInfinity : 0;
+    if (misses(&V::x, 0, 0) || misses(&V::y, 0, 0) || misses(&V::z, z_near, z_far_)) return;
+    if (halvings == 0) return mesh_.is_ribbon() ? meet_ribbon(u0, u1) : meet_tube(u0, u1, side_);
+    Bezier a, b;
+    Bezier::split(piece.p, a.p, b.p);
+    Bezier::split(piece.r, a.r, b.r);
+    const double middle = 0.5 * (u0 + u1);
+    search(a, u0, middle, halvings - 1);
+    search(b, middle, u1, halvings - 1);
+  }
+
+  /// Of the spheres about the curve, the ray meets that of parameter u at z(u) -+ sqrt(h(u)),
+  /// h = r^2 - x^2 - y^2. The tube is entered where z - sqrt(h) is least (side -1) and left where
+  /// z + sqrt(h) is greatest (side 1). With the curve and radius as lines about u, that is
+  ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y',
+  /// at u + w: a cone with round ends, and the exact condition once w = 0.
+  double step(double u, int side) const {
+    const V c = curve_.at(u), d = curve_.along(u);
+    const double r = curve_.radius(u), dr = curve_.widening(u);
+    const double a = dr * dr - d.x * d.x - d.y * d.y, b = r * dr - c.x * d.x - c.y * d.y;
+    const double h = r * r - c.x * c.x - c.y * c.y, k = d.z * d.z - a;
+    if (!(k > 0)) return dr > 0 ? kFar : -kFar;  // one sphere holds the next
+    const double discriminant = b * b - a * h;
+    if (discriminant < 0) {
+      if (a < 0) return -b / a;              // a miss so far; go where the ray is nearest
+      return side * d.z > 0 ? kFar : -kFar;  // along the inside of the cone
+    }
+    const double q = -side * d.z * std::sqrt(discriminant / k);
+    // Two forms of one root; the one without cancellation.
+    double w = 0;
+    if (q * b > 0)
+      w = (b * b - d.z * d.z * h) / (k * (q + b));
+    else if (a != 0)
+      w = (q - b) / a;
+    // On the cone's other half, where radii are negative: on this one there is no extreme.
+    return r + dr * w >= 0 ? w : std::copysign(kFar, dr);
+  }
+
+  /// The extreme of `side` in piece [u0, u1], if steps from its ends lead into it. Extremes at the
+  /// curve's own ends are such too.
+  void meet_tube(double u0, double u1, int side) {
+    const double s0 = step(u0, side), s1 = step(u1, side);
+    if (s0 > 0 && s1 < 0)
+      meet_tube_at(extreme_between(u0, u1, side), side);
+    else if (u0 == 0 && s0 <= 0)
+      meet_tube_at(0, side);
+    else if (u1 == 1 && s1 >= 0)
+      meet_tube_at(1, side);
+  }
+
+  /// The root of step() between u0, where it is positive, and u1, where it is negative: by steps
+  /// and secants that stay between.
+  double extreme_between(double u0, double u1, int side) const {
+    double u = 0.5 * (u0 + u1), before = u, step_before = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const double s = step(u, side);
+      if (s == 0) break;
+      (s > 0 ? u0 : u1) = u;
+      double next = u + s;
+      const double slope = i > 0 ? (s - step_before) / (u - before) : 0;
+      if (slope < 0) next = u - s / slope;
+      if (!(next > u0 && next < u1)) next = 0.5 * (u0 + u1);
+      before = u;
+      step_before = s;
+      u = next;
+      if (std::abs(u - before) < 1e-13) break;
+    }
+    return u;
+  }
+
+  void meet_tube_at(double u, int side) {
+    const V c = curve_.at(u);
+    const double r = curve_.radius(u), h = r * r - c.x * c.x - c.y * c.y;
+    if (!(h >= 0 && r > 0)) return;
+    const double z = c.z + side * std::sqrt(h);
+    const V n = V{-c.x, -c.y, z - c.z} * (1 / r);
+    const bool is_inside =
+        (u == 0 && goes_on_at(n, kCurveGoesOnBefore, 0, first_ - 1)) ||
+        (u == 1 && goes_on_at(n, kCurveGoesOnAfter, 3, first_ + (cubic_ ? 4 : 2)));
+    if (!(z > 0) || is_inside)
+      may_be_inside_ = true;
+    else if (z <= z_far_)
+      add_tube(z, u, ray_.back(n));
+  }
+
+  /// Whether normal n of an end's sphere points into the segment that goes on from there.
+  bool goes_on_at(const V& n, uint32_t flag, int end, uint32_t next) const {
+    if ((mesh_.indices[prim_] & flag) == 0) return false;
+    const V d = ray_.point(vec(&mesh_.positions[3 * size_t{next}])) - curve_.p[end];
+    const double dr = mesh_.radii[next] - curve_.r[end];
+    return dot_d(n, d) + dr > kSeam * std::sqrt(dot_d(d, d));
+  }
+
+  /// Notes a hit on a tube by its place on it, with the formulas that shading finds it again by.
+  void add_tube(double z, double u, const V& normal) {
+    CurveSegment<float> s;
+    s.cubic = cubic_;
+    for (uint32_t k = 0; k < 4; ++k) {
+      const uint32_t i = first_ + (cubic_ || k < 2 ? k : 1);
+      const float* p = &mesh_.positions[3 * size_t{i}];
+      s.p[k] = {p[0], p[1], p[2]};
+      s.r[k] = mesh_.radii[i];
+    }
+    auto along = static_cast<float>(u);
+    const TubeFrame<float> tube = tube_frame<float>(s, curve_point<float>(s, along));
+    const Vec3<float> n = tube.frame.to_local(narrow(normal));
+    if (u == 0 || u == 1) {
+      const float polar = atan2(std::sqrt(n.x * n.x + n.y * n.y), n.z);
+      const float beyond = polar - atan2(tube.sin_side, tube.cos_side);
+      along = u == 0 ? -std::max(beyond, 0.f) : 1.f + std::max(-beyond, 0.f);
+    }
+    add(z, along, atan2(n.y, n.x) * kInv2Pi);
+  }
+
+  /// Across the ribbon, b = c' x n: the ray meets its plane strip at u where x b_y = y b_x.
+  double across(double u) const {
+    const V c = curve_.at(u), b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
+    return c.x * b.y - c.y * b.x;
+  }
+
+  void meet_ribbon(double u0, double u1) {
+    const double f0 = across(u0), f1 = across(u1);
+    if ((f0 < 0) != (f1 < 0)) return meet_ribbon_between(u0, f0, u1, f1);
+    // Seen nearly edge-on it may be met twice: is the other side reached at the extreme of the
+    // parabola through the ends and the middle?
+    const double slope = f1 - f0, bend = 2 * (f0 + f1) - 4 * across(0.5 * (u0 + u1));
+    const double at = bend != 0 ? 0.5 - 0.5 * slope / bend : -1;
+    if (!(at > 0 && at < 1)) return;
+    const double um = u0 + at * (u1 - u0), fm = across(um);
+    if ((fm < 0) == (f0 < 0)) return;
+    meet_ribbon_between(u0, f0, um, fm);
+    meet_ribbon_between(um, fm, u1, f1);
+  }
+
+  /// The hit between parameters at which across() has different signs, by Illinois' regula falsi.
+  void meet_ribbon_between(double u0, double f0, double u1, double f1) {
+    double u = u0;
+    int kept = 0;  // the end that the last step kept, -1 or 1
+    for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
+      u = std::clamp((f1 * u0 - f0 * u1) / (f1 - f0), u0, u1);
+      const double f = across(u);
+      if (f == 0) break;
+      if ((f < 0) == (f0 < 0)) {
+        if (kept == 1) f1 *= 0.5;
+        u0 = u, f0 = f, kept = 1;
+      } else {
+        if (kept == -1) f0 *= 0.5;
+        u1 = u, f1 = f, kept = -1;
+      }
+    }
+    V b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
+    b = b * (1 / std::sqrt(dot_d(b, b)));
+    const V c = curve_.at(u);
+    const double r = curve_.radius(u), s = -(c.x * b.x + c.y * b.y) / (r * (b.x * b.x + b.y * b.y));
+    if (!(std::abs(s) <= 1)) return;
+    const double z = c.z + s * r * b.z;
+    if (z > 0 && z <= z_far_) add(z, static_cast<float>(u), static_cast<float>(0.5 * s + 0.5));
+  }
+
+  void add(double z, float u, float v) {
+    const CurveHit hit{static_cast<float>(z / ray_.length), u, v < 0 ? v + 1 : v};
+    // Pieces side by side find the same hit.
+    for (const CurveHit& known : hits_)
+      if (std::abs(known.u - u) < 1e-6f && std::abs(known.t - hit.t) <= 1e-6f * hit.t) return;
+    if (hit.t > 0) hits_.add(hit);
+  }
+
+  static constexpr double kStraight = 0.025;  ///< of the radius
+  static constexpr int kMostHalvings = 9, kRibbonHalvings = 3;
+  static constexpr int kSteps = 40, kRibbonSteps = 100;
+  static constexpr double kFar = 2;  ///< a step beyond either end
+  /// Sine of the angle by which ends reach beyond the seam, so that none shows a gap.
+  static constexpr double kSeam = 1e-3;
+
+  const Mesh& mesh_;
+  const uint32_t prim_, first_;
+  const bool cubic_;
+  const RaySpace& ray_;
+  const double z_far_;
+  CurveHits& hits_;
+  Bezier curve_;
+  V normal_[4];
+  int side_ = -1;               ///< which of a tube's extremes are looked for
+  bool may_be_inside_ = false;  ///< entered behind the ray's origin or from the next segment
+};
+
+void intersect_sphere(const Mesh& mesh, uint32_t prim, const RaySpace& ray, float tfar,
+                      CurveHits& hits) {
+  const V c = ray.point(vec(&mesh.positions[3 * size_t{prim}]));
+  const double r = mesh.radii[prim], h = r * r - c.x * c.x - c.y * c.y;
+  if (!(h >= 0) || r == 0) return;
+  for (const double side : {-1.0, 1.0}) {
+    const double z = c.z + side * std::sqrt(h), t = z / ray.length;
+    if (!(t > 0 && t <= tfar)) continue;
+    const Vec3<float> n = narrow(ray.back({-c.x, -c.y, z - c.z}));
+    const float phi = atan2(n.y, n.x) * kInv2Pi;
+    hits.add({static_cast<float>(t), phi < 0 ? phi + 1 : phi,
+              atan2(std::sqrt(n.x * n.x + n.y * n.y), n.z) * kInvPi});
+  }
+}
+
+}  // namespace
+
+Bounds curve_bounds(const Mesh& mesh, uint32_t prim) {
+  const bool point = mesh.primitive == Primitive::kSphere;
+  const size_t first = point ? prim : first_point(mesh, prim);
+  const size_t n = point ? 1 : mesh.segment_points();
+  Bounds box;
+  for (size_t k = first; k < first + n; ++k) {
+    const float* p = &mesh.positions[3 * k];
+    const auto reach = [r = mesh.radii[k]](float x) { return 1e-6f * std::abs(x) + 1.00001f * r; };
+    box.add({p[0] - reach(p[0]), p[1] - reach(p[1]), p[2] - reach(p[2])});
+    box.add({p[0] + reach(p[0]), p[1] + reach(p[1]), p[2] + reach(p[2])});
+  }
+  return box;
+}
+
+CurveHits intersect_curve(const Mesh& mesh, uint32_t prim, const float (&origin)[3],
+                          const float (&dir)[3], float tfar, bool all) {
+  const RaySpace ray(origin, dir);
+  CurveHits hits;
+  if (mesh.primitive == Primitive::kSphere)
+    intersect_sphere(mesh, prim, ray, tfar, hits);
+  else
+    SegmentTest(mesh, prim, ray, tfar, hits).run(all);
+  return hits;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rays against curves and points.
+///
+/// One ray at a time and in double precision: what a ray hits does not depend on the rays beside it
+/// (docs/decisions/curves.md).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "wavecomb/scene/mesh.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Where a ray meets a curve or point, u and v as scene/curve.h has them.
+struct CurveHit {
+  float t, u, v;
+};
+
+/// Hits of a ray on one primitive, nearest first.
+class CurveHits {
+ public:
+  static constexpr uint32_t kMost = 8;  ///< of more than these, the farthest are forgotten
+
+  void add(const CurveHit& hit) {
+    if (count_ == kMost && !(hit.t < hits_[kMost - 1].t)) return;
+    uint32_t at = count_ < kMost ? count_++ : kMost - 1;
+    for (; at > 0 && hit.t < hits_[at - 1].t; --at) hits_[at] = hits_[at - 1];
+    hits_[at] = hit;
+  }
+  const CurveHit* begin() const { return hits_.data(); }
+  const CurveHit* end() const { return hits_.data() + count_; }
+
+ private:
+  std::array<CurveHit, kMost> hits_;
+  uint32_t count_ = 0;
+};
+
+/// A box around primitive `prim` of a mesh of curves or points, a little larger than it.
+Bounds curve_bounds(const Mesh& mesh, uint32_t prim);
+
+/// Hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of primitive `prim` of a
+/// mesh of curves or points: the first, or `all`. Where a tube goes on in the next segment, the end
+/// that lies in it is not hit.
+CurveHits intersect_curve(const Mesh& mesh, uint32_t prim, const float (&origin)[3],
+                          const float (&dir)[3], float tfar, bool all);
+
+}  // namespace wavecomb

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Curves and points as Embree's user geometries.
+#pragma once
+
+#include <embree4/rtcore.h>
+
+#include "wavecomb/accel/embree_accelerator.h"
+
+namespace wavecomb {
+
+/// What such a geometry's user pointer points at; must outlive it.
+struct CurveGeometry {
+  const Mesh* mesh;
+  uint32_t id;       ///< of the mesh
+  bool is_filtered;  ///< some of it may be partly present
+};
+
+/// A committed geometry of a mesh of curves or points, to be released by the caller.
+RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, HitRule rule);
+
+}  // namespace wavecomb

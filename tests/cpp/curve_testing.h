@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Curves and points for tests.
+#pragma once
+
+#include "scene_testing.h"
+#include "wavecomb/scene/curve.h"
+
+namespace wavecomb::curve_testing {
+
+using namespace scene_testing;
+
+/// Arrays of a mesh of curves or points.
+struct CurveData {
+  Primitive primitive = Primitive::kCubicTube;
+  std::vector<float> positions, radii, normals, uvs;
+  std::vector<uint32_t> segments, materials;
+
+  void point(const Vec3<float>& p, float radius, const Vec3<float>& n = {0, 0, 1}) {
+    positions.insert(positions.end(), {p.x, p.y, p.z});
+    normals.insert(normals.end(), {n.x, n.y, n.z});
+    radii.push_back(radius);
+  }
+};
+
+/// A mesh that owns its arrays.
+inline Mesh make_curves(CurveData data, uint32_t material = kInheritMaterial,
+                        std::string name = "/World/curves") {
+  const auto owner = std::make_shared<const CurveData>(std::move(data));
+  Mesh mesh;
+  mesh.name = std::move(name);
+  mesh.primitive = owner->primitive;
+  mesh.positions = owner->positions;
+  mesh.radii = owner->radii;
+  mesh.indices = owner->segments;
+  if (mesh.is_ribbon()) mesh.normals = owner->normals;
+  mesh.uvs = owner->uvs;
+  if (!owner->uvs.empty()) mesh.uvs_at = Attribute::kCorner;
+  mesh.face_materials = owner->materials;
+  mesh.material = material;
+  mesh.owner = owner;
+  return mesh;
+}
+
+/// `n` wavy curves of `segments` segments from points of a ball of radius `size` outwards, or as
+/// many spheres as they would have control points.
+inline CurveData strands(Primitive primitive, uint32_t n, uint32_t segments, float size,
+                         float radius, uint32_t seed) {
+  CurveData data;
+  data.primitive = primitive;
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  const bool cubic = primitive == Primitive::kCubicTube || primitive == Primitive::kCubicRibbon;
+  const uint32_t step = cubic ? 3 : 1, points = step * segments + 1;
+  const auto random = [&] { return Vec3<float>(uniform(rng), uniform(rng), uniform(rng)); };
+  for (uint32_t c = 0; c < n; ++c) {
+    const auto first = static_cast<uint32_t>(data.radii.size());
+    Vec3<float> at = random() * size, along = random() * (size / static_cast<float>(points));
+    Vec3<float> turn = along;
+    for (uint32_t k = 0; k < points; ++k) {
+      data.point(at, radius * (1.2f - static_cast<float>(k) / static_cast<float>(points)),
+                 Vec3<float>(0, 0, 1) + random() * 0.3f);
+      // Smooth at the joints of cubics: the step before and after such a point is the same.
+      if (!cubic || k % 3 != 2)
+        turn = along + random() * (0.6f * size / static_cast<float>(points));
+      if (cubic && k % 3 == 0 && k > 0)
+        turn = at - Vec3<float>(data.positions[3 * (first + k) - 3],
+                                data.positions[3 * (first + k) - 2],
+                                data.positions[3 * (first + k) - 1]);
+      at += turn;
+    }
+    if (primitive == Primitive::kSphere) continue;
+    for (uint32_t k = 0; k < segments; ++k)
+      data.segments.push_back((first + step * k) | (k > 0 ? kCurveGoesOnBefore : 0u) |
+                              (k + 1 < segments ? kCurveGoesOnAfter : 0u));
+  }
+  return data;
+}
+
+inline const std::vector<Primitive>& curved_primitives() {
+  static const std::vector<Primitive> all = {Primitive::kLinearTube, Primitive::kCubicTube,
+                                             Primitive::kLinearRibbon, Primitive::kCubicRibbon,
+                                             Primitive::kSphere};
+  return all;
+}
+
+/// Curves and points of every kind, of every program, with textures, presence and instances
+/// (mirrored, stretched), beside triangles.
+inline ScenePtr hairy() {
+  SceneBuilder b;
+  const uint32_t picture = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
+  const uint32_t mask = add_texture(b, 8, 8, 1, random_texels(64, -0.2f, 1.2f, 6));
+  std::vector<uint32_t> materials;
+  Material m = make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f});
+  materials.push_back(b.add_material(m));
+  m.textures[static_cast<size_t>(Slot::kBaseColor)] = use(picture);
+  materials.push_back(b.add_material(m));
+  materials.push_back(b.add_material(make_material(ProgramId::kDielectric, {1, 1, 1}, 0)));
+  materials.push_back(b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.7f, 0.3f}, 0.3f)));
+  m = make_material(ProgramId::kPrincipled, {0.3f, 0.6f, 0.2f}, 0.5f);
+  m.presence = true;
+  m.opacity = 0.5f;
+  materials.push_back(b.add_material(m));
+  m.textures[static_cast<size_t>(Slot::kOpacity)] = use(mask, 0);
+  materials.push_back(b.add_material(m));
+  m = make_material(ProgramId::kEmissive);
+  m.emission = {2, 1, 0.5f};
+  materials.push_back(b.add_material(m));
+  b.add_to_group(0, b.add_mesh(make_mesh(ground(4, -1.2f), materials[0])));
+  const uint32_t group = b.add_group("clump");
+  uint32_t seed = 1;
+  for (const Primitive primitive : curved_primitives()) {
+    CurveData data = strands(primitive, 12, 4, 1.f, 0.05f, seed++);
+    const size_t count = make_curves(data).primitive_count();
+    for (size_t i = 0; i < count; ++i) data.materials.push_back(materials[i % materials.size()]);
+    std::mt19937 rng(seed);
+    data.uvs.resize((primitive == Primitive::kSphere ? 2 : 4) * count);
+    for (float& x : data.uvs) x = static_cast<float>(rng() % 1000) * 1e-3f;
+    b.add_to_group(0, b.add_mesh(make_curves(std::move(data))));
+    b.add_to_group(group, b.add_mesh(make_curves(strands(primitive, 6, 3, 0.5f, 0.04f, seed++))));
+  }
+  for (uint32_t i = 0; i < materials.size(); ++i) {
+    const float x = -1.8f + 0.6f * static_cast<float>(i);
+    b.add_instance(0, group,
+                   translate(x, 0.4f - 0.2f * x, -0.5f) * rotate(1, 40.0 * i) *
+                       scale(i % 2 ? -1.f : 1.f, 0.6f, 1.1f),
+                   materials[i]);
+  }
+  b.add_light(make_light(LightKind::kDome, {0.5f, 0.6f, 0.8f}));
+  Light rect = make_light(LightKind::kRect, {9, 9, 8}, translate(0, 3, 1) * rotate(0, -80));
+  b.add_light(rect);
+  b.set_camera(make_camera({0, 0.6, 4}, {0, -0.1, 0}, 0.9f));
+  return b.build();
+}
+
+}  // namespace wavecomb::curve_testing
