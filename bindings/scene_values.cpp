@@ -240,6 +240,9 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     Reader reader("the camera", nb::cast<nb::dict>(camera));
     reader.take("transform", changed.to_world);
     reader.take("to_world", changed.to_world);
+    // One that is put somewhere stands still there.
+    const nb::dict values = nb::cast<nb::dict>(camera);
+    if (values.contains("transform") || values.contains("to_world")) changed.steps.clear();
     reader.take("window", changed.window);
     reader.take(changed, kCameraNumbers);
     reader.end();

@@ -63,6 +63,9 @@ class Scene:
     def object_names(self) -> list[tuple[str, str]]:
         """(object, asset) as Cryptomatte names them: meshes instance by instance, then lights."""
     @property
+    def moves(self) -> bool:
+        """Whether a mesh, an instance or the camera moves while the shutter is open."""
+    @property
     def warnings(self) -> list[str]: ...
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
@@ -137,7 +140,8 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Positions (n, 3), triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
+        """Positions (n, 3), or (s, n, 3) at s equal steps over the shutter, and normals likewise;
+        triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
         vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,).
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
         afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
@@ -188,11 +192,13 @@ class SceneBuilder:
         names: list[str] | None = None,
         numbers: NDArray[np.uint32] | None = None,
         asset_lengths: list[int] | None = None,
+        motion: NDArray[np.float64] | None = None,
     ) -> None:
         """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it
         that have none of their own. Nested to any depth without copies of geometry. names: prim
         paths, one each or one for all, with numbers (k,) to tell those apart; asset_lengths: as in
-        add_mesh, one for each name."""
+        add_mesh, one for each name. motion: (k, s, 4, 4), transforms at s equal steps over the
+        shutter, in place of transforms."""
     def add_light(
         self,
         kind: str,
@@ -219,9 +225,11 @@ class SceneBuilder:
         focus_distance: float = 1,
         near_clip: float = 0,
         far_clip: float = 1e30,
+        motion: NDArray[np.float64] | None = None,
     ) -> None:
         """Looks along -z. window: x0, x1, y0, y1 on the plane z = -1 (aperture / focal length). The
-        renderer widens it to the shape of the picture (UsdRender's expandAperture)."""
+        renderer widens it to the shape of the picture (UsdRender's expandAperture). motion:
+        (s, 4, 4), transforms at s equal steps over the shutter."""
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
 

@@ -194,6 +194,9 @@ def load(
     threads: int = 0,
     subdivision: str | int = "auto",
     size: tuple[int, int] = (600, 600),
+    shutter: tuple[float, float] | None = None,
+    motion_blur: bool = True,
+    motion_steps: int | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -208,6 +211,9 @@ def load(
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
             size of their edges in the picture (docs/subdivision.md).
         size: Width and height of the picture that automatic levels are for.
+        shutter: When it opens and closes, time codes from the frame; by default the camera's.
+        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -230,7 +236,8 @@ def load(
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
     return load_stage(
         Path(path), camera=camera, frame=frame, variants=variants, threads=threads,
-        subdivision=subdivision, size=size, **options,
+        subdivision=subdivision, size=size,
+        shutter=shutter, motion_blur=motion_blur, motion_steps=motion_steps, **options,
     )  # fmt: skip
 
 

@@ -209,12 +209,15 @@ TEST(RayOrder, SortByDirectionEqualsStableSort) {
 struct BareWave {
   Settings settings;
   Film film{1, 1, {AovSet{0}}};
+  FilterTable filter{FilterKind::kBox, 1.f};
+  CameraSetup camera{Camera{}, 1, 1, filter};
   WaveContext context{};
   std::unique_ptr<Wave> wave;
 
   explicit BareWave(uint32_t capacity) {
     context.settings = &settings;
     context.film = &film;
+    context.camera = &camera;
     context.grid = box();
     wave = std::make_unique<Wave>(capacity, context);
   }

@@ -47,13 +47,30 @@ def examples(*lines: str) -> str:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant, --purpose and --subdivision."""
+    """STAGE, --camera, --frame, --variant, --purpose, --subdivision and those of motion blur."""
     for option in (
         click.option(
             "--subdivision",
             metavar="off|LEVEL|auto",
             help="Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their "
             "size in the picture.  [default: auto]",
+        ),
+        click.option(
+            "--motion-steps",
+            type=click.IntRange(2, 64),
+            metavar="N",
+            help="Steps of every motion over the shutter.  [default: as many as it needs, 2 to 8]",
+        ),
+        click.option(
+            "--no-motion-blur", is_flag=True, help="What moves is drawn as it is at the frame."
+        ),
+        click.option(
+            "--shutter",
+            type=Real(),
+            nargs=2,
+            metavar="OPEN CLOSE",
+            help="When the shutter opens and closes, time codes from the frame.  "
+            "[default: the camera's]",
         ),
         click.option(
             "--variant",
@@ -95,6 +112,9 @@ class StageOptions:
     purposes: tuple[str, ...]
     variants: tuple[str, ...]
     subdivision: str | None = None
+    shutter: tuple[float, float] | None = None
+    no_motion_blur: bool = False
+    motion_steps: int | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -113,6 +133,8 @@ class StageOptions:
             values["frame"] = self.frame
         for name in ("purposes", "variants"):
             values[name] = tuple(values[name])
+        values["shutter"] = tuple(values["shutter"]) if values["shutter"] else None
+        values["no_motion_blur"] = bool(values["no_motion_blur"])
         return StageOptions(**values)
 
     def load(
@@ -133,6 +155,9 @@ class StageOptions:
             threads=threads,
             subdivision="auto" if self.subdivision is None else self.subdivision,
             **({} if size is None else {"size": size}),
+            shutter=self.shutter,
+            motion_blur=not self.no_motion_blur,
+            motion_steps=self.motion_steps,
         )
 
     def selections(self) -> dict[str, str]:

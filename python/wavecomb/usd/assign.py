@@ -17,6 +17,7 @@ from wavecomb.usd.mesh import MeshArrays, find_primvar
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.primvar import Primvar, PrimvarError
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import Track
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.triangulate import Topology
 
@@ -34,6 +35,7 @@ class Draw:
         subsets: GeomSubset prims that bind materials.
         material: Bound to it.
         subset_materials: Bound to each subset.
+        track: In place of ``matrix`` where that changes while the shutter is open.
     """
 
     prim: Usd.Prim
@@ -42,6 +44,7 @@ class Draw:
     subsets: Sequence[Usd.Prim] = ()
     material: UsdShade.Material | None = None
     subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
+    track: Track | None = None
 
 
 class Assigner:

@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
 from wavecomb.usd.identity import Assets, LightGroups
-from wavecomb.usd.instancing import read_instances, sound
+from wavecomb.usd.instancing import moved_instances, read_instances, sound
 from wavecomb.usd.light import Light
 from wavecomb.usd.material import (
     DEFAULT_COLOUR,
@@ -117,7 +117,10 @@ class GroupBuilder:
         self.light_groups = light_groups
         self.report = report
         self.surfaces = surfaces
-        self.meshes = MeshReader(self.time, report, surfaces.subdivide)
+        self.motion = traversal.motion
+        self.meshes = MeshReader(
+            self.time, report, surfaces.subdivide, traversal.skeletons, self.motion
+        )
         self.assigner = Assigner(materials, self.time, report)
         self.bindings = BindingScan()
         self.assets = Assets()
@@ -178,12 +181,19 @@ class GroupBuilder:
 
     def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
         """Adds one gprim to a group."""
+        kind = self.traversal.kind(draw.prim)
+        deforms = kind == "mesh" and self.motion is not None and self.meshes.deforms(draw.prim)
+        if draw.track is not None and not deforms:
+            steps = draw.track.steps()
+            still = replace(draw, matrix=draw.matrix if steps is None else IDENTITY, track=None)
+            if steps is None:
+                return self._draw(group, still, scope)
+            return self._draw_moving(group, still, draw.matrix, steps, scope)
         if scope.override:
             draw.subsets = ()
         names = self.assigner.uv_names(draw)
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
-        kind = self.traversal.kind(draw.prim)
         try:
             mesh: MeshArrays | None
             if kind == "shape":
@@ -191,6 +201,8 @@ class GroupBuilder:
             else:
                 displaced = self.surfaces.is_displaced(draw)
                 mesh = self.meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
+                if mesh is not None and deforms:
+                    mesh = self.meshes.over_shutter(draw.prim, mesh, draw.matrix, draw.track)
         except MeshError as error:
             self.report.warn(f"mesh left out: {error}", draw.prim.GetPath())
             return
@@ -230,6 +242,19 @@ class GroupBuilder:
         """Materials of the same mesh once its triangles are others; says nothing twice."""
         quiet = Assigner(self.materials, self.time, LoadReport())
         return lambda mesh: self._materials(draw, mesh, scope, quiet)
+
+    def _draw_moving(
+        self, group: Group, draw: Draw, matrix: Gf.Matrix4d, steps: Matrices, scope: Scope
+    ) -> None:
+        """Adds a gprim that moves as a whole, as an instance of its own."""
+        path = draw.prim.GetPath()
+        child = Group(str(path), self.report.place(path))
+        self._draw(child, draw, scope)
+        if child.number is not None:
+            inherit = np.full(1, INHERIT_MATERIAL, np.uint32)
+            self._add(
+                group, child, np.array(matrix)[None], inherit, [draw.prim], motion=steps[None]
+            )
 
     def _materials(
         self, draw: Draw, mesh: MeshArrays, scope: Scope, assigner: Assigner | None = None
@@ -281,19 +306,26 @@ class GroupBuilder:
 
     def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
         """Adds native instances, all of one prototype at a time."""
-        batches: dict[int, tuple[Group, list[Any], list[int], list[Usd.Prim]]] = {}
+        batches: dict[
+            tuple[int, int], tuple[Group, list[Any], list[int], list[Any], list[Any]]
+        ] = {}
         for placed in instances:
             child = self._instance_group(placed, scope)
             if child is None:
                 continue
             material = self._instance_material(placed, scope)
-            batch = batches.setdefault(id(child), (child, [], [], []))
+            steps = None if placed.track is None else placed.track.steps()
+            count = 0 if steps is None else len(steps)
+            batch = batches.setdefault((id(child), count), (child, [], [], [], []))
+            batch[4].append(steps)
             batch[1].append(np.array(placed.matrix))
             batch[2].append(material)
             batch[3].append(placed.prim)
-        for child, matrices, materials, prims in batches.values():
+        for (_, count), (child, matrices, materials, prims, moves) in batches.items():
             transforms = np.stack(matrices)
-            self._add(parent, child, transforms, np.array(materials, np.uint32), prims)
+            motion = np.stack(moves) if count else None
+            ids = np.array(materials, np.uint32)
+            self._add(parent, child, transforms, ids, prims, motion=motion)
         self.report.tally("instances", len(instances))
 
     def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
@@ -348,6 +380,9 @@ class GroupBuilder:
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
         outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
+        moved = None
+        if self.motion is not None:
+            moved = moved_instances(prim, self.motion, placed.track, outer, instances, self.report)
         for index, target in enumerate(targets):
             first, last = np.searchsorted(ranked, [index, index + 1])
             if first == last:
@@ -364,7 +399,8 @@ class GroupBuilder:
             if outer is not None:
                 transforms = transforms @ outer
             numbers = instances.kept[chosen].astype(np.uint32)
-            self._add(parent, child, transforms, materials[chosen], [prim], numbers)
+            motion = None if moved is None else np.ascontiguousarray(moved[chosen])
+            self._add(parent, child, transforms, materials[chosen], [prim], numbers, motion)
         self.report.tally("point instances", len(instances.kept))
 
     def _prototype_group(self, root: Usd.Prim, placed: Placed, scope: Scope) -> Group | None:
@@ -418,13 +454,20 @@ class GroupBuilder:
         materials: NDArray[np.uint32],
         prims: Sequence[Usd.Prim],
         numbers: NDArray[np.uint32] | None = None,
+        motion: Matrices | None = None,
     ) -> None:
-        """Places a group k times: as k prims, or as so numbered ones of one point instancer."""
+        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
+
+        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
+        """
         usable = sound(transforms)
+        if motion is not None:
+            usable &= sound(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
         if not usable.all():
             what = "instances left out: transform without an inverse"
             self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
             transforms, materials = transforms[usable], materials[usable]
+            motion = None if motion is None else motion[usable]
             if numbers is None:
                 prims = [prim for prim, good in zip(prims, usable, strict=True) if good]
             else:
@@ -432,7 +475,8 @@ class GroupBuilder:
         if len(transforms) == 0:
             return
         if child.lit:
-            parent.children.append((child, transforms))
+            middle = transforms if motion is None else _middle(motion)
+            parent.children.append((child, middle))
             parent.lit = True
         if child.has_surfaces:
             parent.surfaced.append((child, transforms))
@@ -449,14 +493,24 @@ class GroupBuilder:
             names=names,
             numbers=numbers,
             asset_lengths=lengths,
+            **({} if motion is None else {"motion": motion}),
         )
         if child.bounds is not None:
+            if motion is not None:
+                transforms = motion.reshape(-1, 4, 4)
             lo, hi = child.bounds
             centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
             linear = transforms[:, :3, :3]
             middle = centre @ linear + transforms[:, 3, :3]
             reach = half @ np.abs(linear)
             parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
+
+
+def _middle(motion: Matrices) -> Matrices:
+    """(k, 4, 4) in the middle of steps (k, s, 4, 4)."""
+    last = motion.shape[1] - 1
+    middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
+    return middle
 
 
 def placed_lights(group: Group, limit: int) -> list[tuple[Light, Matrices]]:

@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
+from wavecomb.usd.camera import camera_motion, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.groups import Group, GroupBuilder, placed_lights
 from wavecomb.usd.identity import LightGroups
@@ -21,6 +21,7 @@ from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import check_shutter, find_motion
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
@@ -52,6 +53,7 @@ class LoadedStage:
         light_paths: Prim of each light of the scene, by index; "" of the soft dome. In instances
             both are named by the first instance.
         frame: Time code that was read; None: default values.
+        shutter: When it opens and closes, time codes from the frame; None: no motion blur.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
     """
 
@@ -66,6 +68,7 @@ class LoadedStage:
     light_paths: tuple[str, ...] = ()
     frame: float | None = None
     textures: TextureStock | None = None
+    shutter: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,22 @@ class _Filled:
     materials: tuple[str, ...]
     lights: tuple[str, ...]
     frame: float | None
+    shutter: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Blur:
+    """How motion is blurred.
+
+    Attributes:
+        shutter: When it opens and closes, time codes from the frame; None: as the camera says.
+        steps: Of every motion; None: as many as each needs, up to 8.
+        off: Not at all.
+    """
+
+    shutter: tuple[float, float] | None = None
+    steps: int | None = None
+    off: bool = False
 
 
 def load_stage(
@@ -91,6 +110,9 @@ def load_stage(
     reuse: TextureStock | None = None,
     subdivision: str | int = "auto",
     size: tuple[int, int] = (600, 600),
+    shutter: tuple[float, float] | None = None,
+    motion_blur: bool = True,
+    motion_steps: int | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -111,6 +133,9 @@ def load_stage(
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
+        shutter: When it opens and closes, time codes from the frame; None: as the camera says.
+        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -125,6 +150,8 @@ def load_stage(
     level = parse_level(subdivision)
     if not (len(size) == 2 and min(size) >= 1):
         raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
+    check_shutter(shutter, motion_steps)
+    blur = Blur(shutter, motion_steps, not motion_blur)
     report = LoadReport()
     file = _file_of(source)
     with captured(report):
@@ -139,7 +166,7 @@ def load_stage(
         try:
             filled = _fill(
                 builder, source, frame, camera, purposes, variants or {}, textures, report,
-                editable, surfaces_of,
+                editable, surfaces_of, blur,
             )  # fmt: skip
         finally:
             textures.release()
@@ -158,6 +185,7 @@ def load_stage(
         filled.lights,
         filled.frame,
         textures.stock(scene) if editable else None,
+        filled.shutter,
     )
 
 
@@ -180,6 +208,7 @@ def _fill(
     report: LoadReport,
     editable: bool,
     surfaces_of: SurfacesOf,
+    blur: Blur,
 ) -> _Filled:
     """Fills the builder. A stage that was opened here is closed then."""
     if isinstance(source, Usd.Stage):
@@ -190,12 +219,12 @@ def _fill(
     time = time_code(stage, frame)
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=editable)
-    chosen, lights = _read(
+    chosen, lights, shutter = _read(
         stage, time, camera, purposes, builder, textures, materials, bool(found.lights), report,
-        surfaces_of(materials),
+        surfaces_of(materials), blur,
     )  # fmt: skip
     used = None if time.IsDefault() else float(time.GetValue())
-    return _Filled(chosen, found, materials.paths(), lights, used)
+    return _Filled(chosen, found, materials.paths(), lights, used, shutter)
 
 
 def _native_builder(threads: int) -> _core.SceneBuilder:
@@ -221,13 +250,17 @@ def _read(
     has_lights: bool,
     report: LoadReport,
     surfaces: Surfaces,
-) -> tuple[str | None, tuple[str, ...]]:
-    """Fills the builder; gives the paths of the camera and of the lights."""
+    blur: Blur,
+) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None]:
+    """Fills the builder; gives the paths of the camera and of the lights, and the shutter."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = find_camera(stage, camera)
     groups = LightGroups(report)
     lights = LightReader(time, up_axis, textures, groups, report)
-    traversal = Traversal(time, purposes, lights, report)
+    motion = None
+    if not blur.off:
+        motion = find_motion(view_prim, time, blur.shutter, blur.steps, report)
+    traversal = Traversal(time, purposes, lights, report, motion)
     world = GroupBuilder(stage, traversal, builder, materials, groups, report, surfaces).world()
     lit = materials.glows or has_lights
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
@@ -241,9 +274,14 @@ def _read(
     if view is None:
         report.note("no camera: framed the bounds")
         view = frame_bounds(world.bounds, up_axis)
+    elif view_prim is not None:
+        moves = camera_motion(view_prim, motion)
+        if moves is not None:
+            view.options["motion"] = moves
     surfaces.finish(world, view)
     builder.set_camera(view.transform, **view.options)
-    return chosen, light_paths
+    shutter = None if motion is None else (motion.open - motion.frame, motion.close - motion.frame)
+    return chosen, light_paths, shutter
 
 
 def _add_lights(

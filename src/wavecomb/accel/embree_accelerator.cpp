@@ -114,7 +114,7 @@ struct EmbreeAccelerator::Impl {
     std::memcpy(ray.dir_z, rays.dz + base, 4 * W);
     for (uint32_t i = 0; i < W; ++i) {
       ray.tnear[i] = 0.f;
-      ray.time[i] = 0.f;
+      ray.time[i] = rays.time && i < n ? rays.time[base + i] : 0.f;
       ray.mask[i] = 0xffffffffu;
       ray.flags[i] = 0;
     }
@@ -183,6 +183,7 @@ struct EmbreeAccelerator::Impl {
     ray.dir_y = rays.dy[i];
     ray.dir_z = rays.dz[i];
     ray.tfar = rays.tfar ? rays.tfar[i] : std::numeric_limits<float>::infinity();
+    ray.time = rays.time ? rays.time[i] : 0.f;
     ray.mask = 0xffffffffu;
     ray.id = rays.slot ? rays.slot[i] : static_cast<unsigned>(i);
     return ray;

@@ -17,6 +17,7 @@ struct RaySpan {
   const float* tfar;     ///< null: no limit
   const uint32_t* slot;  ///< for presence, see PresenceKeys; may be null
   size_t size;
+  const float* time = nullptr;  ///< of the shutter, in [0, 1]; null: 0
 };
 
 /// Where hits go: barycentric u, v as in HitBuffer; `inst` is an index into SceneView::instances

@@ -22,9 +22,9 @@ enum class Attribute : uint8_t {
 /// alive for as long as a Scene uses them.
 struct Mesh {
   std::string name;
-  std::span<const float> positions;   ///< 3 per vertex
+  std::span<const float> positions;   ///< 3 per vertex, those of each step after another
   std::span<const uint32_t> indices;  ///< 3 per triangle, counter-clockwise from outside
-  std::span<const float> normals;     ///< 3 per vertex or corner; empty: flat
+  std::span<const float> normals;     ///< 3 per vertex or corner, step by step; empty: flat
   Attribute normals_at = Attribute::kNone;
   std::span<const float> uvs;  ///< 2 per vertex or corner; empty: uv = barycentrics
   Attribute uvs_at = Attribute::kNone;
@@ -32,10 +32,12 @@ struct Mesh {
   uint32_t material = kInheritMaterial;      ///< where face_materials is empty
   uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
   uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
+  uint32_t steps = 1;  ///< of its shape, at equal distances over the shutter; 1: it keeps its shape
   std::shared_ptr<const void> owner;
 
   size_t triangle_count() const { return indices.size() / 3; }
-  size_t vertex_count() const { return positions.size() / 3; }
+  size_t vertex_count() const { return positions.size() / 3 / steps; }
+  bool deforms() const { return steps > 1; }
 };
 
 /// A mesh as lanes read it: addresses and flags, 16 words.
@@ -44,7 +46,8 @@ struct alignas(64) MeshRecord {
   uint32_t material;
   uint32_t flags;
   float uv_density;  ///< sqrt(uv area / area) over all triangles, object space; 0 without uvs
-  uint32_t pad[3];
+  uint32_t motion;   ///< index into MotionView::meshes
+  uint32_t pad[2];
 };
 static_assert(sizeof(MeshRecord) == 64);
 enum MeshFlags : uint32_t {
