@@ -144,12 +144,15 @@ ScenePtr moving_scene(bool moving_camera) {
   builder.add_to_group(0, builder.add_mesh(deforming({ball, egg, ball}, 1)));
   MeshData rag = soup(60, 3), blown = soup(60, 3);
   builder.add_to_group(
-      0, builder.add_mesh(deforming({rag.transform(translate(-2, 0.5f, 0)),
-                                     blown.transform(translate(-2.2f, 0.9f, 0.3f))}, 2)));
+      0, builder.add_mesh(deforming(
+             {rag.transform(translate(-2, 0.5f, 0)), blown.transform(translate(-2.2f, 0.9f, 0.3f))},
+             2)));
   const uint32_t group = builder.add_group("things");
-  builder.add_to_group(group, builder.add_mesh(make_mesh(box({-.5f, -.5f, -.5f}, {.5f, .5f, .5f}))));
-  builder.add_to_group(group, builder.add_mesh(make_mesh(sphere(6, false).transform(
-                                                   translate(0, 1, 0) * scale(.4f, .4f, .4f)), 1)));
+  builder.add_to_group(group,
+                       builder.add_mesh(make_mesh(box({-.5f, -.5f, -.5f}, {.5f, .5f, .5f}))));
+  builder.add_to_group(
+      group, builder.add_mesh(make_mesh(
+                 sphere(6, false).transform(translate(0, 1, 0) * scale(.4f, .4f, .4f)), 1)));
   for (int i = 0; i < 3; ++i) {
     const Affine at = translate(2, 0.6f * static_cast<float>(i), -1);
     const Affine turn[3] = {at, at * rotate(1, 40), at * rotate(1, 80) * translate(0, 0.3f, 0)};
@@ -267,10 +270,106 @@ TEST(Motion, SurfacesAreWhereRaysMeetThem) {
   EXPECT_GT(met, 2000u);
 }
 
+/// Rays at vertices, edges and faces of a mesh where they are at the rays' own times, many of them
+/// along an axis.
+struct AimedRays {
+  std::vector<float> column[8];  ///< origin, direction, tfar, time
+
+  AimedRays(const Mesh& mesh, size_t n, uint32_t seed) {
+    std::mt19937 rng(seed);
+    std::uniform_real_distribution<float> uniform(0, 1);
+    for (auto& c : column) c.resize(n + 16, 0.f);
+    for (size_t i = 0; i < n; ++i) {
+      const float time = uniform(rng), place = time * static_cast<float>(mesh.steps - 1);
+      const auto step = std::min(static_cast<uint32_t>(place), mesh.steps - 2);
+      const size_t face = rng() % mesh.triangle_count();
+      float b[3] = {1, 0, 0};
+      if (i % 3 == 1) b[0] = 1 - (b[1] = uniform(rng));
+      if (i % 3 == 2) b[0] = 1 - (b[1] = 0.5f * uniform(rng)) - (b[2] = 0.5f * uniform(rng));
+      Vec3<float> at{0, 0, 0};
+      for (size_t k = 0; k < 3; ++k) {
+        const size_t vertex = mesh.indices[3 * face + k];
+        const auto p = [&](uint32_t s) {
+          const float* q = &mesh.positions[3 * (s * mesh.vertex_count() + vertex)];
+          return Vec3<float>(q[0], q[1], q[2]);
+        };
+        const float part = place - static_cast<float>(step);
+        at = at + (p(step) * (1 - part) + p(step + 1) * part) * b[k];
+      }
+      Vec3<float> d{0, 0, 0};
+      if (i % 2 == 0)
+        (i % 4 == 0 ? d.x : d.y) = i % 8 < 4 ? 1.f : -1.f;
+      else
+        d = normalize(Vec3<float>(uniform(rng) - 0.5f, uniform(rng) - 0.5f, uniform(rng) - 0.5f));
+      const Vec3<float> o = at - d * (1 + 4 * uniform(rng));
+      const float values[8] = {o.x, o.y, o.z, d.x, d.y, d.z, kInf, time};
+      for (size_t c = 0; c < 8; ++c) column[c][i] = values[c];
+    }
+  }
+  RaySpan span(size_t first, size_t n) const {
+    const auto at = [&](size_t c) { return column[c].data() + first; };
+    return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), nullptr, n, at(7)};
+  }
+};
+
+TEST(Motion, PacketsMeetWhatRaysAloneDo) {
+  // Shared edges, surfaces that cross, and all that moves in one scene or the other.
+  const size_t n = size_for_build(200000, 20);
+  for (const bool instances : {false, true}) {
+    SceneBuilder builder;
+    builder.add_material(Material{});
+    MeshData egg = sphere(8, false), bent = sphere(8, false);
+    egg.transform(translate(0.3f, 0.2f, 0.1f) * scale(1, 1.5f, 0.8f));
+    bent.transform(rotate(0, 30) * translate(0, 0.1f, 0));
+    const Mesh mesh = deforming({sphere(8, false), egg, bent});
+    builder.add_to_group(0, builder.add_mesh(mesh));
+    builder.add_to_group(0, builder.add_mesh(deforming({soup(40, 7), soup(40, 8)})));
+    if (instances) {
+      const uint32_t group = builder.add_group("g");
+      builder.add_to_group(group, builder.add_mesh(make_mesh(sphere(8, false), 0)));
+      const Affine turn[3] = {translate(0.2f, 0, 0), translate(0.5f, 0, 0) * rotate(1, 20),
+                              translate(1, 0, 0) * rotate(1, 40)};
+      builder.add_instance(0, group, turn[0], 0, kNoName, kNoName, turn);
+    }
+    const ScenePtr scene = builder.build();
+    const EmbreeAccelerator accel(scene, 1u);
+    const AimedRays rays(mesh, n, 11);
+    const uint32_t path = 0;
+    const PresenceKeys keys{&path, &path, 0, 0};
+    std::vector<HitBuffer> hits;
+    std::vector<std::vector<uint32_t>> blocked;
+    for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+      if (width > accel.native_width()) continue;
+      HitBuffer& h = hits.emplace_back(n);
+      auto& occluded = blocked.emplace_back(n + 16);
+      // In pieces, so that packets are made up otherwise.
+      for (size_t first = 0; first < n; first += 16 * width + 5) {
+        const size_t m = std::min<size_t>(16 * width + 5, n - first);
+        accel.intersect(
+            rays.span(first, m),
+            {h.t + first, h.u + first, h.v + first, h.prim + first, h.geom + first, h.inst + first},
+            width, width == 16, keys);
+        accel.occluded(rays.span(first, m), occluded.data() + first, width, false, keys);
+      }
+    }
+    size_t met = 0;
+    for (size_t w = 1; w < hits.size(); ++w)
+      for (size_t i = 0; i < n; ++i) {
+        const HitBuffer &a = hits[0], &b = hits[w];
+        ASSERT_EQ(a.inst[i], b.inst[i]) << i;
+        ASSERT_EQ(blocked[0][i], blocked[w][i]) << i;
+        if (a.inst[i] == kNoHit) continue;
+        ++met;
+        ASSERT_TRUE(a.t[i] == b.t[i] && a.u[i] == b.u[i] && a.v[i] == b.v[i] &&
+                    a.prim[i] == b.prim[i] && a.geom[i] == b.geom[i])
+            << i;
+      }
+    EXPECT_GT(met, n / 2);
+  }
+}
+
 TEST(Motion, BadMotionIsRefused) {
-  const auto expect_refused = [](const auto& build) {
-    EXPECT_THROW(build(), Error);
-  };
+  const auto expect_refused = [](const auto& build) { EXPECT_THROW(build(), Error); };
   expect_refused([] {
     SceneBuilder b;
     Mesh mesh = make_mesh(half_plane(0));

@@ -174,6 +174,10 @@ struct EmbreeAccelerator::Impl {
     }
   }
 
+  /// Rays per packet. Embree inverts the transform of a moving instance by other operations for a
+  /// packet than for a ray alone, and so hits differ: there each ray is alone.
+  uint32_t packet(uint32_t width) const { return view.motion.instances ? 1 : width; }
+
   static RTCRay load_ray(const RaySpan& rays, size_t i) {
     RTCRay ray{};
     ray.org_x = rays.ox[i];
@@ -212,7 +216,8 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
-  switch (width) {
+  coherent = coherent && !impl_->view.has_motion;
+  switch (impl_->packet(width)) {
     case 16:
       return impl_->intersect_packets<16>(rays, hits, coherent, keys);
     case 8:
@@ -235,7 +240,7 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
   rtcInitOccludedArguments(&args);
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
   args.context = &context.base;
-  switch (width) {
+  switch (impl_->packet(width)) {
     case 16:
       return impl_->occluded_packets<16>(rays, occluded, args);
     case 8:
