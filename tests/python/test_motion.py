@@ -3,10 +3,13 @@
 
 import numpy as np
 import pytest
-from usd_recorder import QUAD, load, said, write
+from click.testing import CliRunner
+from usd_recorder import QUAD, Recorder, load, said, write
 
 import wavecomb
+from wavecomb.cli import main
 from wavecomb.errors import WavecombError
+from wavecomb.image import read_layers
 from wavecomb.usd import load_stage
 
 HEADER = """#usda 1.0
@@ -290,3 +293,46 @@ def test_names_of_what_moves_are_its_prims(tmp_path):
     loaded = load_stage(write(tmp_path, stage(SCENE % QUAD)), frame=1)
     names = {name for name, _ in loaded.scene.object_names}
     assert {"/Mover/Quad", "/Floor"} <= names
+
+
+def test_subdivision_surfaces_change_their_shape(tmp_path):
+    cage = """
+def Mesh "Cage" {
+    point3f[] points.timeSamples = {
+        1: [(0,0,0), (1,0,0), (1,1,0), (0,1,0), (0,0,1), (1,0,1), (1,1,1), (0,1,1)],
+        2: [(0,0,0), (2,0,0), (2,1,0), (0,1,1), (0,0,2), (1,0,3), (1,1,1), (0,1,1)]
+    }
+    int[] faceVertexCounts = [4, 4, 4, 4, 4, 4]
+    int[] faceVertexIndices = [0,3,2,1, 4,5,6,7, 0,1,5,4, 1,2,6,5, 2,3,7,6, 3,0,4,7]
+}
+"""
+    path = write(tmp_path, stage(camera(0, 1) + cage))
+
+    def read(**options):
+        loaded = load_stage(path, subdivision=2, builder_factory=Recorder, **options)
+        return loaded.scene.mesh("Cage")
+
+    moving = read(frame=1)
+    assert moving["positions"].shape[0] == 2 and moving["normals"].shape[0] == 2
+    for step, frame in ((0, 1), (1, 2)):
+        still = read(frame=frame, motion_blur=False)
+        assert np.array_equal(moving["indices"], still["indices"])
+        assert np.array_equal(moving["positions"][step], still["positions"])
+        assert np.array_equal(moving["normals"][step], still["normals"])
+
+
+def test_options_of_the_command(tmp_path):
+    path = write(tmp_path, stage(SCENE % QUAD))
+
+    def run(*options):
+        arguments = ["render", path, "-o", tmp_path / "a.exr", "--size", 8, 8, "--spp", 4, *options]
+        return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+    assert run().exit_code == 0
+    blurred = read_layers(tmp_path / "a.exr")["beauty"]
+    assert run("--shutter", 0, 1, "--motion-steps", 3).exit_code == 0
+    assert np.allclose(read_layers(tmp_path / "a.exr")["beauty"], blurred, atol=1e-3)
+    assert run("--no-motion-blur").exit_code == 0
+    assert np.abs(read_layers(tmp_path / "a.exr")["beauty"] - blurred).max() > 0.05
+    bad = run("--shutter", 1, 0)
+    assert bad.exit_code == 2 and "when it opens" in bad.stderr
