@@ -169,12 +169,13 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   return builder.add_material(std::move(m));
 }
 
-/// Per vertex when (n, k), per corner when (m, 3, k).
-Attribute attribute_of(const std::optional<Array<float>>& values, size_t k,
-                       const std::string& name) {
+/// Per vertex when (n, k), per corner when (m, 3, k); with steps before that where it `deforms`.
+Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, const std::string& name,
+                       bool deforms = false) {
   if (!values) return Attribute::kNone;
-  if (values->ndim() == 2 && values->shape(1) == k) return Attribute::kVertex;
-  if (values->ndim() == 3 && values->shape(1) == 3 && values->shape(2) == k)
+  const size_t first = deforms ? 1 : 0, n = values->ndim();
+  if (n == first + 2 && values->shape(first + 1) == k) return Attribute::kVertex;
+  if (n == first + 3 && values->shape(first + 1) == 3 && values->shape(first + 2) == k)
     return Attribute::kCorner;
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
@@ -187,9 +188,12 @@ Mesh make_mesh(const Array<float>& positions,
                const std::string& name) {
   Mesh mesh;
   mesh.name = name;
-  if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 ||
-      indices.shape(1) != 3)
-    throw Error("mesh '" + name + "' needs positions of shape (n, 3) and indices of shape (m, 3)");
+  const bool deforms = positions.ndim() == 3;
+  if ((positions.ndim() != 2 && !deforms) || positions.shape(positions.ndim() - 1) != 3 ||
+      indices.ndim() != 2 || indices.shape(1) != 3)
+    throw Error("mesh '" + name +
+                "' needs positions of shape (n, 3), or (steps, n, 3), and indices of shape (m, 3)");
+  if (deforms) mesh.steps = static_cast<uint32_t>(std::min<size_t>(positions.shape(0), 1u << 30));
   if (indices.dtype() != nb::dtype<uint32_t>() && indices.dtype() != nb::dtype<int32_t>())
     throw Error("mesh '" + name + "' needs indices of int32 or uint32");
   mesh.positions = {positions.data(), positions.size()};
@@ -197,7 +201,7 @@ Mesh make_mesh(const Array<float>& positions,
   nb::list owners;
   owners.append(nb::cast(positions));
   owners.append(nb::cast(indices));
-  mesh.normals_at = attribute_of(normals, 3, name);
+  mesh.normals_at = attribute_of(normals, 3, name, deforms);
   if (normals) {
     mesh.normals = {normals->data(), normals->size()};
     owners.append(nb::cast(*normals));
@@ -249,8 +253,10 @@ Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Arr
   mesh.light_group = builder.light_group(light_group);
   mesh.asset_length = asset_length;
   mesh.material = material;
-  if (positions.ndim() != 2 || positions.shape(1) != 3)
-    throw Error("mesh '" + name + "' needs positions of shape (n, 3)");
+  const bool deforms = positions.ndim() == 3;
+  if ((positions.ndim() != 2 && !deforms) || positions.shape(positions.ndim() - 1) != 3)
+    throw Error("mesh '" + name + "' needs positions of shape (n, 3) or (steps, n, 3)");
+  if (deforms) mesh.steps = static_cast<uint32_t>(std::min<size_t>(positions.shape(0), 1u << 30));
   mesh.positions = {positions.data(), positions.size()};
   mesh.radii = {radii.data(), radii.size()};
   owners.append(nb::cast(positions));
@@ -310,7 +316,8 @@ void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
                    const std::optional<Array<uint32_t>>& materials,
                    const std::optional<std::vector<std::string>>& names,
                    const std::optional<Array<uint32_t>>& numbers,
-                   const std::optional<std::vector<uint32_t>>& asset_lengths) {
+                   const std::optional<std::vector<uint32_t>>& asset_lengths,
+                   const std::optional<Array<double>>& motion) {
   if (transforms.ndim() != 3 || transforms.shape(1) != 4 || transforms.shape(2) != 4)
     throw Error("transforms of instances must have the shape (k, 4, 4)");
   const bool is_double = transforms.dtype() == nb::dtype<double>();
@@ -325,17 +332,24 @@ void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
     throw Error("numbers of instances must be one for each transform");
   if (asset_lengths && (!names || asset_lengths->size() != names->size()))
     throw Error("asset lengths of instances must be one for each name");
+  if (motion && (motion->ndim() != 4 || motion->shape(0) != k || motion->shape(2) != 4 ||
+                 motion->shape(3) != 4))
+    throw Error("the motion of instances must have the shape (k, steps, 4, 4)");
+  const size_t steps = motion ? motion->shape(1) : 0;
+  std::vector<Affine> moved(steps);
   std::vector<uint32_t> texts;
   for (size_t i = 0; names && i < names->size(); ++i)
     texts.push_back(
         builder.add_placement_name((*names)[i], asset_lengths ? (*asset_lengths)[i] : 0));
-  for (size_t i = 0; i < k; ++i)
+  for (size_t i = 0; i < k; ++i) {
+    for (size_t s = 0; s < steps; ++s) moved[s] = affine(motion->data() + 16 * (i * steps + s));
     builder.add_instance(parent, child,
                          is_double ? affine(static_cast<const double*>(transforms.data()) + 16 * i)
                                    : affine(static_cast<const float*>(transforms.data()) + 16 * i),
                          materials ? materials->data()[i] : kInheritMaterial,
                          texts.empty() ? kNoName : texts[texts.size() == 1 ? 0 : i],
-                         numbers ? numbers->data()[i] : kNoName);
+                         numbers ? numbers->data()[i] : kNoName, moved);
+  }
 }
 
 uint32_t add_light(SceneBuilder& builder, const std::string& kind,
@@ -366,7 +380,8 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
 void set_camera(SceneBuilder& builder,
                 const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
                 const std::tuple<float, float, float, float>& window, float lens_radius,
-                float focus_distance, float near_clip, float far_clip) {
+                float focus_distance, float near_clip, float far_clip,
+                const std::optional<Array<double>>& motion) {
   Camera camera;
   camera.to_world = affine(transform);
   std::tie(camera.window[0], camera.window[1], camera.window[2], camera.window[3]) = window;
@@ -374,6 +389,10 @@ void set_camera(SceneBuilder& builder,
   camera.focus_distance = focus_distance;
   camera.near_clip = near_clip;
   camera.far_clip = far_clip;
+  if (motion && (motion->ndim() != 3 || motion->shape(1) != 4 || motion->shape(2) != 4))
+    throw Error("the motion of the camera must have the shape (steps, 4, 4)");
+  for (size_t s = 0; motion && s < motion->shape(0); ++s)
+    camera.steps.push_back(affine(motion->data() + 16 * s));
   builder.set_camera(camera);
 }
 
@@ -437,6 +456,8 @@ void bind_scene(nb::module_& m) {
             return d;
           },
           "arrays"_a = true)
+      .def_prop_ro("moves",
+                   [](const Scene& s) { return s.view().has_motion || !s.camera().steps.empty(); })
       .def_prop_ro("warnings", &Scene::warnings)
       .def_prop_ro("bounds", [](const Scene& s) {
         const Bounds& b = s.bounds();
@@ -475,12 +496,12 @@ void bind_scene(nb::module_& m) {
       .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
            "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
-           "numbers"_a = nb::none(), "asset_lengths"_a = nb::none())
+           "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none())
       .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
            "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f,
            "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(), "group"_a = "")
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
            "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,
-           "far_clip"_a = 1e30f)
+           "far_clip"_a = 1e30f, "motion"_a = nb::none())
       .def("build", &SceneBuilder::build, nb::call_guard<nb::gil_scoped_release>());
 }

@@ -84,6 +84,23 @@ class Reader {
       fail(name, "4 x 4 numbers");
     }
   }
+  /// Some of (k, 4, 4), or none.
+  void take(const char* name, std::vector<Affine>& to) {
+    const nb::object value = next(name);
+    if (!value.is_valid()) return;
+    to.clear();
+    if (value.is_none()) return;
+    try {
+      const nb::object array =
+          nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float64");
+      const auto steps =
+          nb::cast<nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>>(
+              array);
+      for (size_t k = 0; k < steps.shape(0); ++k) to.push_back(affine(steps.data() + 16 * k));
+    } catch (const std::exception&) {
+      fail(name, "4 x 4 numbers for each step");
+    }
+  }
   /// Throws where there was more than has been taken.
   void end() const {
     if (nb::len(values_) == taken_) return;
@@ -240,6 +257,10 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     Reader reader("the camera", nb::cast<nb::dict>(camera));
     reader.take("transform", changed.to_world);
     reader.take("to_world", changed.to_world);
+    // One that is put somewhere stands still there.
+    const nb::dict values = nb::cast<nb::dict>(camera);
+    if (values.contains("transform") || values.contains("to_world")) changed.steps.clear();
+    reader.take("motion", changed.steps);
     reader.take("window", changed.window);
     reader.take(changed, kCameraNumbers);
     reader.end();

@@ -68,6 +68,9 @@ class Scene:
     def object_names(self) -> list[tuple[str, str]]:
         """(object, asset) as Cryptomatte names them: meshes instance by instance, then lights."""
     @property
+    def moves(self) -> bool:
+        """Whether a mesh, an instance or the camera moves while the shutter is open."""
+    @property
     def warnings(self) -> list[str]: ...
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
@@ -142,7 +145,8 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Positions (n, 3), triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
+        """Positions (n, 3), or (s, n, 3) at s equal steps over the shutter, and normals likewise;
+        triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
         vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,).
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
         afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
@@ -194,8 +198,8 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Kinds: linear-tube, cubic-tube, linear-ribbon, cubic-ribbon. Positions (n, 3) of Bezier
-        control points (points of lines), radii (n,), normals (n, 3) of ribbons. segments (m,): the
+        """Kinds: linear-tube, cubic-tube, linear-ribbon, cubic-ribbon. Positions (n, 3), or
+        (steps, n, 3) over the shutter (normals likewise), of Bezier control points (points of lines), radii (n,), normals (n, 3) of ribbons. segments (m,): the
         first of four (two) points in a row, plus 2^31 where the curve goes on before it and 2^30
         where it goes on after it: then the point before (after) those of the segment says in which
         direction. uvs (m, 2, 2) at both ends; face_materials (m,). Counts as a mesh; arrays are
@@ -212,7 +216,7 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Spheres: positions (n, 3), radii (n,), uvs (n, 2), face_materials (n,). Counts as a
+        """Spheres: positions (n, 3), or (steps, n, 3) over the shutter, radii (n,), uvs (n, 2), face_materials (n,). Counts as a
         mesh; arrays are kept as in add_mesh."""
     def add_group(self, name: str = "", root: str = "") -> int:
         """A new empty group; group 0, the world, is there. root: the prim path that names of what
@@ -228,11 +232,13 @@ class SceneBuilder:
         names: list[str] | None = None,
         numbers: NDArray[np.uint32] | None = None,
         asset_lengths: list[int] | None = None,
+        motion: NDArray[np.float64] | None = None,
     ) -> None:
         """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it
         that have none of their own. Nested to any depth without copies of geometry. names: prim
         paths, one each or one for all, with numbers (k,) to tell those apart; asset_lengths: as in
-        add_mesh, one for each name."""
+        add_mesh, one for each name. motion: (k, s, 4, 4), transforms at s equal steps over the
+        shutter, in place of transforms."""
     def add_light(
         self,
         kind: str,
@@ -259,9 +265,11 @@ class SceneBuilder:
         focus_distance: float = 1,
         near_clip: float = 0,
         far_clip: float = 1e30,
+        motion: NDArray[np.float64] | None = None,
     ) -> None:
         """Looks along -z. window: x0, x1, y0, y1 on the plane z = -1 (aperture / focal length). The
-        renderer widens it to the shape of the picture (UsdRender's expandAperture)."""
+        renderer widens it to the shape of the picture (UsdRender's expandAperture). motion:
+        (s, 4, 4), transforms at s equal steps over the shutter."""
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
 

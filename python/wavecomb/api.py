@@ -199,6 +199,9 @@ def load(
     progress: Callable[[int, int], None] | None = None,
     isolate: bool = False,
     load_limit: float | None = None,
+    shutter: tuple[float, float] | None = None,
+    motion_blur: bool = True,
+    motion_steps: int | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -221,6 +224,9 @@ def load(
             as long as loading, and 0.3 s; for files that you do not trust.
         load_limit: With ``isolate``: seconds that USD may compose the stage, 0: any; None: 6, and 1
             for each MB of layers.
+        shutter: When it opens and closes, time codes from the frame; by default the camera's.
+        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -245,6 +251,9 @@ def load(
         "threads": threads,
         "subdivision": subdivision,
         "size": size,
+        "shutter": shutter,
+        "motion_blur": motion_blur,
+        "motion_steps": motion_steps,
     }
     if isolate:
         from wavecomb.isolate.probe import check

@@ -18,9 +18,10 @@ from wavecomb.api import check_memory, picture_of, prepare
 from wavecomb.frame_names import parse_frames
 from wavecomb.stats import make_stats
 from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.camera import find_camera, read_camera
+from wavecomb.usd.camera import camera_motion, find_camera, read_camera
 from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.opening import time_code
+from wavecomb.usd.shutter import Blur, find_motion
 from wavecomb.usd.stock import FrameStock
 
 if TYPE_CHECKING:
@@ -57,6 +58,9 @@ class Frames:
         self._path = Path(path)
         self._threads = threads
         self._options = options
+        self._blur = Blur.chosen(
+            options.get("shutter"), options.get("motion_blur", True), options.get("motion_steps")
+        )
         opening = LoadReport()
         started = time.perf_counter()
         layer = None if session_layer is None else Path(session_layer)
@@ -106,12 +110,16 @@ class Frames:
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(prim))
         told = LoadReport()
         view = read_camera(prim, to_world, when, told)
+        motion = find_motion(prim, when, self._blur, told)
         if view is None or not {*told.lines()} <= {*before.report.lines()}:
             return None
         if not self._stock.has_same_levels(view):
             return None
-        renderer.edit(camera={"transform": view.transform, **_CAMERA, **view.options})
-        return replace(before, scene=renderer.scene)
+        moves = camera_motion(prim, motion)
+        lens = {**_CAMERA, **view.options, "motion": moves}
+        renderer.edit(camera={"transform": view.transform, **lens})
+        shutter = None if motion is None else motion.shutter
+        return replace(before, scene=renderer.scene, shutter=shutter)
 
     def _is_camera_missing(self) -> bool:
         """Whether the bounds are framed for want of a camera, not because one is no good."""
@@ -154,6 +162,9 @@ def render_frames(
     mask: Iterable[str] = (),
     session_layer: str | os.PathLike[str] | None = None,
     subdivision: str | int = "auto",
+    shutter: tuple[float, float] | None = None,
+    motion_blur: bool = True,
+    motion_steps: int | None = None,
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -175,6 +186,9 @@ def render_frames(
         mask: Likewise.
         session_layer: Likewise.
         subdivision: Likewise.
+        shutter: Likewise.
+        motion_blur: Likewise.
+        motion_steps: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -201,6 +215,9 @@ def render_frames(
         session_layer=session_layer,
         threads=chosen.threads,
         subdivision=subdivision,
+        shutter=shutter,
+        motion_blur=motion_blur,
+        motion_steps=motion_steps,
         size=(chosen.width, chosen.height),
         **options,
     )

@@ -196,7 +196,8 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
             setup_surface<float>(scene->view(), {0, 0, prim, found.begin()->u, found.begin()->v},
                                  dir * (1.f / static_cast<float>(length)), true, true, true);
         const V3 p = along(o, d, want);
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(widen(s.p)[c], p[c], 4e-7 + s.offset);
+        const double off = 4e-7 + s.offset + 2e-6 * (want + 1e-2) * length;  // t may differ so much
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(widen(s.p)[c], p[c], off);
         EXPECT_NEAR(dot(widen(s.ng), widen(s.ng)), 1, 1e-5);
         if (is_sphere) {
           const V3 n = unit(sub(p, {mesh.positions[3 * prim], mesh.positions[3 * prim + 1],
@@ -212,8 +213,9 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
         }
       }
       EXPECT_GT(hits, rays / 3);
-      // Rays that graze, where sampling and solving see a miss and a hit.
-      EXPECT_LE(differing, rays / 500) << static_cast<int>(primitive) << ", radius " << radius;
+      // Rays that graze, where sampling and solving see a miss and a hit; ribbons are grazed often.
+      EXPECT_LE(differing, rays / (mesh.is_ribbon() ? 150 : 500))
+          << static_cast<int>(primitive) << ", radius " << radius;
     }
 }
 
@@ -257,6 +259,8 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
       for (uint32_t i = 0; i < size_for_build(20000); ++i) {
         const V3 from = along({away, -away, away}, random(), 3);
         const V3 to = along({away + 0.2, -away, away}, random(), 0.6);
+        const V3 apart = sub(from, {away, -away, away});
+        if (dot(apart, apart) < 2.25) continue;  // it may be inside
         const V3 d = unit(sub(to, from));
         const OneHit h = trace_one(accel, narrow(from), narrow(d));
         if (h.inst == kNoHit) continue;

@@ -46,7 +46,7 @@ void for_each_packet_of_slots(uint32_t seed, const Function& f) {
 TEST(PathPool, PathsComeBackFromTheirSlots) {
   for_each_lane_type([]<typename F>() {
     using U = UInt<F>;
-    const PathPool pool(kSlots, {AovSet{0}});
+    const PathPool pool(kSlots, {AovSet{0}}, false);
     for_each_packet_of_slots<F>(1, [&](const U& slot, const Mask<F>& active) {
       store_path<F>(pool, slot, numbered_path<F>(slot), active);
     });
@@ -79,7 +79,7 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
 TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
   for_each_lane_type([]<typename F>() {
     using U = UInt<F>;
-    const PathPool pool(kSlots, {AovSet{0}});
+    const PathPool pool(kSlots, {AovSet{0}}, false);
     std::vector<std::array<float, 3>> expected(kSlots, {0, 0, 0});
     for (uint32_t round = 0; round < 3; ++round)
       for_each_packet_of_slots<F>(round, [&](const U& slot, const Mask<F>& active) {
@@ -101,7 +101,7 @@ TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
 }
 
 TEST(PathPool, BlocksOfRows) {
-  const PathPool plain(100, {AovSet{0}}), aovs(100, {AovSet{}});
+  const PathPool plain(100, {AovSet{0}}, false), aovs(100, {AovSet{}}, false);
   for (const float* rows : {plain.first, plain.depth, plain.hits, plain.centre, plain.parts[0],
                             plain.parts[1], plain.groups, plain.cost_ns})
     EXPECT_EQ(rows, nullptr);
@@ -119,7 +119,7 @@ TEST(PathPool, BlocksOfRows) {
   EXPECT_EQ(plain.radiance - plain.shadows, 100 * PathPool::kShadowWords);
   // What nobody asks for takes nothing: a path, its shadow ray and its radiance are 144 bytes.
   EXPECT_LE(plain.bytes(), 100u * 144 + 4 * (SoaBlock::kPad + 32));
-  const PathPool all(100, {AovSet{(1u << kAovCount) - 1}, 3});
+  const PathPool all(100, {AovSet{(1u << kAovCount) - 1}, 3}, false);
   for (const float* rows :
        {all.hits, all.centre, all.parts[0], all.parts[1], all.groups, all.cost_ns})
     EXPECT_NE(rows, nullptr);
@@ -127,7 +127,7 @@ TEST(PathPool, BlocksOfRows) {
 }
 
 TEST(PathPool, LightGroupsKeepApart) {
-  const PathPool pool(8, {AovSet{static_cast<uint32_t>(Aov::kLightGroups)}, 3});
+  const PathPool pool(8, {AovSet{static_cast<uint32_t>(Aov::kLightGroups)}, 3}, false);
   add_group_radiance<float>(pool, 2, 1, {1.f, 2.f, 3.f}, true);
   add_group_radiance<float>(pool, 2, 1, {1.f, 0.f, 0.f}, true);
   add_group_radiance<float>(pool, 2, kNoGroup, {9.f, 9.f, 9.f}, true);

@@ -37,7 +37,7 @@ struct PoolRays {
   std::vector<uint32_t> slot;
 
   explicit PoolRays(const std::vector<Ray>& rays)
-      : pool(2 * rays.size() + 1, {AovSet{0}}), slot(rays.size()) {
+      : pool(2 * rays.size() + 1, {AovSet{0}}, false), slot(rays.size()) {
     std::vector<uint32_t> slots(2 * rays.size());
     std::iota(slots.begin(), slots.end(), 0u);
     std::shuffle(slots.begin(), slots.end(), std::mt19937(1));
@@ -209,12 +209,15 @@ TEST(RayOrder, SortByDirectionEqualsStableSort) {
 struct BareWave {
   Settings settings;
   Film film{1, 1, {AovSet{0}}};
+  FilterTable filter{FilterKind::kBox, 1.f};
+  CameraSetup camera{Camera{}, 1, 1, filter};
   WaveContext context{};
   std::unique_ptr<Wave> wave;
 
   explicit BareWave(uint32_t capacity) {
     context.settings = &settings;
     context.film = &film;
+    context.camera = &camera;
     context.grid = box();
     wave = std::make_unique<Wave>(capacity, context);
   }

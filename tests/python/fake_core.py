@@ -67,6 +67,8 @@ class Fake:
         scene = SimpleNamespace(
             triangles=1000,
             instanced_triangles=90000,
+            curve_segments=0,
+            points=0,
             mesh_count=2,
             instance_count=90,
             light_count=3,

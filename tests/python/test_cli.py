@@ -349,7 +349,7 @@ def test_policy_names_are_the_cores() -> None:
 
 def test_info(fake: Fake, stage: str) -> None:
     result = run("info", stage)
-    assert result.exit_code == 0
+    assert result.exit_code == 0, result.stderr
     for text in ("1,000 (90,000 with", "1 diffuse, 2 metal", "5.0 MB", "3 RectLight", "/Smoke"):
         assert text in result.stdout
     assert "3: 1 dome, 2 rect" in result.stdout

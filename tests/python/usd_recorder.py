@@ -19,6 +19,7 @@ class Recorder:
         self.textures, self.materials, self.meshes, self.lights = [], [], [], []
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
+        self.motions = []  # (name of a group, its transforms over the shutter)
 
     def add_texture(self, pixels, *, srgb, wrap_s="repeat", wrap_t="repeat", name=""):
         assert pixels.ndim == 3 and 1 <= pixels.shape[2] <= 4 and pixels.flags.c_contiguous
@@ -45,15 +46,16 @@ class Recorder:
         light_group="",
         asset_length=0,
     ):
-        n, m = len(positions), len(indices)
-        assert positions.dtype == np.float32 and positions.shape == (n, 3)
+        steps = positions.shape[:-2]  # of the shutter, where it changes its shape
+        n, m = positions.shape[-2], len(indices)
+        assert positions.dtype == np.float32 and positions.shape == (*steps, n, 3)
         assert indices.dtype == np.uint32 and indices.shape == (m, 3)
         assert positions.flags.c_contiguous and indices.flags.c_contiguous
         assert m > 0 and indices.max() < n and np.isfinite(positions).all()
-        for array, width in ((normals, 3), (uvs, 2)):
+        for array, width, at in ((normals, 3, steps), (uvs, 2, ())):
             if array is not None:
                 assert array.dtype == np.float32 and array.flags.c_contiguous
-                assert array.shape in ((n, width), (m, 3, width))
+                assert array.shape in ((*at, n, width), (*at, m, 3, width))
                 assert np.isfinite(array).all()
         if face_materials is not None:
             assert face_materials.shape == (m,) and face_materials.dtype == np.uint32
@@ -87,13 +89,14 @@ class Recorder:
                 wrap_s=texture["wrap"][0], wrap_t=texture["wrap"][1],
             )  # fmt: skip
         return builder.make_surfaces(descriptions, threads)
+
     def add_curves(self, kind, positions, segments, radii, *, normals=None, **options):
         assert segments.dtype == np.uint32 and segments.ndim == 1 and len(segments) > 0
         first = segments & 0x3FFFFFFF
         points = 4 if kind.startswith("cubic") else 2
         before = (segments >> 31).astype(np.int64)
         after = (segments >> 30 & 1).astype(np.int64)
-        assert (first >= before).all() and (first + points + after <= len(positions)).all()
+        assert (first >= before).all() and (first + points + after <= len(radii)).all()
         assert (normals is not None) == kind.endswith("ribbon")
         assert normals is None or normals.shape == positions.shape
         return self._add_curved(
@@ -102,11 +105,11 @@ class Recorder:
         )  # fmt: skip
 
     def add_points(self, positions, radii, **options):
-        return self._add_curved(len(positions), (2,), positions, radii, options, kind="sphere")
+        return self._add_curved(len(radii), (2,), positions, radii, options, kind="sphere")
 
     def _add_curved(self, count, uv_shape, positions, radii, options, **what):
         assert positions.dtype == radii.dtype == np.float32 and positions.flags.c_contiguous
-        assert positions.shape == (len(radii), 3) and radii.shape == (len(radii),)
+        assert positions.shape[-2:] == (len(radii), 3) and radii.shape == (len(radii),)
         assert np.isfinite(positions).all() and (radii >= 0).all() and np.isfinite(radii).all()
         uvs, faces = options["uvs"], options["face_materials"]
         assert uvs is None or (uvs.dtype == np.float32 and uvs.shape == (count, *uv_shape))
@@ -122,15 +125,19 @@ class Recorder:
         self.groups[group]["meshes"].append(mesh)
 
     def add_instances(
-        self, parent, child, transforms, materials=None, *, names, numbers=None, asset_lengths
-    ):
+        self, parent, child, transforms, materials=None, *, names, numbers=None, asset_lengths,
+        motion=None,
+    ):  # fmt: skip
         assert len(names) == len(asset_lengths) and len(names) in (1, len(transforms))
         assert all(length <= len(name) for name, length in zip(names, asset_lengths, strict=True))
         assert numbers is None or (numbers.dtype == np.uint32 and len(numbers) == len(transforms))
         assert transforms.dtype == np.float64 and transforms.shape == (len(transforms), 4, 4)
         assert materials.dtype == np.uint32 and materials.shape == (len(transforms),)
         assert np.isfinite(transforms).all() and child != 0
+        assert motion is None or motion.shape == (len(transforms), motion.shape[1], 4, 4)
         self.groups[parent]["children"].append((child, transforms, materials))
+        if motion is not None:
+            self.motions.append((self.groups[child]["name"], motion))
 
     def add_light(self, kind, transform, **options):
         assert np.shape(transform) == (4, 4)

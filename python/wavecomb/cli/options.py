@@ -92,7 +92,7 @@ def isolation_options(command: F) -> F:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant, --purpose, --mask, --subdivision ..."""
+    """STAGE, --camera, --frame, --variant, --purpose, --mask, --subdivision, --shutter ..."""
     for option in (
         click.option(
             "--subdivision",
@@ -112,6 +112,23 @@ def stage_options(command: F) -> F:
             metavar="PATH",
             help="Prim to draw, with all below it and what it needs; may be given again.  "
             "[default: all]",
+        ),
+        click.option(
+            "--motion-steps",
+            type=click.IntRange(2, 64),
+            metavar="N",
+            help="Steps of every motion over the shutter.  [default: as many as it needs, 2 to 8]",
+        ),
+        click.option(
+            "--no-motion-blur", is_flag=True, help="What moves is drawn as it is at the frame."
+        ),
+        click.option(
+            "--shutter",
+            type=Real(),
+            nargs=2,
+            metavar="OPEN CLOSE",
+            help="When the shutter opens and closes, time codes from the frame.  "
+            "[default: the camera's]",
         ),
         click.option(
             "--variant",
@@ -155,6 +172,9 @@ class StageOptions:
     mask: tuple[str, ...] = ()
     session_layer: str | None = None
     subdivision: str | None = None
+    shutter: tuple[float, float] | None = None
+    no_motion_blur: bool = False
+    motion_steps: int | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -173,6 +193,8 @@ class StageOptions:
             values["frame"] = self.frame
         for name in ("purposes", "variants", "mask"):
             values[name] = tuple(values[name] or ())
+        values["shutter"] = tuple(values["shutter"]) if values["shutter"] else None
+        values["no_motion_blur"] = bool(values["no_motion_blur"])
         return StageOptions(**values)
 
     def load(
@@ -202,6 +224,9 @@ class StageOptions:
             "session_layer": self.session_layer,
             "subdivision": "auto" if self.subdivision is None else self.subdivision,
             **({} if size is None else {"size": size}),
+            "shutter": self.shutter,
+            "motion_blur": not self.no_motion_blur,
+            "motion_steps": self.motion_steps,
         }
 
     def selections(self) -> dict[str, str]:

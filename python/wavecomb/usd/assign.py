@@ -18,6 +18,7 @@ from wavecomb.usd.mesh import MeshArrays, find_primvar
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.primvar import Primvar, PrimvarError, as_integers
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import Track
 from wavecomb.usd.strands import Strands
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.triangulate import Topology
@@ -36,6 +37,7 @@ class Draw:
         subsets: GeomSubset prims that bind materials.
         material: Bound to it.
         subset_materials: Bound to each subset.
+        track: In place of ``matrix`` where that changes while the shutter is open.
     """
 
     prim: Usd.Prim
@@ -44,6 +46,7 @@ class Draw:
     subsets: Sequence[Usd.Prim] = ()
     material: UsdShade.Material | None = None
     subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
+    track: Track | None = None
 
 
 class Assigner:

@@ -42,6 +42,7 @@ class Cage:
         uvs: Texture coordinates.
         topology: Its triangles as polygons.
         smooth: Whether polygons have normals at all.
+        steps: Points and matrices at equal steps over the shutter; none: it keeps its shape.
     """
 
     points: Floats
@@ -54,6 +55,7 @@ class Cage:
     uvs: Primvar | None
     topology: Topology
     smooth: bool = True
+    steps: Sequence[tuple[Floats, Gf.Matrix4d]] = ()
 
     def triangles_at(self, level: int) -> int:
         """Triangles that ``level`` steps of subdivision make."""
@@ -62,6 +64,12 @@ class Cage:
         if self.scheme == "loop":
             return len(self.counts) * 4**level
         return 2 * len(self.indices) * int(4 ** (level - 1))
+
+    def over_shutter(self, description: dict[str, Any]) -> list[dict[str, Any]]:
+        """A description for ``SceneBuilder.make_surfaces`` as one for each step."""
+        if not self.steps:
+            return [description]
+        return [description | {"points": p, "matrix": np.array(m)} for p, m in self.steps]
 
     def primvar(self, primvar: Primvar, width: int) -> dict[str, Any]:
         """A primvar as ``SceneBuilder.make_surfaces`` takes it; one that fits (``spread`` says)."""

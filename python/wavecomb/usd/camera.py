@@ -15,6 +15,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.usd.network import number, pair
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.search import every
+from wavecomb.usd.shutter import Motion
 
 Matrix = NDArray[np.float64]
 
@@ -123,6 +124,21 @@ def read_camera(
     elif stop > 0:
         report.warn("camera has fStop but no focusDistance: drawn without depth of field", path)
     return View(frame, options)
+
+
+def camera_motion(prim: Usd.Prim, motion: Motion | None) -> Matrix | None:
+    """Transforms (s, 4, 4) of a camera at equal steps over the shutter; None: it stands still."""
+    if motion is None:
+        return None
+    frames: list[Matrix | None] = []
+
+    def frame(time: float) -> Matrix:
+        world = np.array(motion.xforms(time).GetLocalToWorldTransform(prim))
+        frames.append(_rigid(world))
+        return world if frames[-1] is None else frames[-1]
+
+    steps = motion.steps(frame)
+    return None if any(f is None for f in frames) else steps
 
 
 def _rigid(to_world: Matrix) -> Matrix | None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
+from wavecomb.usd.deforming import points_at, step_times
 from wavecomb.usd.mesh import (
     IDENTITY,
     UV_NAMES,
@@ -23,6 +24,7 @@ from wavecomb.usd.mesh import (
 )
 from wavecomb.usd.primvar import Primvar, PrimvarError, as_array, read_primvar
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import Motion
 from wavecomb.usd.strands import Strands, lay_out
 from wavecomb.usd.triangulate import MeshError
 
@@ -38,10 +40,10 @@ class CurveArrays:
 
     Attributes:
         kind: linear-tube, cubic-tube, linear-ribbon or cubic-ribbon; sphere for points.
-        positions: (n, 3) control points or points.
+        positions: (n, 3) control points or points, or (s, n, 3) at s steps over the shutter.
         segments: (m,) as ``SceneBuilder.add_curves`` takes them; None for points.
         radii: (n,).
-        normals: (n, 3) of ribbons.
+        normals: (n, 3) of ribbons, or (s, n, 3).
         uvs: (m, 2, 2) at both ends of segments; (n, 2) for points; None: none wanted.
         bounds: (2, 3).
         topology: What primvars of the prim are spread over.
@@ -111,7 +113,7 @@ class CurveReader:
         radii = np.maximum(strands.controls(widths, kind)[:, 0] * np.float32(scale), 0)
         reach = float(radii.max(initial=0.0))
         bounds += np.array([[-reach], [reach]], np.float32)
-        normals = self._normals(prim, strands)
+        normals = self.normals(prim, strands)
         if normals is not None and matrix != IDENTITY:
             normals = bake_normals(normals, matrix)
         shape = ("cubic-" if strands.cubic else "linear-") + (
@@ -146,7 +148,7 @@ class CurveReader:
     def _widths(self, prim: Usd.Prim, strands: Strands) -> tuple[NDArray[Any], str]:
         return read_widths(prim, strands, self.time, self.report)
 
-    def _normals(self, prim: Usd.Prim, strands: Strands) -> Array | None:
+    def normals(self, prim: Usd.Prim, strands: Strands) -> Array | None:
         """At control points, for ribbons; None for tubes."""
         primvar = authored(prim, "normals", self.time)
         if primvar is None:
@@ -182,6 +184,41 @@ class CurveReader:
         else:
             first, last = strands.ends(*found)
         return np.ascontiguousarray(np.stack([first, last], axis=1), np.float32)
+
+
+def over_shutter(
+    prim: Usd.Prim, shape: CurveArrays, matrix: Gf.Matrix4d, motion: Motion, report: LoadReport
+) -> CurveArrays:
+    """Curves or points that were read at the frame, where they are at the steps of the shutter.
+
+    Widths and texture coordinates are those of the frame.
+
+    Args:
+        prim: Whose points change.
+        shape: Its arrays at the frame.
+        matrix: From the prim to its group.
+        motion: While the shutter is open.
+        report: For what is odd.
+    """
+    times = step_times(prim, None, motion)
+    found = points_at(prim, None, times, motion.frame, report)
+    layout = shape.topology
+    if found is None or len(found[0]) != layout.sizes["vertex"]:
+        return shape
+    if all(np.array_equal(points, found[0]) for points in found):
+        return shape
+    steps, normals = [], []
+    for points, time in zip(found, times, strict=True):
+        controls = points if shape.segments is None else layout.controls(points, "vertex")
+        steps.append(bake(controls, matrix))
+        if shape.normals is not None:
+            then = CurveReader(Usd.TimeCode(time), LoadReport()).normals(prim, layout)
+            normals.append(shape.normals if then is None else bake_normals(then, matrix))
+    positions = np.stack(steps)
+    reach = float(shape.radii.max(initial=0.0))
+    bounds = extent(positions.reshape(-1, 3)) + np.array([[-reach], [reach]], np.float32)
+    together = np.stack(normals) if normals else None
+    return replace(shape, positions=positions, normals=together, bounds=bounds)
 
 
 def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:

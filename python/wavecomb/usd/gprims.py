@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 from pxr import Usd
 
 from wavecomb.usd.assign import Draw
-from wavecomb.usd.curves import CurveArrays, CurveReader
+from wavecomb.usd.curves import CurveArrays, CurveReader, over_shutter
+from wavecomb.usd.deforming import deforms
 from wavecomb.usd.mesh import UV_NAMES, MeshArrays, MeshReader
 from wavecomb.usd.points import PointReader
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import Motion
+from wavecomb.usd.skeleton import Skeletons
 from wavecomb.usd.stock import MeshStock
 from wavecomb.usd.surfaces import Surfaces
 
@@ -28,13 +31,34 @@ class GprimReader:
         time: Usd.TimeCode,
         report: LoadReport,
         surfaces: Surfaces,
+        skeletons: Skeletons,
+        motion: Motion | None = None,
         stock: MeshStock | None = None,
     ) -> None:
-        """``stock``: arrays to take from and leave there."""
+        """Reads at ``time``.
+
+        Args:
+            time: The frame.
+            report: For what is odd.
+            surfaces: Say what is subdivided or displaced.
+            skeletons: Deform what is bound to them.
+            motion: Shapes are taken over its shutter; None: at ``time`` only.
+            stock: Arrays to take from and leave there.
+        """
         self.time = time
         self.report = report
         self.surfaces = surfaces
+        self.skeletons = skeletons
+        self.motion = motion
         self.stock = stock
+
+    def deforms(self, kind: str, prim: Usd.Prim) -> bool:
+        """Whether the shape of a gprim may change while the shutter is open."""
+        return self.motion is not None and self._changes(kind, prim)
+
+    def _changes(self, kind: str, prim: Usd.Prim) -> bool:
+        """Whether the shape of a gprim may change over time."""
+        return kind != "shape" and deforms(prim, self.skeletons.of(prim))
 
     def read(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | CurveArrays | None:
         """The arrays of a gprim in its group's space; None where there is nothing to draw.
@@ -52,18 +76,32 @@ class GprimReader:
         displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
 
         def read(report: LoadReport) -> MeshArrays | CurveArrays | None:
-            if kind == "curves":
-                curves = CurveReader(self.time, report)
-                return curves.curves(draw.prim, draw.matrix, names, draw.inherited)
-            if kind == "points":
-                points = PointReader(self.time, report)
-                return points.points(draw.prim, draw.matrix, names, draw.inherited)
-            meshes = MeshReader(self.time, report, self.surfaces.subdivide)
+            strands: CurveArrays | None
+            if kind in ("curves", "points"):
+                if kind == "curves":
+                    curves = CurveReader(self.time, report)
+                    strands = curves.curves(draw.prim, draw.matrix, names, draw.inherited)
+                else:
+                    points = PointReader(self.time, report)
+                    strands = points.points(draw.prim, draw.matrix, names, draw.inherited)
+                if (
+                    strands is not None
+                    and self.motion is not None
+                    and self._changes(kind, draw.prim)
+                ):
+                    return over_shutter(draw.prim, strands, draw.matrix, self.motion, report)
+                return strands
+            meshes = MeshReader(
+                self.time, report, self.surfaces.subdivide, self.skeletons, self.motion
+            )
             if kind == "shape":
                 return meshes.shape(draw.prim, draw.matrix)
-            return meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
+            mesh = meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
+            if mesh is not None and self.deforms(kind, draw.prim):
+                return meshes.over_shutter(draw.prim, mesh, draw.matrix, draw.track)
+            return mesh
 
-        if self.stock is None:
+        if self.stock is None or self._changes(kind, draw.prim):
             return read(self.report)
         options = (tuple(names), names is UV_NAMES, displaced)
         return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)

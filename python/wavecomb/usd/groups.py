@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.isolate import trail
 from wavecomb.usd.assign import Assigner, Draw
@@ -17,7 +17,7 @@ from wavecomb.usd.colour import quantise
 from wavecomb.usd.curves import CurveArrays, uniform_scale
 from wavecomb.usd.gprims import GprimReader, add_shape
 from wavecomb.usd.identity import Assets, LightGroups
-from wavecomb.usd.instancing import read_instances, sound
+from wavecomb.usd.instancing import moved_instances, read_instances, sound
 from wavecomb.usd.light import Light
 from wavecomb.usd.material import (
     DEFAULT_COLOUR,
@@ -138,7 +138,10 @@ class GroupBuilder:
         self.light_groups = light_groups
         self.report = report
         self.surfaces = surfaces
-        self.gprims = GprimReader(self.time, report, surfaces, stock)
+        self.motion = traversal.motion
+        self.gprims = GprimReader(
+            self.time, report, surfaces, traversal.skeletons, self.motion, stock
+        )
         self.progress = progress
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(materials, self.time, report)
@@ -206,8 +209,16 @@ class GroupBuilder:
     def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
         """Adds one gprim to a group."""
         kind = self.traversal.kind(draw.prim)
+        baked = kind == "mesh" and self.gprims.deforms(kind, draw.prim)
+        if draw.track is not None and not baked:
+            steps = draw.track.steps()
+            still = replace(draw, matrix=draw.matrix if steps is None else IDENTITY, track=None)
+            if steps is None:
+                return self._draw(group, still, scope)
+            return self._draw_alone(group, still, draw.matrix, scope, steps)
         if kind in STRANDS.values() and uniform_scale(draw.matrix) is None:
-            return self._draw_skewed(group, draw, scope)
+            own = replace(draw, matrix=IDENTITY)
+            return self._draw_alone(group, own, draw.matrix, scope)
         if scope.override:
             draw.subsets = ()
         names = self.assigner.uv_names(draw)
@@ -255,16 +266,27 @@ class GroupBuilder:
         quiet = Assigner(self.materials, self.time, LoadReport())
         return lambda mesh: self._materials(draw, mesh, scope, quiet)
 
-    def _draw_skewed(self, group: Group, draw: Draw, scope: Scope) -> None:
-        """Adds curves or points that a transform makes oval: a group of their own, placed by it."""
+    def _draw_alone(
+        self,
+        group: Group,
+        draw: Draw,
+        matrix: Gf.Matrix4d,
+        scope: Scope,
+        steps: Matrices | None = None,
+    ) -> None:
+        """Adds a gprim as an instance of its own, placed by ``matrix``.
+
+        For what moves as a whole, by ``steps`` (s, 4, 4), and for curves or points that a transform
+        makes oval.
+        """
         path = draw.prim.GetPath()
         child = Group(str(path), self.report.place(path))
-        own = replace(draw, matrix=IDENTITY)
-        self._draw(child, own, scope)
+        self._draw(child, draw, scope)
         if child.empty:
             return
         inherit = np.array([INHERIT_MATERIAL], np.uint32)
-        self._add(group, child, np.array(draw.matrix)[None], inherit, [draw.prim])
+        motion = None if steps is None else steps[None]
+        self._add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
 
     def _materials(
         self,
@@ -324,19 +346,26 @@ class GroupBuilder:
 
     def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
         """Adds native instances, all of one prototype at a time."""
-        batches: dict[int, tuple[Group, list[Any], list[int], list[Usd.Prim]]] = {}
+        batches: dict[
+            tuple[int, int], tuple[Group, list[Any], list[int], list[Any], list[Any]]
+        ] = {}
         for placed in instances:
             child = self._instance_group(placed, scope)
             if child is None:
                 continue
             material = self._instance_material(placed, scope)
-            batch = batches.setdefault(id(child), (child, [], [], []))
+            steps = None if placed.track is None else placed.track.steps()
+            count = 0 if steps is None else len(steps)
+            batch = batches.setdefault((id(child), count), (child, [], [], [], []))
+            batch[4].append(steps)
             batch[1].append(np.array(placed.matrix))
             batch[2].append(material)
             batch[3].append(placed.prim)
-        for child, matrices, materials, prims in batches.values():
+        for (_, count), (child, matrices, materials, prims, moves) in batches.items():
             transforms = np.stack(matrices)
-            self._add(parent, child, transforms, np.array(materials, np.uint32), prims)
+            motion = np.stack(moves) if count else None
+            ids = np.array(materials, np.uint32)
+            self._add(parent, child, transforms, ids, prims, motion=motion)
         self.report.tally("instances", len(instances))
 
     def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
@@ -391,6 +420,9 @@ class GroupBuilder:
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
         outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
+        moved = None
+        if self.motion is not None:
+            moved = moved_instances(prim, self.motion, placed.track, outer, instances, self.report)
         for index, target in enumerate(targets):
             first, last = np.searchsorted(ranked, [index, index + 1])
             if first == last:
@@ -407,7 +439,8 @@ class GroupBuilder:
             if outer is not None:
                 transforms = transforms @ outer
             numbers = instances.kept[chosen].astype(np.uint32)
-            self._add(parent, child, transforms, materials[chosen], [prim], numbers)
+            motion = None if moved is None else np.ascontiguousarray(moved[chosen])
+            self._add(parent, child, transforms, materials[chosen], [prim], numbers, motion)
         self.report.tally("point instances", len(instances.kept))
 
     def _prototype_group(self, root: Usd.Prim, placed: Placed, scope: Scope) -> Group | None:
@@ -461,13 +494,20 @@ class GroupBuilder:
         materials: NDArray[np.uint32],
         prims: Sequence[Usd.Prim],
         numbers: NDArray[np.uint32] | None = None,
+        motion: Matrices | None = None,
     ) -> None:
-        """Places a group k times: as k prims, or as so numbered ones of one point instancer."""
+        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
+
+        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
+        """
         usable = sound(transforms)
+        if motion is not None:
+            usable &= sound(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
         if not usable.all():
             what = "instances left out: transform without an inverse"
             self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
             transforms, materials = transforms[usable], materials[usable]
+            motion = None if motion is None else motion[usable]
             if numbers is None:
                 prims = [prim for prim, good in zip(prims, usable, strict=True) if good]
             else:
@@ -475,7 +515,8 @@ class GroupBuilder:
         if len(transforms) == 0:
             return
         if child.lit:
-            parent.children.append((child, transforms))
+            middle = transforms if motion is None else _middle(motion)
+            parent.children.append((child, middle))
             parent.lit = True
         if child.has_surfaces:
             parent.surfaced.append((child, transforms))
@@ -492,14 +533,24 @@ class GroupBuilder:
             names=names,
             numbers=numbers,
             asset_lengths=lengths,
+            **({} if motion is None else {"motion": motion}),
         )
         if child.bounds is not None:
+            if motion is not None:
+                transforms = motion.reshape(-1, 4, 4)
             lo, hi = child.bounds
             centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
             linear = transforms[:, :3, :3]
             middle = centre @ linear + transforms[:, 3, :3]
             reach = half @ np.abs(linear)
             parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
+
+
+def _middle(motion: Matrices) -> Matrices:
+    """(k, 4, 4) in the middle of steps (k, s, 4, 4)."""
+    last = motion.shape[1] - 1
+    middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
+    return middle
 
 
 def placed_lights(group: Group, limit: int) -> list[tuple[Light, Matrices]]:

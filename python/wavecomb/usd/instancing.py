@@ -12,6 +12,7 @@ from pxr import Usd, UsdGeom
 
 from wavecomb.usd.primvar import as_array, as_integers
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import Motion, Track
 from wavecomb.usd.triangulate import cross
 
 Matrices = NDArray[np.float64]
@@ -91,6 +92,59 @@ def read_instances(
     transforms[:, 3, :3] = positions[kept]
     transforms[:, 3, 3] = 1.0
     return Instances(transforms, index[kept], kept, count)
+
+
+def moved_instances(
+    prim: Usd.Prim,
+    motion: Motion,
+    track: Track | None,
+    outer: Matrices | None,
+    instances: Instances,
+    report: LoadReport,
+) -> Matrices | None:
+    """Transforms (k, s, 4, 4) of instances over the shutter; None where they stand still.
+
+    Velocities, accelerations and angular velocities count as UsdGeomPointInstancer has it.
+
+    Args:
+        prim: The point instancer.
+        motion: With the shutter.
+        track: Of the instancer; None: it stands still at ``outer``.
+        outer: (4, 4) from it to its group; None: the identity.
+        instances: Of it at the frame.
+        report: For what is odd.
+    """
+    instancer = UsdGeom.PointInstancer(prim)
+    names = ("positions", "orientations", "orientationsf", "scales")
+    varying = [a for a in map(prim.GetAttribute, names) if a and a.ValueMightBeTimeVarying()]
+    speeds = [prim.GetAttribute(name) for name in ("velocities", "angularVelocities")]
+    changes = bool(varying) or any(a.HasAuthoredValue() for a in speeds)
+    if track is None and not changes:
+        return None
+    whole = None if track is None else track.steps()
+    least = 2 if whole is None else len(whole)
+    if prim.GetAttribute("angularVelocities").HasAuthoredValue() or len(varying) > 1:
+        least = max(least, 3)
+    times = motion.sampled(varying, least)
+    inner = [instances.transforms] * len(times)
+    if changes:
+        found = instancer.ComputeInstanceTransformsAtTimes(
+            [Usd.TimeCode(time) for time in times],
+            Usd.TimeCode(motion.frame),
+            UsdGeom.PointInstancer.ExcludeProtoXform,
+            UsdGeom.PointInstancer.IgnoreMask,
+        )
+        if len(found) != len(times) or any(len(one) != instances.authored for one in found):
+            what = "point instancer's motion does not match protoIndices: not blurred"
+            report.warn(what, prim.GetPath())
+            return None
+        inner = [np.array(one)[instances.kept] for one in found]
+    places = [outer if track is None else np.array(track.at(time)) for time in times]
+    steps = [
+        one if place is None else one @ place for one, place in zip(inner, places, strict=True)
+    ]
+    out = np.stack(steps, axis=1)
+    return None if (out == out[:, :1]).all() else out
 
 
 def _mask(

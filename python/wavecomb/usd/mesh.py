@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.cage import SCHEMES, Cage, crease_pairs, read_rules
+from wavecomb.usd.deforming import matrix_at, points_at, step_times
 from wavecomb.usd.network import word
 from wavecomb.usd.normals import smooth_normals
 from wavecomb.usd.primvar import (
@@ -25,6 +26,8 @@ from wavecomb.usd.primvar import (
 )
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shapes import read_shape
+from wavecomb.usd.shutter import Motion, Track
+from wavecomb.usd.skeleton import Skeletons, Skin, SkinError, skinned_points
 from wavecomb.usd.triangulate import MeshError, Topology, triangulate
 
 Array = NDArray[np.float32]
@@ -48,9 +51,9 @@ class MeshArrays:
     """A mesh in its group's space.
 
     Attributes:
-        positions: (n, 3).
+        positions: (n, 3), or (s, n, 3) at s steps over the shutter.
         triangles: (m, 3), counter-clockwise from outside.
-        normals: (n, 3), (m, 3, 3) or None.
+        normals: (n, 3), (m, 3, 3) or None; at each step where there are some.
         uvs: (n, 2), (m, 3, 2) or None.
         bounds: (2, 3) lowest and highest coordinates.
         topology: Where the triangles come from; None for implicit shapes.
@@ -134,11 +137,28 @@ def extent(positions: Array) -> Array:
 class MeshReader:
     """Reads meshes and shapes of one stage."""
 
-    def __init__(self, time: Usd.TimeCode, report: LoadReport, subdivide: bool = True) -> None:
-        """``subdivide``: subdivision meshes get a cage, and their authored normals do not count."""
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        report: LoadReport,
+        subdivide: bool = True,
+        skeletons: Skeletons | None = None,
+        motion: Motion | None = None,
+    ) -> None:
+        """Reads at ``time``.
+
+        Args:
+            time: The frame.
+            report: For what is odd.
+            subdivide: Subdivision meshes get a cage, and their authored normals do not count.
+            skeletons: Deform what is bound to them.
+            motion: Shapes are taken over its shutter; None: at ``time`` only.
+        """
         self.time = time
         self.report = report
         self.subdivide = subdivide
+        self.skeletons = skeletons
+        self.motion = motion
 
     def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> MeshArrays:
         """An implicit shape, in its group's space."""
@@ -178,7 +198,10 @@ class MeshReader:
         """
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
+        skin = self._skin(prim)
         points = as_array(get("points").Get(time))
+        if skin is not None and points is not None and len(points):
+            points = skinned_points(skin, get("points").Get(time), time)
         counts = as_integers(get("faceVertexCounts").Get(time))
         if points is None or len(points) == 0 or len(counts) == 0:
             return None
@@ -212,6 +235,55 @@ class MeshReader:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
             normals, uvs = _reverse(normals), _reverse(uvs)
         return MeshArrays(positions, triangles, normals, uvs, bounds, topology, cage)
+
+    def over_shutter(
+        self, prim: Usd.Prim, mesh: MeshArrays, matrix: Gf.Matrix4d, track: Track | None
+    ) -> MeshArrays:
+        """A mesh that was read by ``mesh``, with its shape at the steps of the shutter.
+
+        Args:
+            prim: A UsdGeomMesh that ``deforms``.
+            mesh: Its arrays at the frame.
+            matrix: From the mesh to its group.
+            track: In place of ``matrix`` where that changes.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        motion, topology, skin = self.motion, mesh.topology, self._skin(prim)
+        if motion is None or topology is None:
+            return mesh
+        times = step_times(prim, skin, motion)
+        shapes = points_at(prim, skin, times, motion.frame, self.report)
+        if shapes is None or len(shapes[0]) != len(mesh.positions):
+            return mesh
+        matrices = [matrix_at(track, matrix, time) for time in times]
+        if track is None and all(np.array_equal(shape, shapes[0]) for shape in shapes):
+            return mesh
+        mirrored = check_matrix(matrix)
+        scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
+        positions = np.stack([bake(p, m) for p, m in zip(shapes, matrices, strict=True)])
+        normals: list[Array] = []
+        for points, to_group, time in zip(shapes, matrices, times, strict=True):
+            if mesh.normals is None:
+                break
+            then = MeshReader(Usd.TimeCode(time), LoadReport(), self.subdivide, self.skeletons)
+            found = then._normals(prim, points, topology, scheme)
+            if found is not None:
+                found = bake_normals(found, to_group)
+                normals.append(_reverse(found) if mirrored else found)
+        if mesh.normals is not None and {n.shape for n in normals} != {mesh.normals.shape}:
+            normals = [mesh.normals] * len(times)
+        return replace(
+            mesh,
+            positions=positions,
+            normals=np.stack(normals) if normals else None,
+            bounds=extent(positions.reshape(-1, 3)),
+            cage=mesh.cage and replace(mesh.cage, steps=list(zip(shapes, matrices, strict=True))),
+        )
+
+    def _skin(self, prim: Usd.Prim) -> Skin | None:
+        return None if self.skeletons is None else self.skeletons.of(prim)
 
     def _normals(
         self, prim: Usd.Prim, points: Array, topology: Topology, scheme: str | None
@@ -259,6 +331,7 @@ class MeshReader:
                     return None
                 kind = attribute.GetMetadata("interpolation") or "vertex"
                 primvar = Primvar(values, kind, "normals")
+            primvar = self._skinned_normals(prim, primvar, topology)
             normals, at = spread(primvar, topology, 3)
         except PrimvarError as error:
             self.report.warn(f"{error}: ignored", prim.GetPath())
@@ -278,6 +351,21 @@ class MeshReader:
                 smooth = smooth[topology.triangles]
             normals = np.where(lengths.reshape(*normals.shape[:-1], 1) > 0, normals, smooth)
         return np.ascontiguousarray(normals, np.float32)
+
+    def _skinned_normals(self, prim: Usd.Prim, primvar: Primvar, topology: Topology) -> Primvar:
+        """Authored normals under the mesh's skin; of points and of corners only."""
+        skin = self._skin(prim)
+        corners = topology.indices if primvar.interpolation == "faceVarying" else None
+        wanted = topology.point_count if corners is None else len(corners)
+        kinds = ("vertex", "varying", "faceVarying")
+        if skin is None or primvar.interpolation not in kinds or len(primvar.values) != wanted:
+            return primvar
+        try:
+            authored = np.asarray(primvar.values[:, :3], np.float64)
+            values = skin.normals(authored, corners, topology.point_count, self.time)
+        except SkinError:
+            return primvar
+        return replace(primvar, values=values)
 
     def _coordinates(
         self,
@@ -352,7 +440,7 @@ def find_primvar(
     return None
 
 
-def _reverse(values: Array | None) -> Array | None:
+def _reverse(values: Any) -> Any:
     """Values (m, 3, c) with the corners of each triangle reversed; others as they are."""
     if values is None or values.ndim != 3:
         return values

@@ -15,7 +15,7 @@ from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import trail
-from wavecomb.usd.camera import find_camera, frame_bounds, read_camera
+from wavecomb.usd.camera import camera_motion, find_camera, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
@@ -23,6 +23,7 @@ from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.shutter import Blur, find_motion
 from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
@@ -55,6 +56,7 @@ class LoadedStage:
         light_paths: Prim of each light of the scene, by index; "" of the soft dome. In instances
             both are named by the first instance.
         frame: Time code that was read; None: default values.
+        shutter: When it opens and closes, time codes from the frame; None: no motion blur.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
     """
 
@@ -69,6 +71,7 @@ class LoadedStage:
     light_paths: tuple[str, ...] = ()
     frame: float | None = None
     textures: TextureStock | None = None
+    shutter: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,7 @@ class _Filled:
     materials: tuple[str, ...]
     lights: tuple[str, ...]
     frame: float | None
+    shutter: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,7 @@ class _Choice:
     camera: str | None
     purposes: Sequence[str]
     editable: bool
+    blur: Blur
 
 
 def load_stage(
@@ -109,6 +114,9 @@ def load_stage(
     size: tuple[int, int] = (600, 600),
     stock: FrameStock | None = None,
     progress: LoadProgress | None = None,
+    shutter: tuple[float, float] | None = None,
+    motion_blur: bool = True,
+    motion_steps: int | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -135,6 +143,9 @@ def load_stage(
         stock: Of a stage that is open and was read at another frame: what did not change is
             shared. Changes nothing else.
         progress: Is told how many of the prims found so far are read.
+        shutter: When it opens and closes, time codes from the frame; None: as the camera says.
+        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -151,6 +162,7 @@ def load_stage(
     level = parse_level(subdivision)
     if not (len(size) == 2 and min(size) >= 1):
         raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
+    blur = Blur.chosen(shutter, motion_blur, motion_steps)
     report = LoadReport()
     file = _file_of(source)
     if stock is not None:
@@ -166,7 +178,7 @@ def load_stage(
             )
 
         try:
-            choice = _Choice(opened, frame, camera, purposes, editable)
+            choice = _Choice(opened, frame, camera, purposes, editable, blur)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -197,6 +209,7 @@ def load_stage(
         filled.lights,
         filled.frame,
         textures.stock(scene) if editable else None,
+        filled.shutter,
     )
 
 
@@ -242,11 +255,10 @@ def _fill(
     time = time_code(stage, choice.frame)
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
-    chosen, lights = _read(
+    chosen, lights, shutter = _read(
         stage,
         time,
-        choice.camera,
-        choice.purposes,
+        choice,
         builder,
         textures,
         materials,
@@ -257,7 +269,7 @@ def _fill(
         progress,
     )
     used = None if time.IsDefault() else float(time.GetValue())
-    return _Filled(chosen, found, materials.paths(), lights, used)
+    return _Filled(chosen, found, materials.paths(), lights, used, shutter)
 
 
 def _native_builder(threads: int) -> _core.SceneBuilder:
@@ -275,8 +287,7 @@ def _give_back_memory() -> None:
 def _read(
     stage: Usd.Stage,
     time: Usd.TimeCode,
-    camera: str | None,
-    purposes: Sequence[str],
+    choice: _Choice,
     builder: _core.SceneBuilder,
     textures: TextureTable,
     materials: MaterialTable,
@@ -285,13 +296,14 @@ def _read(
     surfaces: Surfaces,
     stock: FrameStock | None,
     progress: LoadProgress | None,
-) -> tuple[str | None, tuple[str, ...]]:
-    """Fills the builder; gives the paths of the camera and of the lights."""
+) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None]:
+    """Fills the builder; gives the paths of the camera and of the lights, and the shutter."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
-    view_prim = find_camera(stage, camera)
+    view_prim = find_camera(stage, choice.camera)
     groups = LightGroups(report)
     lights = LightReader(time, up_axis, textures, groups, report)
-    traversal = Traversal(time, purposes, lights, report)
+    motion = find_motion(view_prim, time, choice.blur, report)
+    traversal = Traversal(time, choice.purposes, lights, report, motion)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
     world = GroupBuilder(
@@ -309,11 +321,15 @@ def _read(
     if view is None:
         report.note("no camera: framed the bounds")
         view = frame_bounds(world.bounds, up_axis)
+    elif view_prim is not None:
+        moves = camera_motion(view_prim, motion)
+        if moves is not None:
+            view.options["motion"] = moves
     surfaces.finish(world, view)
     if stock is not None:
         stock.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
-    return chosen, light_paths
+    return chosen, light_paths, None if motion is None else motion.shutter
 
 
 def _add_lights(

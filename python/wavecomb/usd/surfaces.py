@@ -201,7 +201,7 @@ class Surfaces:
             if surface.level == 0 and not surface.moves:
                 continue
             batch.append(surface)
-            triangles += surface.cage.triangles_at(surface.level)
+            triangles += surface.cage.triangles_at(surface.level) * max(1, len(surface.cage.steps))
             if triangles >= _BATCH_TRIANGLES:
                 self._refine(batch)
                 batch, triangles = [], 0
@@ -284,8 +284,10 @@ class Surfaces:
         if not fresh:
             return
         described = [self._describe(surface) for surface in fresh]
-        made = self.builder.make_surfaces([d for d, _ in described], self.threads)
-        for surface, (_, names), refined in zip(fresh, described, made, strict=True):
+        steps = [s.cage.over_shutter(d) for s, (d, _) in zip(fresh, described, strict=True)]
+        made = iter(self.builder.make_surfaces([d for each in steps for d in each], self.threads))
+        for surface, (_, names), each in zip(fresh, described, steps, strict=True):
+            refined = _joined([next(made) for _ in each])
             if isinstance(refined, str):
                 what = f"mesh not subdivided, {refined}: drawn as polygons"
                 self.report.warn(what, surface.draw.prim.GetPath())
@@ -401,3 +403,15 @@ class Surfaces:
         except ValueError as error:
             path = surface.draw.prim.GetPath()
             self.report.warn(f"mesh not subdivided, {error}: drawn as polygons", path)
+
+
+def _joined(steps: list[Any]) -> Any:
+    """What was refined at the steps of the shutter as one; else the first error."""
+    first = next((step for step in steps if isinstance(step, str)), steps[0])
+    if len(steps) == 1 or isinstance(first, str):
+        return first
+    shapes = {name: [step[name] for step in steps] for name in ("positions", "normals")}
+    return first | {
+        name: None if any(part is None for part in parts) else np.stack(parts)
+        for name, parts in shapes.items()
+    }

@@ -19,6 +19,8 @@ from wavecomb.usd.mesh import IDENTITY
 from wavecomb.usd.network import word
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shapes import SHAPES
+from wavecomb.usd.shutter import Motion, Track
+from wavecomb.usd.skeleton import Skeletons
 
 Matrices = NDArray[np.float64]
 
@@ -39,6 +41,7 @@ class Placed:
     purpose: str
     inherited: Sequence[Any]
     material: UsdShade.Material | None = None
+    track: Track | None = None
 
 
 @dataclass
@@ -55,12 +58,20 @@ class Traversal:
     """Finds the prims to draw, one group at a time."""
 
     def __init__(
-        self, time: Usd.TimeCode, purposes: Sequence[str], lights: LightReader, report: LoadReport
+        self,
+        time: Usd.TimeCode,
+        purposes: Sequence[str],
+        lights: LightReader,
+        report: LoadReport,
+        motion: Motion | None = None,
     ) -> None:
+        """``motion``: what is followed while the shutter is open; None: it is not."""
         self.time = time
         self.purposes = frozenset(purposes)
         self.lights = lights
         self.report = report
+        self.motion = motion
+        self.skeletons = Skeletons(report)
         self.xforms = UsdGeom.XformCache(time)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
@@ -106,11 +117,12 @@ class Traversal:
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
-        # (prim, transform of its parent, purpose, inherited primvars, predicate for its children)
-        stack: list[tuple[Usd.Prim, Gf.Matrix4d, str, Sequence[Any], Any]]
-        stack = [(prim, IDENTITY, purpose, (), predicate) for prim in reversed(roots)]
+        # (prim, transform of its parent, its track, purpose, inherited primvars, predicate for its
+        # children)
+        stack: list[tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any]]
+        stack = [(prim, IDENTITY, None, purpose, (), predicate) for prim in reversed(roots)]
         while stack:
-            prim, matrix, purpose, inherited, pick = stack.pop()
+            prim, matrix, track, purpose, inherited, pick = stack.pop()
             kind = self.kind(prim)
             if kind == "shading":
                 continue
@@ -122,6 +134,8 @@ class Traversal:
                     purpose = word(authored.Get(), purpose)
                 if kind != "scope":
                     own, resets = local(prim)
+                    if self.motion is not None:
+                        track = self.motion.follow(prim, track, matrix, resets)
                     if resets:
                         matrix = own
                     elif own != IDENTITY:
@@ -129,33 +143,38 @@ class Traversal:
             shown = purpose in self.purposes
             if prim.IsInstance():
                 prototype = prim.GetPrototype()
-                if self._shared(prototype):
+                if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
                     inherited = self.inherit(prim, inherited)
-                    found.instances.append(Placed(prim, matrix, purpose, inherited))
+                    placed = Placed(prim, matrix, purpose, inherited, track=track)
+                    found.instances.append(placed)
                     continue
                 pick = proxies
+            if prim.GetTypeName() == "SkelRoot":
+                self.skeletons.enter(prim)
             children = prim.GetChildren() if pick is None else prim.GetFilteredChildren(pick)
             if kind in DRAWN:
                 if shown:
                     subsets = [c for c in children if _binds(c)] if children else ()
-                    found.draws.append(Draw(prim, matrix, inherited, subsets))
+                    found.draws.append(Draw(prim, matrix, inherited, subsets, track=track))
             elif kind == "instancer":
                 if shown:
-                    found.instancers.append(Placed(prim, matrix, purpose, inherited))
+                    placed = Placed(prim, matrix, purpose, inherited, track=track)
+                    found.instancers.append(placed)
                 continue
             elif kind == "light":
                 if shown:
+                    if track is not None and self.motion is not None:
+                        self.report.note("moving light: still, in mid-shutter", prim.GetPath())
+                        matrix = track.at(self.motion.middle)
                     self._light(found, prim, matrix)
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
             elif children and kind in ("xform", "scope"):
                 inherited = self.inherit(prim, inherited)
-                if prim.GetTypeName() == "SkelRoot":
-                    self.report.note("skeletal meshes are drawn in rest pose", prim.GetPath())
             for child in reversed(children):
-                stack.append((child, matrix, purpose, inherited, pick))
+                stack.append((child, matrix, track, purpose, inherited, pick))
         return found
 
     def _shared(self, prototype: Usd.Prim) -> bool:

@@ -33,7 +33,7 @@ class Varying:
         for prim in _everything(stage):
             names = []
             for attribute in prim.GetAttributes() if clipped else prim.GetAuthoredAttributes():
-                if attribute.ValueMightBeTimeVarying():
+                if attribute.ValueMightBeTimeVarying() or _carries(attribute):
                     names.append(attribute.GetName())
                 if attribute.HasAuthoredConnections():
                     sources.update(path.GetPrimPath() for path in attribute.GetConnections())
@@ -85,3 +85,8 @@ def _everything(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     yield from Usd.PrimRange.Stage(stage, _ANY)
     for prototype in stage.GetPrototypes():
         yield from Usd.PrimRange(prototype, _ANY)
+
+
+def _carries(attribute: Usd.Attribute) -> bool:
+    """Whether a single sample of it moves points at other times."""
+    return attribute.GetName() == "velocities" and attribute.GetNumTimeSamples() > 0

@@ -59,7 +59,6 @@ template <uint32_t W, typename Ray>
 void prepare(Ray& ray) {
   for (uint32_t i = 0; i < W; ++i) {
     first(ray.tnear)[i] = 0.f;
-    first(ray.time)[i] = 0.f;
     first(ray.mask)[i] = 0xffffffffu;
     first(ray.id)[i] = 0;
     first(ray.flags)[i] = 0;
@@ -74,6 +73,10 @@ void load(Ray& ray, const RaySpan& rays, size_t base) {
   std::memcpy(first(ray.dir_x), rays.dx + base, 4 * W);
   std::memcpy(first(ray.dir_y), rays.dy + base, 4 * W);
   std::memcpy(first(ray.dir_z), rays.dz + base, 4 * W);
+  if (rays.time)
+    std::memcpy(first(ray.time), rays.time + base, 4 * W);
+  else
+    std::fill_n(first(ray.time), W, 0.f);
   if (rays.tfar)
     std::memcpy(first(ray.tfar), rays.tfar + base, 4 * W);
   else

@@ -20,6 +20,9 @@ double dot_d(const V& a, const V& b) {
 V cross_d(const V& a, const V& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
+V widen(const Vec3<float>& a) {
+  return {a.x, a.y, a.z};
+}
 Vec3<float> narrow(const V& a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }
@@ -87,22 +90,46 @@ uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
 
+/// The values of a mesh's points at a time, bit for bit those of detail::MovingRows.
+class PointsAt {
+ public:
+  PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(step_place(time, mesh.steps - 1)) {}
+
+  Vec3<float> position(size_t point) const { return at(mesh_.positions, point); }
+  Vec3<float> normal(size_t point) const { return at(mesh_.normals, point); }
+
+ private:
+  Vec3<float> at(std::span<const float> values, size_t point) const {
+    if (!mesh_.deforms()) return {values[3 * point], values[3 * point + 1], values[3 * point + 2]};
+    const size_t stride = values.size() / mesh_.steps;
+    const float* p = &values[place_.before * stride + 3 * point];
+    const float* q = p + stride;
+    const Vec3<float> a(p[0], p[1], p[2]), b(q[0], q[1], q[2]);
+    return (b - a) * place_.part + a;
+  }
+
+  const Mesh& mesh_;
+  const StepPlace place_;
+};
+
 /// One segment and one ray.
 class SegmentTest {
  public:
-  SegmentTest(const Mesh& mesh, uint32_t prim, const RaySpace& ray, float tfar, CurveHits& hits)
+  SegmentTest(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
+              float tfar, CurveHits& hits)
       : mesh_(mesh),
         prim_(prim),
         first_(first_point(mesh, prim)),
         cubic_(mesh.is_cubic()),
         ray_(ray),
         z_far_(tfar * ray.length),
-        hits_(hits) {
+        hits_(hits),
+        points_(points) {
     const uint32_t n = cubic_ ? 4 : 2;
     for (uint32_t k = 0; k < n; ++k) {
-      curve_.p[k] = ray.point(vec(&mesh.positions[3 * size_t{first_ + k}]));
+      curve_.p[k] = ray.point(widen(points.position(first_ + k)));
       curve_.r[k] = mesh.radii[first_ + k];
-      if (mesh.is_ribbon()) normal_[k] = ray.vector(vec(&mesh.normals[3 * size_t{first_ + k}]));
+      if (mesh.is_ribbon()) normal_[k] = ray.vector(widen(points.normal(first_ + k)));
     }
     if (cubic_) return;
     Bezier::line(curve_.p);
@@ -248,7 +275,7 @@ class SegmentTest {
   /// Whether normal n of an end's sphere points into the segment that goes on from there.
   bool goes_on_at(const V& n, uint32_t flag, int end, uint32_t next) const {
     if ((mesh_.indices[prim_] & flag) == 0) return false;
-    const V d = ray_.point(vec(&mesh_.positions[3 * size_t{next}])) - curve_.p[end];
+    const V d = ray_.point(widen(points_.position(next))) - curve_.p[end];
     const double dr = mesh_.radii[next] - curve_.r[end];
     return dot_d(n, d) + dr > kSeam * std::sqrt(dot_d(d, d));
   }
@@ -259,8 +286,7 @@ class SegmentTest {
     s.cubic = cubic_;
     for (uint32_t k = 0; k < 4; ++k) {
       const uint32_t i = first_ + (cubic_ || k < 2 ? k : 1);
-      const float* p = &mesh_.positions[3 * size_t{i}];
-      s.p[k] = {p[0], p[1], p[2]};
+      s.p[k] = points_.position(i);
       s.r[k] = mesh_.radii[i];
     }
     auto along = static_cast<float>(u);
@@ -340,15 +366,16 @@ class SegmentTest {
   const RaySpace& ray_;
   const double z_far_;
   CurveHits& hits_;
+  const PointsAt& points_;
   Bezier curve_;
   V normal_[4];
   int side_ = -1;               ///< which of a tube's extremes are looked for
   bool may_be_inside_ = false;  ///< entered behind the ray's origin or from the next segment
 };
 
-void intersect_sphere(const Mesh& mesh, uint32_t prim, const RaySpace& ray, float tfar,
-                      CurveHits& hits) {
-  const V c = ray.point(vec(&mesh.positions[3 * size_t{prim}]));
+void intersect_sphere(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
+                      float tfar, CurveHits& hits) {
+  const V c = ray.point(widen(points.position(prim)));
   const double r = mesh.radii[prim], h = r * r - c.x * c.x - c.y * c.y;
   if (!(h >= 0) || r == 0) return;
   for (const double side : {-1.0, 1.0}) {
@@ -363,13 +390,13 @@ void intersect_sphere(const Mesh& mesh, uint32_t prim, const RaySpace& ray, floa
 
 }  // namespace
 
-Bounds curve_bounds(const Mesh& mesh, uint32_t prim) {
+Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
   const bool point = mesh.primitive == Primitive::kSphere;
   const size_t first = point ? prim : first_point(mesh, prim);
   const size_t n = point ? 1 : mesh.segment_points();
   Bounds box;
   for (size_t k = first; k < first + n; ++k) {
-    const float* p = &mesh.positions[3 * k];
+    const float* p = &mesh.positions[3 * (step * mesh.vertex_count() + k)];
     const auto reach = [r = mesh.radii[k]](float x) { return 1e-6f * std::abs(x) + 1.00001f * r; };
     box.add({p[0] - reach(p[0]), p[1] - reach(p[1]), p[2] - reach(p[2])});
     box.add({p[0] + reach(p[0]), p[1] + reach(p[1]), p[2] + reach(p[2])});
@@ -378,13 +405,14 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim) {
 }
 
 CurveHits intersect_curve(const Mesh& mesh, uint32_t prim, const float (&origin)[3],
-                          const float (&dir)[3], float tfar, bool all) {
+                          const float (&dir)[3], float tfar, bool all, float time) {
   const RaySpace ray(origin, dir);
+  const PointsAt points(mesh, time);
   CurveHits hits;
   if (mesh.primitive == Primitive::kSphere)
-    intersect_sphere(mesh, prim, ray, tfar, hits);
+    intersect_sphere(mesh, prim, points, ray, tfar, hits);
   else
-    SegmentTest(mesh, prim, ray, tfar, hits).run(all);
+    SegmentTest(mesh, prim, points, ray, tfar, hits).run(all);
   return hits;
 }
 

@@ -114,7 +114,7 @@ struct EmbreeAccelerator::Impl {
     std::memcpy(ray.dir_z, rays.dz + base, 4 * W);
     for (uint32_t i = 0; i < W; ++i) {
       ray.tnear[i] = 0.f;
-      ray.time[i] = 0.f;
+      ray.time[i] = rays.time && i < n ? rays.time[base + i] : 0.f;
       ray.mask[i] = 0xffffffffu;
       ray.flags[i] = 0;
     }
@@ -174,6 +174,10 @@ struct EmbreeAccelerator::Impl {
     }
   }
 
+  /// Rays per packet. Embree inverts the transform of a moving instance by other operations for a
+  /// packet than for a ray alone, and so hits differ: there each ray is alone.
+  uint32_t packet(uint32_t width) const { return view.motion.instances ? 1 : width; }
+
   static RTCRay load_ray(const RaySpan& rays, size_t i) {
     RTCRay ray{};
     ray.org_x = rays.ox[i];
@@ -183,6 +187,7 @@ struct EmbreeAccelerator::Impl {
     ray.dir_y = rays.dy[i];
     ray.dir_z = rays.dz[i];
     ray.tfar = rays.tfar ? rays.tfar[i] : std::numeric_limits<float>::infinity();
+    ray.time = rays.time ? rays.time[i] : 0.f;
     ray.mask = 0xffffffffu;
     ray.id = rays.slot ? rays.slot[i] : static_cast<unsigned>(i);
     return ray;
@@ -211,7 +216,8 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
-  switch (width) {
+  coherent = coherent && !impl_->view.has_motion;
+  switch (impl_->packet(width)) {
     case 16:
       return impl_->intersect_packets<16>(rays, hits, coherent, keys);
     case 8:
@@ -234,7 +240,7 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
   rtcInitOccludedArguments(&args);
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
   args.context = &context.base;
-  switch (width) {
+  switch (impl_->packet(width)) {
     case 16:
       return impl_->occluded_packets<16>(rays, occluded, args);
     case 8:

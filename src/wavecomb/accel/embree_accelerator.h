@@ -17,6 +17,7 @@ struct RaySpan {
   const float* tfar;     ///< null: no limit
   const uint32_t* slot;  ///< for presence, see PresenceKeys; may be null
   size_t size;
+  const float* time = nullptr;  ///< of the shutter, in [0, 1]; null: 0
 };
 
 /// Where hits go: barycentric u, v as in HitBuffer; `inst` is an index into SceneView::instances
@@ -66,7 +67,8 @@ class EmbreeAccelerator {
   /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent`: the rays of a packet go
   /// much the same way, and are traversed together. Hits do not depend on width or order, nor on
   /// coherence for rays from one point; from several, rays at edges may differ
-  /// (docs/decisions/canonical-hits.md).
+  /// (docs/decisions/canonical-hits.md). Where things move, none are taken for coherent; where
+  /// instances do, each ray is traced alone (docs/decisions/motion.md).
   void intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width, bool coherent,
                  const PresenceKeys& keys) const;
   /// occluded[i] = 1 where something lies before tfar, else 0.

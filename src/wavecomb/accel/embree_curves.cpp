@@ -19,7 +19,8 @@ const CurveGeometry& curves_of(const void* user) {
 CurveHits meet(const CurveGeometry& curves, RTCRayN* ray, unsigned n, unsigned i, unsigned prim) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
-  return intersect_curve(*curves.mesh, prim, o, d, RTCRayN_tfar(ray, n, i), curves.is_filtered);
+  return intersect_curve(*curves.mesh, prim, o, d, RTCRayN_tfar(ray, n, i), curves.is_filtered,
+                         RTCRayN_time(ray, n, i));
 }
 
 /// Calls found(i, hit) with the first hit of each of a packet's rays that is there for its path.
@@ -83,7 +84,8 @@ void occlude_curves(const RTCOccludedFunctionNArguments* args) {
 }
 
 void curve_box(const RTCBoundsFunctionArguments* args) {
-  put_bounds(curve_bounds(*curves_of(args->geometryUserPtr).mesh, args->primID), *args->bounds_o);
+  const Mesh& mesh = *curves_of(args->geometryUserPtr).mesh;
+  put_bounds(curve_bounds(mesh, args->primID, args->timeStep), *args->bounds_o);
 }
 
 }  // namespace
@@ -91,6 +93,7 @@ void curve_box(const RTCBoundsFunctionArguments* args) {
 RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, HitRule rule) {
   RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(g, static_cast<unsigned>(user.mesh->primitive_count()));
+  rtcSetGeometryTimeStepCount(g, user.mesh->steps);
   rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // only read
   rtcSetGeometryBoundsFunction(g, curve_box, nullptr);
   rtcSetGeometryIntersectFunction(

@@ -75,6 +75,12 @@ std::vector<LightRecord> light_shapes(const Scene& scene) {
   return shapes;
 }
 
+void set_transform(RTCGeometry g, uint32_t step, const Affine& m) {
+  const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y, m.row[1].y, m.row[2].y,
+                             m.row[0].z, m.row[1].z, m.row[2].z, m.t.x,      m.t.y,      m.t.z};
+  rtcSetGeometryTransform(g, step, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+}
+
 bool same_shape(const LightRecord& a, const LightRecord& b) {
   return a.kind == b.kind && a.radius == b.radius && std::ranges::equal(a.p, b.p) &&
          std::ranges::equal(a.u, b.u) && std::ranges::equal(a.v, b.v);
@@ -163,8 +169,10 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
     positions = copy->data();
     padded_[mesh_id] = std::move(copy);
   }
-  rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, 12,
-                             mesh.vertex_count());
+  rtcSetGeometryTimeStepCount(g, mesh.steps);
+  for (uint32_t step = 0; step < mesh.steps; ++step)
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3, positions,
+                               step * mesh.vertex_count() * 12, 12, mesh.vertex_count());
   rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices.data(), 0,
                              12, mesh.triangle_count());
   if (filtered_[mesh_id]) {
@@ -255,11 +263,11 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   for (size_t i = 0; i < instances.size(); ++i) {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
     rtcSetGeometryInstancedScene(g, group_scenes_[instances[i].group]);
-    const Affine& m = instances[i].to_world;
-    const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y,
-                               m.row[1].y, m.row[2].y, m.row[0].z, m.row[1].z,
-                               m.row[2].z, m.t.x,      m.t.y,      m.t.z};
-    rtcSetGeometryTransform(g, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+    const StepRange& motion = instances[i].motion;
+    if (!motion.moves()) set_transform(g, 0, instances[i].to_world);
+    if (motion.moves()) rtcSetGeometryTimeStepCount(g, motion.segments + 1);
+    for (uint32_t k = 0; motion.moves() && k <= motion.segments; ++k)
+      set_transform(g, k, geometry_->steps[motion.first + k].affine());
     rtcCommitGeometry(g);
     rtcAttachGeometryByID(top_, g, static_cast<unsigned>(i + 1));
     rtcReleaseGeometry(g);

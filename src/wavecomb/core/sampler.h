@@ -32,8 +32,9 @@ struct Sample4 {
 
 /// Sets of four dimensions. A path's first set places it on the film and the lens; each vertex has
 /// two: one for its light (choice, u, v, roulette), one for its BSDF (lobe, u, v, light-texture
-/// spare).
+/// spare). Its time in the shutter is of a set of its own, which no other number depends on.
 inline constexpr uint32_t kCameraSet = 0;
+inline constexpr uint32_t kTimeSet = 0xffffffffu;
 inline constexpr uint32_t light_set(uint32_t depth) {
   return 1 + 2 * depth;
 }

@@ -8,6 +8,7 @@ namespace wavecomb {
 CameraSetup::CameraSetup(const Camera& camera, uint32_t width, uint32_t height,
                          const FilterTable& table)
     : to_world(camera.to_world),
+      steps(camera.steps.begin(), camera.steps.end()),
       lens_radius(camera.lens_radius),
       focus_distance(camera.focus_distance),
       near_clip(camera.near_clip),

@@ -7,6 +7,7 @@
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/film/filter.h"
+#include "wavecomb/integrate/motion.h"
 #include "wavecomb/scene/camera.h"
 
 namespace wavecomb {
@@ -18,16 +19,40 @@ inline constexpr float kConeShare = 0.25f;
 /// A camera with its window fitted to a picture of width x height pixels.
 struct CameraSetup {
   Affine to_world;
-  Vec3<float> backward;  ///< unit vector along the camera's z axis
-  float x0, y1;          ///< window's upper left corner on the plane z = -1
-  float step_x, step_y;  ///< window size of a pixel
+  std::vector<MatrixStep> steps;  ///< over the shutter, where it moves
+  Vec3<float> backward;           ///< unit vector along the camera's z axis
+  float x0, y1;                   ///< window's upper left corner on the plane z = -1
+  float step_x, step_y;           ///< window size of a pixel
   float lens_radius, focus_distance, near_clip, far_clip;
   const float* filter;  ///< FilterTable::offsets()
   bool has_far;         ///< the far plane cuts something off
 
   /// Widens the window to the picture's shape (UsdRender's expandAperture).
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table);
+  bool moves() const { return !steps.empty(); }
 };
+
+/// Where the camera is at a time of the shutter.
+template <typename F>
+inline MatrixLanes<F> camera_place(const CameraSetup& camera, const F& time,
+                                   const Mask<F>& active) {
+  const Affine& m = camera.to_world;
+  if (!camera.moves())
+    return {{Vec3<F>(m.row[0]), Vec3<F>(m.row[1]), Vec3<F>(m.row[2])}, Vec3<F>(m.t)};
+  const auto segments = static_cast<uint32_t>(camera.steps.size() - 1);
+  return detail::MatrixPair<F>(camera.steps.data(), UInt<F>(0u), UInt<F>(segments), time, active)
+      .matrix();
+}
+
+/// Distance of a point along the camera's axis, at a time of the shutter.
+template <typename F>
+inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time,
+                      const Mask<F>& active) {
+  if (!camera.moves())
+    return -dot(Vec3<F>(p - Vec3<F>(camera.to_world.t)), Vec3<F>(camera.backward));
+  const MatrixLanes<F> m = camera_place<F>(camera, time, active);
+  return -dot(Vec3<F>(p - m.t), normalize(Vec3<F>(m.row[0].z, m.row[1].z, m.row[2].z)));
+}
 
 template <typename F>
 struct CameraRay {
@@ -55,10 +80,10 @@ inline F centre_distance2(const CameraSetup& camera, const Sample4<F>& r, const 
 }
 
 /// The ray through a point of the picture, in pixels, y down from the top; `u`, `v` choose a point
-/// of the lens.
+/// of the lens. `time`: of the shutter.
 template <typename F>
 inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F& fy, const F& u,
-                                const F& v) {
+                                const F& v, const F& time, const Mask<F>& active) {
   Vec3<F> d{fma(fx, F(camera.step_x), F(camera.x0)), fma(fy, F(-camera.step_y), F(camera.y1)),
             F(-1.f)};
   Vec3<F> o(F(0.f));
@@ -70,24 +95,24 @@ inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F&
          fma(o.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
   }
   o = fma(d, F(camera.near_clip), o);
-  const Affine& m = camera.to_world;
-  const auto rotate = [](const Vec3<float>& row, const Vec3<F>& w) { return dot(Vec3<F>(row), w); };
-  const Vec3<F> world{rotate(m.row[0], d), rotate(m.row[1], d), rotate(m.row[2], d)};
+  const MatrixLanes<F> m = camera_place<F>(camera, time, active);
+  const Vec3<F> world{dot(m.row[0], d), dot(m.row[1], d), dot(m.row[2], d)};
   const F len = length(world);
   CameraRay<F> ray;
-  ray.o = {rotate(m.row[0], o) + m.t.x, rotate(m.row[1], o) + m.t.y, rotate(m.row[2], o) + m.t.z};
+  ray.o = {dot(m.row[0], o) + m.t.x, dot(m.row[1], o) + m.t.y, dot(m.row[2], o) + m.t.z};
   ray.d = world * F(1.f / len);
   ray.spread = F(kConeShare * camera.step_y);
   ray.tfar = len * (camera.far_clip - camera.near_clip);
   return ray;
 }
 
-/// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set.
+/// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set and a time.
 template <typename F>
 inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y,
-                               const Sample4<F>& r, const Mask<F>& active) {
+                               const Sample4<F>& r, const Mask<F>& active, const F& time = F(0.f)) {
   return ray_through<F>(camera, F(x + 0.5f + filter_offset<F>(camera.filter, r.x, active)),
-                        F(y + 0.5f + filter_offset<F>(camera.filter, r.y, active)), r.z, r.w);
+                        F(y + 0.5f + filter_offset<F>(camera.filter, r.y, active)), r.z, r.w, time,
+                        active);
 }
 
 }  // namespace wavecomb

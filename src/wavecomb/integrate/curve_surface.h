@@ -102,6 +102,30 @@ inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const
   s.uv_per_length = sqrt(density2);
 }
 
+/// Puts control points, normals of ribbons and instances where they are at the hits' time; gives a
+/// bound of all terms of world positions.
+template <typename F>
+[[gnu::noinline, gnu::cold]] F move_segment(const SceneView& scene, const MeshHit<F>& hit,
+                                            const UInt<F>& first, const Mask<F>& strands,
+                                            const Mask<F>& ribbons, const Mask<F>& active,
+                                            CurveSegment<F>& s, InstanceMaps<F>& maps) {
+  const MovingRows<F> points(scene, hit.mesh, hit.time, &MeshRecord::positions,
+                             &MeshMotion::positions, active);
+  const MovingRows<F> normals(scene, hit.mesh, hit.time, &MeshRecord::normals, &MeshMotion::normals,
+                              active);
+  Vec3<F> far(F(0.f));
+  for (uint32_t k = 0; k < 4; ++k) {
+    const Mask<F> on = k == 0 ? active : (k == 1 ? strands : s.cubic);
+    const auto [p, reach] = points(first + k, on);
+    s.p[k] = select<F>(on, p, s.p[k]);
+    s.n[k] = select<F>(ribbons & on, normals(first + k, ribbons & on).v, s.n[k]);
+    far = max(far, select<F>(on, reach + Vec3<F>(s.r[k]), Vec3<F>(F(0.f))));
+  }
+  const MovedInstance<F> instance = moved_instance<F>(scene, hit.inst, hit.time, maps, far, active);
+  maps.place(instance);
+  return instance.size;
+}
+
 /// The surface at hits on curves and points. Of no use to triangles; never inlined, so that scenes
 /// without curves do not pay for its registers.
 template <typename F>
@@ -109,7 +133,7 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
                                             bool with_uv, const Mask<F>& active, Surface<F>& out) {
   using U = UInt<F>;
   const MeshReader<F> mesh(scene, hit.mesh, active);
-  const InstanceMaps<F> maps(scene, hit.inst, active);
+  InstanceMaps<F> maps(scene, hit.inst, active);
   const auto is = [&](uint32_t flag) { return active & Mask<F>((mesh.flags & flag) != U(0u)); };
   const Mask<F> spheres = is(kIsSphere), ribbons = is(kIsRibbon);
   const Mask<F> strands = active & not_(spheres);
@@ -124,6 +148,9 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
     s.r[k] = bits_float<F>(mesh.word(&MeshRecord::radii, first + k, on));
     s.n[k] = mesh.vec3(&MeshRecord::normals, first + k, ribbons & on);
   }
+  F moved_size(0.f);
+  if (scene.has_motion)
+    moved_size = move_segment(scene, hit, first, strands, ribbons, active, s, maps);
 
   CurvedPoint<F> c = tube_point<F>(s, hit.u, hit.v);
   if (any(ribbons)) merge(c, ribbon_point<F>(s, hit.u, hit.v), ribbons);
@@ -151,6 +178,7 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
   };
   r.offset =
       max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
+  r.offset = max(r.offset, F(moved_size * 0x1.4p-20f));
   r.terminator = Vec3<F>(F(0.f));
   r.dpdu = Vec3<F>(F(0.f));
   r.uv_per_length = F(0.f);

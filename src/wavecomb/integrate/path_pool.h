@@ -29,7 +29,8 @@ class PathPool {
   static constexpr uint32_t kShadowGroup = 10;  ///< word of a shadow ray's row
 
   PathPool() = default;
-  PathPool(size_t capacity, const AovLayout& aovs)
+  /// `moves`: something moves while the shutter is open.
+  PathPool(size_t capacity, const AovLayout& aovs, bool moves)
       : light_groups(aovs.light_groups),
         rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)) {
     paths = rows_.floats(0);
@@ -50,12 +51,14 @@ class PathPool {
     block(aov_blocks_[6], groups, light_groups > 0, kRadianceWords * light_groups);
     block(aov_blocks_[7], cost_ns, set.has(Aov::kCost), 1);
     block(aov_blocks_[8], guides, set.guides(), kGuideWords);
+    block(times_, time, moves, 1);
     wants_uv = set.has(Aov::kUv);
   }
 
   float* paths = nullptr;     ///< rows of load_path
   float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group
   float* radiance = nullptr;  ///< r, g, b so far
+  float* time = nullptr;      ///< of the shutter, in [0, 1); null where nothing moves
   // Null where not asked for.
   float* first = nullptr;   ///< albedo, normal, uv
   float* depth = nullptr;   ///< along the camera's axis; infinite where nothing was hit
@@ -69,13 +72,13 @@ class PathPool {
   uint32_t light_groups = 0;
   bool wants_uv = false;
   size_t bytes() const {
-    size_t n = rows_.bytes();
+    size_t n = rows_.bytes() + times_.bytes();
     for (const SoaBlock& block : aov_blocks_) n += block.bytes();
     return n;
   }
 
  private:
-  SoaBlock rows_;
+  SoaBlock rows_, times_;
   std::array<SoaBlock, 9> aov_blocks_;
 };
 

@@ -43,8 +43,9 @@ class PathTracer {
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
     keys_ = {&key.pixel_hash, &key.sample, 1, 0};
     const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
+    time_ = context_.moves() ? path_time<F>(settings_.sampler, key) : 0.f;
     const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
-                                           static_cast<F>(pixel >> 16), r, true);
+                                           static_cast<F>(pixel >> 16), r, true, time_);
     PathResult result;
     result.centre2 = centre_distance2<F>(*context_.camera, r, true);
     std::fill(groups_.begin(), groups_.end(), 0.f);
@@ -72,7 +73,8 @@ class PathTracer {
         keep_parts(depth, 1);
         return result;
       }
-      if (depth == 0) result.depth = camera_depth(o, path.dir, hit.t);
+      if (depth == 0)
+        result.depth = camera_depth<F>(*context_.camera, fma(path.dir, hit.t, o), time_, true);
       if (depth == 0) note_hit(result.hit, hit, fma(path.dir, hit.t, o));
       if (hit.inst == kLightShape) {
         const Color<F> c =
@@ -134,7 +136,7 @@ class PathTracer {
 
   Hit intersect(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
     Hit h;
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1};
+    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1, times()};
     keys_.salt = 2 * depth;
     context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
     counts_.add_rays(depth, 1);
@@ -142,7 +144,7 @@ class PathTracer {
   }
 
   bool occluded(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1};
+    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1, times()};
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
     context_.accel->occluded(ray, &blocked, 1, false, keys_);
@@ -191,7 +193,7 @@ class PathTracer {
                         uint32_t material, const PathState<F>& path, VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
-    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v};
+    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, time_};
     VertexResult<F> v{};
     visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
                      [&]<typename Bsdf>() {
@@ -201,11 +203,7 @@ class PathTracer {
     return v;
   }
 
-  F camera_depth(const Vec3<F>& o, const Vec3<F>& d, F t) const {
-    const CameraSetup& c = *context_.camera;
-    const Vec3<F> p = fma(d, t, o) - c.to_world.t;
-    return -dot(p, c.backward);
-  }
+  const float* times() const { return context_.scene.has_motion ? &time_ : nullptr; }
 
   static constexpr uint32_t kFirstSlot = 0;
   const WaveContext& context_;
@@ -213,6 +211,7 @@ class PathTracer {
   PhaseClock& clock_;
   Counts& counts_;
   PresenceKeys keys_;
+  F time_ = 0.f;  ///< of the path
   bool wants_guides_;
   std::vector<F> groups_;
 };

@@ -22,12 +22,22 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   Mask<F> active = lanes;
   if (scene.has_curves) active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
   const detail::MeshReader<F> mesh(scene, hit.mesh, active);
-  const detail::InstanceMaps<F> maps(scene, hit.inst, active);
+  detail::InstanceMaps<F> maps(scene, hit.inst, active);
   const U corner = hit.prim * 3u;
   const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
-  const Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
-  const Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
-  const Vec3<F> p2 = mesh.vec3(&MeshRecord::positions, i2, active);
+  Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
+  Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
+  Vec3<F> p2 = mesh.vec3(&MeshRecord::positions, i2, active);
+  F moved_size(0.f);
+  if (scene.has_motion) [[unlikely]] {
+    const MovedTriangle<F> moved =
+        moved_triangle<F>(scene, hit.inst, hit.mesh, {i0, i1, i2}, hit.time, maps, active);
+    p0 = moved.p[0];
+    p1 = moved.p[1];
+    p2 = moved.p[2];
+    maps.place(moved.instance);
+    moved_size = moved.instance.size;
+  }
   const F b1 = hit.u, b2 = hit.v, b0 = 1.f - b1 - b2;
   const Vec3<F> e1 = p1 - p0, e2 = p2 - p0;
   const Vec3<F> p = fma(e2, b2, fma(e1, b1, p0));
@@ -49,6 +59,9 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   };
   s.offset =
       max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
+  // And what lies between steps was rounded as they are.
+  if (scene.has_motion) [[unlikely]]
+    s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
 
   s.ns = s.ng;
   s.terminator = Vec3<F>(F(0.f));
@@ -57,9 +70,17 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   if (any(smooth)) {
     const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
     const Mask<U> pick(per_corner);
-    const Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, select(pick, U(corner), i0), smooth);
-    const Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, select(pick, U(corner + 1u), i1), smooth);
-    const Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, select(pick, U(corner + 2u), i2), smooth);
+    const U a0 = select(pick, U(corner), i0), a1 = select(pick, U(corner + 1u), i1),
+            a2 = select(pick, U(corner + 2u), i2);
+    Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
+    Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
+    Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
+    if (scene.has_motion) [[unlikely]] {
+      const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
+      n0 = moved[0];
+      n1 = moved[1];
+      n2 = moved[2];
+    }
     const Vec3<F> n = maps.map_normal(fma(n2, b2, fma(n1, b1, Vec3<F>(n0 * b0))));
     const F len2 = length_squared(n);
     const Mask<F> good = smooth & (len2 > 0.f) & is_finite(len2);

@@ -5,6 +5,7 @@
 #include "wavecomb/core/frame.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows.h"
+#include "wavecomb/integrate/motion.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -15,6 +16,7 @@ template <typename F>
 struct MeshHit {
   UInt<F> inst, mesh, prim;
   F u, v;
+  F time{};  ///< of the path, where the scene moves
 };
 
 /// A surface point in world space.
@@ -106,6 +108,12 @@ struct InstanceMaps {
     side = r[15];
   }
 
+  /// Takes other transforms where instances move.
+  void place(const MovedInstance<F>& to) {
+    for (int i = 0; i < 3; ++i) row[i] = select<F>(to.moves, to.to_world.row[i], row[i]);
+    t = select<F>(to.moves, to.to_world.t, t);
+    side = select(to.moves, to.side, side);
+  }
   Vec3<F> point(const Vec3<F>& p) const {
     return {fma(row[0].z, p.z, fma(row[0].y, p.y, fma(row[0].x, p.x, t.x))),
             fma(row[1].z, p.z, fma(row[1].y, p.y, fma(row[1].x, p.x, t.y))),

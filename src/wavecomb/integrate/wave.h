@@ -47,6 +47,8 @@ struct WaveContext {
   RayRecorder* recorder;            ///< gets the rays; null in any render that is not measured
   const AovTables* aovs = nullptr;  ///< what indices mean to AOVs; null where none asks
 
+  /// Whether paths need a time.
+  bool moves() const { return scene.has_motion || camera->moves(); }
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
   }
@@ -66,12 +68,13 @@ struct WaveTask {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.film->aovs().layout()),
+      : pool(capacity, context.film->aovs().layout(), context.moves()),
         rays(capacity),
         hits(capacity),
         shading(capacity),
         shadows(capacity),
         columns(3, capacity),
+        times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
         sorter(capacity),
         ray_sorter(context.orders_rays() ? capacity : 0),
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
@@ -88,6 +91,7 @@ struct Wave {
   ShadingQueue shading;
   ShadowQueue shadows;
   SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
+  SoaBlock times;    ///< of the rays that are traced, where the scene moves
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
   std::vector<float> scratch;         ///< one a material, for policies
@@ -100,7 +104,7 @@ struct Wave {
 
   size_t bytes() const {
     return pool.bytes() + rays.bytes() + hits.bytes() + shading.bytes() + shadows.bytes() +
-           columns.bytes();
+           columns.bytes() + times.bytes();
   }
 };
 

@@ -27,7 +27,8 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   for (; wave.rays.size > 0; ++depth) {
     // Camera rays of a pinhole are coherent as they come, and from one point packets give the same
     // hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
-    const bool coherent = depth == 0 && context.camera->lens_radius == 0;
+    const bool coherent =
+        depth == 0 && context.camera->lens_radius == 0 && !context.camera->moves();
     RayOrderChoice ray_order;
     clock.enter(Phase::kTrace);
     if (depth > 0) {
@@ -37,7 +38,8 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
       fetch_rays<F>(wave);
     }
     Clock::time_point start = Clock::now();
-    trace(wave, context, depth, depth == 0 ? tfar : nullptr, coherent);
+    trace(wave, context, depth, depth == 0 ? tfar : nullptr, fetch_times<F>(wave, wave.rays),
+          coherent);
     learn_order(wave.ray_chooser, depth, ray_order, start);
 
     clock.enter(Phase::kShade);
@@ -106,6 +108,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
         {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f, 0.01f * context.scene.scale, 0.f, key},
         true);
     std::memset(wave.pool.radiance + i * PathPool::kRadianceWords, 0, 4 * PathPool::kRadianceWords);
+    if (wave.pool.time) wave.pool.time[i] = u;
   }
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {

@@ -17,11 +17,15 @@ struct OneHit {
   uint32_t prim, geom, inst;
 };
 
+/// Of the shutter: what moves is picked where it is then.
+constexpr float kMiddle = 0.5f;
+
 OneHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {
   OneHit hit{};
+  const float time = kMiddle;
   const uint32_t path = 0;  // partly present surfaces are there for some paths: for this one
   accel.intersect(
-      {&ray.o.x, &ray.o.y, &ray.o.z, &ray.d.x, &ray.d.y, &ray.d.z, &ray.tfar, nullptr, 1},
+      {&ray.o.x, &ray.o.y, &ray.o.z, &ray.d.x, &ray.d.y, &ray.d.z, &ray.tfar, nullptr, 1, &time},
       {&hit.t, &hit.u, &hit.v, &hit.prim, &hit.geom, &hit.inst}, 1, false, {&path, &path, 1, 0});
   return hit;
 }
@@ -37,7 +41,7 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
                          uint32_t width, uint32_t height) {
   const FilterTable filter(FilterKind::kBox, 1.f);
   const CameraSetup camera(scene.camera(), width, height, filter);
-  const CameraRay<float> ray = ray_through<float>(camera, x, y, 0.5f, 0.5f);
+  const CameraRay<float> ray = ray_through<float>(camera, x, y, 0.5f, 0.5f, kMiddle, true);
   const OneHit hit = trace(accel, ray);
   if (hit.inst == kNoHit) return std::nullopt;
 
@@ -58,16 +62,15 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
     out.material = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[hit.prim];
     if (out.material == kInheritMaterial) out.material = instance.material;
     const Surface<float> surface = setup_surface<float>(
-        view, {hit.inst, mesh_id, hit.prim, hit.u, hit.v}, ray.d, true, false, true);
+        view, {hit.inst, mesh_id, hit.prim, hit.u, hit.v, kMiddle}, ray.d, true, false, true);
     out.position = surface.p;
     out.normal = surface.ns;
     out.uv = surface.uv;
   }
   out.object = names.object(object);
   out.asset = names.asset(object);
-  const Vec3<float> from_camera = out.position - camera.to_world.t;
-  out.depth = -dot(from_camera, camera.backward);
-  out.distance = length(from_camera);
+  out.depth = camera_depth<float>(camera, out.position, kMiddle, true);
+  out.distance = length(out.position - camera_place<float>(camera, kMiddle, true).t);
   return out;
 }
 

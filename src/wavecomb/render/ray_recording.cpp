@@ -66,7 +66,8 @@ RaySpan RayRecording::Stage::rays() const {
           column(5),
           has_tfar ? column(6) : nullptr,
           nullptr,
-          size};
+          size,
+          has_time ? column(has_tfar ? 7 : 6) : nullptr};
 }
 
 void RayRecording::closest(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) {
@@ -79,11 +80,17 @@ void RayRecording::occluded(const void* wave, const RaySpan& rays, uint32_t dept
 
 void RayRecording::keep(const void* wave, const RaySpan& rays, RayKind kind, uint32_t depth,
                         bool coherent) {
-  const bool has_tfar = rays.tfar != nullptr;
-  const size_t columns = has_tfar ? 7 : 6;
-  Stage stage{kind, has_tfar, coherent, rays.size, SoaBlock(columns, rays.size)};
-  const float* const from[7] = {rays.ox, rays.oy, rays.oz, rays.dx, rays.dy, rays.dz, rays.tfar};
-  for (size_t c = 0; c < columns; ++c) std::memcpy(stage.columns.floats(c), from[c], 4 * rays.size);
+  std::vector<const float*> from{rays.ox, rays.oy, rays.oz, rays.dx, rays.dy, rays.dz};
+  if (rays.tfar) from.push_back(rays.tfar);
+  if (rays.time) from.push_back(rays.time);
+  Stage stage{kind,
+              rays.tfar != nullptr,
+              rays.time != nullptr,
+              coherent,
+              rays.size,
+              SoaBlock(from.size(), rays.size)};
+  for (size_t c = 0; c < from.size(); ++c)
+    std::memcpy(stage.columns.floats(c), from[c], 4 * rays.size);
 
   const std::lock_guard lock(mutex_);
   bytes_ += stage.columns.bytes();

@@ -63,7 +63,7 @@ class RayRecording final : public RayRecorder {
   /// The rays of one stage of a wave.
   struct Stage {
     RayKind kind;
-    bool has_tfar, coherent;
+    bool has_tfar, has_time, coherent;
     size_t size;
     SoaBlock columns;
     RaySpan rays() const;

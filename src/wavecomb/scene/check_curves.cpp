@@ -19,7 +19,7 @@ void check_curves(const Mesh& mesh, const std::string& name) {
   if (vertices > kCurveFirstPoint / 4 || mesh.primitive_count() > kCurveFirstPoint / 4)
     throw Error(name + " has too many points for 32-bit offsets; split it");
   need(mesh.radii.size(), vertices, "radii");
-  if (mesh.is_ribbon()) need(mesh.normals.size(), 3 * vertices, "normal coordinates");
+  if (mesh.is_ribbon()) need(mesh.normals.size(), 3 * vertices * mesh.steps, "normal coordinates");
   if (points) need(mesh.indices.size(), 0, "indices");
   if (mesh.uvs_at == Attribute::kVertex)
     throw Error(name + " has texture coordinates per vertex; give them per segment end or point");

@@ -70,9 +70,14 @@ uint64_t hash_geometry(const Scene& scene) {
     h.add_array(m.face_materials);
     h.add_array(m.radii);
     h.add(m.primitive, m.normals_at, m.uvs_at, m.material);
+    if (m.deforms()) h.add(m.steps);
   }
   for (const Group& group : scene.groups()) h.add_array(std::span<const uint32_t>(group.meshes));
-  for (const Instance& i : scene.instances()) h.add(i.group, i.to_world, i.material);
+  for (const Instance& i : scene.instances()) {
+    h.add(i.group, i.to_world, i.material);
+    for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
+      h.add(scene.geometry()->steps[i.motion.first + k].affine());
+  }
   return h.value();
 }
 
@@ -138,6 +143,7 @@ uint64_t hash_camera(const Scene& scene) {
   Hash h;
   const Camera& c = scene.camera();
   h.add(c.to_world, c.lens_radius, c.focus_distance, c.near_clip, c.far_clip);
+  for (const Affine& step : c.steps) h.add(step);
   h.add_array(std::span<const float>(c.window));
   return h.value();
 }

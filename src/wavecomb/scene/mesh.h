@@ -34,12 +34,13 @@ enum class Primitive : uint8_t {
 struct Mesh {
   std::string name;
   Primitive primitive = Primitive::kTriangle;
-  std::span<const float> positions;   ///< 3 per vertex, Bezier control point or point
+  std::span<const float> positions;  ///< 3 per vertex, Bezier control point or point; those of each
+                                     ///< step after another
   std::span<const uint32_t> indices;  ///< 3 per triangle, counter-clockwise from outside; 1 per
                                       ///< segment (kCurveFirstPoint); none for points
   std::span<const float> radii;       ///< 1 per control point or point; none for triangles
-  std::span<const float> normals;     ///< 3 per vertex or corner; empty: flat. 3 per control point
-                                      ///< of ribbons
+  std::span<const float> normals;     ///< 3 per vertex or corner, step by step; empty: flat. 3 per
+                                      ///< control point of ribbons, step by step
   Attribute normals_at = Attribute::kNone;
   std::span<const float> uvs;  ///< 2 per vertex or corner; empty: uv = barycentrics
   Attribute uvs_at = Attribute::kNone;
@@ -47,6 +48,7 @@ struct Mesh {
   uint32_t material = kInheritMaterial;      ///< where face_materials is empty
   uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
   uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
+  uint32_t steps = 1;  ///< of its shape, at equal distances over the shutter; 1: it keeps its shape
   std::shared_ptr<const void> owner;
 
   bool is_curved() const { return primitive != Primitive::kTriangle; }
@@ -64,7 +66,8 @@ struct Mesh {
     if (primitive == Primitive::kSphere) return vertex_count();
     return is_curved() ? indices.size() : indices.size() / 3;
   }
-  size_t vertex_count() const { return positions.size() / 3; }
+  size_t vertex_count() const { return positions.size() / 3 / steps; }
+  bool deforms() const { return steps > 1; }
 };
 
 /// A mesh as lanes read it: addresses and flags, 16 words.
@@ -73,7 +76,7 @@ struct alignas(64) MeshRecord {
   uint32_t material;
   uint32_t flags;
   float uv_density;  ///< sqrt(uv area / area) over all triangles, object space; 0 without uvs
-  uint32_t pad;
+  uint32_t motion;   ///< index into MotionView::meshes
   uint64_t radii;
 };
 static_assert(sizeof(MeshRecord) == 64);

@@ -48,6 +48,10 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.textures = geometry_->texture_views.data();
   v.lights = lights_->set.view(v.materials);
   v.scale = geometry_->radius;
+  v.motion = {geometry_->mesh_motions.data(),
+              geometry_->instance_motions.empty() ? nullptr : geometry_->instance_motions.data(),
+              geometry_->steps.data()};
+  v.has_motion = geometry_->moves();
   v.has_emissive_meshes = materials_->has_emission;
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
                              [](const Mesh& mesh) { return mesh.is_curved(); });
@@ -121,7 +125,8 @@ SceneBytes Scene::bytes() const {
   const LightSet& set = lights_->set;
   b.records =
       of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
-         g.geometry_mesh, g.texture_views, g.placements) +
+         g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
+         g.instance_motions) +
       of(materials_->materials, materials_->records, materials_->uses, materials_->programs) +
       of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins) +
       g.names.bytes();

@@ -24,10 +24,12 @@ struct SceneView {
   const uint32_t* material_program = nullptr;
   MaterialView materials;
   LightView lights;
+  MotionView motion;
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;
   bool has_curves = false;  ///< curves or points
+  bool has_motion = false;  ///< some mesh or instance moves while the shutter is open
 };
 
 /// Memory of a scene's arrays, bytes.
@@ -140,10 +142,12 @@ class SceneBuilder {
   void add_to_group(uint32_t group, uint32_t mesh);
   /// Places `child` inside `parent`; nested to any depth without copies of geometry. `material` (or
   /// kInheritMaterial) goes to the meshes in it that have none of their own.
-  /// `name` is of add_placement_name, `number` tells those of one name apart.
+  /// `name` is of add_placement_name, `number` tells those of one name apart. `steps`: transforms
+  /// at equal distances over the shutter, two or more where it moves; `transform` does not count
+  /// then.
   void add_instance(uint32_t parent, uint32_t child, const Affine& transform,
                     uint32_t material = kInheritMaterial, uint32_t name = kNoName,
-                    uint32_t number = kNoName);
+                    uint32_t number = kNoName, std::span<const Affine> steps = {});
   /// A name for instances; the first `asset_length` characters name the asset that they are part
   /// of, 0 where that is not known.
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
@@ -163,17 +167,25 @@ class SceneBuilder {
     Affine transform;
     uint32_t material;
     uint32_t name, number;
+    StepRange motion;  ///< of node_steps_
   };
   /// Instances of groups with meshes that one placement of `group` makes; finds cycles.
   uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
-  void flatten(uint32_t group, const Instance& here, const std::vector<uint64_t>& counts,
-               std::vector<Instance>& out, std::vector<Placement>& placements) const;
+  /// Places `group` and all that is in it. `steps`: of `here`, where it moves.
+  void flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
+               const std::vector<uint64_t>& counts, std::vector<Instance>& out,
+               SceneGeometry& geometry) const;
+  /// Transforms of a node within a group that moves as `outer` says or stands still at `still`;
+  /// none where neither moves.
+  std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
+                               const Node& node) const;
   void make_records(SceneGeometry& geometry, uint32_t grey) const;
 
   uint32_t threads_;
   std::vector<Mesh> meshes_;
   std::vector<Group> groups_;
   std::vector<std::vector<Node>> children_;
+  std::vector<Affine> node_steps_;
   std::vector<Material> materials_;
   std::vector<TexturePtr> textures_;
   std::vector<Light> lights_;

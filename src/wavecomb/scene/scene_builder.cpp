@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/check_curves.h"
@@ -154,10 +155,12 @@ void check_mesh(const Mesh& mesh) {
   if (mesh.positions.size() % 3 != 0) throw Error(name + ": positions must be triples");
   if (mesh.is_curved()) {
     check_curves(mesh, name);
-    meshes_.push_back(std::move(mesh));
-    return static_cast<uint32_t>(meshes_.size() - 1);
+    return;
   }
   if (mesh.indices.size() % 3 != 0) throw Error(name + ": indices must be triples");
+  if (mesh.steps < 1 || mesh.steps > kMostSteps || mesh.positions.size() % (3 * mesh.steps) != 0)
+    throw Error(name + " needs as many points at each of 1 to " + std::to_string(kMostSteps) +
+                " steps of its motion");
   if (mesh.vertex_count() > 0x7fffffffu / 3 || mesh.triangle_count() > 0x7fffffffu / 9)
     throw Error(name + " has too many points or triangles for 32-bit offsets; split it");
   for (float x : mesh.positions)
@@ -169,7 +172,7 @@ void check_mesh(const Mesh& mesh) {
   if (!mesh.indices.empty() && highest >= vertices)
     throw Error(name + " has a face with vertex " + std::to_string(highest) + " but only " +
                 std::to_string(vertices) + " points");
-  check_attribute(mesh, mesh.normals, mesh.normals_at, 3, "normals");
+  check_attribute(mesh, mesh.normals, mesh.normals_at, size_t{3} * mesh.steps, "normals");
   check_attribute(mesh, mesh.uvs, mesh.uvs_at, 2, "texture coordinates");
   if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.triangle_count())
     throw Error(name + " has " + std::to_string(mesh.face_materials.size()) +
@@ -207,14 +210,23 @@ void SceneBuilder::add_to_group(uint32_t group, uint32_t mesh) {
 }
 
 void SceneBuilder::add_instance(uint32_t parent, uint32_t child, const Affine& transform,
-                                uint32_t material, uint32_t name, uint32_t number) {
+                                uint32_t material, uint32_t name, uint32_t number,
+                                std::span<const Affine> steps) {
   if (parent >= groups_.size() || child >= groups_.size())
     throw Error("an instance names a group that was never added");
   if (child == 0) throw Error("the world cannot be instanced; make a group");
-  if (!finite(transform))
+  if (!finite(transform) ||
+      !std::all_of(steps.begin(), steps.end(), [](const Affine& m) { return finite(m); }))
     throw Error("an instance of " + quoted("group", groups_[child].name) +
                 " has a transform that is not finite; mend it");
-  children_[parent].push_back({child, transform, material, name, number});
+  if (steps.size() == 1 || steps.size() > kMostSteps)
+    throw Error("the motion of an instance of " + quoted("group", groups_[child].name) +
+                " needs 2 to " + std::to_string(kMostSteps) + " steps");
+  StepRange motion;
+  if (!steps.empty())
+    motion = {static_cast<uint32_t>(node_steps_.size()), static_cast<uint32_t>(steps.size() - 1)};
+  node_steps_.insert(node_steps_.end(), steps.begin(), steps.end());
+  children_[parent].push_back({child, transform, material, name, number, motion});
 }
 
 uint32_t SceneBuilder::add_placement_name(std::string_view name, uint32_t asset_length) {
@@ -266,18 +278,50 @@ uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
   return known = count;
 }
 
-void SceneBuilder::flatten(uint32_t group, const Instance& here,
+uint32_t common_segments(uint32_t a, uint32_t b) {
+  const uint32_t both = std::lcm(a, b);
+  return both < kMostSteps / 2 ? both : std::max(a, b);
+}
+
+std::vector<Affine> SceneBuilder::composed(std::span<const Affine> outer, const Affine& still,
+                                           const Node& node) const {
+  if (outer.empty() && !node.motion.moves()) return {};
+  const Affine* const first =
+      node.motion.moves() ? &node_steps_[node.motion.first] : &node.transform;
+  const std::span<const Affine> inner(first, node.motion.segments + 1);
+  if (outer.empty()) outer = {&still, 1};
+  const uint32_t n = common_segments(std::max<uint32_t>(1, static_cast<uint32_t>(outer.size() - 1)),
+                                     std::max(1u, node.motion.segments));
+  std::vector<Affine> steps;
+  for (uint32_t k = 0; k <= n; ++k) steps.push_back(at_step(outer, k, n) * at_step(inner, k, n));
+  return steps;
+}
+
+void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
                            const std::vector<uint64_t>& counts, std::vector<Instance>& out,
-                           std::vector<Placement>& placements) const {
-  if (group != 0 && !groups_[group].meshes.empty()) out.push_back(here);
+                           SceneGeometry& geometry) const {
+  if (group != 0 && !groups_[group].meshes.empty()) {
+    out.push_back(here);
+    if (!steps.empty()) {
+      out.back().motion = {static_cast<uint32_t>(geometry.steps.size()),
+                           static_cast<uint32_t>(steps.size() - 1)};
+      // What knows one place only takes the middle of the shutter.
+      out.back().to_world = at_step(steps, 1, 2);
+      for (const Affine& m : steps) geometry.steps.emplace_back(m);
+    }
+  }
   for (const Node& node : children_[group]) {
     if (counts[node.child] == 0) continue;
-    const auto placement = static_cast<uint32_t>(placements.size());
-    placements.push_back({here.placement, node.child, node.name, node.number});
+    const auto placement = static_cast<uint32_t>(geometry.placements.size());
+    geometry.placements.push_back({here.placement, node.child, node.name, node.number});
+    const std::vector<Affine> moved = composed(steps, here.to_world, node);
     flatten(node.child,
-            {node.child, here.to_world * node.transform,
-             node.material == kInheritMaterial ? here.material : node.material, placement},
-            counts, out, placements);
+            {node.child,
+             here.to_world * node.transform,
+             node.material == kInheritMaterial ? here.material : node.material,
+             placement,
+             {}},
+            moved, counts, out, geometry);
   }
 }
 
@@ -287,11 +331,17 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
-  flatten(0, {0, Affine{}, kInheritMaterial, kNoName}, placements, flat, geometry->placements);
+  flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, *geometry);
+  const auto sound = [](const Affine& m) {
+    const float det = m.determinant();
+    return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
+  };
   size_t singular = 0;
   for (Instance& i : flat) {
-    const float det = i.to_world.determinant();
-    if (finite(i.to_world) && std::isfinite(det) && std::abs(det) > 1e-35f)
+    bool good = i.motion.moves() || sound(i.to_world);
+    for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
+      good = good && sound(geometry->steps[i.motion.first + k].affine());
+    if (good)
       geometry->instances.push_back(std::move(i));
     else
       ++singular;
@@ -342,11 +392,19 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
 void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
   const std::vector<Mesh>& meshes = geometry.meshes;
   geometry.mesh_records.resize(meshes.size());
+  geometry.mesh_motions.resize(1);
   geometry.face_materials.resize(meshes.size());
   parallel_for(meshes.size(), [&](size_t m) {
     geometry.mesh_records[m] = make_mesh_record(meshes[m]);
     geometry.face_materials[m] = distinct(meshes[m].face_materials);
   });
+  for (size_t m = 0; m < meshes.size(); ++m) {
+    const Mesh& mesh = meshes[m];
+    if (!mesh.deforms()) continue;
+    geometry.mesh_records[m].motion = static_cast<uint32_t>(geometry.mesh_motions.size());
+    geometry.mesh_motions.push_back({mesh.positions.size_bytes() / mesh.steps,
+                                     mesh.normals.size_bytes() / mesh.steps, mesh.steps - 1, 0});
+  }
   for (const auto& texture : geometry.textures) geometry.texture_views.push_back(texture->view());
 
   std::vector<uint32_t> first(geometry.groups.size());
@@ -361,7 +419,7 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
       const auto& p = meshes[mesh].positions;
       const auto& radii = meshes[mesh].radii;
       for (size_t i = 0; i + 2 < p.size(); i += 3) {
-        const float r = radii.empty() ? 0.f : radii[i / 3];
+        const float r = radii.empty() ? 0.f : radii[i / 3 % radii.size()];
         bounds[g].add({p[i] - r, p[i + 1] - r, p[i + 2] - r});
         bounds[g].add({p[i] + r, p[i + 1] + r, p[i + 2] + r});
       }
@@ -369,6 +427,10 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
   });
   geometry.instance_records.reserve(geometry.instances.size() + 1);
   geometry.instance_records.push_back(make_instance_record(Affine{}, grey));
+  if (!geometry.steps.empty()) {
+    geometry.instance_motions.resize(1);
+    for (const Instance& i : geometry.instances) geometry.instance_motions.push_back(i.motion);
+  }
   geometry.bounds = bounds[0];
   auto emissive = static_cast<uint32_t>(geometry.groups[0].meshes.size());
   for (const Instance& i : geometry.instances) {
@@ -379,10 +441,15 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     geometry.instance_records.push_back(r);
     const Bounds& b = bounds[i.group];
     if (b.empty()) continue;
-    for (int corner = 0; corner < 8; ++corner)
-      geometry.bounds.add(
-          i.to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
+    const auto add_box = [&](const Affine& to_world) {
+      for (int corner = 0; corner < 8; ++corner)
+        geometry.bounds.add(
+            to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
                             corner & 4 ? b.hi.z : b.lo.z}));
+    };
+    if (!i.motion.moves()) add_box(i.to_world);
+    for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
+      add_box(geometry.steps[i.motion.first + k].affine());
   }
   if (geometry.bounds.empty()) return;
   const Bounds& b = geometry.bounds;

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/motion.h"
 
 namespace wavecomb {
 
@@ -60,6 +61,11 @@ void check_camera(const Camera& camera) {
   const float* w = camera.window;
   if (!finite(camera.to_world) || std::abs(camera.to_world.determinant()) < 1e-30f)
     throw Error("the camera's transform is singular or not finite; mend it");
+  if (camera.steps.size() == 1 || camera.steps.size() > kMostSteps)
+    throw Error("the camera's motion needs 2 to " + std::to_string(kMostSteps) + " steps");
+  for (const Affine& step : camera.steps)
+    if (!finite(step) || std::abs(step.determinant()) < 1e-30f)
+      throw Error("the camera's motion is singular or not finite; mend it");
   for (int i = 0; i < 4; ++i)
     if (!std::isfinite(w[i])) throw Error("the camera's window is not finite; check its aperture");
   if (!(w[0] < w[1]) || !(w[2] < w[3]))

@@ -76,8 +76,11 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
     const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
     for (uint32_t mesh_id : group.meshes) {
       const Mesh& mesh = geometry.meshes[mesh_id];
-      const bool shines =
-          mesh.triangle_count() > 0 && geometry.any_material(mesh_id, record.material, emits);
+      // What moves is no light to aim at: its triangles are where they are at a path's own time.
+      // Paths that meet it see it shine.
+      const bool moves = mesh.deforms() || (i > 0 && geometry.instances[i - 1].motion.moves());
+      const bool shines = !moves && mesh.triangle_count() > 0 &&
+                          geometry.any_material(mesh_id, record.material, emits);
       emissive.push_back(shines ? static_cast<uint32_t>(triangle_count) : kNoLight);
       if (!shines) continue;
       sources.push_back({triangle_count, &mesh, &record,

@@ -13,6 +13,7 @@
 #include "wavecomb/scene/light_data.h"
 #include "wavecomb/scene/material_data.h"
 #include "wavecomb/scene/mesh.h"
+#include "wavecomb/scene/motion.h"
 #include "wavecomb/scene/names.h"
 #include "wavecomb/texture/texture.h"
 
@@ -50,6 +51,7 @@ struct Instance {
   Affine to_world;
   uint32_t material = kInheritMaterial;
   uint32_t placement = kNoName;  ///< index into Scene::placements
+  StepRange motion;              ///< of SceneGeometry::steps
 };
 
 /// Light groups that a stage may have, with that of lights without one.
@@ -76,6 +78,10 @@ struct SceneGeometry {
   std::vector<InstanceRecord> instance_records;
   std::vector<uint32_t> geometry_mesh;
   std::vector<TextureView> texture_views;
+  std::vector<MeshMotion> mesh_motions;
+  std::vector<MatrixStep> steps;            ///< of all instances that move
+  std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
+  bool moves() const { return mesh_motions.size() > 1 || !steps.empty(); }
 
   /// Runs test(material) for what faces of `mesh` wear where the instance's own is `inherited`,
   /// until it says yes.

@@ -38,8 +38,8 @@ inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inherited, co
 template <typename F>
 inline void store_depth(PathPool& pool, const CameraSetup& camera, const Vec3<F>& o,
                         const Vec3<F>& d, const F& t, const UInt<F>& slot, const Mask<F>& active) {
-  const Vec3<F> p = fma(d, t, o) - Vec3<F>(camera.to_world.t);
-  scatter<F>(pool.depth, -dot(p, Vec3<F>(camera.backward)), slot, active);
+  const F time = camera.moves() ? gather<F>(pool.time, slot, active) : F(0.f);
+  scatter<F>(pool.depth, camera_depth<F>(camera, fma(d, t, o), time, active), slot, active);
 }
 
 /// What camera rays met, into the rows of AovHit.

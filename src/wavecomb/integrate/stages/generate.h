@@ -29,8 +29,13 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const U sample = slot - index * task.samples + task.first_sample;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, settings.seed);
     const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
+    F time(0.f);
+    if (pool.time) {
+      time = path_time<F>(settings.sampler, key);
+      store(pool.time + i, time);
+    }
     const CameraRay<F> ray =
-        camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active);
+        camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active, time);
     store_path<F>(pool, slot,
                   {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), F(0.f), ray.spread, key},
                   active);

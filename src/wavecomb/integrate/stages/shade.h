@@ -51,7 +51,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     const U slot = id(Q::kSlot);
     const U material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, on)
                                      : load<U>(queue.uints(Q::kMaterial) + i);
-    const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), r[Q::kU], r[Q::kV]};
+    MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), r[Q::kU], r[Q::kV]};
+    if (context.scene.has_motion) [[unlikely]]
+      hit.time = gather<F>(pool.time, slot, active);
     PathLanes<F> path = load_path<F>(pool, slot, active);
     const F t = r[Q::kT];
     const PathState<F> state{path.d,

@@ -33,17 +33,29 @@ void fetch_shadows(Wave& wave) {
   fetch<16, F>(q, wave.pool.shadows, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
 }
 
+/// Times of the listed slots' paths side by side; null where the scene stands still.
+template <typename F, typename Queue>
+const float* fetch_times(Wave& wave, const Queue& q) {
+  float* times = wave.times.floats(0);
+  if (!times) return nullptr;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i);
+    store(times + i, gather<F>(wave.pool.time, load<UInt<F>>(q.slot + i), active));
+  }
+  return times;
+}
+
 /// Keys of presence for rays of `depth`; shadow rays draw other numbers than the rays themselves.
 inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow) {
   const auto* words = reinterpret_cast<const uint32_t*>(pool.paths);
   return {words + 13, words + 14, PathPool::kPathWords, 2 * depth + (shadow ? 1u : 0u)};
 }
 
-/// Closest hits of the ray queue into the hit buffer.
+/// Closest hits of the ray queue into the hit buffer. `times`: of fetch_times.
 inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar,
-                  bool coherent) {
+                  const float* times, bool coherent) {
   const RayQueue& q = wave.rays;
-  const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size};
+  const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size, times};
   if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
   const HitBuffer& h = wave.hits;
   PhaseClock::Clock::time_point start;
@@ -60,7 +72,8 @@ template <typename F>
 void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;
   ShadowQueue& q = wave.shadows;
-  const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.slot, q.size};
+  const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
+                     q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
   PhaseClock::Clock::time_point start;
   if (wave.pool.cost_ns) start = PhaseClock::Clock::now();

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Where things are at the time of a path.
+///
+/// Everything moves along straight lines between the steps that the scene holds, as Embree moves
+/// what it traverses. Time runs from 0, where the shutter opens, to 1.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "wavecomb/core/rows.h"
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/vec.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// When a path sees the scene, in [0, 1): one time for all its rays, a function of its key alone.
+template <typename F>
+inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
+  return sample_4d<F>(sampler, key, kTimeSet).x;
+}
+
+/// A transform, rows of A and the translation.
+template <typename F>
+struct MatrixLanes {
+  Vec3<F> row[3], t;
+};
+
+namespace detail {
+
+/// A place between two steps.
+template <typename F>
+struct BetweenSteps {
+  UInt<F> before;  ///< step, counted from the first
+  F part;          ///< share of the way to the next
+
+  BetweenSteps(const F& time, const UInt<F>& segments) {
+    const F at = time * F(Int<F>(segments));
+    const UInt<F> whole(to_int<F>(at)), last = segments - 1u;
+    before = select(Mask<UInt<F>>(whole < last), whole, last);
+    part = at - F(Int<F>(before));
+  }
+};
+
+/// The transforms of two steps, and what lies between.
+template <typename F>
+struct MatrixPair {
+  std::array<F, 16> a, b;
+  F part;
+
+  /// `first`, `segments`: of each active lane's StepRange, which moves.
+  MatrixPair(const MatrixStep* steps, const UInt<F>& first, const UInt<F>& segments, const F& time,
+             const Mask<F>& active) {
+    const BetweenSteps<F> at(time, segments);
+    const UInt<F> word = (first + at.before) * 16u;
+    a = load_rows<16, F>(steps, word, active);
+    b = load_rows<16, F>(steps, word + 16u, active);
+    part = at.part;
+  }
+  F at(size_t k) const { return fma(F(b[k] - a[k]), part, a[k]); }
+  MatrixLanes<F> matrix() const {
+    return {{{at(0), at(1), at(2)}, {at(4), at(5), at(6)}, {at(8), at(9), at(10)}},
+            {at(3), at(7), at(11)}};
+  }
+  /// The larger magnitude of word k of the two.
+  F reach(size_t k) const { return max(abs(a[k]), abs(b[k])); }
+};
+
+/// One of the arrays of meshes, whose values may differ from step to step.
+template <typename F>
+class MovingRows {
+ public:
+  MovingRows(const SceneView& scene, const UInt<F>& mesh, const F& time,
+             uint64_t MeshRecord::* array, uint64_t MeshMotion::* stride, const Mask<F>& active) {
+    const InMemory<UInt<F>> index(mesh);
+    alignas(64) float at[kWidth<F>], parts[kWidth<F>];
+    store(at, time);
+    const uint32_t bits = lane_bits<F>(active);
+    for (size_t i = 0; i < kWidth<F>; ++i) {
+      const MeshRecord& record = scene.meshes[(bits >> i & 1u) != 0 ? index.value[i] : 0u];
+      const MeshMotion& motion = scene.motion.meshes[record.motion];
+      const auto [before, part] = step_place(at[i], motion.segments);
+      before_[i] = record.*array + before * (motion.*stride);
+      after_[i] = before_[i] + (motion.*stride);  // 0 for a mesh that keeps its shape
+      parts[i] = part;
+    }
+    part_ = load<F>(parts);
+  }
+
+  struct Value {
+    Vec3<F> v, reach;  ///< and the larger magnitudes of the two steps
+  };
+  Value operator()(const UInt<F>& index, const Mask<F>& active) const {
+    const auto rows = [&](const uint64_t* base) {
+      const auto r =
+          load_rows_of<3, F>([&](size_t lane) { return reinterpret_cast<const void*>(base[lane]); },
+                             index * 3u, active);
+      return Vec3<F>(r[0], r[1], r[2]);
+    };
+    const Vec3<F> a = rows(before_), b = rows(after_);
+    const auto larger = [](const F& x, const F& y) { return max(abs(x), abs(y)); };
+    // No fma: traversal of curves comes to the same bits in any build.
+    return {Vec3<F>(b - a) * part_ + a, {larger(a.x, b.x), larger(a.y, b.y), larger(a.z, b.z)}};
+  }
+
+ private:
+  uint64_t before_[kWidth<F>], after_[kWidth<F>];
+  F part_;
+};
+
+}  // namespace detail
+
+/// Where the instances of hits are at the hits' time.
+template <typename F>
+struct MovedInstance {
+  Mask<F> moves;
+  MatrixLanes<F> to_world;  ///< where it moves
+  F side;                   ///< sign of its determinant
+  F size;                   ///< bounds all terms of a world position
+};
+
+/// `maps`: row and t of the instances at rest. `reach`: bounds the magnitudes of what is placed.
+/// Not inline, like what follows: kernels of scenes at rest keep their size.
+template <typename F, typename Maps>
+[[gnu::noinline, gnu::cold]] MovedInstance<F> moved_instance(const SceneView& scene,
+                                                             const UInt<F>& inst, const F& time,
+                                                             const Maps& maps, const Vec3<F>& reach,
+                                                             const Mask<F>& active) {
+  using U = UInt<F>;
+  MovedInstance<F> out;
+  const auto size = [&](const Vec3<F>& row, const F& t) {
+    return F(fma(row.z, reach.z, fma(row.y, reach.y, fma(row.x, reach.x, t))));
+  };
+  const auto abs3 = [](const Vec3<F>& v) { return Vec3<F>(abs(v.x), abs(v.y), abs(v.z)); };
+  out.size = F(0.f);
+  for (size_t i = 0; i < 3; ++i) {
+    const F t = i == 0 ? maps.t.x : (i == 1 ? maps.t.y : maps.t.z);
+    out.size = max(out.size, size(abs3(maps.row[i]), F(abs(t))));
+  }
+  out.moves = Mask<F>(false);
+  if (!scene.motion.instances) return out;
+  const auto range = load_rows<2, F>(scene.motion.instances, inst * 2u, active);
+  const U first = float_bits<F>(range[0]), segments = float_bits<F>(range[1]);
+  out.moves = active & Mask<F>(segments != U(0u));
+  if (none(out.moves)) return out;
+  const detail::MatrixPair<F> pair(scene.motion.steps, first, segments, time, out.moves);
+  out.to_world = pair.matrix();
+  const Vec3<F>* row = out.to_world.row;
+  out.side = select(dot(row[0], cross(row[1], row[2])) < 0.f, F(-1.f), F(1.f));
+  F moving_size(0.f);
+  for (size_t i = 0; i < 3; ++i)
+    moving_size =
+        max(moving_size, size({pair.reach(4 * i), pair.reach(4 * i + 1), pair.reach(4 * i + 2)},
+                              pair.reach(4 * i + 3)));
+  out.size = select(out.moves, moving_size, out.size);
+  return out;
+}
+
+/// The triangle of a hit at the hit's time, and where its instance is.
+template <typename F>
+struct MovedTriangle {
+  Vec3<F> p[3];
+  MovedInstance<F> instance;
+};
+
+template <typename F, typename Maps>
+[[gnu::noinline, gnu::cold]] MovedTriangle<F> moved_triangle(
+    const SceneView& scene, const UInt<F>& inst, const UInt<F>& mesh,
+    const std::array<UInt<F>, 3>& corners, const F& time, const Maps& maps, const Mask<F>& active) {
+  MovedTriangle<F> out;
+  const detail::MovingRows<F> points(scene, mesh, time, &MeshRecord::positions,
+                                     &MeshMotion::positions, active);
+  Vec3<F> reach(F(0.f));
+  for (size_t k = 0; k < 3; ++k) {
+    const auto [p, r] = points(corners[k], active);
+    out.p[k] = p;
+    reach = max(reach, r);
+  }
+  out.instance = moved_instance<F>(scene, inst, time, maps, reach, active);
+  return out;
+}
+
+/// Normals with the given indices at a hit's time.
+template <typename F>
+[[gnu::noinline, gnu::cold]] std::array<Vec3<F>, 3> moved_normals(
+    const SceneView& scene, const UInt<F>& mesh, const std::array<UInt<F>, 3>& indices,
+    const F& time, const Mask<F>& active) {
+  const detail::MovingRows<F> normals(scene, mesh, time, &MeshRecord::normals, &MeshMotion::normals,
+                                      active);
+  return {normals(indices[0], active).v, normals(indices[1], active).v,
+          normals(indices[2], active).v};
+}
+
+}  // namespace wavecomb

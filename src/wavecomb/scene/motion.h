@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+/// How things move while the shutter is open: values at equal steps of time, straight lines
+/// between.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/core/affine.h"
+
+namespace wavecomb {
+
+/// Steps that anything may have: Embree's limit.
+inline constexpr uint32_t kMostSteps = 129;
+
+/// Distances of the values of one step from those of the one before, of a mesh that changes its
+/// shape. MeshRecord::motion is an index into a list of these, whose first is of meshes that do
+/// not.
+struct MeshMotion {
+  uint64_t positions = 0, normals = 0;  ///< bytes
+  uint32_t segments = 0;                ///< steps less one; 0: still
+  uint32_t pad = 0;
+};
+static_assert(sizeof(MeshMotion) == 24);
+
+/// The step before a time in [0, 1], and the share of the way to the next.
+struct StepPlace {
+  uint32_t before;
+  float part;
+};
+inline StepPlace step_place(float time, uint32_t segments) {
+  const float place = time * static_cast<float>(segments);
+  const uint32_t last = segments > 0 ? segments - 1 : 0;
+  const uint32_t before = std::min(static_cast<uint32_t>(place), last);
+  return {before, place - static_cast<float>(before)};
+}
+
+/// Steps [first, first + segments] of a list of steps; 0 segments: it stands still.
+struct StepRange {
+  uint32_t first = 0, segments = 0;
+  bool moves() const { return segments > 0; }
+};
+
+/// A transform at one step, as lanes read it.
+struct alignas(64) MatrixStep {
+  float to_world[12] = {};  ///< rows of A, each followed by its translation
+  float pad[4] = {};
+
+  MatrixStep() = default;
+  explicit MatrixStep(const Affine& m)
+      : to_world{m.row[0].x, m.row[0].y, m.row[0].z, m.t.x,      m.row[1].x, m.row[1].y,
+                 m.row[1].z, m.t.y,      m.row[2].x, m.row[2].y, m.row[2].z, m.t.z} {}
+  Affine affine() const {
+    const float* w = to_world;
+    return {{{w[0], w[1], w[2]}, {w[4], w[5], w[6]}, {w[8], w[9], w[10]}}, {w[3], w[7], w[11]}};
+  }
+};
+static_assert(sizeof(MatrixStep) == 64);
+
+/// What kernels need of a scene's motion.
+struct MotionView {
+  const MeshMotion* meshes = nullptr;
+  const StepRange* instances = nullptr;  ///< by instance; null where none moves
+  const MatrixStep* steps = nullptr;
+};
+
+/// The transform a share `part` of the way from a to b, component by component, as Embree does.
+inline Affine between(const Affine& a, const Affine& b, float part) {
+  const auto mix = [&](const Vec3<float>& p, const Vec3<float>& q) {
+    return p * (1.f - part) + q * part;
+  };
+  return {{mix(a.row[0], b.row[0]), mix(a.row[1], b.row[1]), mix(a.row[2], b.row[2])},
+          mix(a.t, b.t)};
+}
+
+/// What `steps` say at step k of n.
+inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
+  const uint64_t place = uint64_t{k} * (steps.size() - 1);
+  const size_t before = place / n;
+  if (place % n == 0) return steps[before];
+  return between(steps[before], steps[before + 1],
+                 static_cast<float>(place % n) / static_cast<float>(n));
+}
+
+/// Segments for the product of two motions: enough for the steps of both, within reason.
+uint32_t common_segments(uint32_t a, uint32_t b);
+
+}  // namespace wavecomb
