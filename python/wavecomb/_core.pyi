@@ -199,11 +199,11 @@ class SceneBuilder:
         asset_length: int = 0,
     ) -> int:
         """Kinds: linear-tube, cubic-tube, linear-ribbon, cubic-ribbon. Positions (n, 3), or
-        (steps, n, 3) over the shutter (normals likewise), of Bezier control points (points of lines), radii (n,), normals (n, 3) of ribbons. segments (m,): the
-        first of four (two) points in a row, plus 2^31 where the curve goes on before it and 2^30
-        where it goes on after it: then the point before (after) those of the segment says in which
-        direction. uvs (m, 2, 2) at both ends; face_materials (m,). Counts as a mesh; arrays are
-        kept as in add_mesh."""
+        (steps, n, 3) over the shutter, of Bezier control points (points of lines), radii (n,),
+        normals of ribbons (shape of positions). segments (m,): the first of four (two) points in a
+        row, plus 2^31 where the curve goes on before it and 2^30 where it goes on after it: then
+        the point before (after) those of the segment says in which direction. uvs (m, 2, 2) at both
+        ends; face_materials (m,). Counts as a mesh; arrays are kept as in add_mesh."""
     def add_points(
         self,
         positions: NDArray[np.float32],
@@ -216,8 +216,8 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Spheres: positions (n, 3), or (steps, n, 3) over the shutter, radii (n,), uvs (n, 2), face_materials (n,). Counts as a
-        mesh; arrays are kept as in add_mesh."""
+        """Spheres: positions (n, 3), or (steps, n, 3) over the shutter, radii (n,), uvs (n, 2),
+        face_materials (n,). Counts as a mesh; arrays are kept as in add_mesh."""
     def add_group(self, name: str = "", root: str = "") -> int:
         """A new empty group; group 0, the world, is there. root: the prim path that names of what
         is in it begin with, and that names of its instances take the place of."""
