@@ -2,6 +2,7 @@
 // What moves while the shutter is open: against closed forms, and one picture for all schedules.
 #include "wavecomb/integrate/motion.h"
 
+#include "curve_testing.h"
 #include "wave_testing.h"
 #include "wavecomb/integrate/surface.h"
 
@@ -21,6 +22,21 @@ Mesh deforming(const std::vector<MeshData>& shapes, uint32_t material = 0) {
   }
   Mesh mesh = make_mesh(std::move(all), material);
   mesh.steps = static_cast<uint32_t>(shapes.size());
+  return mesh;
+}
+
+/// Curves or points that sway: each step a little further to the right, where they are high.
+Mesh swaying(Primitive primitive, uint32_t steps, uint32_t seed, uint32_t material) {
+  curve_testing::CurveData data = curve_testing::strands(primitive, 12, 2, 0.8f, 0.06f, seed);
+  const std::vector<float> still = data.positions, normals = data.normals;
+  for (uint32_t s = 1; s < steps; ++s)
+    for (size_t i = 0; i < still.size(); i += 3) {
+      const float by = 0.3f * static_cast<float>(s) * still[i + 1];
+      data.positions.insert(data.positions.end(), {still[i] + by, still[i + 1], still[i + 2]});
+      data.normals.insert(data.normals.end(), {normals[i] + by, normals[i + 1], normals[i + 2]});
+    }
+  Mesh mesh = curve_testing::make_curves(std::move(data), material);
+  mesh.steps = steps;
   return mesh;
 }
 
@@ -64,6 +80,31 @@ TEST(Motion, MovingEdgeCoversAPixelForItsShareOfTheTime) {
   builder.add_to_group(0, builder.add_mesh(deforming({half_plane(-0.5f), half_plane(0.3f)})));
   builder.set_camera(camera_before_the_plane());
   EXPECT_NEAR(mean(builder.build(), 1u << 18), 0.4, 2e-3);
+}
+
+TEST(Motion, MovingPointsAndCurvesCoverTheirShare) {
+  // A disk of radius 0.3 before a pixel of side 1, seen from afar: there from step 0 to 1, then on
+  // its way out, from step 2 to 3 gone.
+  for (const bool tube : {false, true}) {
+    curve_testing::CurveData data;
+    data.primitive = tube ? Primitive::kLinearTube : Primitive::kSphere;
+    for (const float x : {0.f, 0.f, 9.f, 9.f}) {
+      data.point({x, 0, 0}, 0.3f);
+      if (tube) data.point({x, 0, -1}, 0.3f);
+    }
+    data.radii.resize(tube ? 2 : 1);
+    if (tube) data.segments = {0};
+    Mesh mesh = curve_testing::make_curves(std::move(data), 0);
+    mesh.steps = 4;
+    SceneBuilder builder;
+    builder.add_material(glowing());
+    builder.add_to_group(0, builder.add_mesh(std::move(mesh)));
+    Camera camera = make_camera({0, 0, 1000}, {0, 0, 0}, 0.001f);
+    builder.set_camera(camera);
+    // On its way of 9 it is whole for 0.2, then half of it on average for 0.6.
+    const double seen = kPiD * 0.09, crossing = (0.2 + 0.5 * 0.6) / 9;
+    EXPECT_NEAR(mean(builder.build(), 1u << 18), seen * (1 + crossing) / 3, 2e-3) << tube;
+  }
 }
 
 TEST(Motion, EveryStepCounts) {
@@ -165,6 +206,12 @@ ScenePtr moving_scene(bool moving_camera) {
       builder.add_instance(0, group, at, 0, kNoName, kNoName, turn);
     else
       builder.add_instance(0, group, at * scale(0.5f, 0.5f, 0.5f), 2);
+  }
+  uint32_t seed = 7;
+  for (const Primitive primitive : curve_testing::curved_primitives()) {
+    builder.add_to_group(0, builder.add_mesh(swaying(primitive, 2 + seed % 2, seed, seed % 3)));
+    builder.add_to_group(group, builder.add_mesh(swaying(primitive, 1, seed + 50, 1)));
+    ++seed;
   }
   // A lamp that moves: seen, but not aimed at.
   const Affine fly[2] = {translate(0, 3, 0), translate(2, 3, 0)};

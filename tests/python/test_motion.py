@@ -255,8 +255,46 @@ def Mesh "Floor" {
 """
 
 
-def test_blur_is_the_mean_of_still_frames(tmp_path):
-    path = write(tmp_path, stage(SCENE % QUAD))
+STRANDS = """
+def BasisCurves "Hair" {
+    uniform token type = "cubic"
+    uniform token basis = "bspline"
+    int[] curveVertexCounts = [5]
+    float[] widths = [0.2]
+    point3f[] points.timeSamples = {
+        1: [(0,-1,0.5), (0,0,0.5), (0,0.5,0.5), (0,1,0.5), (0,2,0.5)],
+        2: [(0,-1,0.5), (0,0,0.5), (0.4,0.5,0.5), (0.9,1,0.5), (1.4,2,0.5)]
+    }
+}
+def BasisCurves "Blade" {
+    uniform token type = "linear"
+    int[] curveVertexCounts = [2]
+    float[] widths = [0.3]
+    normal3f[] normals = [(0,0,1), (0,0,1)]
+    point3f[] points.timeSamples = {
+        1: [(1,0,0.2), (1,1,0.2)], 2: [(1.2,0,0.2), (1.8,0.8,0.4)]
+    }
+}
+def Points "Dust" {
+    point3f[] points.timeSamples = { 1: [(0.2,1.4,0), (0.8,1.4,0)] }
+    vector3f[] velocities.timeSamples = { 1: [(0,-24,0), (12,0,0)] }
+    float[] widths = [0.3, 0.2]
+}
+def Xform "Carrier" {
+    double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 2: (-0.5, 0.5, 0) }
+    double3 xformOp:scale = (1, 0.5, 1)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"]
+    def Points "Balls" {
+        point3f[] points = [(1.4, 0.4, 0.5)]
+        float[] widths = [0.4]
+    }
+}
+"""
+
+
+@pytest.mark.parametrize("more", ["", STRANDS], ids=["mesh", "curves and points"])
+def test_blur_is_the_mean_of_still_frames(tmp_path, more):
+    path = write(tmp_path, stage(SCENE % QUAD + more))
     settings = {"size": (24, 24), "threads": 1, "max_depth": 3}
     blurred = wavecomb.render(load_stage(path, frame=1), spp=512, error=True, **settings)
     stills = []
@@ -275,7 +313,7 @@ def test_blur_is_the_mean_of_still_frames(tmp_path):
 
 
 def test_one_picture_for_all_schedules_from_a_stage(tmp_path):
-    loaded = load_stage(write(tmp_path, stage(SCENE % QUAD)), frame=1)
+    loaded = load_stage(write(tmp_path, stage(SCENE % QUAD + STRANDS)), frame=1)
     assert loaded.scene.moves
     pictures = [
         wavecomb.render(loaded, size=(24, 24), spp=4, **options).beauty.tobytes()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.deforming import points_at, step_times
+from wavecomb.usd.deforming import points_at, points_now, step_times
 from wavecomb.usd.mesh import (
     IDENTITY,
     UV_NAMES,
@@ -227,7 +227,7 @@ def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
     Raises:
         MeshError: They are no points.
     """
-    points = as_array(prim.GetAttribute("points").Get(time))
+    points = as_array(points_now(prim, time))
     if points is None or len(points) == 0:
         return None
     if points.shape[1] != 3:

@@ -33,6 +33,15 @@ def _has_velocities(prim: Usd.Prim) -> bool:
     return bool(velocities and velocities.HasAuthoredValue())
 
 
+def points_now(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
+    """Points at one time, as USD has them: velocities carry those of the sample before."""
+    if not time.IsDefault() and _has_velocities(prim):
+        found = UsdGeom.PointBased(prim).ComputePointsAtTime(time, time)
+        if found:
+            return found
+    return prim.GetAttribute("points").Get(time)
+
+
 def step_times(prim: Usd.Prim, skin: Skin | None, motion: Motion) -> list[float]:
     """Time codes at which its shape is taken."""
     get = prim.GetAttribute

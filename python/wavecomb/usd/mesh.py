@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.cage import SCHEMES, Cage, crease_pairs, read_rules
-from wavecomb.usd.deforming import matrix_at, points_at, step_times
+from wavecomb.usd.deforming import matrix_at, points_at, points_now, step_times
 from wavecomb.usd.network import word
 from wavecomb.usd.normals import smooth_normals
 from wavecomb.usd.primvar import (
@@ -199,9 +199,10 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         skin = self._skin(prim)
-        points = as_array(get("points").Get(time))
+        authored = points_now(prim, time)
+        points = as_array(authored)
         if skin is not None and points is not None and len(points):
-            points = skinned_points(skin, get("points").Get(time), time)
+            points = skinned_points(skin, authored, time)
         counts = as_integers(get("faceVertexCounts").Get(time))
         if points is None or len(points) == 0 or len(counts) == 0:
             return None
