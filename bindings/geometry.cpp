@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/geometry/quads.h"
 #include "wavecomb/geometry/screen_size.h"
 #include "wavecomb/geometry/surface.h"
 #include "wavecomb/scene/parallel.h"
@@ -190,6 +192,14 @@ double pixels(const Array<float>& points, const Array<int32_t>& counts,
   return most;
 }
 
+nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
+                 const std::optional<Array<int64_t>>& starts) {
+  const std::span<const int64_t> first =
+      starts ? std::span(starts->data(), starts->size()) : std::span<const int64_t>();
+  return array_of(
+      split_quads({points.data(), points.size()}, {indices.data(), indices.size()}, first), 3);
+}
+
 nb::tuple weld(const Array<int32_t>& corners, uint32_t point_count, const Array<float>& values) {
   if (values.ndim() != 2) throw Error("values must have the shape (corners, width)");
   Welded welded;
@@ -209,5 +219,6 @@ void bind_geometry(nb::module_& m) {
   m.attr("MAX_SUBDIVISION") = Subdivision::kMaxLevel;
   m.def("edge_pixels", &pixels, "points"_a, "counts"_a, "indices"_a, "transforms"_a, "to_camera"_a,
         "centre"_a, "half"_a, "pixels_per_unit"_a);
+  m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
   m.def("weld_corners", &weld, "corners"_a, "point_count"_a, "values"_a);
 }

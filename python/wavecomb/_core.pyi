@@ -535,6 +535,15 @@ def edge_pixels(
     The greatest over transforms (k, 4, 4) to the world. Edges out of the picture count an eighth.
     to_camera (4, 4), row vectors; centre, half: of the window on the plane z = -1."""
 
+def split_quads(
+    points: NDArray[np.float32],
+    indices: NDArray[np.int32],
+    starts: NDArray[np.int64] | None = None,
+) -> NDArray[np.int64]:
+    """Corners (2 k, 3) of the two triangles of each quad, cut along the better diagonal.
+
+    points (n, 3); indices (corners,), in range; starts (k,): first corners, None: all are quads."""
+
 def weld_corners(
     corners: NDArray[np.int32], point_count: int, values: NDArray[np.float32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

@@ -20,6 +20,7 @@ from wavecomb.usd.primvar import (
     PrimvarError,
     as_array,
     as_integers,
+    authored_names,
     from_attribute,
     read_primvar,
     spread,
@@ -111,10 +112,19 @@ def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
     return out.reshape(normals.shape)
 
 
+def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | None:
+    """Its subdivisionScheme; ``names``: of what is authored."""
+    if "subdivisionScheme" not in names:
+        return "catmullClark"
+    return word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
+
+
 def _moves_only(matrix: Gf.Matrix4d) -> bool:
     """Whether a transform is a translation."""
     return bool(matrix.ExtractRotationMatrix() == _NO_TURN)
 
+
+_NORMALS = ("primvars:normals", "normals")
 
 _NO_TURN = Gf.Matrix3d(1.0)
 
@@ -129,7 +139,7 @@ def extent(positions: Array) -> Array:
     np.minimum.reduce(positions, axis=0, out=bounds[0])
     np.maximum.reduce(positions, axis=0, out=bounds[1])
     # Written so that NaN fails too.
-    if not all(-LIMIT < value < LIMIT for row in bounds.tolist() for value in row):
+    if not (bounds[0].min() > -LIMIT and bounds[1].max() < LIMIT):
         raise MeshError("a point is not finite or absurdly far away")
     return bounds
 
@@ -199,10 +209,11 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         skin = self._skin(prim)
-        authored = points_now(prim, time)
-        points = as_array(authored)
+        names = authored_names(prim)
+        value = points_now(prim, time) if "velocities" in names else get("points").Get(time)
+        points = as_array(value)
         if skin is not None and points is not None and len(points):
-            points = skinned_points(skin, authored, time)
+            points = skinned_points(skin, value, time)
         counts = as_integers(get("faceVertexCounts").Get(time))
         if points is None or len(points) == 0 or len(counts) == 0:
             return None
@@ -210,13 +221,12 @@ class MeshReader:
             raise MeshError("points are not triples")
         points = np.ascontiguousarray(points, np.float32)
         indices = as_integers(get("faceVertexIndices").Get(time))
-        holes = get("holeIndices")
-        hole_list = as_integers(holes.Get(time)) if holes.HasAuthoredValue() else None
-        flip = word(get("orientation").Get(time)) == "leftHanded"
+        holes = as_integers(get("holeIndices").Get(time)) if "holeIndices" in names else None
+        flip = "orientation" in names and word(get("orientation").Get(time)) == "leftHanded"
         positions = points if matrix == IDENTITY else bake(points, matrix)
         bounds = extent(positions)
-        topology = triangulate(points, counts, indices, hole_list, flip)
-        scheme = word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
+        topology = triangulate(points, counts, indices, holes, flip)
+        scheme = _scheme(prim, names, time)
         subdivided = self.subdivide and scheme in SCHEMES
         normals = self._normals(prim, points, topology, scheme)
         primvar = self._coordinates(prim, topology, uv_names, inherited) if uv_names else None
@@ -305,7 +315,7 @@ class MeshReader:
 
     def _creases(self, prim: Usd.Prim, topology: Topology) -> NDArray[np.int64] | None:
         get, time = prim.GetAttribute, self.time
-        if not get("creaseIndices").HasAuthoredValue():
+        if "creaseIndices" not in authored_names(prim):
             return None
         indices = as_integers(get("creaseIndices").Get(time))
         lengths = as_integers(get("creaseLengths").Get(time))
@@ -321,6 +331,8 @@ class MeshReader:
 
     def _authored_normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
         """primvars:normals, else normals; None where there are none that fit."""
+        if authored_names(prim).isdisjoint(_NORMALS):
+            return None
         try:
             primvar = read_primvar(prim, "normals", self.time)
             if primvar is None:

@@ -60,6 +60,11 @@ def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
     return np.ascontiguousarray(array[:, 0], dtype)
 
 
+def authored_names(prim: Usd.Prim) -> frozenset[str]:
+    """Properties that a prim has opinions of: to ask each attribute takes USD as long as this."""
+    return frozenset(prim.GetAuthoredPropertyNames())
+
+
 def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> Primvar | None:
     """A primvar with its indices applied, or None where it has no value.
 

@@ -17,6 +17,7 @@ from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import Light, LightReader
 from wavecomb.usd.mesh import IDENTITY
 from wavecomb.usd.network import word
+from wavecomb.usd.primvar import authored_names
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shapes import SHAPES
 from wavecomb.usd.shutter import Motion, Track
@@ -126,13 +127,19 @@ class Traversal:
             kind = self.kind(prim)
             if kind == "shading":
                 continue
+            names: frozenset[str] = frozenset()
             if kind != "other":
-                if word(prim.GetAttribute("visibility").Get(time)) == "invisible":
+                names = authored_names(prim)
+                if (
+                    "visibility" in names
+                    and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
+                ):
                     continue
-                authored = prim.GetAttribute("purpose")
-                if authored.HasAuthoredValue():
-                    purpose = word(authored.Get(), purpose)
-                if kind != "scope":
+                if "purpose" in names:
+                    authored = prim.GetAttribute("purpose")
+                    if authored.HasAuthoredValue():
+                        purpose = word(authored.Get(), purpose)
+                if kind != "scope" and "xformOpOrder" in names:
                     own, resets = local(prim)
                     if self.motion is not None:
                         track = self.motion.follow(prim, track, matrix, resets)
@@ -172,7 +179,8 @@ class Traversal:
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
             elif children and kind in ("xform", "scope"):
-                inherited = self.inherit(prim, inherited)
+                if any(name.startswith("primvars:") for name in names):
+                    inherited = self.inherit(prim, inherited)
             for child in reversed(children):
                 stack.append((child, matrix, track, purpose, inherited, pick))
         return found

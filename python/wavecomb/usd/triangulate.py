@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb import _core
+
 _CHUNK = 1 << 17
 """Polygons split at once: bounds the memory in use."""
 
@@ -157,16 +159,10 @@ def _quads(
     points: NDArray[np.float32], indices: NDArray[np.int32], flip: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
     """Corners and points (m, 3) of the triangles of a mesh of quads alone."""
-    count = len(indices) // 4
-    corners = np.empty((2 * count, 3), np.intp)
-    triangles = np.empty((2 * count, 3), np.uint32)
-    for first in range(0, count, _CHUNK):
-        last = min(count, first + _CHUNK)
-        ring = np.arange(4 * first, 4 * last).reshape(-1, 4)
-        part = _split_rings(points, indices, ring).reshape(-1, 3)
-        corners[2 * first : 2 * last] = part[:, ::-1] if flip else part
-        triangles[2 * first : 2 * last] = indices.take(corners[2 * first : 2 * last])
-    return corners, triangles
+    corners = _core.split_quads(points, indices)
+    if flip:
+        corners = np.ascontiguousarray(corners[:, ::-1])
+    return corners, indices.take(corners).view(np.uint32)
 
 
 def _split_rings(
@@ -176,9 +172,11 @@ def _split_rings(
     size = ring.shape[1]
     if size == 3:
         return ring[:, None, :]
-    p = points.take(indices[ring], axis=0).astype(np.float64)
     if size == 4:
-        return _split_quads(p, ring)
+        return _core.split_quads(points, indices, np.ascontiguousarray(ring[:, 0])).reshape(
+            -1, 2, 3
+        )
+    p = points.take(indices[ring], axis=0).astype(np.float64)
     p -= p[:, :1]
     # Newell's normal; the fan is right where each of its triangles turns the same way.
     normal = cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
@@ -192,29 +190,6 @@ def _split_rings(
         for face in np.flatnonzero(bad):
             out[face] = ring[face][clip_ears(p[face], normal[face])]
     return out
-
-
-def _split_quads(p: NDArray[np.float64], ring: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Triangles (faces, 2, 3) of quads with corners p (faces, 4, 3), ring (faces, 4)."""
-    d = p[:, 1:] - p[:, :1]
-    # d1 x d2, d2 x d3 and d1 x d3; the first two add up to the normal of the quad.
-    turns = cross(d.take(_FIRST, axis=1), d.take(_SECOND, axis=1))
-    normal = turns[:, 0] + turns[:, 1]
-    signed = np.einsum("fkc,fc->fk", turns, normal)
-    whole = signed[:, 0] + signed[:, 1]
-    # Signed areas of the smaller triangle for either diagonal: both pairs add up to the whole.
-    first = np.minimum(signed[:, 0], signed[:, 1])
-    second = np.minimum(signed[:, 2], whole - signed[:, 2])
-    other = second > first + 1e-6 * whole
-    out: NDArray[np.intp] = ring.take(_QUAD, axis=1)
-    if other.any():
-        out[other] = ring[other][:, _QUAD_OTHER]
-    return out
-
-
-_FIRST, _SECOND = np.array([0, 1, 0]), np.array([1, 2, 2])
-_QUAD = np.array([[0, 1, 2], [0, 2, 3]])
-_QUAD_OTHER = np.array([[0, 1, 3], [1, 2, 3]])
 
 
 def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
