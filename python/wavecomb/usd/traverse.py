@@ -178,9 +178,12 @@ class Traversal:
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
-            elif children and kind in ("xform", "scope"):
-                if any(name.startswith("primvars:") for name in names):
-                    inherited = self.inherit(prim, inherited)
+            elif (
+                children
+                and kind in ("xform", "scope")
+                and any(name.startswith("primvars:") for name in names)
+            ):
+                inherited = self.inherit(prim, inherited)
             for child in reversed(children):
                 stack.append((child, matrix, track, purpose, inherited, pick))
         return found
