@@ -375,7 +375,7 @@ def _asked_for(
     import_usd()
     from wavecomb.usd import peek_products
 
-    choice = peek_products(path)[0][0]
+    choice = peek_products(os.fspath(path))[0][0]
     chosen = size or choice.resolution or DEFAULT_SIZE
     region = choice.region(*chosen)
     if region is not None:
