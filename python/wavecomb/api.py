@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], "bool | None"]
 
+DEFAULT_SIZE = (600, 600)
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
 # Of an adaptive render: sums and layers of errors, and what measuring them takes.
@@ -200,8 +201,13 @@ def load(
     isolate: bool = False,
     load_limit: float | None = None,
     shutter: tuple[float, float] | None = None,
-    motion_blur: bool = True,
+    motion_blur: bool | None = None,
     motion_steps: int | None = None,
+    depth_of_field: bool | None = None,
+    projection: str | None = None,
+    exposure: bool = True,
+    render_settings: str | None = None,
+    product: str | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -210,7 +216,8 @@ def load(
         camera: Path of a camera prim; by default the stage's render settings, or its first camera,
             or one that sees everything.
         frame: Time code; by default the stage's start.
-        purposes: Of the geometry, as in USD; by default "default" and "render".
+        purposes: Of the geometry, as in USD; by default as the stage's render settings say, else
+            "default" and "render".
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
         mask: Prims to draw with all below them, and what they need; by default all.
         session_layer: File with opinions that are stronger than the stage's.
@@ -225,8 +232,15 @@ def load(
         load_limit: With ``isolate``: seconds that USD may compose the stage, 0: any; None: 6, and 1
             for each MB of layers.
         shutter: When it opens and closes, time codes from the frame; by default the camera's.
-        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_blur: Whether what moves while the shutter is open is blurred; by default unless the
+            render settings disable it.
         motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
+        depth_of_field: Whether the camera's lens blurs; by default likewise.
+        projection: "perspective", "orthographic" or "latlong"; by default the camera's.
+        exposure: Whether the camera's exposure multiplies light in the picture.
+        render_settings: Path or name of a RenderSettings prim; by default those that the stage
+            names, else the only ones under /Render (docs/cameras.md).
+        product: Path or name of one of their products; by default the first.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -254,6 +268,11 @@ def load(
         "shutter": shutter,
         "motion_blur": motion_blur,
         "motion_steps": motion_steps,
+        "depth_of_field": depth_of_field,
+        "projection": projection,
+        "exposure": exposure,
+        "render_settings": render_settings,
+        "product": product,
     }
     if isolate:
         from wavecomb.isolate.probe import check
@@ -279,7 +298,7 @@ def import_usd() -> None:
 def render(
     source: str | os.PathLike[str] | LoadedStage | Scene,
     *,
-    size: tuple[int, int] = (600, 600),
+    size: tuple[int, int] | None = None,
     spp: int = 64,
     progress: Progress | None = None,
     camera: str | None = None,
@@ -297,7 +316,7 @@ def render(
 
     Args:
         source: A path, what ``load`` gave, or a ``Scene``.
-        size: Width and height, pixels.
+        size: Width and height, pixels; by default of a path's render settings, else 600 x 600.
         spp: Samples per pixel; with ``adaptive`` or ``noise`` the most of them.
         progress: Called as progress(samples_done, samples_total) about ten times a second; return
             False to stop and keep what is done.
@@ -309,7 +328,7 @@ def render(
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
             from.
         aovs: What to keep beside the beauty: names of docs/aovs.md, "light_NAME" for a light group,
-            "crypto", "all"; by default albedo, normal and depth.
+            "crypto", "all"; by default a path's render vars, else albedo, normal and depth.
         checkpoint: File that the state of the render is saved to, now and then and at the end.
         every: Seconds between checkpoints.
         resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
@@ -334,7 +353,9 @@ def render(
     """
     from wavecomb.stats import make_stats
 
-    own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
+    if isinstance(source, (str, os.PathLike)):
+        size, aovs = _asked_for(source, size, aovs, settings)
+    own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)
     scene, loaded, stage = _resolve(source, camera, frame, subdivision, chosen)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
@@ -342,6 +363,24 @@ def render(
     result = _render(scene, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats, scene=scene, aovs=names)
+
+
+def _asked_for(
+    path: str | os.PathLike[str],
+    size: tuple[int, int] | None,
+    aovs: Iterable[str] | None,
+    settings: dict[str, Any],
+) -> tuple[tuple[int, int], Iterable[str] | None]:
+    """Size and AOVs, and the region in ``settings``: as the first render product says, if none."""
+    import_usd()
+    from wavecomb.usd import peek_products
+
+    choice = peek_products(os.fspath(path))[0][0]
+    chosen = size or choice.resolution or DEFAULT_SIZE
+    region = choice.region(*chosen)
+    if region is not None:
+        settings.setdefault("region", region)
+    return chosen, choice.aovs if aovs is None else aovs
 
 
 def prepare(
