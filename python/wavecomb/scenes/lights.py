@@ -124,16 +124,16 @@ def _mesh(
     polygons = _BOX
     if kind == "Strip":
         points, polygons = points[[0, 1, 5, 4]], [[0, 1, 2, 3]]
-    writer.polygons(f"/World/Objects/{name}", points.astype(np.float32), polygons, material)
+    writer.polygons(f"/World/Objects/{name}", points, polygons, material)
 
 
 def _street(writer: StageWriter, rng: np.random.Generator) -> None:
     """Ground, facades with bays, and the end of the street."""
     writer.material("Asphalt", looks.diffuse((0.22, 0.22, 0.24)))
     far = _LENGTH + 2.0
-    ground = np.array([[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]], np.float32)
+    ground = np.array([[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]])
     writer.polygons("/World/Set/Ground", ground, [[0, 1, 2, 3]], "Asphalt")
-    end = np.array([[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]], np.float32)
+    end = np.array([[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]])
     writer.polygons("/World/Set/End", end, [[0, 1, 2, 3]], "Asphalt")
     for side in (-1, 1):
         z, house = 8.0, 0
@@ -146,6 +146,6 @@ def _street(writer: StageWriter, rng: np.random.Generator) -> None:
             top = _HEIGHT + float(rng.uniform(0.0, 4.0))
             corners = [[x, y, w] for x in (x0, x1) for y in (0.0, top) for w in (z - width, z)]
             path = f"/World/Set/House_{'L' if side < 0 else 'R'}{house:02d}"
-            writer.polygons(path, np.array(corners, np.float32), _BOX, name)
+            writer.polygons(path, np.array(corners), _BOX, name)
             z -= width
             house += 1
