@@ -296,6 +296,7 @@ class Settings:
     roulette_depth: int
     clamp_indirect: float  # 0: off
     fresnel: str  # "exact" | "schlick"
+    light_selection: str  # "auto" | "tree" | "power"
     cosine_sampling: bool
     integrator: str  # "wavefront" | "reference"
     adaptive: float  # error that a pixel may have; 0: off

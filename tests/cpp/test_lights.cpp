@@ -22,7 +22,7 @@ float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& 
   const LightView view = lights.view();
   if (view.first_triangle == 0) {
     const auto t = trace(view, from, dir);
-    return t ? triangle_light_pdf<float>(view, 0u, dir, *t, true) : 0.f;
+    return t ? triangle_light_pdf<float>(view, 0u, from, dir, *t, true) : 0.f;
   }
   const LightRecord& r = view.lights[0];
   switch (static_cast<LightKind>(r.kind)) {
@@ -248,7 +248,8 @@ TEST(Irradiance, PointLight) {
   EXPECT_TRUE(s.is_delta);
   EXPECT_EQ(s.pdf, 1);
   EXPECT_FLOAT_EQ(s.distance, 5);
-  EXPECT_FALSE(sample_light<float>(lights.view(), {0, 3, 4}, 0.3f, 0.2f, 0.1f, true).valid);
+  EXPECT_FALSE(
+      sample_light<float>(lights.view(), Vec3<float>{0, 3, 4}, 0.3f, 0.2f, 0.1f, true).valid);
 }
 
 TEST(Irradiance, DistantLights) {
@@ -327,7 +328,8 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
   light.texture = lights.add_texture(2, 2, {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1});
   lights.build({light});
   const auto seen = [&](float x, float y) {
-    return light_hit<float>(lights.view(), 0u, {x, y, -1}, {0, 0, 1}, 1.f, true).radiance;
+    return light_hit<float>(lights.view(), 0u, Vec3<float>{x, y, -1}, {0, 0, 1}, 1.f, true)
+        .radiance;
   };
   // Looking along +z with +y up, right is -x.
   EXPECT_NEAR(seen(0.25f, 0.25f).x, 1, 1e-5);  // upper left: red
@@ -338,14 +340,17 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
   EXPECT_NEAR(seen(0.25f, -0.25f).x, 0, 1e-5);
   EXPECT_NEAR(seen(-0.25f, -0.25f).x, 1, 1e-5);
   // From behind: nothing.
-  EXPECT_EQ(light_hit<float>(lights.view(), 0u, {0, 0, 1}, {0, 0, -1}, 1.f, true).radiance.y, 0);
+  EXPECT_EQ(
+      light_hit<float>(lights.view(), 0u, Vec3<float>{0, 0, 1}, {0, 0, -1}, 1.f, true).radiance.y,
+      0);
   // Samples carry the radiance that a hit at the same place gives.
   std::mt19937 rng(2);
   for (int i = 0; i < 1000; ++i) {
-    const auto s = sample_light<float>(lights.view(), {0.1f, 0.2f, -1}, 0.f,
+    const auto s = sample_light<float>(lights.view(), Vec3<float>{0.1f, 0.2f, -1}, 0.f,
                                        static_cast<float>(rng() % 999) / 999.f,
                                        static_cast<float>(rng() % 999) / 999.f, true);
-    const auto hit = light_hit<float>(lights.view(), 0u, {0.1f, 0.2f, -1}, s.wi, s.distance, true);
+    const auto hit =
+        light_hit<float>(lights.view(), 0u, Vec3<float>{0.1f, 0.2f, -1}, s.wi, s.distance, true);
     ASSERT_NEAR(hit.radiance.x, s.weight.x * s.pdf, 1e-4);
     ASSERT_NEAR(hit.pdf / s.pdf, 1, 1e-4);
   }
@@ -396,7 +401,7 @@ TEST(TexturedLights, TriangleReadsItsMaterialsEmission) {
   t.material = material;
   lights.build({}, {t});
   for (int i = 0; i < 2000; ++i) {
-    const auto s = sample_light<float>(lights.view(), {0.3f, 0.2f, 0}, 0.f,
+    const auto s = sample_light<float>(lights.view(), Vec3<float>{0.3f, 0.2f, 0}, 0.f,
                                        static_cast<float>(rng() % 999) / 999.f,
                                        static_cast<float>(rng() % 999) / 999.f, true);
     const Vec3<float> p = Vec3<float>(0.3f, 0.2f, 0) + s.wi * s.distance;
@@ -472,7 +477,7 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
       const Vec3<F> dir = square_to_sphere<F>(at(4), at(5));
       const auto hit = light_hit<F>(view, id, p, dir, at(7), active);
       for (const F& x : {hit.radiance.x, hit.radiance.z, hit.pdf}) put(x);
-      put(triangle_light_pdf<F>(view, id, dir, at(7), active));
+      put(triangle_light_pdf<F>(view, id, p, dir, at(7), active));
       const auto escaped = escaped_radiance<F>(view, dir, at(7), at(6) < 0.3f, active);
       for (const F& x : {escaped.x, escaped.y, escaped.z}) put(x);
     }
@@ -540,7 +545,7 @@ TEST(LightEdges, PointsOnAndInsideLightsGiveNoNan) {
         }
         const auto hit = light_hit<float>(view, 0u, p, {0, 0, 1}, u, true);
         ASSERT_TRUE(std::isfinite(hit.radiance.x) && std::isfinite(hit.pdf) && hit.pdf >= 0);
-        const float pdf = triangle_light_pdf<float>(view, 0u, {0, 0, 1}, u, true);
+        const float pdf = triangle_light_pdf<float>(view, 0u, p, {0, 0, 1}, u, true);
         ASSERT_TRUE(std::isfinite(pdf) && pdf >= 0);
       }
     }
@@ -549,8 +554,10 @@ TEST(LightEdges, PointsOnAndInsideLightsGiveNoNan) {
 
 TEST(LightEdges, SphereShinesOutwardsOnly) {
   const Lights lights({make_light(LightKind::kSphere)});
-  EXPECT_FALSE(sample_light<float>(lights.view(), {0.1f, 0, 0}, 0.f, 0.5f, 0.5f, true).valid);
-  const auto hit = light_hit<float>(lights.view(), 0u, {0.1f, 0, 0}, {1, 0, 0}, 0.4f, true);
+  EXPECT_FALSE(
+      sample_light<float>(lights.view(), Vec3<float>{0.1f, 0, 0}, 0.f, 0.5f, 0.5f, true).valid);
+  const auto hit =
+      light_hit<float>(lights.view(), 0u, Vec3<float>{0.1f, 0, 0}, {1, 0, 0}, 0.4f, true);
   EXPECT_EQ(hit.radiance.x, 0);
   EXPECT_EQ(hit.pdf, 0);
 }

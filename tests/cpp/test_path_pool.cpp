@@ -28,7 +28,8 @@ PathLanes<F> numbered_path(const UInt<F>& slot) {
           at(11),
           at(12),
           // Any bits, NaN too: keys are hashes.
-          {slot * 100u + 0x7f800001u, slot * 100u + 0xff800001u}};
+          {slot * 100u + 0x7f800001u, slot * 100u + 0xff800001u},
+          slot * 100u + 0x7fc00001u};
 }
 
 /// All slots in random order, `kWidth` at a time, each packet with a mask of its own.
@@ -55,6 +56,7 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
       for (uint32_t k = 0; k < 13; ++k) ASSERT_EQ(row[k], word(s, k)) << s << ", " << k;
       ASSERT_EQ(std::bit_cast<uint32_t>(row[13]), 100 * s + 0x7f800001u);
       ASSERT_EQ(std::bit_cast<uint32_t>(row[14]), 100 * s + 0xff800001u);
+      ASSERT_EQ(std::bit_cast<uint32_t>(row[15]), 100 * s + 0x7fc00001u);
     }
     // Shadow rays and radiance are untouched.
     ASSERT_TRUE(std::all_of(pool.shadows, pool.radiance + kSlots * PathPool::kRadianceWords,
@@ -72,6 +74,7 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
         ASSERT_EQ(lane_bits<F>(Mask<F>(a[k] == b[k])) & all, all) << k;
       ASSERT_EQ(lane_bits<F>(Mask<F>(p.key.pixel_hash == q.key.pixel_hash)) & all, all);
       ASSERT_EQ(lane_bits<F>(Mask<F>(p.key.sample == q.key.sample)) & all, all);
+      ASSERT_EQ(lane_bits<F>(Mask<F>(p.receiver == q.receiver)) & all, all);
     });
   });
 }

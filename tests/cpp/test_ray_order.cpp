@@ -52,7 +52,8 @@ struct PoolRays {
                          6,
                          7,
                          8,
-                         {9, static_cast<uint32_t>(i)}},
+                         {9, static_cast<uint32_t>(i)},
+                         10},
                         true);
     }
     slot.resize(rays.size() + SoaBlock::kPad);
@@ -253,7 +254,7 @@ TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
           const Vec3<float> o(r.o[0], r.o[1], r.o[2]), d(r.d[0], r.d[1], r.d[2]);
           ray_of[slot[i]] = i;
           key[i] = direction_key<float>(d);
-          store_path<float>(wave.pool, slot[i], {o, d, {1, 1, 1}, 0, 0, 0, 0, {1, 2}}, true);
+          store_path<float>(wave.pool, slot[i], {o, d, {1, 1, 1}, 0, 0, 0, 0, {1, 2}, 0}, true);
           store_shadow(wave.pool, slot[i], r, static_cast<float>(10 * i));
           wave.rays.slot[i] = wave.shadows.slot[i] = slot[i];
           wave.rays.direction[i] = wave.shadows.direction[i] = key[i];

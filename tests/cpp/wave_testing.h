@@ -7,6 +7,7 @@
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/render/pixel_order.h"
+#include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb::wave_testing {
 
@@ -44,6 +45,8 @@ class WaveRun {
       context_.wants_position |= (policy->columns() & kPositionColumn) != 0;
     }
     context_.scene = scene_->view();
+    context_.scene.lights.by_tree =
+        chooses_by_tree(case_.settings.light_selection, context_.scene.lights);
     context_.accel = accel_.get();
     context_.settings = &case_.settings;
     context_.camera = &camera_;

@@ -59,6 +59,7 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
         *("--variant", "/World/Car{paint}=red", "--variant", "lod=high", "--purpose", "proxy"),
         *("--spp", 4, "--camera", "/Cam", "--frame", 7, "--lanes", "8", "--seed", 3),
         *("--filter", "box", "--filter-width", 1, "--roulette", "off", "--fresnel", "schlick"),
+        *("--light-selection", "tree"),
         *("--integrator", "reference", "--threads", 1, "--wave-size", 64, "--sampler", "sobol"),
         *("--clamp-indirect", 2.5, "--max-depth", 5),
         *("--policy", "texture-locality", "--materialize", "on", "--ray-order", "morton"),
@@ -73,6 +74,7 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
         "width": 40, "height": 30, "spp": 4, "lanes": 8, "seed": 3, "filter": "box",
         "filter_width": 1.0, "roulette": "off", "fresnel": "schlick", "integrator": "reference",
         "threads": 1, "wave_size": 64, "sampler": "sobol", "clamp_indirect": 2.5, "max_depth": 5,
+        "light_selection": "tree",
         "policy": "texture-locality", "materialize": "on", "ray_order": "morton",
         "shadow_order": "auto", "costs": "model", "cost_weight": 0.5,
     }  # fmt: skip

@@ -42,6 +42,7 @@ SETTINGS = {
     "roulette_depth": "integer",
     "clamp_indirect": "number",
     "fresnel": "text",
+    "light_selection": "text",
     "cosine_sampling": "flag",
     "integrator": "text",
     "threads": "count",

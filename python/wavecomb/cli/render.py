@@ -115,6 +115,12 @@ _INTEGERS = click.IntRange(min=0)
 )
 @click.option("--fresnel", type=click.Choice(["exact", "schlick"]), help="[default: exact]")
 @click.option(
+    "--light-selection",
+    type=click.Choice(["auto", "tree", "power"]),
+    help="How a light is chosen to sample: for the place that it lights, or by power.  "
+    "[default: auto]",
+)
+@click.option(
     "--policy",
     type=click.Choice(POLICIES),
     help="Order of shading; changes no picture (docs/scheduling.md).  [default: program]",

@@ -18,6 +18,7 @@ from wavecomb.cli.options import Real, examples
         "wavecomb scene mixed -o mixed.usdc",
         "wavecomb scene cornell-dragon -o box.usda --dragon dragon.obj",
         "wavecomb scene spread -o spread.usdc --materials 256 --texture-mb 64 --shader-cost 10",
+        "wavecomb scene lights -o street.usdc --lights 10000",
     ),
 )
 @click.argument("name", required=False)
@@ -35,6 +36,7 @@ from wavecomb.cli.options import Real, examples
 @click.option(
     "--programs", type=click.IntRange(1, 5), metavar="N", help="spread: kinds of materials, 1 to 5."
 )
+@click.option("--lights", type=click.IntRange(min=1), metavar="N", help="lights: how many.")
 @click.option("--texture-mb", type=Real(0), metavar="X", help="spread: memory of its textures.")
 @click.option(
     "--shader-cost",

@@ -42,6 +42,7 @@ class Setup:
     roulette_depth: int = 2
     clamp_indirect: float = 0.0
     fresnel: str = "exact"
+    light_selection: str = "auto"
     cosine_sampling: bool = False
     integrator: str = "wavefront"
     adaptive: float = 0.0

@@ -28,6 +28,7 @@ class SceneOptions:
         texture_mb: Memory of all textures of ``spread``, 1e6 bytes; 0 is none.
         shader_cost: How often the dearest material of ``spread`` evaluates its parameters for a
             hit; the others from once up, geometrically.
+        lights: How many ``lights`` has.
     """
 
     dragon: Path | str | None = None
@@ -41,6 +42,7 @@ class SceneOptions:
     programs: int = 5
     texture_mb: float = 16.0
     shader_cost: float = 1.0
+    lights: int = 1000
 
     def __post_init__(self) -> None:
         """Refuses what no scene can use."""

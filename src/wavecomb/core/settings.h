@@ -14,6 +14,9 @@ namespace wavecomb {
 enum class SamplerKind : uint8_t { kSobol, kIndependent };
 enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
+/// How the light is chosen that a vertex is lit by: by its power alone, or by tree for the vertex
+/// (light/light_tree.h). kAuto: by tree where there are lights enough for it to pay.
+enum class LightSelection : uint8_t { kAuto, kTree, kPower };
 enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
 /// Order of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
@@ -52,6 +55,7 @@ struct Settings {
   CostSource costs = CostSource::kAuto;
   float clamp_indirect = 0;  ///< largest luminance of one indirect contribution; 0: off
   bool schlick_fresnel = false;
+  LightSelection light_selection = LightSelection::kAuto;
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;

@@ -20,7 +20,7 @@ namespace wavecomb {
 /// Contract: owned by one wave. AOVs are there only where asked for.
 class PathPool {
  public:
-  /// Words of a row: 15 for a path, 10 for its shadow ray, 3 for its radiance.
+  /// Words of a row: 16 for a path, 10 for its shadow ray, 3 for its radiance.
   static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
   /// And 8 for what was hit first: albedo, normal, uv.
   static constexpr uint32_t kFirstWords = 8;
@@ -91,6 +91,7 @@ struct PathLanes {
   F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
   SampleKey<F> key;
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray
 };
 
 template <typename F>
@@ -105,7 +106,8 @@ WAVECOMB_INLINE PathLanes<F> load_path(const PathPool& pool, const UInt<F>& slot
           r[10],
           r[11],
           r[12],
-          {float_bits<F>(r[13]), float_bits<F>(r[14])}};
+          {float_bits<F>(r[13]), float_bits<F>(r[14])},
+          float_bits<F>(r[15])};
 }
 
 template <typename F>
@@ -115,7 +117,7 @@ WAVECOMB_INLINE void store_path(const PathPool& pool, const UInt<F>& slot, const
       pool.paths, slot * PathPool::kPathWords,
       {p.o.x, p.o.y, p.o.z, p.d.x, p.d.y, p.d.z, p.throughput.x, p.throughput.y, p.throughput.z,
        p.pdf, p.eta_scale, p.cone_width, p.cone_spread, bits_float<F>(p.key.pixel_hash),
-       bits_float<F>(p.key.sample), F(0.f)},
+       bits_float<F>(p.key.sample), bits_float<F>(p.receiver)},
       active);
 }
 

@@ -64,16 +64,15 @@ class PathTracer {
     const auto keep_parts = [&](uint32_t first, uint32_t last) {
       for (uint32_t d = first; d <= last && d < 2; ++d) result.parts[d] = result.radiance;
     };
-    Vec3<F> o = ray.o;
     F cone_at_origin = ray.width;
     bool is_seen = true;  // only clear surfaces so far
-    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread};
+    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u};
     ++counts_.samples;
 
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
-      const Hit hit = intersect(o, path.dir, tfar, depth);
+      const Hit hit = intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
       if (hit.inst == kNoHit) {
@@ -86,11 +85,10 @@ class PathTracer {
         return result;
       }
       if (depth == 0)
-        result.depth = camera_depth<F>(*context_.camera, fma(path.dir, hit.t, o), time_, true);
-      if (depth == 0) note_hit(result.hit, hit, fma(path.dir, hit.t, o));
+        result.depth = camera_depth<F>(*context_.camera, fma(path.dir, hit.t, path.o), time_, true);
+      if (depth == 0) note_hit(result.hit, hit, fma(path.dir, hit.t, path.o));
       if (hit.inst == kLightShape) {
-        const Color<F> c =
-            shape_emission<F>(scene, settings_, depth, hit.geom, o, hit.t, path, true);
+        const Color<F> c = shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true);
         result.radiance += c;
         add_light(hit.geom, c);
         keep_parts(depth, 1);
@@ -134,7 +132,6 @@ class PathTracer {
         keep_parts(depth + 1, 1);
         return result;
       }
-      o = v.o;
       path = v.next;
       cone_at_origin = v.next.cone_width;
     }

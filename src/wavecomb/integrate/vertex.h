@@ -54,6 +54,10 @@ struct PathState {
   F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
+  Vec3<F> o;         ///< origin of the ray that arrived
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex before
+
+  LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };
 
 /// What shading a vertex gives. Lanes outside the masks hold anything.
@@ -63,10 +67,9 @@ struct VertexResult {
   Mask<F> has_shadow;  ///< a shadow ray is wanted
   Vec3<F> shadow_o, shadow_d;
   F shadow_tfar;
-  Color<F> direct;  ///< to add where the shadow ray is free, clamped
-  Mask<F> alive;    ///< the path goes on
-  Vec3<F> o;        ///< of the next ray; its direction and the rest is in `next`
-  PathState<F> next;
+  Color<F> direct;    ///< to add where the shadow ray is free, clamped
+  Mask<F> alive;      ///< the path goes on
+  PathState<F> next;  ///< the next ray and what goes with it
 };
 
 /// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
@@ -126,9 +129,10 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
 /// Radiance of a light's own shape met by a path.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
-                               uint32_t depth, const UInt<F>& light, const Vec3<F>& o, const F& t,
+                               uint32_t depth, const UInt<F>& light, const F& t,
                                const PathState<F>& path, const Mask<F>& active) {
-  const LightHit<F> hit = light_hit<F>(scene.lights, light, o, path.dir, t, active);
+  const LightHit<F> hit =
+      light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
   const F w = bounce_weight<F>(path.pdf, hit.pdf);
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
@@ -238,9 +242,10 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
           aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
         const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
         if (any(sampled))
-          light_pdf = select(
-              sampled, triangle_light_pdf<F>(scene.lights, base + hit.prim, path.dir, t, sampled),
-              F(0.f));
+          light_pdf = select(sampled,
+                             triangle_light_pdf<F>(scene.lights, base + hit.prim,
+                                                   path.vertex_before(), path.dir, t, sampled),
+                             F(0.f));
       }
       const F w = bounce_weight<F>(path.pdf, light_pdf);
       const Color<F> e =
@@ -283,11 +288,17 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     return F(dot(world, s.ng) * local.z) > 0.f;
   };
 
+  LightReceiver<F> receiver(Vec3<F>(F(0.f)));
+  if (scene.lights.by_tree) {
+    // What reflects alone is lit on the side that it is seen from.
+    if (kOpaque) receiver.normal = pack_normal<F>(select<F>(wo.z < 0.f, -frame.n, frame.n));
+    receiver.seed = hash_u32<U>(key.pixel_hash, U(key.sample + 0x632be5abu * (depth + 1)));
+  }
   const Mask<F> lit = active & bsdf.has_non_delta();
   if (Bsdf::kHasNonDelta && scene.lights.count > 0 && any(lit)) {
     // Light is gathered where reflected rays will start, so that both techniques agree.
-    const Vec3<F> from = spawn_origin<F>(s, -path.dir);
-    const LightSample<F> l = sample_light<F>(scene.lights, from, rl.x, rl.y, rl.z, lit);
+    receiver.p = spawn_origin<F>(s, -path.dir);
+    const LightSample<F> l = sample_light<F>(scene.lights, receiver, rl.x, rl.y, rl.z, lit);
     const Vec3<F> wi = frame.to_local(l.wi);
     const BsdfEval<F> e = bsdf.eval(wo, wi);
     const F bounce_pdf =
@@ -299,7 +310,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
-    if (wants_lights) aovs->lit_by = chosen_light<F>(scene.lights, rl.x, lit);
+    if (wants_lights) aovs->lit_by = chosen_light<F>(scene.lights, receiver, rl.x, lit);
     out.shadow_o = spawn_origin<F>(s, l.wi);
     out.shadow_d = l.wi;
     out.shadow_tfar = l.distance * 0.9999f;
@@ -324,10 +335,11 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.next.throughput = path.throughput * b.weight;
   out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
   out.next.eta_scale = path.eta_scale * b.eta * b.eta;
+  out.next.receiver = receiver.normal;
   out.next.cone_width = path.cone_width;
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
-  out.o = spawn_origin<F>(s, d);
+  out.next.o = spawn_origin<F>(s, d);
   const F largest = max_component(out.next.throughput);
   out.alive = active & (b.pdf > 0.f) & consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);
 

@@ -102,10 +102,10 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     queue.uints(Q::kProgram)[i] = context.traits[hits.material].program;
     queue.slot[i] = i;
     const SampleKey<float> key{i * 0x9e3779b9u, i};
-    store_path<float>(
-        wave.pool, i,
-        {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f, 0.01f * context.scene.scale, 0.f, key},
-        true);
+    store_path<float>(wave.pool, i,
+                      {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f,
+                       0.01f * context.scene.scale, 0.f, key, 0u},
+                      true);
     std::memset(wave.pool.radiance + i * PathPool::kRadianceWords, 0, 4 * PathPool::kRadianceWords);
     if (wave.pool.time) wave.pool.time[i] = u;
   }

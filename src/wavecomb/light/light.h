@@ -10,6 +10,7 @@
 #include "wavecomb/light/disk.h"
 #include "wavecomb/light/distant.h"
 #include "wavecomb/light/dome.h"
+#include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/rect.h"
 #include "wavecomb/light/sphere.h"
 #include "wavecomb/light/triangle.h"
@@ -59,6 +60,37 @@ inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>&
   return select(rest < threshold, bin, other) + select(triangle, U(view.first_triangle), U(0u));
 }
 
+/// A choice, by power or by tree.
+template <typename F>
+struct LightPick {
+  UInt<F> light;
+  F by_tree;       ///< probability, where the tree chose
+  Mask<F> active;  ///< lanes that have a light
+  bool tree_chose;
+
+  LightPick(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
+            const Mask<F>& wanted)
+      : by_tree(0.f), active(wanted), tree_chose(view.by_tree) {
+    if (tree_chose) {
+      const LightChoice<F> choice = choose_by_tree<F>(view, to, u_pick, wanted);
+      light = choice.light;
+      by_tree = choice.pdf;
+      active = wanted & (choice.pdf > 0.f);
+    } else {
+      light = pick_light<F>(view, u_pick, wanted);
+    }
+  }
+  F pdf(const F& by_power) const { return tree_chose ? by_tree : by_power; }
+};
+
+/// Probability with which sample_light chooses finite light `light`, which is `by_power` where
+/// lights are chosen by power.
+template <typename F>
+inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& by_power,
+                         const LightReceiver<F>& to, const Mask<F>& active) {
+  return view.by_tree ? tree_pdf<F>(view, light, to, active) : by_power;
+}
+
 /// Runs `one(kind, lanes)` for each kind of light among the active lanes.
 template <typename F, typename Function>
 inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Function& one) {
@@ -92,25 +124,30 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const Li
 
 /// The light that sample_light chooses for u_pick, where there is one.
 template <typename F>
-inline UInt<F> chosen_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
+inline UInt<F> chosen_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
+                            const Mask<F>& active) {
   if (view.count == 0 || none(active)) return UInt<F>(kNoLight);
+  if (view.by_tree) return detail::choose_by_tree<F>(view, to, u_pick, active).light;
   return detail::pick_light<F>(view, u_pick, active);
 }
 
-/// Chooses a light by power and a point on it as seen from p. Numbers in [0, 1); u_pick is a
-/// multiple of 2^-24, as samplers give it.
+/// Chooses a light, by power or by tree, and a point on it as seen from `to`. Numbers in [0, 1);
+/// u_pick is a multiple of 2^-24, as samplers give it.
 template <typename F>
-inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, const F& u_pick,
-                                   const F& u, const F& v, const Mask<F>& active) {
+inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to,
+                                   const F& u_pick, const F& u, const F& v, const Mask<F>& wanted) {
   const F zero(0.f);
+  const Vec3<F>& p = to.p;
   LightSample<F> result{Vec3<F>(zero, zero, F(1.f)),
                         F(kFarAway),
                         Color<F>(zero),
                         zero,
                         Mask<F>(false),
                         Mask<F>(false)};
-  if (view.count == 0 || none(active)) return result;
-  const UInt<F> index = detail::pick_light<F>(view, u_pick, active);
+  if (view.count == 0 || none(wanted)) return result;
+  const detail::LightPick<F> pick(view, to, u_pick, wanted);
+  const UInt<F>& index = pick.light;
+  const Mask<F>& active = pick.active;
   const auto put = [&](const detail::KindSample<F>& s, const F& pick_pdf, const Mask<F>& lanes) {
     const F pdf = s.pdf * pick_pdf;
     const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
@@ -125,7 +162,8 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
   const Mask<F> triangle = active & Mask<F>(index >= UInt<F>(view.first_triangle));
   if (any(triangle)) {
     const detail::TriangleReader<F> light(view, index, triangle);
-    put(detail::sample_triangle<F>(light, view, p, u, v, triangle), light.pick_pdf, triangle);
+    put(detail::sample_triangle<F>(light, view, p, u, v, triangle), pick.pdf(light.pick_pdf),
+        triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (none(others)) return result;
@@ -136,7 +174,7 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
                              // its lanes.
                              const detail::LightReader<F> light(view.lights, index, lanes);
                              put(detail::sample_kind<F>(kind, view, light, p, u, v, lanes),
-                                 light.pick_pdf(), lanes);
+                                 pick.pdf(light.pick_pdf()), lanes);
                            });
   return result;
 }
@@ -147,16 +185,18 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` (rect, disk, sphere) sends back along the ray origin + t dir which
+/// Radiance that light `light` (rect, disk, sphere) sends back along the ray from.p + t dir which
 /// hit it at distance t. Other kinds and inactive lanes give 0.
 template <typename F>
-inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const Vec3<F>& origin,
-                             const Vec3<F>& dir, const F& t, const Mask<F>& hit_lanes) {
+inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
+                             const LightReceiver<F>& from, const Vec3<F>& dir, const F& t,
+                             const Mask<F>& hit_lanes) {
+  const Vec3<F>& origin = from.p;
   LightHit<F> result{Color<F>(F(0.f)), F(0.f)};
   const Mask<F> active = hit_lanes & Mask<F>(light < UInt<F>(view.first_triangle));
   if (none(active)) return result;
   const detail::LightReader<F> reader(view.lights, light, active);
-  const F pick_pdf = reader.pick_pdf();
+  const F pick_pdf = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, active);
   detail::for_each_kind<F>(
       reader.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
         detail::KindHit<F> hit{Color<F>(F(0.f)), F(0.f)};
@@ -172,11 +212,14 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const 
 
 /// The sampling density of triangle light `light` for a hit at distance t along dir; 0 for others.
 template <typename F>
-inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const Vec3<F>& dir,
-                            const F& t, const Mask<F>& active) {
+inline F triangle_light_pdf(const LightView& view, const UInt<F>& light,
+                            const LightReceiver<F>& from, const Vec3<F>& dir, const F& t,
+                            const Mask<F>& active) {
   const Mask<F> lanes = active & Mask<F>(light >= UInt<F>(view.first_triangle));
   if (none(lanes)) return F(0.f);
-  return select(lanes, detail::triangle_pdf<F>(view, light, dir, t, lanes), F(0.f));
+  const detail::TriangleDensity<F> d = detail::triangle_pdf<F>(view, light, dir, t, lanes);
+  const F pick_pdf = detail::finite_pick_pdf<F>(view, light, d.pick_pdf, from, lanes);
+  return select(lanes, F(d.solid_angle * pick_pdf), F(0.f));
 }
 
 /// Radiance * MIS weight of infinite light `light` for a ray that left the scene along dir, as
@@ -190,8 +233,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
   const detail::KindHit<F> hit =
       is_dome ? detail::hit_dome<F>(view, record, dir, active)
               : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
+  const float pick_pdf = view.by_tree ? view.tree.infinite_pdf[light] : record.pick_pdf;
   const F weight =
-      select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
+      select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * pick_pdf)));
   return hit.radiance * weight;
 }
 

@@ -85,17 +85,23 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }
 
-/// Density over solid angle, the choice of the light included, for a hit at distance t along dir.
+/// Density over solid angle, and the probability of the light's choice by power.
 template <typename F>
-inline F triangle_pdf(const LightView& view, const UInt<F>& light, const Vec3<F>& dir, const F& t,
-                      const Mask<F>& active) {
+struct TriangleDensity {
+  F solid_angle, pick_pdf;
+};
+
+/// For a hit at distance t along dir.
+template <typename F>
+inline TriangleDensity<F> triangle_pdf(const LightView& view, const UInt<F>& light,
+                                       const Vec3<F>& dir, const F& t, const Mask<F>& active) {
   static_assert(offsetof(TriangleLight, pick_pdf) == offsetof(TriangleLight, m) + 12);
   const auto r = load_rows<4, F>(
       view.triangles,
       (light - view.first_triangle) * (sizeof(TriangleLight) / 4) + offsetof(TriangleLight, m) / 4,
       active);
   const F projected = abs(dot(dir, Vec3<F>(r[0], r[1], r[2])));
-  return area_to_solid_angle<F>(F(t * t), projected, F(1.f)) * r[3];
+  return {area_to_solid_angle<F>(F(t * t), projected, F(1.f)), r[3]};
 }
 
 }  // namespace wavecomb::detail

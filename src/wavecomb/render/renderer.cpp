@@ -14,6 +14,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb {
 namespace {
@@ -226,8 +227,10 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   if (options.resume) options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();
   const uint32_t wave_size = wave_size_for(settings, pixels);
+  SceneView scene_view = scene.view();
+  scene_view.lights.by_tree = chooses_by_tree(settings.light_selection, scene_view.lights);
   const WaveContext context{
-      scene.view(),
+      scene_view,
       impl_->accel.get(),
       &settings,
       &camera,

@@ -339,6 +339,7 @@ LightView LightSet::view(const MaterialView& materials) const {
   v.triangle_uvs = triangle_uvs.data();
   v.pick = pick;
   v.pick.bins = pick_bins.data();
+  v.tree = tree.view();
   v.count = static_cast<uint32_t>(size());
   v.first_triangle = first_triangle();
   v.infinite_count = infinite_count;
@@ -382,6 +383,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   for (size_t i = 0; i < set.records.size(); ++i) set.records[i].pick_pdf = pdf(i);
   for (size_t i = 0; i < triangle_count; ++i)
     set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
+  set.tree = build_light_tree(set, powers);
   return set;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "wavecomb/scene/light_data.h"
+#include "wavecomb/scene/light_tree.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
@@ -35,6 +36,7 @@ struct LightSet {
   std::vector<TriangleUvs> triangle_uvs;  ///< of triangles with textured emission
   std::vector<uint32_t> pick_bins;
   PickTable pick;  ///< without its pointer
+  LightTree tree;
   std::vector<Distribution2D> distributions;
   uint32_t infinite_count = 0;
   std::vector<uint32_t> of_input;  ///< record of each input light

@@ -112,6 +112,45 @@ struct PickTable {
   uint32_t triangle_bins = 0;  ///< first bin of the triangles
 };
 
+/// Half of a node of a light tree: bounds of the lights below, in 8 words.
+struct LightTreeChild {
+  float centre[3];  ///< of a sphere around them
+  float radius;
+  float intensity;  ///< sum over them, along their normals, relative to all lights of the tree
+  /// Axis of the cone of their normals, 16 bits a component: 0 is -1, 65535 is 1.
+  uint32_t axis_xy;
+  /// Low bits: z of the axis. Then sin(angle / 2) of the cone in steps of 1 / 255 (8 bits) and of
+  /// what they emit off their normals in steps of 1 / 127 (7 bits). Top bit: they shine to both
+  /// sides.
+  uint32_t axis_z_cones;
+  uint32_t next;  ///< node, or kTreeLeaf | light
+};
+static_assert(sizeof(LightTreeChild) == 32);
+
+/// A node of a light tree: one cache line.
+struct alignas(64) LightTreeNode {
+  LightTreeChild child[2];
+};
+static_assert(sizeof(LightTreeNode) == 64);
+
+inline constexpr uint32_t kTreeLeaf = 0x80000000u;
+/// Most nodes between the root and a light: a trail has a bit for each.
+inline constexpr uint32_t kMaxTreeDepth = 31;
+
+/// How a light is chosen by tree (light/light_tree.h). Numbers k in [0, 2^24) below `numbers`
+/// choose a light of the tree, the others infinite light i where k < infinite_ends[i] first holds.
+struct LightTreeView {
+  const LightTreeNode* nodes = nullptr;
+  /// Of each light: bit d says which child of the node at depth d it is below. kNoLight: the tree
+  /// has it not.
+  const uint32_t* trails = nullptr;
+  const uint32_t* infinite_ends = nullptr;
+  const float* infinite_pdf = nullptr;
+  uint32_t root = kNoLight;
+  uint32_t numbers = 0;
+  uint32_t count = 0;  ///< lights of the tree
+};
+
 /// What kernels need of all lights. Light i is record i for i < first_triangle, else triangle
 /// i - first_triangle. Infinite lights (distant, dome) come first.
 struct LightView {
@@ -119,7 +158,9 @@ struct LightView {
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
   PickTable pick;
-  uint32_t count = 0;  ///< records and triangles
+  LightTreeView tree;
+  bool by_tree = false;  ///< lights are chosen by `tree` and not by `pick`
+  uint32_t count = 0;    ///< records and triangles
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
   const Distribution2D* distributions = nullptr;

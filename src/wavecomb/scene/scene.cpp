@@ -128,7 +128,8 @@ SceneBytes Scene::bytes() const {
          g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
          g.instance_motions) +
       of(materials_->materials, materials_->records, materials_->uses, materials_->programs) +
-      of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins) +
+      of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins,
+         set.tree.nodes, set.tree.trails) +
       g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;

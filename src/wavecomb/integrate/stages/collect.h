@@ -98,7 +98,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     PathState<F> state;
     if (any(wanted)) {
       path = load_path<F>(wave.pool, slot, wanted);
-      state = {path.d, path.throughput, path.pdf, path.eta_scale, F(0.f), F(0.f)};
+      state = {path.d, path.throughput, path.pdf, path.eta_scale,
+               F(0.f), F(0.f),          path.o,   path.receiver};
     }
     if (any(ended)) {
       Color<F> c(F(0.f));
@@ -106,8 +107,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         c = select<F>(missed, environment_emission<F>(scene, settings, depth, state, missed), c);
       if (any(shape)) {
         const U light = load<U>(hits.geom + i);
-        c = select<F>(shape, shape_emission<F>(scene, settings, depth, light, o, t, state, shape),
-                      c);
+        c = select<F>(shape, shape_emission<F>(scene, settings, depth, light, t, state, shape), c);
       }
       add_radiance<F>(wave.pool, slot, c, ended & not_(is_black(c)));
       if (wave.pool.groups)

@@ -61,7 +61,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                              path.pdf,
                              path.eta_scale,
                              fma(path.cone_spread, t, path.cone_width),
-                             path.cone_spread};
+                             path.cone_spread,
+                             path.o,
+                             path.receiver};
     const VertexResult<F> v =
         shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, id(Q::kGeom), t,
                               material, state, wants_aovs ? &aovs : nullptr, active);
@@ -97,8 +99,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     }
     if (any(v.alive))
       store_path<F>(pool, slot,
-                    {v.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
-                     v.next.cone_width, v.next.cone_spread, path.key},
+                    {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
+                     v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
                     v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;

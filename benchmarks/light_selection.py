@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What choosing lights by tree brings against choosing them by power, by their number.
+
+    .venv/bin/python benchmarks/light_selection.py
+    .venv/bin/python benchmarks/light_selection.py --quick       # does it run?
+
+The street of `wavecomb scene lights`, whose light is as strong with 10 lights as with 10,000. For
+each number, in rounds of `--rounds` seeds: a render by power and one by tree, side by side.
+
+Figures, by tree / by power unless said otherwise:
+
+- error: of relMSE, against a render by tree of `--reference` samples a pixel;
+- time: of render seconds, median of the rounds with its 95 % interval;
+- efficiency: error x time by power / error x time by tree; the error at equal time is less by it;
+- us a sample: render seconds for a sample by tree (the threads together).
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sitting import RESULTS, ROOT, head, log, ratio, row, show, write_result
+
+import wavecomb
+from wavecomb.scenes import write_scene
+
+
+def main() -> None:
+    """Renders, prints the table, writes the JSON."""
+    args = _arguments()
+    found: dict[str, Any] = {}
+    for count in args.lights:
+        found[str(count)] = measure(count, args)
+        log(f"{count} lights: {found[str(count)]}")
+        content = {"size": args.size, "spp": args.spp, "rounds": args.rounds, "lights": found}
+        write_result(args.output, "wavecomb-light-selection/1", content)
+    for line in report(found):
+        print(line)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--lights", nargs="+", type=int, default=[4, 10, 100, 1000, 10_000])
+    parser.add_argument("--size", nargs=2, type=int, default=[120, 80], metavar=("W", "H"))
+    parser.add_argument("--spp", type=int, default=32)
+    parser.add_argument("--reference", type=int, default=4096, help="samples a pixel")
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--max-depth", type=int, default=4)
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "quick", help="of stages")
+    parser.add_argument("--output", type=Path, default=RESULTS / "light_selection.json")
+    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    args = parser.parse_args()
+    if args.quick:
+        args.size, args.spp, args.reference, args.rounds = [48, 32], 8, 256, 3
+        args.lights = [10, 1000]
+        args.output = args.folder / "light_selection.json"
+    return args
+
+
+def measure(count: int, args: argparse.Namespace) -> dict[str, Any]:
+    """All figures of one number of lights."""
+    path = args.folder / f"lights-{count}.usdc"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_scene("lights", path, lights=count)
+    scene = wavecomb.load(path).scene
+    size = (args.size[0], args.size[1])
+
+    def render(selection: str, seed: int, spp: int) -> wavecomb.Picture:
+        return wavecomb.render(
+            scene, size=size, spp=spp, seed=seed, threads=args.threads,
+            max_depth=args.max_depth, light_selection=selection,
+        )  # fmt: skip
+
+    truth = render("tree", 1000, args.reference).beauty.astype(np.float64)
+    weight = 1.0 / (truth**2 + 0.01 * truth.mean() ** 2)
+    error: dict[str, list[float]] = {"power": [], "tree": []}
+    seconds: dict[str, list[float]] = {"power": [], "tree": []}
+    samples = 0
+    for seed in range(args.rounds):
+        for selection in ("power", "tree") if seed % 2 else ("tree", "power"):
+            picture = render(selection, seed, args.spp)
+            error[selection].append(float(((picture.beauty - truth) ** 2 * weight).mean()))
+            seconds[selection].append(picture.stats["seconds"]["render"])
+            samples = picture.stats["counts"]["samples"]
+    mean = {selection: float(np.mean(of)) for selection, of in error.items()}
+    time = ratio(seconds["tree"], seconds["power"])
+    return {
+        "relmse": mean,
+        "error": mean["tree"] / mean["power"],
+        "time": time,
+        "efficiency": mean["power"] / (mean["tree"] * time["median"]),
+        "sample_us": {k: 1e6 * float(np.median(v)) / samples for k, v in seconds.items()},
+    }
+
+
+def report(found: dict[str, Any]) -> list[str]:
+    """The table, as Markdown."""
+    lines = list(
+        head("lights", "relMSE by power", "by tree", "time", "efficiency", "us a sample by tree")
+    )
+    for count, figures in found.items():
+        lines.append(
+            row(
+                f"{int(count):,}",
+                f"{figures['relmse']['power']:.4f}",
+                f"{figures['relmse']['tree']:.4f}",
+                show(figures["time"], 2),
+                f"{figures['efficiency']:.1f}",
+                f"{figures['sample_us']['tree']:.2f}",
+            )
+        )
+    return lines
+
+
+if __name__ == "__main__":
+    main()

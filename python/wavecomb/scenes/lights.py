@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A street at night: as many lights as are asked for, of every kind that has a place.
+
+For measuring how the choice of a light scales. The street stays as long and its light as strong
+whatever their number: more lights are smaller ones. They are of five kinds in turn, and of powers
+that differ a hundredfold:
+
+- windows: rectangles on the facades, which face the street;
+- lamps: disks that shine down;
+- bulbs: spheres on strings across the street;
+- signs: emissive boxes of 12 triangles that stand out from the facades;
+- strips: emissive quads at the kerbs, of 2 triangles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, UsdGeom, UsdLux
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.stage import StageWriter
+
+MAX_LIGHTS = 200_000
+_LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0
+_POWER = 3000.0  # of all lights together, W
+_SIGN_COLOURS = 16
+_KINDS = ("Window", "Lamp", "Bulb", "Sign", "Strip")
+_BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+
+
+def build_lights(writer: StageWriter, options: SceneOptions) -> None:
+    """Fills a stage with ``options.lights`` lights."""
+    if not 1 <= options.lights <= MAX_LIGHTS:
+        raise SceneError(f"lights: lights must be from 1 to {MAX_LIGHTS}, not {options.lights}")
+    rng = np.random.default_rng([options.seed, 1001])
+    _street(writer, rng)
+    count = options.lights
+    power = np.exp(rng.uniform(np.log(0.1), np.log(10.0), count))
+    power *= _POWER / power.sum()
+    for index in range(count):
+        colour = np.array([1.0, rng.uniform(0.4, 1.0), rng.uniform(0.15, 1.0)])
+        size = rng.uniform(0.5, 1.5) * min(1.0, (200.0 / count) ** 0.5)
+        kind = _KINDS[index % len(_KINDS)]
+        z = -rng.uniform(0.0, _LENGTH)
+        place = _PLACES[kind](rng, z)
+        if kind in ("Sign", "Strip"):
+            _mesh(writer, f"{kind}_{index:06d}", kind, place, size, power[index], rng)
+        else:
+            _light(writer, f"{kind}_{index:06d}", kind, place, size, power[index] * colour)
+    writer.camera((1.5, 2.2, 6.0), (-0.5, 3.0, -20.0), 65.0, options.aspect or 1.5)
+
+
+_PLACES = {
+    "Window": lambda rng, z: (rng.choice([-1, 1]) * (_HALF_WIDTH - 0.02), rng.uniform(1, 11), z),
+    "Lamp": lambda rng, z: (rng.choice([-1, 1]) * rng.uniform(2.5, 4.5), rng.uniform(3, 5), z),
+    "Bulb": lambda rng, z: (rng.uniform(-4, 4), rng.uniform(4, 8), z),
+    "Sign": lambda rng, z: (rng.choice([-1, 1]) * rng.uniform(4.0, 4.5), rng.uniform(2.5, 8), z),
+    "Strip": lambda rng, z: (rng.choice([-1, 1]) * rng.uniform(3.0, 4.9), 0.02, z),
+}
+"""Where a kind of light hangs: x, y, z."""
+
+
+def _light(
+    writer: StageWriter,
+    name: str,
+    kind: str,
+    place: tuple[float, float, float],
+    size: float,
+    power: NDArray[np.float64],
+) -> None:
+    """A light of UsdLux that gives off ``power`` (3,) W."""
+    path = f"/World/Lights/{name}"
+    if kind == "Window":
+        light = UsdLux.RectLight.Define(writer.stage, path)
+        light.CreateWidthAttr(0.8 * size)
+        light.CreateHeightAttr(size)
+        radiance = power / (np.pi * 0.8 * size * size)
+    elif kind == "Lamp":
+        light = UsdLux.DiskLight.Define(writer.stage, path)
+        light.CreateRadiusAttr(0.2 * size)
+        radiance = power / (np.pi * np.pi * (0.2 * size) ** 2)
+    else:
+        light = UsdLux.SphereLight.Define(writer.stage, path)
+        light.CreateRadiusAttr(0.06 * size)
+        radiance = power / (4.0 * np.pi * np.pi * (0.06 * size) ** 2)
+    peak = float(radiance.max())
+    light.CreateIntensityAttr(peak)
+    light.CreateColorAttr(Gf.Vec3f(*(float(v) / peak for v in radiance)))
+    xform = UsdGeom.XformCommonAPI(light)
+    xform.SetTranslate(tuple(float(v) for v in place))
+    # A light shines along its -Z: windows into the street, lamps down.
+    if kind == "Window":
+        xform.SetRotate((0.0, 90.0 if place[0] > 0 else -90.0, 0.0))
+    elif kind == "Lamp":
+        xform.SetRotate((-90.0, 0.0, 0.0))
+
+
+def _mesh(
+    writer: StageWriter,
+    name: str,
+    kind: str,
+    place: tuple[float, float, float],
+    size: float,
+    power: float,
+    rng: np.random.Generator,
+) -> None:
+    """An emissive mesh that gives off about ``power`` W, one of a few radiances."""
+    half = np.array([0.25, 0.4, 0.03]) if kind == "Sign" else np.array([0.04, 0.0, 0.6])
+    half = half * size
+    area = 8.0 * (half[0] * half[1] + half[1] * half[2] + half[0] * half[2])
+    # Both sides of a triangle shine; those inside a box light nothing.
+    wanted = power / (np.pi * area * (1.0 if kind == "Sign" else 0.5))
+    step = round(2.0 * np.log2(wanted))
+    hue = int(rng.integers(_SIGN_COLOURS))
+    tint = 0.55 + 0.45 * np.cos(2.0 * np.pi * (hue / _SIGN_COLOURS + np.array([0, 1, 2]) / 3.0))
+    material = f"Glow_{hue:02d}_{step + 100:03d}"
+    emission = tuple(float(v) for v in tint * 2.0 ** (step / 2.0))
+    writer.material(material, looks.emissive((emission[0], emission[1], emission[2])))
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    points = np.array(place) + corners * half
+    polygons = _BOX
+    if kind == "Strip":
+        points, polygons = points[[0, 1, 5, 4]], [[0, 1, 2, 3]]
+    writer.polygons(f"/World/Objects/{name}", points, polygons, material)
+
+
+def _street(writer: StageWriter, rng: np.random.Generator) -> None:
+    """Ground, facades with bays, and the end of the street."""
+    writer.material("Asphalt", looks.diffuse((0.22, 0.22, 0.24)))
+    far = _LENGTH + 2.0
+    ground = np.array([[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]])
+    writer.polygons("/World/Set/Ground", ground, [[0, 1, 2, 3]], "Asphalt")
+    end = np.array([[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]])
+    writer.polygons("/World/Set/End", end, [[0, 1, 2, 3]], "Asphalt")
+    for side in (-1, 1):
+        z, house = 8.0, 0
+        while z > -far:
+            width = float(rng.uniform(5.0, 9.0))
+            name = f"Wall_{house % 4}"
+            shade = 0.35 + 0.12 * (house % 4)
+            writer.material(name, looks.diffuse((shade, 0.92 * shade, 0.8 * shade)))
+            x0, x1 = side * _HALF_WIDTH, side * (_HALF_WIDTH + 6.0)
+            top = _HEIGHT + float(rng.uniform(0.0, 4.0))
+            corners = [[x, y, w] for x in (x0, x1) for y in (0.0, top) for w in (z - width, z)]
+            path = f"/World/Set/House_{'L' if side < 0 else 'R'}{house:02d}"
+            writer.polygons(path, np.array(corners), _BOX, name)
+            z -= width
+            house += 1

@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/light_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/scene/light_cluster.h"
+#include "wavecomb/scene/parallel.h"
+
+namespace wavecomb {
+namespace {
+
+constexpr double kPiD = 3.14159265358979323846;
+constexpr uint32_t kNumbers = 1u << 24;
+constexpr size_t kBins = 12;
+/// Lights from which on the tree pays (docs/light-selection.md).
+constexpr uint32_t kLeastForTree = 8;
+/// Ranges that are built apart from one another, and the least lights that are worth it.
+constexpr size_t kTasks = 64, kParallel = 4096;
+
+/// A light of the tree, as splitting sees it.
+struct Item {
+  float lo[3], hi[3];
+  float axis[3];  ///< of its normals, times (1 + cos of their cone) / 2
+  float intensity;
+  uint32_t light;
+
+  float centre(size_t k) const { return 0.5f * lo[k] + 0.5f * hi[k]; }
+};
+
+/// Sums over items from which a split is judged.
+struct Bin {
+  float lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
+  float axis[3] = {0, 0, 0};
+  double intensity = 0;
+  size_t count = 0;
+
+  void add(const Item& item) {
+    // Normals of triangles have no sign: both sides shine.
+    const float d = axis[0] * item.axis[0] + axis[1] * item.axis[1] + axis[2] * item.axis[2];
+    merge(item, d < 0 ? -1.f : 1.f, 1);
+  }
+  void add(const Bin& other) { merge(other, 1.f, other.count); }
+
+ private:
+  template <typename T>
+  void merge(const T& o, float sign, size_t items) {
+    for (size_t k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], o.lo[k]);
+      hi[k] = std::max(hi[k], o.hi[k]);
+      axis[k] += sign * o.axis[k];
+    }
+    intensity += double{o.intensity};
+    count += items;
+  }
+};
+
+/// Solid angle, weighed by cosine, that lights with normals in a cone of that angle shine into,
+/// which are pi / 2 off their normals at most (Conty Estevez and Kulla 2018, eq. 1).
+double emission_measure(double angle) {
+  const double reach = std::min(angle + kPiD / 2, kPiD);
+  return 2 * kPiD * (1 - std::cos(angle)) +
+         kPiD / 2 *
+             (2 * reach * std::sin(angle) - std::cos(angle - 2 * reach) -
+              2 * angle * std::sin(angle) + std::cos(angle));
+}
+
+/// The measure by the cosine of the angle, from -1 to 1.
+class MeasureTable {
+ public:
+  MeasureTable() {
+    for (size_t i = 0; i <= kSteps; ++i)
+      values_[i] = emission_measure(std::acos(2.0 * static_cast<double>(i) / kSteps - 1));
+  }
+  double operator()(double cosine) const {
+    const double at = std::clamp(cosine * 0.5 + 0.5, 0.0, 1.0) * kSteps;
+    return values_[static_cast<size_t>(std::nearbyint(at))];
+  }
+
+ private:
+  static constexpr size_t kSteps = 256;
+  std::array<double, kSteps + 1> values_;
+};
+
+/// The share of a cost that is alike for all splits of a node: intensity x bound x orientation. The
+/// bound is a sphere, of which half the square of the diagonal is a measure. The mean of vectors
+/// spread over a cone has the length (1 + cos) / 2.
+double cost(const Bin& bin, const MeasureTable& measure) {
+  double diagonal2 = 0, sum2 = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const double extent = double{bin.hi[k]} - double{bin.lo[k]};
+    diagonal2 += extent * extent;
+    sum2 += double{bin.axis[k]} * double{bin.axis[k]};
+  }
+  const double cosine = 2 * std::sqrt(sum2) / static_cast<double>(bin.count) - 1;
+  return bin.intensity * diagonal2 * measure(cosine);
+}
+
+/// Where a range is cut, and the way to it from the root.
+struct Range {
+  size_t begin, end;
+  uint32_t slot;  ///< node
+  uint32_t depth, trail;
+  size_t size() const { return end - begin; }
+};
+
+class Builder {
+ public:
+  Builder(const LightSet& set, std::vector<Item> items, double total, LightTree& tree)
+      : set_(set), items_(std::move(items)), scale_(1 / total), tree_(tree) {}
+
+  /// Splits from the root until there is a task for each thread, builds those, joins them up.
+  void run(std::span<const double> powers) {
+    powers_ = powers;
+    struct Top {
+      Range range;
+      size_t below = 0;  ///< first of its two children; 0: a task
+      LightCluster cluster;
+    };
+    std::vector<Top> tops{{{0, items_.size(), 0, 0, 0}, 0, {}}};
+    for (size_t first = 0; tops.size() < 2 * kTasks && first < tops.size();) {
+      const size_t last = tops.size();
+      std::vector<size_t> cuts(last - first, 0);
+      parallel_for(last - first, [&](size_t i) {
+        const Range& r = tops[first + i].range;
+        if (r.size() >= kParallel) cuts[i] = split(r);
+      });
+      for (size_t i = first; i < last; ++i) {
+        if (cuts[i - first] == 0) continue;
+        const auto [left, right] = children(tops[i].range, cuts[i - first]);
+        tops[i].below = tops.size();
+        tops.push_back({left, 0, {}});
+        tops.push_back({right, 0, {}});
+      }
+      first = last;
+    }
+    parallel_for(tops.size(), [&](size_t i) {
+      if (tops[i].below == 0) tops[i].cluster = build(tops[i].range);
+    });
+    for (size_t i = tops.size(); i-- > 0;)
+      if (const size_t below = tops[i].below; below != 0)
+        tops[i].cluster = join(tops[i].range, tops[below].cluster, tops[below + 1].cluster);
+    tree_.root = tops[0].cluster.next;
+  }
+
+ private:
+  /// Halves of a range. Nodes are depth first, a range of n items has n - 1.
+  static std::pair<Range, Range> children(const Range& r, size_t cut) {
+    const auto left_nodes = static_cast<uint32_t>(cut - r.begin - 1);
+    return {{r.begin, cut, r.slot + 1, r.depth + 1, r.trail},
+            {cut, r.end, r.slot + 1 + left_nodes, r.depth + 1, r.trail | 1u << r.depth}};
+  }
+
+  LightCluster build(const Range& r) {
+    if (r.size() == 1) return leaf(items_[r.begin].light, r.trail);
+    const auto [left, right] = children(r, split(r));
+    const LightCluster a = build(left), b = build(right);
+    return join(r, a, b);
+  }
+
+  LightCluster leaf(uint32_t light, uint32_t trail) {
+    LightCluster c = cluster_of(set_, light, powers_[light]);
+    c.intensity *= scale_;
+    c.next = kTreeLeaf | light;
+    tree_.trails[light] = trail;
+    return c;
+  }
+
+  LightCluster join(const Range& r, const LightCluster& a, const LightCluster& b) {
+    tree_.nodes[r.slot].child[0] = encode(a);
+    tree_.nodes[r.slot].child[1] = encode(b);
+    LightCluster c = unite(a, b);
+    c.next = r.slot;
+    return c;
+  }
+
+  /// Puts the items of the left half first and returns where the right one begins.
+  size_t split(const Range& r) {
+    const std::span<Item> items(items_.data() + r.begin, r.size());
+    if (items.size() == 2) return r.begin + 1;
+    std::array<float, 3> lo, hi;
+    for (size_t k = 0; k < 3; ++k) {
+      lo[k] = INFINITY;
+      hi[k] = -INFINITY;
+      for (const Item& item : items) {
+        lo[k] = std::min(lo[k], item.centre(k));
+        hi[k] = std::max(hi[k], item.centre(k));
+      }
+    }
+    const float longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+    const size_t bins = items.size() < 32 ? 4 : kBins;
+    double least = INFINITY;
+    size_t axis = 3, last = 0;
+    const auto bin_of = [&](const Item& item, size_t k) {
+      const float at = (item.centre(k) - lo[k]) / (hi[k] - lo[k]) * static_cast<float>(bins);
+      return at > 0 ? std::min(static_cast<size_t>(std::min(at, 1e6f)), bins - 1) : size_t{0};
+    };
+    const bool has_room = r.depth + std::bit_width(items.size() - 1) < kMaxTreeDepth;
+    for (size_t k = 0; k < 3 && has_room && std::isfinite(longest); ++k) {
+      const float extent = hi[k] - lo[k];
+      if (!(extent > 0)) continue;
+      std::array<Bin, kBins> of{};
+      for (const Item& item : items) of[bin_of(item, k)].add(item);
+      std::array<double, kBins> left{};
+      Bin sum;
+      for (size_t i = 0; i + 1 < bins; ++i) {
+        sum.add(of[i]);
+        left[i] = sum.count > 0 ? cost(sum, measure_) : 0;
+      }
+      sum = {};
+      for (size_t i = bins - 1; i > 0; --i) {
+        sum.add(of[i]);
+        if (sum.count == 0 || sum.count == items.size()) continue;
+        // Thin bounds are of no use: the regularity factor of the paper.
+        const double all = (left[i - 1] + cost(sum, measure_)) * double{longest / extent};
+        if (!(all < least)) continue;
+        least = all;
+        axis = k;
+        last = i - 1;
+      }
+    }
+    if (axis == 3) return halve(r, items, lo, hi);
+    const auto middle = std::partition(
+        items.begin(), items.end(), [&](const Item& item) { return bin_of(item, axis) <= last; });
+    return r.begin + static_cast<size_t>(middle - items.begin());
+  }
+
+  /// In the middle of the longest axis: for lights at one place, or where the tree gets deep.
+  static size_t halve(const Range& r, std::span<Item> items, const std::array<float, 3>& lo,
+                      const std::array<float, 3>& hi) {
+    size_t axis = 0;
+    for (size_t k = 1; k < 3; ++k)
+      if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+    const auto middle = items.begin() + static_cast<std::ptrdiff_t>(items.size() / 2);
+    std::nth_element(items.begin(), middle, items.end(), [&](const Item& a, const Item& b) {
+      const float x = a.centre(axis), y = b.centre(axis);
+      return x != y ? x < y : a.light < b.light;
+    });
+    return r.begin + items.size() / 2;
+  }
+
+ public:
+  static LightCluster cluster_of(const LightSet& set, uint32_t light, double power) {
+    return light < set.first_triangle()
+               ? bound_light(set.records[light], power)
+               : bound_light(set.triangles[light - set.first_triangle()], power);
+  }
+
+ private:
+  const LightSet& set_;
+  std::vector<Item> items_;
+  double scale_;  ///< of intensities
+  LightTree& tree_;
+  std::span<const double> powers_;
+  MeasureTable measure_;
+};
+
+Item make_item(const LightCluster& c, uint32_t light, double scale) {
+  Item item{};
+  std::copy_n(c.lo, 3, item.lo);
+  std::copy_n(c.hi, 3, item.hi);
+  for (size_t k = 0; k < 3; ++k)
+    item.axis[k] = static_cast<float>(c.normals.axis[k] * (1 + std::cos(c.normals.angle)) / 2);
+  item.intensity = static_cast<float>(c.intensity * scale);
+  item.light = light;
+  return item;
+}
+
+/// Divides the 2^24 numbers among the tree and the infinite lights that shine.
+void share_numbers(const LightSet& set, std::span<const double> powers, size_t lit_in_tree,
+                   LightTree& tree) {
+  const size_t infinite = set.infinite_count;
+  size_t lit = lit_in_tree;
+  for (size_t i = 0; i < infinite; ++i) lit += powers[i] > 0 ? 1 : 0;
+  tree.infinite_ends.resize(infinite);
+  tree.infinite_pdf.resize(infinite);
+  std::vector<uint32_t> numbers(infinite, 0);
+  double largest = 0, total = 0;
+  for (const double p : powers) largest = std::max(largest, p);
+  for (const double p : powers) total += p / largest;
+  uint32_t left = kNumbers;
+  constexpr double floor_share = 0.01;
+  for (size_t i = 0; i < infinite; ++i) {
+    if (!(powers[i] > 0)) continue;
+    const double share =
+        (1 - floor_share) * (powers[i] / largest / total) + floor_share / static_cast<double>(lit);
+    // The tree keeps one number in a thousand, so that lamps in the open are found at all.
+    const uint32_t most = left - (lit_in_tree > 0 ? kNumbers / 1000 : 0);
+    numbers[i] = std::min(most, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));
+    left -= numbers[i];
+  }
+  if (lit_in_tree == 0 && left < kNumbers)  // what rounding has left
+    *std::find_if(numbers.rbegin(), numbers.rend(), [](uint32_t n) { return n > 0; }) += left;
+  tree.numbers = lit_in_tree > 0 ? left : 0;
+  uint32_t end = tree.numbers;
+  for (size_t i = 0; i < infinite; ++i) {
+    tree.infinite_ends[i] = end += numbers[i];
+    tree.infinite_pdf[i] = static_cast<float>(numbers[i]) * 0x1p-24f;
+  }
+}
+
+}  // namespace
+
+LightTreeView LightTree::view() const {
+  return {nodes.data(),
+          trails.data(),
+          infinite_ends.data(),
+          infinite_pdf.data(),
+          root,
+          numbers,
+          static_cast<uint32_t>(root == kNoLight ? 0 : nodes.size() + 1)};
+}
+
+LightTree build_light_tree(const LightSet& set, std::span<const double> powers) {
+  LightTree tree;
+  std::vector<uint32_t> lit;
+  for (size_t i = set.infinite_count; i < powers.size(); ++i)
+    if (powers[i] > 0) lit.push_back(static_cast<uint32_t>(i));
+  tree.trails.assign(powers.size(), kNoLight);
+  share_numbers(set, powers, lit.size(), tree);
+  if (lit.empty()) return tree;
+
+  double total = 0, largest = 0;
+  for (const uint32_t i : lit) largest = std::max(largest, powers[i]);
+  for (const uint32_t i : lit) total += powers[i] / largest;
+  total *= largest;
+  if (!std::isfinite(total)) total = largest;
+  std::vector<Item> items(lit.size());
+  constexpr size_t kChunk = 4096;
+  parallel_for((lit.size() + kChunk - 1) / kChunk, [&](size_t chunk) {
+    for (size_t i = chunk * kChunk; i < std::min(lit.size(), (chunk + 1) * kChunk); ++i)
+      items[i] = make_item(Builder::cluster_of(set, lit[i], powers[lit[i]]), lit[i], 1 / total);
+  });
+  tree.nodes.resize(lit.size() - 1);
+  Builder(set, std::move(items), total, tree).run(powers);
+  return tree;
+}
+
+bool chooses_by_tree(LightSelection selection, const LightView& lights) {
+  const uint32_t least = selection == LightSelection::kTree ? 1 : kLeastForTree;
+  return selection != LightSelection::kPower && lights.tree.count >= least;
+}
+
+}  // namespace wavecomb

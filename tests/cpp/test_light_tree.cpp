@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Choosing lights by tree: probabilities, bounds, and agreement of packets with scalars.
+#include "wavecomb/light/light_tree.h"
+
+#include <chrono>
+#include <random>
+
+#include "bsdf_testing.h"
+#include "lane_testing.h"
+#include "light_testing.h"
+#include "wavecomb/core/warp.h"
+#include "wavecomb/scene/light_cluster.h"
+#include "wavecomb/scene/light_tree.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace light_testing;
+using bsdf_testing::chi_square_p;
+using bsdf_testing::sidak;
+
+/// Random numbers by hand: those of the standard library differ between libraries.
+struct Numbers {
+  std::mt19937 rng;
+  explicit Numbers(uint32_t seed) : rng(seed) {}
+  float operator()() { return static_cast<float>(rng() >> 8) * 0x1p-24f; }
+  float between(float lo, float hi) { return lo + (hi - lo) * (*this)(); }
+  Vec3<float> point(float half) {
+    return {between(-half, half), between(-half, half), between(-half, half)};
+  }
+  Vec3<float> direction() { return square_to_sphere<float>((*this)(), (*this)()); }
+};
+
+/// `n` lights of all finite kinds, dark ones and points among them, and `infinite` others.
+Lights random_lights(size_t n, uint32_t seed, size_t infinite = 0) {
+  Numbers number(seed);
+  std::vector<Light> lights;
+  std::vector<EmissiveTriangle> triangles;
+  for (size_t i = 0; i < n; ++i) {
+    const Vec3<float> at = number.point(10);
+    const auto turn =
+        rotate(360 * static_cast<double>(number()), 360 * static_cast<double>(number()));
+    const float power = number() < 0.1f ? 0.f : std::exp(number.between(-4, 4));
+    if (i % 4 == 3) {
+      triangles.push_back(make_triangle(at, at + number.point(0.4f), at + number.point(0.4f)));
+      for (float& x : triangles.back().radiance) x *= power;
+      continue;
+    }
+    const auto kind = static_cast<LightKind>(i % 4);  // rect, disk, sphere
+    Light light = make_light(kind, translate(at.x, at.y, at.z) * turn);
+    light.width = number.between(0.05f, 1);
+    light.height = number.between(0.05f, 1);
+    light.radius = kind == LightKind::kSphere && number() < 0.3f ? 0 : number.between(0.02f, 0.5f);
+    light.color = Vec3<float>{1, 1, 1} * power;
+    lights.push_back(light);
+  }
+  for (size_t i = 0; i < infinite; ++i) {
+    Light light = make_light(i % 2 ? LightKind::kDistant : LightKind::kDome);
+    light.color = Vec3<float>{1e-3f, 1e-3f, 1e-3f} * static_cast<float>(i);
+    lights.push_back(light);
+  }
+  return Lights(lights, triangles);
+}
+
+LightView by_tree(const Lights& lights) {
+  LightView view = lights.view();
+  view.by_tree = true;
+  return view;
+}
+
+LightReceiver<float> random_receiver(Numbers& number) {
+  const Vec3<float> p = number.point(12);
+  const bool any_side = number() < 0.3f;
+  return LightReceiver<float>(p, any_side ? 0u : pack_normal<float>(number.direction()));
+}
+
+float pick_pdf(const LightView& view, uint32_t light, const LightReceiver<float>& to) {
+  return light < view.infinite_count ? view.tree.infinite_pdf[light]
+                                     : detail::tree_pdf<float>(view, light, to, true);
+}
+
+TEST(LightTree, ProbabilitiesAddUpToOne) {
+  for (const size_t n : {1, 2, 3, 17, 400}) {
+    for (const size_t infinite : {0, 3}) {
+      const Lights lights = random_lights(n, static_cast<uint32_t>(n), infinite);
+      const LightView view = by_tree(lights);
+      Numbers number(3);
+      for (int k = 0; k < 200; ++k) {
+        const LightReceiver<float> to = random_receiver(number);
+        double sum = 0;
+        for (uint32_t i = 0; i < view.count; ++i) sum += double{pick_pdf(view, i, to)};
+        // Bounds shrink on the way down: some numbers end where no light has anything to give, and
+        // then none is chosen.
+        double none = 0;
+        constexpr int kTries = 400;
+        for (int i = 0; i < kTries; ++i) {
+          const float u = (static_cast<float>(i) + 0.5f) / kTries;
+          const bool found = detail::choose_by_tree<float>(view, to, u, true).light != kNoLight;
+          none += found ? 0 : 1.0 / kTries;
+        }
+        ASSERT_NEAR(sum, 1 - none, none == 0 ? 0.01 : 0.05) << n << ", " << infinite;
+      }
+    }
+  }
+  // Spheres shine everywhere.
+  std::vector<Light> spheres;
+  Numbers number(4);
+  for (int i = 0; i < 500; ++i) {
+    const Vec3<float> at = number.point(10);
+    spheres.push_back(make_light(LightKind::kSphere, translate(at.x, at.y, at.z)));
+    spheres.back().radius = number();
+  }
+  const Lights all(spheres);
+  for (int k = 0; k < 100; ++k) {
+    double sum = 0;
+    const LightReceiver<float> to(number.point(20));
+    for (uint32_t i = 0; i < 500; ++i) sum += double{pick_pdf(by_tree(all), i, to)};
+    ASSERT_NEAR(sum, 1, 1e-5);
+  }
+}
+
+TEST(LightTree, LightsAreChosenAsOftenAsStated) {
+  const Lights lights = random_lights(100, 5, 3);
+  const LightView view = by_tree(lights);
+  Numbers number(6);
+  for (int k = 0; k < 20; ++k) {
+    LightReceiver<float> to = random_receiver(number);
+    constexpr uint32_t kSamples = 200000;
+    std::vector<double> hits(view.count + 1, 0), expected(view.count + 1, 0);
+    double sum = 0;
+    for (uint32_t i = 0; i < view.count; ++i) sum += expected[i] = double{pick_pdf(view, i, to)};
+    expected[view.count] = std::max(0.0, 1 - sum);  // none
+    for (double& e : expected) e *= kSamples;
+    for (uint32_t i = 0; i < kSamples; ++i) {
+      to.seed = hash_u32<uint32_t>(i);
+      const LightChoice<float> c = detail::choose_by_tree<float>(view, to, number(), true);
+      if (c.light != kNoLight) {
+        ASSERT_EQ(c.pdf, pick_pdf(view, c.light, to));
+      }
+      ++hits[c.light == kNoLight ? view.count : c.light];
+    }
+    for (uint32_t i = 0; i <= view.count; ++i)
+      if (expected[i] == 0) {
+        ASSERT_EQ(hits[i], 0) << i;
+      }
+    double statistic = 0, rare = 0, rare_hits = 0;
+    int cells = 0;
+    const auto add = [&](double h, double e) {
+      if (!(e > 0)) return;
+      statistic += (h - e) * (h - e) / e;
+      ++cells;
+    };
+    for (uint32_t i = 0; i <= view.count; ++i) {
+      if (expected[i] >= 5) {
+        add(hits[i], expected[i]);
+      } else {
+        rare += expected[i];
+        rare_hits += hits[i];
+      }
+    }
+    if (rare >= 5) add(rare_hits, rare);
+    ASSERT_GT(cells, 4);
+    EXPECT_GT(chi_square_p(statistic, cells - 1), sidak(1e-3, 20)) << k;
+  }
+}
+
+/// A light that brings anything to a receiver is chosen sometimes: by a point on it that is seen
+/// from the front, above the receiver's horizon.
+TEST(LightTree, WhatShinesCanBeChosen) {
+  const Lights lights = random_lights(300, 8);
+  const LightView power = lights.view(), view = by_tree(lights);
+  Numbers number(9);
+  int seen = 0;
+  for (int k = 0; k < 40000; ++k) {
+    const Vec3<float> p = k % 3 == 0 ? number.point(1) : number.point(12), n = number.direction();
+    const auto s = sample_light<float>(power, p, number(), number(), number(), true);
+    if (!s.valid || !(dot(s.wi, n) > 0)) continue;
+    ++seen;
+  }
+  EXPECT_GT(seen, 4000);
+  // The same light again, by its number.
+  Numbers again(9);
+  for (int k = 0; k < 40000; ++k) {
+    const Vec3<float> p = k % 3 == 0 ? again.point(1) : again.point(12), n = again.direction();
+    const float u = again(), a = again(), b = again();
+    const auto s = sample_light<float>(power, p, u, a, b, true);
+    if (!s.valid || !(dot(s.wi, n) > 0)) continue;
+    const uint32_t light = detail::pick_light<float>(power, u, true);
+    ASSERT_GT(pick_pdf(view, light, LightReceiver<float>(p)), 0.f) << light;
+    ASSERT_GT(pick_pdf(view, light, LightReceiver<float>(p, pack_normal<float>(n))), 0.f) << light;
+  }
+}
+
+TEST(LightTree, ConesHoldWhatTheyUnite) {
+  Numbers number(10);
+  for (int k = 0; k < 2000; ++k) {
+    DirectionCone cones[2];
+    for (DirectionCone& c : cones) {
+      const Vec3<float> d = number.direction();
+      const double axis[3] = {double{d.x}, double{d.y}, double{d.z}};
+      std::copy_n(axis, 3, c.axis);
+      c.angle = double{number()} * (number() < 0.5f ? 0.3 : kPiD);
+      c.two_sided = number() < 0.3f;
+    }
+    if (k % 7 == 0)
+      std::transform(cones[0].axis, cones[0].axis + 3, cones[1].axis, std::negate<>());
+    const DirectionCone all = unite(cones[0], cones[1]);
+    const auto cosine = [](const DirectionCone& c, const Vec3<float>& d) {
+      const double x = c.axis[0] * double{d.x} + c.axis[1] * double{d.y} + c.axis[2] * double{d.z};
+      return std::acos(std::clamp(c.two_sided ? std::abs(x) : x, -1.0, 1.0));
+    };
+    for (int i = 0; i < 50; ++i) {
+      const Vec3<float> d = number.direction();
+      for (const DirectionCone& c : cones)
+        if (cosine(c, d) < c.angle) {
+          ASSERT_LT(cosine(all, d), all.angle + 1e-5) << k;
+        }
+    }
+  }
+}
+
+TEST(LightTree, PacketsGiveTheBitsOfScalars) {
+  const Lights lights = random_lights(200, 11, 3);
+  const LightView view = by_tree(lights);
+  constexpr size_t kN = 1 << 12;
+  Numbers number(12);
+  std::vector<float> in[5];
+  std::vector<uint32_t> ids, normals, seeds;
+  for (size_t i = 0; i < kN; ++i) {
+    const LightReceiver<float> to = random_receiver(number);
+    const float values[] = {to.p.x, to.p.y, to.p.z, number(), number()};
+    for (size_t c = 0; c < 5; ++c) in[c].push_back(values[c]);
+    ids.push_back(static_cast<uint32_t>(number.rng()) % view.count);
+    normals.push_back(to.normal);
+    seeds.push_back(static_cast<uint32_t>(number.rng()));
+  }
+  const auto run = [&]<typename F>(std::vector<uint32_t>& out) {
+    using U = UInt<F>;
+    out.assign(3 * kN, 0u);
+    for (size_t i = 0; i < kN; i += kWidth<F>) {
+      LightReceiver<F> to(Vec3<F>(load<F>(&in[0][i]), load<F>(&in[1][i]), load<F>(&in[2][i])),
+                          load<U>(&normals[i]));
+      to.seed = load<U>(&seeds[i]);
+      const Mask<F> active = load<F>(&in[4][i]) < 0.9f;
+      const auto choice = detail::choose_by_tree<F>(view, to, load<F>(&in[3][i]), active);
+      store(&out[i], choice.light);
+      store(&out[kN + i], float_bits<F>(choice.pdf));
+      const U id = load<U>(&ids[i]);
+      const Mask<F> finite = active & Mask<F>(id >= U(view.infinite_count));
+      store(&out[2 * kN + i], float_bits<F>(detail::tree_pdf<F>(view, id, to, finite)));
+    }
+  };
+  std::vector<uint32_t> scalar;
+  run.operator()<float>(scalar);
+  lane_testing::for_each_packet([&]<typename F>() {
+    std::vector<uint32_t> packets;
+    run.template operator()<F>(packets);
+    EXPECT_EQ(packets, scalar) << kWidth<F>;
+  });
+}
+
+TEST(LightTree, LightsAtOnePlaceAndBlackOnes) {
+  std::vector<Light> same(3000, make_light(LightKind::kSphere));
+  for (Light& light : same) light.radius = 0;
+  const Lights lights(same);
+  const LightView view = by_tree(lights);
+  EXPECT_EQ(view.tree.count, same.size());
+  double sum = 0;
+  for (uint32_t i = 0; i < view.count; ++i)
+    sum += double{pick_pdf(view, i, LightReceiver<float>(Vec3<float>{0, 0, 0}))};
+  EXPECT_NEAR(sum, 1, 1e-5);
+
+  Light black = make_light(LightKind::kRect);
+  black.color = {0, 0, 0};
+  const Lights dark({black, black});
+  EXPECT_EQ(dark.view().tree.count, 0u);
+  EXPECT_FALSE(chooses_by_tree(LightSelection::kTree, dark.view()));
+  const Lights one({black, make_light(LightKind::kRect)});
+  EXPECT_TRUE(chooses_by_tree(LightSelection::kTree, one.view()));
+  EXPECT_FALSE(chooses_by_tree(LightSelection::kAuto, one.view()));
+  EXPECT_FALSE(chooses_by_tree(LightSelection::kPower, view));
+  EXPECT_EQ(pick_pdf(by_tree(one), 1, LightReceiver<float>(Vec3<float>{0, 0, -3})), 1.f);
+}
+
+/// A weak lamp close by beats a strong one far away.
+TEST(LightTree, NearLightsAreChosenMostly) {
+  Light near = make_light(LightKind::kSphere, translate(0, 0, 1)), far = near;
+  near.radius = far.radius = 0.1f;
+  far.to_world = translate(0, 0, 100);
+  far.color = near.color * 100.f;
+  const Lights lights({near, far});
+  const LightView view = by_tree(lights);
+  EXPECT_GT(pick_pdf(view, 0, LightReceiver<float>(Vec3<float>{0, 0, 0})), 0.98f);
+  EXPECT_GT(pick_pdf(view, 1, LightReceiver<float>(Vec3<float>{0, 0, 90})), 0.98f);
+}
+
+TEST(LightTree, HundredThousandTrianglesAreQuick) {
+  std::vector<EmissiveTriangle> triangles;
+  Numbers number(13);
+  for (int i = 0; i < 100000; ++i) {
+    const Vec3<float> at = number.point(10);
+    triangles.push_back(make_triangle(at, at + number.point(0.1f), at + number.point(0.1f)));
+  }
+  const Lights lights({}, triangles);
+  std::vector<double> powers(triangles.size(), 1);
+  const auto start = std::chrono::steady_clock::now();
+  const LightTree tree = build_light_tree(lights.set, powers);
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  RecordProperty("build_ms", static_cast<int>(1e3 * seconds.count()));
+  EXPECT_LT(seconds.count(), 20);  // of a machine with other things to do
+  ASSERT_EQ(tree.nodes.size(), triangles.size() - 1);
+  // Deep enough for all, and balanced within reason.
+  const LightTree again = build_light_tree(lights.set, powers);
+  EXPECT_EQ(tree.trails, again.trails);
+  EXPECT_LT(*std::max_element(tree.trails.begin(), tree.trails.end()), 1u << 31);
+}
+
+}  // namespace
+}  // namespace wavecomb
