@@ -27,8 +27,9 @@ _PASSED_ON = (
 )
 _WATCHED = {*_PASSED_ON, signal.SIGTSTP, signal.SIGCONT, signal.SIGCHLD}
 _PR_SET_PDEATHSIG = 1
-CHATTER = ("libpng ", "failed call to posix_madvise")
-"""What libraries print of files that they refuse; a warning says it better."""
+CHATTER = ("libpng ", "failed call to posix_madvise", "UnicodeDecodeError: 'utf-8'")
+"""What libraries print of files that they refuse, and USD of names that are no text; a warning
+says it better."""
 
 
 def is_wise() -> bool:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +21,7 @@ NEAREST = 16
 """Placements of a mesh that are measured edge by edge; the others look smaller than these."""
 
 _MOST_PLACED = 1 << 20
-"""Placements of a group along one way from the world that are looked at."""
+"""Placements of a group that are looked at."""
 
 
 class ViewSize:
@@ -84,15 +83,28 @@ class ViewSize:
 
 
 def placements(world: Group) -> dict[int, Matrices]:
-    """Where the groups that hold surfaces are placed: id of a group -> (k, 4, 4)."""
-    found: dict[int, list[Matrices]] = {}
-    for group, placed in _walk(world, np.eye(4)[None]):
-        found.setdefault(id(group), []).append(placed)
-    return {key: np.concatenate(parts) for key, parts in found.items()}
+    """Where the groups that hold surfaces are placed: id of a group -> (k, 4, 4).
+
+    Of each group ``_MOST_PLACED`` count: instances in instances may multiply them.
+    """
+    order: list[Group] = []
+    _after_its_users(world, set(), order)
+    found: dict[int, Matrices] = {id(world): np.eye(4)[None]}
+    for group in reversed(order):
+        placed = found[id(group)]
+        for child, transforms in group.surfaced:
+            some = transforms[: max(1, _MOST_PLACED // len(placed))]
+            every = (some[:, None] @ placed[None]).reshape(-1, 4, 4)
+            known = found.get(id(child))
+            both = every if known is None else np.concatenate([known, every])
+            found[id(child)] = both[:_MOST_PLACED]
+    return found
 
 
-def _walk(group: Group, placed: Matrices) -> Iterator[tuple[Group, Matrices]]:
-    yield group, placed
-    for child, transforms in group.surfaced:
-        every = transforms[:, None] @ placed[None]
-        yield from _walk(child, every.reshape(-1, 4, 4)[:_MOST_PLACED])
+def _after_its_users(group: Group, met: set[int], order: list[Group]) -> None:
+    """Groups that hold surfaces: each before those that it is placed in."""
+    met.add(id(group))
+    for child, _ in group.surfaced:
+        if id(child) not in met:
+            _after_its_users(child, met, order)
+    order.append(group)
