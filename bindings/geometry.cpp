@@ -174,7 +174,8 @@ namespace {
 double pixels(const Array<float>& points, const Array<int32_t>& counts,
               const Array<int32_t>& indices, const Array<double>& transforms,
               const Array<double>& to_camera, const std::array<double, 2>& centre,
-              const std::array<double, 2>& half, double pixels_per_unit) {
+              const std::array<double, 2>& half, double pixels_per_unit,
+              const std::string& projection) {
   if (transforms.ndim() != 3 || transforms.shape(1) != 4 || transforms.shape(2) != 4 ||
       to_camera.size() != 16)
     throw Error("transforms must have the shape (k, 4, 4)");
@@ -183,6 +184,8 @@ double pixels(const Array<float>& points, const Array<int32_t>& counts,
   std::copy_n(centre.begin(), 2, view.centre);
   std::copy_n(half.begin(), 2, view.half);
   view.pixels = pixels_per_unit;
+  view.is_parallel = projection == "orthographic";
+  view.is_all_round = projection == "latlong";
   const nb::gil_scoped_release release;
   double most = 0;
   for (size_t i = 0; i < transforms.shape(0); ++i)
@@ -218,7 +221,7 @@ void bind_geometry(nb::module_& m) {
   using namespace nb::literals;
   m.attr("MAX_SUBDIVISION") = Subdivision::kMaxLevel;
   m.def("edge_pixels", &pixels, "points"_a, "counts"_a, "indices"_a, "transforms"_a, "to_camera"_a,
-        "centre"_a, "half"_a, "pixels_per_unit"_a);
+        "centre"_a, "half"_a, "pixels_per_unit"_a, "projection"_a = "perspective");
   m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
   m.def("weld_corners", &weld, "corners"_a, "point_count"_a, "values"_a);
 }

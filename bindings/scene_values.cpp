@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene_values.h"
 
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -41,10 +44,37 @@ const Members<Light, float> kLightNumbers{{"width", &Light::width},
                                           {"radius", &Light::radius},
                                           {"angle", &Light::angle}};
 const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize}};
-const Members<Camera, float> kCameraNumbers{{"lens_radius", &Camera::lens_radius},
-                                            {"focus_distance", &Camera::focus_distance},
-                                            {"near_clip", &Camera::near_clip},
-                                            {"far_clip", &Camera::far_clip}};
+const Members<Camera, float> kCameraNumbers{
+    {"lens_radius", &Camera::lens_radius},   {"focus_distance", &Camera::focus_distance},
+    {"near_clip", &Camera::near_clip},       {"far_clip", &Camera::far_clip},
+    {"pixel_aspect", &Camera::pixel_aspect}, {"exposure", &Camera::exposure}};
+const std::vector<std::pair<const char*, Projection>> kProjections{
+    {"perspective", Projection::kPerspective},
+    {"orthographic", Projection::kOrthographic},
+    {"latlong", Projection::kLatlong}};
+const std::vector<std::pair<const char*, Conform>> kConforms{
+    {"expandAperture", Conform::kExpandAperture},
+    {"cropAperture", Conform::kCropAperture},
+    {"adjustApertureWidth", Conform::kAdjustApertureWidth},
+    {"adjustApertureHeight", Conform::kAdjustApertureHeight},
+    {"adjustPixelAspectRatio", Conform::kAdjustPixelAspectRatio}};
+
+template <typename Value>
+Value by_name(const char* what, const std::vector<std::pair<const char*, Value>>& names,
+              const std::string& wanted) {
+  std::string known;
+  for (const auto& [name, value] : names) {
+    if (wanted == name) return value;
+    known += std::string(known.empty() ? "" : ", ") + name;
+  }
+  throw Error(std::string("the camera has no ") + what + " '" + wanted + "'; there are " + known);
+}
+
+template <typename Value>
+const char* name_of(const std::vector<std::pair<const char*, Value>>& names, Value wanted) {
+  return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == wanted; })
+      ->first;
+}
 
 nb::object to_python(const Vec3<float>& v) {
   return nb::make_tuple(v.x, v.y, v.z);
@@ -83,6 +113,15 @@ class Reader {
     } catch (const std::exception&) {
       fail(name, "4 x 4 numbers");
     }
+  }
+  void take(const char* name, std::string& to) {
+    const nb::object value = next(name);
+    if (value.is_valid() && !nb::try_cast(value, to)) fail(name, "a name");
+  }
+  /// Planes of four numbers.
+  void take(const char* name, std::vector<std::array<float, 4>>& to) {
+    const nb::object value = next(name);
+    if (value.is_valid() && !nb::try_cast(value, to)) fail(name, "4 numbers for each plane");
   }
   /// Some of (k, 4, 4), or none.
   void take(const char* name, std::vector<Affine>& to) {
@@ -246,7 +285,18 @@ nb::dict camera_dict(const Scene& scene) {
   d["to_world"] = matrix(c.to_world);
   d["window"] = nb::make_tuple(c.window[0], c.window[1], c.window[2], c.window[3]);
   put(d, c, kCameraNumbers);
+  d["projection"] = name_of(kProjections, c.projection);
+  d["conform"] = name_of(kConforms, c.conform);
+  d["clip_planes"] = c.clip_planes;
   return d;
+}
+
+Projection projection_of(const std::string& name) {
+  return by_name("projection", kProjections, name);
+}
+
+Conform conform_of(const std::string& name) {
+  return by_name("conform", kConforms, name);
 }
 
 SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dict& materials,
@@ -263,6 +313,13 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     reader.take("motion", changed.steps);
     reader.take("window", changed.window);
     reader.take(changed, kCameraNumbers);
+    std::string projection = name_of(kProjections, changed.projection);
+    std::string conform = name_of(kConforms, changed.conform);
+    reader.take("projection", projection);
+    reader.take("conform", conform);
+    changed.projection = projection_of(projection);
+    changed.conform = conform_of(conform);
+    reader.take("clip_planes", changed.clip_planes);
     reader.end();
     edit.camera = changed;
   }

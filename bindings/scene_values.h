@@ -4,6 +4,8 @@
 
 #include <nanobind/ndarray.h>
 
+#include <string>
+
 #include "wavecomb/scene/scene.h"
 
 /// USD's row-vector matrix at `m` as a column-vector map.
@@ -18,6 +20,10 @@ wavecomb::Affine affine(const T* m) {
 /// Likewise of a 4 x 4 array; throws Error for any other.
 wavecomb::Affine affine(
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& m);
+
+/// By their names in Python and USD; throw Error for others.
+wavecomb::Projection projection_of(const std::string& name);
+wavecomb::Conform conform_of(const std::string& name);
 
 const char* light_kind_name(wavecomb::LightKind kind);
 

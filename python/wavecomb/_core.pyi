@@ -4,7 +4,7 @@
 Arrays are NumPy arrays and are not copied where said so.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,8 +52,7 @@ class Scene:
         arrays: geometry and textures, too, of which every byte is read."""
     @property
     def camera(self) -> dict[str, Any]:
-        """As set_camera takes it: to_world (4, 4), window, lens_radius, focus_distance, near_clip,
-        far_clip."""
+        """As set_camera takes it, but for motion; its transform is to_world (4, 4)."""
     def material(self, material: int) -> dict[str, Any]:
         """name, program and parameters of a material as add_material takes them; its textures with
         their names as well. Raises Error for an id that is not there."""
@@ -266,10 +265,19 @@ class SceneBuilder:
         near_clip: float = 0,
         far_clip: float = 1e30,
         motion: NDArray[np.float64] | None = None,
+        projection: str = "perspective",
+        conform: str = "expandAperture",
+        pixel_aspect: float = 1,
+        clip_planes: Sequence[Sequence[float]] = (),
+        exposure: float = 1,
     ) -> None:
-        """Looks along -z. window: x0, x1, y0, y1 on the plane z = -1 (aperture / focal length). The
-        renderer widens it to the shape of the picture (UsdRender's expandAperture). motion:
-        (s, 4, 4), transforms at s equal steps over the shutter."""
+        """Looks along -z. window: x0, x1, y0, y1 on the plane z = -1 (aperture / focal length); of
+        an "orthographic" camera in scene units across its axis; of a "latlong" one longitude and
+        latitude in radians. The renderer fits it to the picture, whose pixels are pixel_aspect
+        times as wide as high, by conform: UsdRender's aspectRatioConformPolicy. motion: (s, 4, 4),
+        transforms at s equal steps over the shutter. clip_planes: (a, b, c, d) in the camera's
+        space; what it sees itself is cut off where a x + b y + c z + d < 0. exposure multiplies
+        light in the picture. Raises Error for names that are not known."""
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
 
@@ -529,11 +537,12 @@ def edge_pixels(
     centre: tuple[float, float],
     half: tuple[float, float],
     pixels_per_unit: float,
+    projection: str = "perspective",
 ) -> float:
     """Mean length in pixels of the edges of polygons, long ones counting by their length.
 
     The greatest over transforms (k, 4, 4) to the world. Edges out of the picture count an eighth.
-    to_camera (4, 4), row vectors; centre, half: of the window on the plane z = -1."""
+    to_camera (4, 4), row vectors; centre, half: of the camera's window."""
 
 def split_quads(
     points: NDArray[np.float32],

@@ -200,8 +200,13 @@ def load(
     isolate: bool = False,
     load_limit: float | None = None,
     shutter: tuple[float, float] | None = None,
-    motion_blur: bool = True,
+    motion_blur: bool | None = None,
     motion_steps: int | None = None,
+    depth_of_field: bool | None = None,
+    projection: str | None = None,
+    exposure: bool = True,
+    render_settings: str | None = None,
+    product: str | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -210,7 +215,8 @@ def load(
         camera: Path of a camera prim; by default the stage's render settings, or its first camera,
             or one that sees everything.
         frame: Time code; by default the stage's start.
-        purposes: Of the geometry, as in USD; by default "default" and "render".
+        purposes: Of the geometry, as in USD; by default as the stage's render settings say, else
+            "default" and "render".
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
         mask: Prims to draw with all below them, and what they need; by default all.
         session_layer: File with opinions that are stronger than the stage's.
@@ -225,8 +231,15 @@ def load(
         load_limit: With ``isolate``: seconds that USD may compose the stage, 0: any; None: 6, and 1
             for each MB of layers.
         shutter: When it opens and closes, time codes from the frame; by default the camera's.
-        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_blur: Whether what moves while the shutter is open is blurred; by default unless the
+            render settings disable it.
         motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
+        depth_of_field: Whether the camera's lens blurs; by default likewise.
+        projection: "perspective", "orthographic" or "latlong"; by default the camera's.
+        exposure: Whether the camera's exposure multiplies light in the picture.
+        render_settings: Path or name of a RenderSettings prim; by default those that the stage
+            names, else the only ones under /Render (docs/cameras.md).
+        product: Path or name of one of their products; by default the first.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -254,6 +267,11 @@ def load(
         "shutter": shutter,
         "motion_blur": motion_blur,
         "motion_steps": motion_steps,
+        "depth_of_field": depth_of_field,
+        "projection": projection,
+        "exposure": exposure,
+        "render_settings": render_settings,
+        "product": product,
     }
     if isolate:
         from wavecomb.isolate.probe import check

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +18,12 @@ from wavecomb.api import check_memory, picture_of, prepare
 from wavecomb.frame_names import parse_frames
 from wavecomb.stats import make_stats
 from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.camera import camera_motion, find_camera, read_camera
+from wavecomb.usd.camera import camera_motion, read_camera
 from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.opening import time_code
-from wavecomb.usd.shutter import Blur, find_motion
+from wavecomb.usd.shutter import find_motion
 from wavecomb.usd.stock import FrameStock
+from wavecomb.usd.view_options import ViewOptions
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -31,7 +32,17 @@ if TYPE_CHECKING:
     from wavecomb.api import Picture
     from wavecomb.usd import LoadedStage
 
-_CAMERA = {"lens_radius": 0.0, "focus_distance": 1.0, "near_clip": 0.0, "far_clip": 1e30}
+_CAMERA: dict[str, Any] = {
+    "lens_radius": 0.0,
+    "focus_distance": 1.0,
+    "near_clip": 0.0,
+    "far_clip": 1e30,
+    "projection": "perspective",
+    "conform": "expandAperture",
+    "pixel_aspect": 1.0,
+    "clip_planes": [],
+    "exposure": 1.0,
+}
 """What ``SceneBuilder.set_camera`` takes where a camera says nothing."""
 
 
@@ -58,9 +69,7 @@ class Frames:
         self._path = Path(path)
         self._threads = threads
         self._options = options
-        self._blur = Blur.chosen(
-            options.get("shutter"), options.get("motion_blur", True), options.get("motion_steps")
-        )
+        self._view(options).check()
         opening = LoadReport()
         started = time.perf_counter()
         layer = None if session_layer is None else Path(session_layer)
@@ -74,56 +83,66 @@ class Frames:
         self._loaded: LoadedStage | None = None
         self._is_built = False
 
-    def load(self, frame: float, **options: Any) -> LoadedStage:
-        """The stage at a frame; options: of ``load_stage`` that change no scene, such as progress.
+    @staticmethod
+    def _view(options: Mapping[str, Any]) -> ViewOptions:
+        names = {field.name for field in fields(ViewOptions)}
+        return ViewOptions(**{name: options[name] for name in names if name in options})
+
+    def load(self, frame: float | None, **options: Any) -> LoadedStage:
+        """The stage at a frame; None: its start, else default values.
+
+        Args:
+            frame: Time code.
+            **options: Of ``load_stage``, in place of those that were given at first.
 
         Raises:
             WavecombError: It cannot be rendered.
         """
         started = time.perf_counter()
-        loaded = self._seen_anew(frame)
+        options = {**self._options, **options}
+        when = time_code(self._stage, frame)
+        loaded = self._seen_anew(when, options)
         if loaded is None:
             # Let go of first: two hierarchies at a time would be twice the memory.
             self._renderer, self._loaded = None, None
             loaded = load_stage(
-                self._stage,
-                frame=frame,
-                threads=self._threads,
-                stock=self._stock,
-                **self._options,
-                **options,
+                self._stage, frame=frame, threads=self._threads, stock=self._stock, **options
             )
         seconds = time.perf_counter() - started + self._opening_s
         self._opening_s = 0.0
-        self._loaded = replace(loaded, seconds=seconds, stage_path=self._path, frame=frame)
+        self._loaded = replace(loaded, seconds=seconds, stage_path=self._path, frame=_number(when))
         return self._loaded
 
-    def _seen_anew(self, frame: float) -> LoadedStage | None:
+    def _seen_anew(self, when: Usd.TimeCode, options: Mapping[str, Any]) -> LoadedStage | None:
         """The scene that is there with its camera at a frame; None where more may be other."""
         before, renderer = self._loaded, self._renderer
-        if before is None or renderer is None or not self._stock.varying.is_view_only:
+        if before is None or renderer is None:
             return None
-        if before.camera_path is None:
-            return before if self._is_camera_missing() else None
-        prim = self._stage.GetPrimAtPath(before.camera_path)
-        when = time_code(self._stage, frame)
-        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(prim))
+        if not self._stock.varying.is_view_only and before.frame != _number(when):
+            return None
         told = LoadReport()
-        view = read_camera(prim, to_world, when, told)
-        motion = find_motion(prim, when, self._blur, told)
+        seen = self._view(options).on(self._stage, told)
+        if before.camera_path is None or seen.camera is None:
+            # The bounds are framed; not where a camera is no good.
+            is_same = before.camera_path is None and seen.camera is None
+            return before if is_same and before.render == seen.choice else None
+        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))
+        view = read_camera(seen.camera, to_world, when, told, seen.lens)
+        motion = find_motion(seen.camera, when, seen.blur, told)
+        shutter = None if motion is None else motion.shutter
         if view is None or not {*told.lines()} <= {*before.report.lines()}:
             return None
-        if not self._stock.has_same_levels(view):
+        if not self._stock.varying.is_view_only and shutter != before.shutter:
             return None
-        moves = camera_motion(prim, motion)
+        if not self._stock.has_same_levels(view, options.get("size")):
+            return None
+        moves = camera_motion(seen.camera, motion)
         lens = {**_CAMERA, **view.options, "motion": moves}
         renderer.edit(camera={"transform": view.transform, **lens})
-        shutter = None if motion is None else motion.shutter
-        return replace(before, scene=renderer.scene, shutter=shutter)
-
-    def _is_camera_missing(self) -> bool:
-        """Whether the bounds are framed for want of a camera, not because one is no good."""
-        return find_camera(self._stage, self._options.get("camera")) is None
+        path = str(seen.camera.GetPath())
+        return replace(
+            before, scene=renderer.scene, shutter=shutter, camera_path=path, render=seen.choice
+        )
 
     def render(
         self,
@@ -150,6 +169,11 @@ class Frames:
         return stats
 
 
+def _number(when: Usd.TimeCode) -> float | None:
+    """A time code; None: default values."""
+    return None if when.IsDefault() else float(when.GetValue())
+
+
 def render_frames(
     path: str | os.PathLike[str],
     frames: str | Iterable[float],
@@ -163,8 +187,13 @@ def render_frames(
     session_layer: str | os.PathLike[str] | None = None,
     subdivision: str | int = "auto",
     shutter: tuple[float, float] | None = None,
-    motion_blur: bool = True,
+    motion_blur: bool | None = None,
     motion_steps: int | None = None,
+    depth_of_field: bool | None = None,
+    projection: str | None = None,
+    exposure: bool = True,
+    render_settings: str | None = None,
+    product: str | None = None,
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -189,6 +218,11 @@ def render_frames(
         shutter: Likewise.
         motion_blur: Likewise.
         motion_steps: Likewise.
+        depth_of_field: Likewise.
+        projection: Likewise.
+        exposure: Likewise.
+        render_settings: Likewise.
+        product: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -218,6 +252,11 @@ def render_frames(
         shutter=shutter,
         motion_blur=motion_blur,
         motion_steps=motion_steps,
+        depth_of_field=depth_of_field,
+        projection=projection,
+        exposure=exposure,
+        render_settings=render_settings,
+        product=product,
         size=(chosen.width, chosen.height),
         **options,
     )

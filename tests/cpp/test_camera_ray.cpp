@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/integrate/camera_ray.h"
 
+#include <tuple>
+
 #include "lane_testing.h"
 #include "scene_testing.h"
 
@@ -126,14 +128,151 @@ TEST(CameraRay, NearAndFar) {
   EXPECT_FALSE(CameraSetup(Camera{}, 4, 4, table).has_far);
 }
 
+TEST(CameraRay, OrthographicAtCorners) {
+  Camera camera;
+  camera.projection = Projection::kOrthographic;
+  camera.window[0] = -4;  // off the axis
+  camera.window[1] = 6;
+  camera.window[2] = -2;
+  camera.window[3] = 3;
+  camera.near_clip = 1;
+  camera.far_clip = 11;
+  const float last = 0x1.fffffep-1f;
+  const CameraRay<float> first = ray_at(camera, 4, 2, 0, 0, {0, 0, 0, 0});
+  const CameraRay<float> end = ray_at(camera, 4, 2, 3, 1, {last, last, 0, 0});
+  for (const auto& [ray, x, y] : {std::tuple(first, -4.0, 3.0), std::tuple(end, 6.0, -2.0)}) {
+    EXPECT_NEAR(ray.o.x, x, 1e-5);
+    EXPECT_NEAR(ray.o.y, y, 1e-5);
+    EXPECT_NEAR(ray.o.z, -1, 1e-6);
+    EXPECT_EQ(ray.d.x, 0);
+    EXPECT_EQ(ray.d.y, 0);
+    EXPECT_EQ(ray.d.z, -1);
+    EXPECT_NEAR(ray.tfar, 10, 1e-5);
+    EXPECT_EQ(ray.spread, 0);  // as wide everywhere
+    EXPECT_NEAR(ray.width, 2.5 * kConeShare, 1e-6);
+  }
+  const FilterTable table(FilterKind::kBox, 1);
+  EXPECT_FALSE(CameraSetup(camera, 4, 2, table).is_pinhole());  // not from one point
+  EXPECT_TRUE(CameraSetup(Camera{}, 4, 2, table).is_pinhole());
+}
+
+TEST(CameraRay, CircleOfConfusion) {
+  // A thin lens of radius R in focus at f blurs a point of the film over a disk of radius
+  // R |z / f - 1| at distance z, with perspective and without.
+  for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
+    Camera camera;
+    camera.projection = projection;
+    camera.lens_radius = 0.25f;
+    camera.focus_distance = 5;
+    for (const double z : {2.0, 5.0, 9.0}) {
+      const bool parallel = projection == Projection::kOrthographic;
+      const double middle = 0.25 * (parallel ? 1 : z);  // pixel centre of the window's right half
+      double widest = 0;
+      for (const float v : {0.f, 0.25f, 0.5f, 0.75f}) {  // the lens' edge
+        const CameraRay<float> ray = ray_at(camera, 2, 1, 1, 0, {0.5f, 0.5f, 0.f, v});
+        const double t = -(z + ray.o.z) / ray.d.z;
+        const double x = ray.o.x + t * ray.d.x - 2 * middle, y = ray.o.y + t * ray.d.y;
+        widest = std::max(widest, std::hypot(x, y));
+      }
+      EXPECT_NEAR(widest, 0.25 * std::abs(z / 5 - 1), 2e-6) << z;
+    }
+  }
+}
+
+TEST(CameraRay, LatlongSeesAllDirections) {
+  Camera camera;
+  camera.projection = Projection::kLatlong;
+  camera.window[0] = -kPi;
+  camera.window[1] = kPi;
+  camera.window[2] = -0.5f * kPi;
+  camera.window[3] = 0.5f * kPi;
+  camera.near_clip = 2;
+  camera.far_clip = 5;
+  camera.lens_radius = 1;  // which it has no use for
+  const FilterTable table(FilterKind::kBox, 1);
+  const CameraSetup setup(camera, 8, 5, table);  // of any shape: it fills the picture
+  const auto at = [&](float x, float y) {
+    return ray_through<float>(setup, x, y, 0.3f, 0.6f, 0.f, true);
+  };
+  const auto expect = [](const CameraRay<float>& ray, double x, double y, double z) {
+    EXPECT_NEAR(ray.d.x, x, 1e-6);
+    EXPECT_NEAR(ray.d.y, y, 1e-6);
+    EXPECT_NEAR(ray.d.z, z, 1e-6);
+    EXPECT_NEAR(length(ray.o), 2, 1e-6);  // spheres, not planes
+    EXPECT_NEAR(ray.tfar, 3, 1e-5);
+  };
+  expect(at(4, 2.5f), 0, 0, -1);
+  expect(at(6, 2.5f), 1, 0, 0);
+  expect(at(2, 2.5f), -1, 0, 0);
+  expect(at(0, 2.5f), 0, 0, 1);
+  expect(at(8, 2.5f), 0, 0, 1);
+  expect(at(3, 0), 0, 1, 0);
+  expect(at(3, 5), 0, -1, 0);
+  const double lon = kPi / 4, lat = kPi / 5;
+  expect(at(5, 1.5f), std::sin(lon) * std::cos(lat), std::sin(lat), -std::cos(lon) * std::cos(lat));
+  EXPECT_NEAR(camera_depth<float>(setup, Vec3<float>{3, 0, 4}, 0.f, true), 5, 1e-6);
+}
+
+TEST(CameraRay, ClippingPlanesCutOff) {
+  Camera camera;
+  camera.near_clip = 1;
+  camera.far_clip = 100;
+  camera.clip_planes = {{0, 0, -1, -4}, {0, 0, 1, 20}, {1, 0, 0, 1}};  // z <= -4, z >= -20, x >= -1
+  const CameraRay<float> ray = ray_at(camera, 1, 1, 0, 0, kCentre);
+  EXPECT_NEAR(ray.o.z, -4, 1e-6);
+  EXPECT_NEAR(ray.tfar, 16, 1e-5);
+  const CameraRay<float> left = ray_at(camera, 2, 2, 0, 0, kCentre);  // x = z / 4 = -1 at z = -4
+  EXPECT_NEAR(left.o.z, -4, 1e-6);
+  EXPECT_NEAR(left.tfar, 0, 1e-5);
+  camera.clip_planes = {{0, 0, 1, -1}};  // nothing is before the camera
+  EXPECT_LE(ray_at(camera, 1, 1, 0, 0, kCentre).tfar, 0);
+  camera.clip_planes = {{0, 1, 0, -1}};  // along the ray, which is on the wrong side
+  EXPECT_LE(ray_at(camera, 1, 1, 0, 0, kCentre).tfar, 0);
+}
+
+TEST(CameraRay, ConformPolicies) {
+  // A window of 4 x 2 in a picture of 100 x 100 pixels: half_x, half_y.
+  const std::tuple<Conform, float, float> cases[] = {{Conform::kExpandAperture, 2.f, 2.f},
+                                                     {Conform::kCropAperture, 1.f, 1.f},
+                                                     {Conform::kAdjustApertureWidth, 1.f, 1.f},
+                                                     {Conform::kAdjustApertureHeight, 2.f, 2.f},
+                                                     {Conform::kAdjustPixelAspectRatio, 2.f, 1.f}};
+  for (const auto& [conform, half_x, half_y] : cases) {
+    Camera camera;
+    camera.window[0] = -1;
+    camera.window[1] = 3;
+    camera.window[2] = -1;
+    camera.window[3] = 1;
+    camera.conform = conform;
+    const FittedWindow fitted = fitted_window(camera, 100, 100);
+    EXPECT_EQ(fitted.centre_x, 1);
+    EXPECT_EQ(fitted.half_x, half_x);
+    EXPECT_EQ(fitted.half_y, half_y);
+  }
+  Camera camera;  // 1 x 1; pixels twice as wide as high make the picture 2 x 1
+  camera.pixel_aspect = 2;
+  EXPECT_EQ(fitted_window(camera, 50, 50).half_x, 1.f);
+  camera.conform = Conform::kCropAperture;
+  EXPECT_EQ(fitted_window(camera, 50, 50).half_y, 0.25f);
+}
+
+using Kind = std::tuple<Projection, FilterKind>;
+
 TEST(CameraRay, LanesAgree) {
   Camera camera = make_camera({1, 2, 3}, {0, 1, -4}, 0.7f);
   camera.lens_radius = 0.1f;
   camera.focus_distance = 3;
   camera.near_clip = 0.01f;
   camera.far_clip = 100;
-  for (const FilterKind kind :
-       {FilterKind::kBox, FilterKind::kGaussian, FilterKind::kBlackmanHarris}) {
+  for (const auto& [projection, kind] :
+       {Kind{Projection::kPerspective, FilterKind::kBox},
+        Kind{Projection::kPerspective, FilterKind::kGaussian},
+        Kind{Projection::kPerspective, FilterKind::kBlackmanHarris},
+        Kind{Projection::kOrthographic, FilterKind::kBox},
+        Kind{Projection::kLatlong, FilterKind::kBox}}) {
+    camera.projection = projection;
+    if (projection != Projection::kPerspective)
+      camera.clip_planes = {{0.1f, 0.2f, -1, -1}, {0.3f, 0, 1, 7}};
     const FilterTable table(kind, 3);
     const CameraSetup setup(camera, 640, 480, table);
     constexpr size_t kCount = 4096;
@@ -142,21 +281,21 @@ TEST(CameraRay, LanesAgree) {
     for (float& x : columns[0]) x = std::floor(x * 640);
     for (float& y : columns[1]) y = std::floor(y * 480);
     const auto run = [&]<typename F>() {
-      std::vector<float> out[8];
+      std::vector<float> out[9];
       for (auto& o : out) o.resize(kCount);
       for (size_t i = 0; i < kCount; i += kWidth<F>) {
         const auto at = [&](int c) { return load<F>(columns[c].data() + i); };
         const CameraRay<F> r =
             camera_ray<F>(setup, at(0), at(1), {at(2), at(3), at(4), at(5)}, Mask<F>(true));
-        const F values[8] = {r.o.x, r.o.y, r.o.z, r.d.x, r.d.y, r.d.z, r.spread, r.tfar};
-        for (int c = 0; c < 8; ++c) store(out[c].data() + i, values[c]);
+        const F values[9] = {r.o.x, r.o.y, r.o.z, r.d.x, r.d.y, r.d.z, r.width, r.spread, r.tfar};
+        for (int c = 0; c < 9; ++c) store(out[c].data() + i, values[c]);
       }
       return std::to_array(out);
     };
     const auto scalar = run.operator()<float>();
     for_each_packet([&]<typename F>() {
       const auto packet = run.template operator()<F>();
-      for (size_t c = 0; c < 8; ++c) lane_testing::expect_same(scalar[c], packet[c], "camera ray");
+      for (size_t c = 0; c < 9; ++c) lane_testing::expect_same(scalar[c], packet[c], "camera ray");
     });
   }
 }

@@ -165,6 +165,16 @@ TEST(EdgePixels, OfASquareBeforeTheCamera) {
   EXPECT_NEAR(seen, 2 * 100 / std::sqrt(10001.0), 1e-9);
   placed[14] = 100;
   EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen / 8, 1e-9);
+  // Without perspective as large at any distance; in all directions, behind the camera, too.
+  view.is_parallel = true;
+  view.half[0] = view.half[1] = 2;
+  placed[14] = -1000;
+  EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), 200, 1e-9);
+  view.is_parallel = false;
+  view.is_all_round = true;
+  placed[14] = 100;
+  EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen, 1e-9);
+  view.is_all_round = false;
   // All round the camera: finite.
   placed[14] = 0;
   EXPECT_LE(edge_pixels(square, sizes, corners, placed.data(), view), 200.0);

@@ -93,6 +93,10 @@ class Fake:
             cameras=("/Camera", "/Closeup"),
         )
 
+    def peek_products(self, stage: Any, *options: Any) -> tuple[list[Any], Any]:
+        nothing = dict.fromkeys(("settings", "product", "resolution", "aovs", "output"))
+        return [SimpleNamespace(**nothing, region=lambda width, height: None)], None
+
     def render(
         self,
         scene: Any,
@@ -172,6 +176,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     }.items():
         setattr(core, name, value)
     usd.load_stage = fake.load_stage  # type: ignore[attr-defined]
+    usd.peek_products = fake.peek_products  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "wavecomb._core", core)
     monkeypatch.setitem(sys.modules, "wavecomb.usd", usd)
     monkeypatch.setattr(wavecomb, "_core", core, raising=False)

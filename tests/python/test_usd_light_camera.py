@@ -182,11 +182,6 @@ def test_which_camera(tmp_path):
     assert load(tmp_path, settings)[1].camera_path == "/Second"
 
 
-def test_orthographic_is_listed(tmp_path):
-    _, loaded = load(tmp_path, 'def Camera "C" { token projection = "orthographic" }')
-    assert "orthographic" in said(loaded)
-
-
 def test_time(tmp_path):
     text = f"""#usda 1.0
     (startTimeCode = 1

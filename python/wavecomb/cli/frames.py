@@ -104,7 +104,7 @@ def render_sequence(
         job.reporter.begins(frame_text(frame), number, len(wanted))
         try:
             if stock is None:
-                stock = _open(job, source)
+                stock = open_frames(job, source)
             here = purpose_at(purpose, frame)
             picture, stopped, report = job.run(
                 FrameShot(stock, frame), replace(source, frame=frame), here
@@ -132,13 +132,12 @@ def render_sequence(
     return picture, files
 
 
-def _open(job: Job, source: StageOptions) -> Frames:
+def open_frames(job: Job, source: StageOptions) -> Frames:
+    """The stage of a job, to be read at several frames or through several cameras."""
     from wavecomb.api import import_usd
 
     import_usd()
     from wavecomb.sequence import Frames
 
     options = source.for_load((job.settings.width, job.settings.height))
-    if options["purposes"] is None:
-        del options["purposes"]
     return Frames(job.stage, threads=job.settings.threads, **options)

@@ -56,7 +56,9 @@ class Shot(Protocol):
 class Still:
     """A stage at one frame."""
 
-    def __init__(self, source: StageOptions, stage: str, settings: Any) -> None:
+    def __init__(self, source: StageOptions, stage: str, settings: Any, kept: Any = None) -> None:
+        """``kept``: held until the stage is loaded."""
+        self._kept = kept
         self._source = source
         self._stage = stage
         self._settings = settings
@@ -67,6 +69,7 @@ class Still:
         chosen = self._settings
         size = chosen.width, chosen.height
         self._loaded = self._source.load(self._stage, chosen.threads, size, progress)
+        self._kept = None
         return self._loaded
 
     def render(self, *arguments: Any, **named: Any) -> Any:
@@ -86,13 +89,15 @@ class Still:
 class FrameShot:
     """One frame of a stage that stays open."""
 
-    def __init__(self, frames: Frames, frame: float) -> None:
+    def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
+        """``options``: of ``Frames.load``."""
         self._frames = frames
         self._frame = frame
+        self._options = options
 
     def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
         """Reads what is other in this frame."""
-        return self._frames.load(self._frame, progress=progress)
+        return self._frames.load(self._frame, progress=progress, **self._options)
 
     def render(self, *arguments: Any, **named: Any) -> Any:
         """Renders it."""

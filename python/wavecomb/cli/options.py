@@ -12,6 +12,7 @@ import click
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
+    from wavecomb.usd.render_settings import RenderChoice
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -114,6 +115,33 @@ def stage_options(command: F) -> F:
             "[default: all]",
         ),
         click.option(
+            "--depth-of-field",
+            type=click.Choice(["on", "off"]),
+            help="What is out of focus is blurred, as the camera's fStop says.  "
+            "[default: unless the render settings disable it]",
+        ),
+        click.option(
+            "--camera-exposure",
+            type=click.Choice(["on", "off"]),
+            help="The camera's exposure multiplies light in the picture.  [default: on]",
+        ),
+        click.option(
+            "--camera-projection",
+            type=click.Choice(["perspective", "orthographic", "latlong"]),
+            help="latlong: all directions in one picture.  [default: the camera's]",
+        ),
+        click.option(
+            "--product",
+            metavar="PATH",
+            help="Render product, by path or name.  [default: of render all, else the first]",
+        ),
+        click.option(
+            "--render-settings",
+            metavar="PATH",
+            help="Render settings prim, by path or name.  "
+            "[default: the stage's, else the only ones under /Render]",
+        ),
+        click.option(
             "--motion-steps",
             type=click.IntRange(2, 64),
             metavar="N",
@@ -142,7 +170,8 @@ def stage_options(command: F) -> F:
             "purposes",
             multiple=True,
             type=click.Choice(["default", "render", "proxy", "guide"]),
-            help="Geometry to take, may be given again.  [default: default and render]",
+            help="Geometry to take, may be given again.  "
+            "[default: of the render settings, else default and render]",
         ),
         click.option(
             "--frame",
@@ -175,6 +204,11 @@ class StageOptions:
     shutter: tuple[float, float] | None = None
     no_motion_blur: bool = False
     motion_steps: int | None = None
+    depth_of_field: str | None = None
+    camera_exposure: str | None = None
+    camera_projection: str | None = None
+    product: str | None = None
+    render_settings: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -225,9 +259,26 @@ class StageOptions:
             "subdivision": "auto" if self.subdivision is None else self.subdivision,
             **({} if size is None else {"size": size}),
             "shutter": self.shutter,
-            "motion_blur": not self.no_motion_blur,
+            "motion_blur": False if self.no_motion_blur else None,
             "motion_steps": self.motion_steps,
+            "depth_of_field": None if self.depth_of_field is None else self.depth_of_field == "on",
+            "exposure": self.camera_exposure != "off",
+            "projection": self.camera_projection,
+            "product": self.product,
+            "render_settings": self.render_settings,
         }
+
+    def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:
+        """What the stage's render settings ask for, a choice for each product.
+
+        Also what is to be kept until the stage is loaded, so that its layers are read once.
+        """
+        from wavecomb.api import import_usd
+
+        import_usd()
+        from wavecomb.usd import peek_products
+
+        return peek_products(stage, self.render_settings, self.product, self.session_layer)
 
     def selections(self) -> dict[str, str]:
         """Variants as ``wavecomb.load`` takes them."""

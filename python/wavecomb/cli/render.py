@@ -10,15 +10,14 @@ import click
 
 from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions, aov_options
-from wavecomb.cli.frames import check_frames, frame_options, render_sequence
-from wavecomb.cli.job import Job, Names, Still, how_far, purpose_at
+from wavecomb.cli.frames import check_frames, frame_options, open_frames, render_sequence
+from wavecomb.cli.job import Job, Names, Shot, Still, how_far, purpose_at
 from wavecomb.cli.options import Real, StageOptions, examples, isolation_options, stage_options
+from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
 from wavecomb.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
-
-DEFAULT_SIZE = (600, 600)
 
 _INTEGERS = click.IntRange(min=0)
 
@@ -43,10 +42,9 @@ _INTEGERS = click.IntRange(min=0)
 @click.option(
     "-o",
     "--output",
-    required=True,
     type=click.Path(),
     metavar="FILE.exr",
-    help="Picture, all layers.",
+    help="Picture, all layers.  [default: the productName of each render product]",
 )
 @aov_options
 @click.option("--png", type=click.Path(), metavar="FILE", help="Picture for display, too.")
@@ -62,14 +60,15 @@ _INTEGERS = click.IntRange(min=0)
     nargs=2,
     type=int,
     metavar="W H",
-    help="Pixels.  [default: 600 600]",
+    help="Pixels.  [default: of the render settings, else 600 600]",
 )
 @click.option(
     "--region",
     nargs=4,
     type=int,
     metavar="X0 Y0 X1 Y1",
-    help="Pixels to render, the end excluded; others have no samples.  [default: all]",
+    help="Pixels to render, the end excluded; others have no samples.  "
+    "[default: the render settings' data window, else all]",
 )
 @click.option(
     "--spp",
@@ -157,7 +156,7 @@ _INTEGERS = click.IntRange(min=0)
 @click.option("--quiet", is_flag=True, help="Only warnings and errors.")
 def render_command(
     stage: str,
-    output: str,
+    output: str | None,
     png: str | None,
     stats_file: str | None,
     size: tuple[int, int] | None,
@@ -179,21 +178,27 @@ def render_command(
     SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
     all. docs/render.md and docs/aovs.md say more.
     """
-    from wavecomb.api import keeps_error, make_settings
+    from wavecomb.api import keeps_error
 
     source = StageOptions.take(options)
     purpose = PurposeOptions.take(options)
     layers = AovOptions.take(options)
     costs_file = costs if costs is not None and costs not in SOURCES else None
-    names = Names(output, png, stats_file)
-    numbers = check_frames(frames, skip_existing, source, names, purpose)
-    for frame in (None,) if numbers is None else numbers:
-        _check_outputs(
-            stage,
-            names if frame is None else names.at(frame),
-            purpose if frame is None else purpose_at(purpose, frame),
-            costs_file,
-        )
+
+    def checked(names: Names) -> tuple[float, ...] | None:
+        """The frames of a sequence; what can be known to fail fails here."""
+        numbers = check_frames(frames, skip_existing, source, names, purpose)
+        for frame in (None,) if numbers is None else numbers:
+            _check_outputs(
+                stage,
+                names if frame is None else names.at(frame),
+                purpose if frame is None else purpose_at(purpose, frame),
+                costs_file,
+            )
+        return numbers
+
+    if output is not None:
+        checked(Names(output, png, stats_file))
     if purpose.denoise:
         from wavecomb.denoise import check_denoiser
 
@@ -214,37 +219,49 @@ def render_command(
         chosen = {**resumed.settings, **chosen}
         source = source.completed(resumed.source)
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
-    aovs = layers.names if layers.aovs or resumed is None else resumed.aovs
-    size = chosen.pop("width", DEFAULT_SIZE[0]), chosen.pop("height", DEFAULT_SIZE[1])
-    guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
-    settings = make_settings(
-        size, chosen.pop("spp"), aovs=aov_names.with_guides(aovs, guides), **chosen
-    )
-    shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
-    further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
-    layers.check(output, (*aovs, *further))
-
+    before = None if resumed is None else resumed.aovs
+    choices, opened = source.peek(stage)
+    plans = plan_products(choices, output, png, stats_file, purpose, frames)
     reporter = make_reporter(purpose.progress, quiet)
-    job = Job(stage, settings, aovs, profile, layers, reporter, exposure, tone_map)
-    if numbers is not None:
-        last, _ = render_sequence(job, numbers, names, source, purpose, skip_existing)
-        if last is not None and costs_file is not None:
-            _save_costs(costs_file, last)
-        return
-    shot = Still(source, stage, settings)
-    picture, stopped, report = job.run(shot, source, purpose, resumed)
-    del shot  # the scene: nothing needs it while files are written
-    if stopped is not None and not picture.samples.any():
-        click.echo("stopped before the first sample; nothing was written", err=True)
-        raise click.exceptions.Exit(128 + stopped)
-    picture, files = job.write(picture, names, denoise=purpose.denoise)
-    if costs_file is not None:
-        _save_costs(costs_file, picture)
-        files.append(costs_file)
-    reporter.finished(picture, report, files)
-    if stopped is not None:
-        click.echo(f"stopped {how_far(picture)}; {output} holds what was done", err=True)
-        raise click.exceptions.Exit(128 + stopped)
+
+    def job_of(plan: Plan) -> Job:
+        aovs = plan.aovs(layers, before)
+        guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
+        settings = plan.settings(chosen, aov_names.with_guides(aovs, guides), resumed is not None)
+        shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
+        further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
+        layers.check(plan.names.output, (*aovs, *further))
+        return Job(stage, settings, aovs, profile, layers, reporter, exposure, tone_map)
+
+    # All is checked before the first is rendered.
+    jobs = [(plan, checked(plan.names), job_of(plan)) for plan in plans]
+    shared = open_frames(jobs[0][2], source) if len(jobs) > 1 and frames is None else None
+    for plan, numbers, job in jobs:
+        here = plan.source(source)
+        if numbers is not None:
+            opened = None
+            last, _ = render_sequence(job, numbers, plan.names, here, purpose, skip_existing)
+            if last is not None and costs_file is not None:
+                _save_costs(costs_file, last)
+            continue
+        shot: Shot = Still(here, stage, job.settings, opened)
+        if shared is not None:
+            shot = plan.shot(shared, source.frame, job.settings)
+        opened = None
+        picture, stopped, report = job.run(shot, here, purpose, resumed)
+        del shot  # the scene: nothing needs it while files are written
+        if stopped is not None and not picture.samples.any():
+            click.echo("stopped before the first sample; nothing was written", err=True)
+            raise click.exceptions.Exit(128 + stopped)
+        picture, files = job.write(picture, plan.names, denoise=purpose.denoise)
+        if costs_file is not None:
+            _save_costs(costs_file, picture)
+            files.append(costs_file)
+        reporter.finished(picture, report, files)
+        if stopped is not None:
+            done = f"{plan.names.output} holds what was done"
+            click.echo(f"stopped {how_far(picture)}; {done}", err=True)
+            raise click.exceptions.Exit(128 + stopped)
 
 
 def _save_costs(costs_file: str, picture: Any) -> None:

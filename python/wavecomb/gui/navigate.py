@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from wavecomb.gui.camera import UPS, Matrix, Pose, Vector
-from wavecomb.output import fitted_window
 
 STEEPEST = math.radians(89.9)
 """An orbit stops short of the poles, where the way up is lost."""
@@ -46,14 +45,21 @@ def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[flo
         upwards: Pixels that it moved up.
         size: Of the picture in the same pixels.
     """
-    x0, x1, y0, y1 = fitted_window(pose.window, *map(round, size))
+    x0, x1, y0, y1 = pose.fitted(*map(round, size))
+    if pose.projection == "orthographic":
+        depth = 1.0
     right = -across * depth * (x1 - x0) / size[0]
     up = -upwards * depth * (y1 - y0) / size[1]
     return _placed(pose, pose.to_world[:3, :3], pose.position + right * pose.right + up * pose.up)
 
 
 def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
-    """Moves towards a point: the distance is multiplied by ``factor``, above 0."""
+    """Moves towards a point: the distance is multiplied by ``factor``, above 0.
+
+    Nearer is no larger to an orthographic camera: its window is.
+    """
+    if pose.projection == "orthographic":
+        return replace(_scaled(pose, factor), path=None)
     return _placed(pose, pose.to_world[:3, :3], pivot + (pose.position - pivot) * factor)
 
 
@@ -97,18 +103,33 @@ def _framed(pose: Pose, axes: Matrix, bounds: Matrix, aspect: float) -> Pose:
         [[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i, j, k in np.ndindex(2, 2, 2)]
     )
     local = (corners - centre) @ axes.T
-    x0, x1, y0, y1 = fitted_window(pose.window, round(1000 * aspect), 1000)
+    if pose.projection == "latlong":  # all is in the picture: from the middle
+        return _placed(pose, axes, centre)
+    x0, x1, y0, y1 = pose.fitted(round(1000 * aspect), 1000)
     half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
     reach = np.maximum(np.abs(local[:, 0]) / half[0], np.abs(local[:, 1]) / half[1])
-    distance = MARGIN * float((reach + local[:, 2]).max())
-    if distance <= 0.0:
-        distance = 1.0
+    size = float(np.linalg.norm(bounds[1] - bounds[0]))
+    if pose.projection == "orthographic":
+        scale = MARGIN * float(reach.max()) or 1.0
+        pose = _scaled(pose, scale)
+        x0, x1, y0, y1 = (scale * edge for edge in (x0, x1, y0, y1))
+        distance, depth = size or 1.0, 1.0
+    else:
+        distance = MARGIN * float((reach + local[:, 2]).max())
+        if distance <= 0.0:
+            distance = 1.0
+        depth = distance
     # A window that is off the axis looks past the centre.
-    shift = -0.5 * (x0 + x1) * distance * axes[0] - 0.5 * (y0 + y1) * distance * axes[1]
+    shift = -0.5 * (x0 + x1) * depth * axes[0] - 0.5 * (y0 + y1) * depth * axes[1]
     framed = _placed(pose, axes, centre + distance * axes[2] + shift)
     near = min(framed.near_clip, 1e-3 * distance)
-    size = float(np.linalg.norm(bounds[1] - bounds[0]))
     return replace(framed, near_clip=near, far_clip=max(framed.far_clip, distance + 2.0 * size))
+
+
+def _scaled(pose: Pose, factor: float) -> Pose:
+    """With a window ``factor`` times as large about its own (0, 0)."""
+    x0, x1, y0, y1 = (factor * edge for edge in pose.window)
+    return replace(pose, window=(x0, x1, y0, y1))
 
 
 def rotation(axis: Vector, angle: float) -> Matrix:

@@ -8,7 +8,16 @@ them; ``mesh``, ``shapes``, ``light``, ``camera`` and ``instancing`` read one ki
 
 from wavecomb.errors import WavecombError
 from wavecomb.usd.opening import open_stage
+from wavecomb.usd.peek import peek_products
 from wavecomb.usd.report import Finding, LoadReport
 from wavecomb.usd.stage import LoadedStage, load_stage
 
-__all__ = ["Finding", "LoadReport", "LoadedStage", "WavecombError", "load_stage", "open_stage"]
+__all__ = [
+    "Finding",
+    "LoadReport",
+    "LoadedStage",
+    "WavecombError",
+    "load_stage",
+    "open_stage",
+    "peek_products",
+]

@@ -188,7 +188,7 @@ class GroupBuilder:
         prims += [subset for draw in found.draws for subset in draw.subsets]
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        materials = iter(bound_materials(prims))
+        materials = iter(bound_materials(prims, self.traversal.binding_purposes))
         for draw in found.draws:
             draw.material = next(materials)
         for placed in found.instances:
@@ -392,7 +392,8 @@ class GroupBuilder:
             for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
             if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.Subset)
         ]
-        return tuple(str(m.GetPath()) if m else "" for m in bound_materials(prims))
+        bound = bound_materials(prims, self.traversal.binding_purposes)
+        return tuple(str(m.GetPath()) if m else "" for m in bound)
 
     def _instance_material(self, placed: Placed, scope: Scope) -> int:
         """The id for the meshes of an instance that have none of their own."""

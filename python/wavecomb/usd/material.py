@@ -28,6 +28,9 @@ DEFAULT_COLOUR = (0.5, 0.5, 0.5)
 """Of what has neither a material nor a display colour."""
 
 
+BINDING_PURPOSES = ("full", "preview")
+"""Purposes of bindings where render settings name none; each has all purposes after it."""
+
 PREVIEW = "preview"
 """``surface_source`` of UsdPreviewSurface."""
 
@@ -35,17 +38,23 @@ LAMP = 1.0
 """Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
 
 
-def bound_materials(prims: Sequence[Usd.Prim]) -> list[UsdShade.Material | None]:
-    """The material of each prim (full, else all purposes, else preview), in bulk."""
+def bound_materials(
+    prims: Sequence[Usd.Prim], purposes: Sequence[str] = BINDING_PURPOSES
+) -> list[UsdShade.Material | None]:
+    """The material of each prim, in bulk.
+
+    For each of ``purposes`` in turn a binding of that purpose, else one of all purposes.
+    """
     if not prims:
         return []
     compute = UsdShade.MaterialBindingAPI.ComputeBoundMaterials
-    found = list(compute(prims, UsdShade.Tokens.full)[0])
-    bare = [i for i, material in enumerate(found) if not material]
-    if bare:
-        preview = compute([prims[i] for i in bare], UsdShade.Tokens.preview)[0]
-        for i, material in zip(bare, preview, strict=True):
-            found[i] = material
+    found = list(compute(prims, purposes[0])[0])
+    for purpose in purposes[1:]:
+        bare = [i for i, material in enumerate(found) if not material]
+        if bare:
+            others = compute([prims[i] for i in bare], purpose)[0]
+            for i, material in zip(bare, others, strict=True):
+                found[i] = material
     return [material if material else None for material in found]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import patience, trail
@@ -52,6 +52,79 @@ def survey(stage: Usd.Stage) -> Survey:
         if found is not None:
             found.append(str(prim.GetPath()))
     return Survey(tuple(cameras), tuple(lights))
+
+
+_RENDER_RELATIONS = ("products", "orderedVars", "camera")
+
+
+def open_render_settings(
+    file: Path, wanted: str | None = None, session_layer: Path | None = None
+) -> Usd.Stage:
+    """The stage of a file with nothing but its render settings and the cameras they name.
+
+    Who holds it while the stage is opened whole saves reading the layers again.
+
+    Args:
+        file: .usd, .usda, .usdc or .usdz.
+        wanted: Path of settings that are not under /Render.
+        session_layer: As ``open_stage`` takes it.
+
+    Raises:
+        WavecombError: A file is none, or cannot be read.
+    """
+    _check_file(file)
+    if session_layer is not None:
+        _check_file(session_layer)
+    trail.note("opening", file)
+    try:
+        session = Sdf.Layer.CreateAnonymous("session.usda")
+        if session_layer is not None:
+            session.subLayerPaths.append(_session(session_layer).identifier)
+        with patience.watched(file):
+            root = Sdf.Layer.FindOrOpen(str(file))
+            if not root:
+                raise WavecombError(f"{file}: cannot be read as USD")
+            paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
+            kept = {path for path in map(_prim_path, paths) if path is not None}
+            mask = Usd.StagePopulationMask(sorted(kept))
+            stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
+            # Settings name products, these name vars, and both name cameras. (ExpandPopulationMask
+            # with predicates of Python's can wait for itself.)
+            for _ in range(2):
+                named = {path for path in _named_by(stage) if not mask.Includes(path)}
+                if not named:
+                    break
+                for path in named:
+                    mask.Add(path)
+                stage.SetPopulationMask(mask)
+    except Tf.ErrorException as error:
+        raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
+    return stage
+
+
+def _named_by(stage: Usd.Stage) -> set[Sdf.Path]:
+    """Prims that render settings and products point to."""
+    return {
+        target.GetPrimPath()
+        for prim in stage.Traverse()
+        if prim.IsA(UsdRender.SettingsBase)
+        for name in _RENDER_RELATIONS
+        if prim.HasRelationship(name)
+        for target in prim.GetRelationship(name).GetForwardedTargets()
+    }
+
+
+def _settings_path(layer: Sdf.Layer) -> str:
+    value = layer.pseudoRoot.GetInfo("renderSettingsPrimPath")
+    return value if isinstance(value, str) else ""
+
+
+def _prim_path(text: str) -> Sdf.Path | None:
+    """The path of a prim in the world; None for any other text."""
+    if not text.startswith("/") or not Sdf.Path.IsValidPathString(text):
+        return None
+    path = Sdf.Path(text)
+    return path if path.IsPrimPath() else None
 
 
 def open_stage(

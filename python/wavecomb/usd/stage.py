@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,24 +15,25 @@ from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import trail
-from wavecomb.usd.camera import camera_motion, find_camera, frame_bounds, read_camera
+from wavecomb.usd.camera import camera_motion, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
+from wavecomb.usd.render_settings import RenderChoice
 from wavecomb.usd.report import LoadReport
-from wavecomb.usd.shutter import Blur, find_motion
+from wavecomb.usd.shutter import find_motion
 from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
+from wavecomb.usd.view_options import Seen, ViewOptions
 
 if TYPE_CHECKING:
     from wavecomb import _core
 
-PURPOSES = ("default", "render", "proxy", "guide")
 SurfacesOf = Callable[[MaterialTable], Surfaces]
 
 MAX_LIGHTS = 4096
@@ -57,6 +58,7 @@ class LoadedStage:
             both are named by the first instance.
         frame: Time code that was read; None: default values.
         shutter: When it opens and closes, time codes from the frame; None: no motion blur.
+        render: What the stage's render settings ask for.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
     """
 
@@ -72,6 +74,7 @@ class LoadedStage:
     frame: float | None = None
     textures: TextureStock | None = None
     shutter: tuple[float, float] | None = None
+    render: RenderChoice = field(default_factory=RenderChoice)
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,7 @@ class _Filled:
     lights: tuple[str, ...]
     frame: float | None
     shutter: tuple[float, float] | None
+    render: RenderChoice
 
 
 @dataclass(frozen=True)
@@ -92,10 +96,8 @@ class _Choice:
 
     opened: Callable[[], Usd.Stage]
     frame: float | None
-    camera: str | None
-    purposes: Sequence[str]
+    view: ViewOptions
     editable: bool
-    blur: Blur
 
 
 def load_stage(
@@ -103,7 +105,7 @@ def load_stage(
     *,
     frame: float | None = None,
     camera: str | None = None,
-    purposes: Sequence[str] = ("default", "render"),
+    purposes: Sequence[str] | None = None,
     variants: Mapping[str, str] | None = None,
     mask: Sequence[str] = (),
     session_layer: str | Path | None = None,
@@ -115,8 +117,13 @@ def load_stage(
     stock: FrameStock | None = None,
     progress: LoadProgress | None = None,
     shutter: tuple[float, float] | None = None,
-    motion_blur: bool = True,
+    motion_blur: bool | None = None,
     motion_steps: int | None = None,
+    depth_of_field: bool | None = None,
+    projection: str | None = None,
+    exposure: bool = True,
+    render_settings: str | None = None,
+    product: str | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -127,7 +134,8 @@ def load_stage(
         frame: Time code; None: the stage's start, else default values.
         camera: Prim path or unique name of a camera; None: the render settings', the stage's first,
             or a view that frames all.
-        purposes: Of the geometry to draw: default, render, proxy, guide.
+        purposes: Of the geometry to draw: default, render, proxy, guide; None: as the render
+            settings say, else default and render.
         variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
             prim's.
         mask: Prims to draw, with all below them; with what they need, all lights and cameras. None:
@@ -144,17 +152,22 @@ def load_stage(
             shared. Changes nothing else.
         progress: Is told how many of the prims found so far are read.
         shutter: When it opens and closes, time codes from the frame; None: as the camera says.
-        motion_blur: Whether what moves while the shutter is open is blurred.
+        motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
+            render settings disable it.
         motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
+        depth_of_field: Whether the camera's lens blurs; None: unless the render settings disable
+            it.
+        projection: perspective, orthographic or latlong; None: the camera's.
+        exposure: Whether the camera's exposure multiplies light in the picture.
+        render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
+            else the only ones under /Render.
+        product: Path or name of one of their products; None: the first.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
         WavecombError: The file or an option is no good.
     """
     started = clock.perf_counter()
-    unknown = [name for name in purposes if name not in PURPOSES]
-    if unknown:
-        raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
@@ -162,7 +175,11 @@ def load_stage(
     level = parse_level(subdivision)
     if not (len(size) == 2 and min(size) >= 1):
         raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
-    blur = Blur.chosen(shutter, motion_blur, motion_steps)
+    view = ViewOptions(
+        camera, purposes, shutter, motion_blur, motion_steps, depth_of_field, projection, exposure,
+        render_settings, product,
+    )  # fmt: skip
+    view.check()
     report = LoadReport()
     file = _file_of(source)
     if stock is not None:
@@ -178,7 +195,7 @@ def load_stage(
             )
 
         try:
-            choice = _Choice(opened, frame, camera, purposes, editable, blur)
+            choice = _Choice(opened, frame, view, editable)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -210,6 +227,7 @@ def load_stage(
         filled.frame,
         textures.stock(scene) if editable else None,
         filled.shutter,
+        filled.render,
     )
 
 
@@ -255,10 +273,11 @@ def _fill(
     time = time_code(stage, choice.frame)
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
+    seen = choice.view.on(stage, report)
     chosen, lights, shutter = _read(
         stage,
         time,
-        choice,
+        seen,
         builder,
         textures,
         materials,
@@ -269,7 +288,7 @@ def _fill(
         progress,
     )
     used = None if time.IsDefault() else float(time.GetValue())
-    return _Filled(chosen, found, materials.paths(), lights, used, shutter)
+    return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice)
 
 
 def _native_builder(threads: int) -> _core.SceneBuilder:
@@ -287,7 +306,7 @@ def _give_back_memory() -> None:
 def _read(
     stage: Usd.Stage,
     time: Usd.TimeCode,
-    choice: _Choice,
+    seen: Seen,
     builder: _core.SceneBuilder,
     textures: TextureTable,
     materials: MaterialTable,
@@ -299,11 +318,11 @@ def _read(
 ) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None]:
     """Fills the builder; gives the paths of the camera and of the lights, and the shutter."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
-    view_prim = find_camera(stage, choice.camera)
+    view_prim = seen.camera
     groups = LightGroups(report)
     lights = LightReader(time, up_axis, textures, groups, report)
-    motion = find_motion(view_prim, time, choice.blur, report)
-    traversal = Traversal(time, choice.purposes, lights, report, motion)
+    motion = find_motion(view_prim, time, seen.blur, report)
+    traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
     world = GroupBuilder(
@@ -316,11 +335,11 @@ def _read(
     view = None
     if view_prim is not None:
         to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
-        view = read_camera(view_prim, to_world, time, report)
+        view = read_camera(view_prim, to_world, time, report, seen.lens)
     chosen = None if view is None or view_prim is None else str(view_prim.GetPath())
     if view is None:
         report.note("no camera: framed the bounds")
-        view = frame_bounds(world.bounds, up_axis)
+        view = frame_bounds(world.bounds, up_axis, seen.lens)
     elif view_prim is not None:
         moves = camera_motion(view_prim, motion)
         if moves is not None:

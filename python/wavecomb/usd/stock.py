@@ -95,7 +95,8 @@ class RefinedStock:
 class FrameStock:
     """For ``load_stage``: what it may take from the frame before, and leaves for the next one.
 
-    ``has_same_levels`` says of another view whether subdivision surfaces would be refined as much.
+    ``has_same_levels`` says of another view, and the size of its picture (None: as it was), whether
+    subdivision surfaces would be refined as much.
 
     Contract: for one open stage, which does not change but in time.
     """
@@ -105,7 +106,9 @@ class FrameStock:
         self.varying = Varying(stage)
         self.meshes = MeshStock(self.varying)
         self.refined = RefinedStock()
-        self.has_same_levels: Callable[[View], bool] = lambda view: True
+        self.has_same_levels: Callable[[View, tuple[int, int] | None], bool] = lambda view, size: (
+            True
+        )
         self.textures: TextureStock | None = None
         self.opening = opening
 

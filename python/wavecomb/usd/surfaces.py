@@ -213,15 +213,21 @@ class Surfaces:
         if self.stock is None:
             self._all = []
 
-    def has_same_levels(self, world: Group, view: View) -> bool:
-        """Whether another view asks for the levels that ``finish`` chose, which had a stock."""
+    def has_same_levels(
+        self, world: Group, view: View, size: tuple[int, int] | None = None
+    ) -> bool:
+        """Whether another view asks for the levels that ``finish`` chose, which had a stock.
+
+        ``size``: of its picture; None: as it was.
+        """
+        size_before, self.size = self.size, self.size if size is None else size
         before = [surface.level for surface in self._all]
         report, self.report = self.report, LoadReport()
         try:
             self._choose(world, view)
             return before == [surface.level for surface in self._all]
         finally:
-            self.report = report
+            self.report, self.size = report, size_before
             for surface, level in zip(self._all, before, strict=True):
                 surface.level = level
 

@@ -15,6 +15,7 @@ from wavecomb.usd.assign import Draw
 from wavecomb.usd.instancing import sound
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import Light, LightReader
+from wavecomb.usd.material import BINDING_PURPOSES
 from wavecomb.usd.mesh import IDENTITY
 from wavecomb.usd.network import word
 from wavecomb.usd.primvar import authored_names
@@ -65,9 +66,11 @@ class Traversal:
         lights: LightReader,
         report: LoadReport,
         motion: Motion | None = None,
+        binding_purposes: Sequence[str] = BINDING_PURPOSES,
     ) -> None:
         """``motion``: what is followed while the shutter is open; None: it is not."""
         self.time = time
+        self.binding_purposes = tuple(binding_purposes)
         self.purposes = frozenset(purposes)
         self.lights = lights
         self.report = report

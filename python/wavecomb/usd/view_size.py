@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb.output import camera_window, pixel_aspect
 from wavecomb.usd.cage import Cage
 from wavecomb.usd.camera import View
 
@@ -29,17 +30,14 @@ class ViewSize:
 
     def __init__(self, view: View, size: tuple[int, int]) -> None:
         """``size``: of the picture, width and height."""
-        x0, x1, y0, y1 = (float(value) for value in view.options["window"])
-        half = [0.5 * (x1 - x0), 0.5 * (y1 - y0)]
-        # As the camera does: the window grows to the shape of the picture.
-        aspect = size[0] / size[1]
-        if half[0] / half[1] < aspect:
-            half[0] = half[1] * aspect
-        else:
-            half[1] = half[0] / aspect
+        x0, x1, y0, y1 = camera_window(view.options, *size)
+        half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
         self.centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-        self.half = half[0], half[1]
-        self.pixels = size[0] / (2.0 * half[0])
+        self.half = half
+        # The longer way where pixels are not square: more is refined, not less.
+        shape = pixel_aspect(view.options, *size)
+        self.pixels = size[0] / (2.0 * half[0]) * (shape if shape > 1.0 + 1e-5 else 1.0)
+        self.projection = str(view.options.get("projection", "perspective"))
         self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
 
     def edges(self, cage: Cage, bounds: NDArray[Any], placed: Matrices) -> float:
@@ -58,6 +56,7 @@ class ViewSize:
         return _core.edge_pixels(
             cage.points, cage.counts, cage.indices, np.ascontiguousarray(transforms),
             np.ascontiguousarray(self.to_camera), self.centre, self.half, self.pixels,
+            self.projection,
         )  # fmt: skip
 
     def _largest(self, bounds: NDArray[Any], placed: Matrices) -> NDArray[np.intp]:
@@ -71,6 +70,11 @@ class ViewSize:
         reach = radius * scale
         distance = np.maximum(np.linalg.norm(seen, axis=1) - reach, 0.01 * reach + 1e-30)
         depth = np.maximum(-seen[:, 2] + reach, 0.0)
+        if self.projection == "latlong":
+            return np.argsort(-scale / distance, kind="stable")[:NEAREST]
+        if self.projection == "orthographic":
+            distance = np.ones_like(distance)
+            depth = (depth > 0).astype(np.float64)
         aside = [
             np.abs(seen[:, axis] - self.centre[axis] * depth) - reach <= self.half[axis] * depth
             for axis in (0, 1)

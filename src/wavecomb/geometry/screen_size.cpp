@@ -22,8 +22,10 @@ Point transformed(const double* m, const Point& p) {
 }
 
 bool is_inside(const Point& p, const ScreenView& view) {
+  if (view.is_all_round) return true;
   if (!(p.z < 0)) return false;
-  const double x = p.x / -p.z - view.centre[0], y = p.y / -p.z - view.centre[1];
+  const double w = view.is_parallel ? 1 : -p.z;
+  const double x = p.x / w - view.centre[0], y = p.y / w - view.centre[1];
   return std::abs(x) <= kMargin * view.half[0] && std::abs(y) <= kMargin * view.half[1];
 }
 
@@ -57,7 +59,7 @@ double edge_pixels(std::span<const float> points, std::span<const int32_t> face_
       const Point along = b - a, middle = (a + b) * 0.5;
       const double length = length_of(along);
       // No nearer than half the edge: what passes the camera is not infinitely large.
-      const double distance = std::max(length_of(middle), 0.5 * length);
+      const double distance = view.is_parallel ? 1 : std::max(length_of(middle), 0.5 * length);
       if (!(distance > 0)) continue;
       const double pixels = view.pixels * length / distance;
       if (is_inside(a, view) || is_inside(b, view) || is_inside(middle, view))

@@ -12,8 +12,10 @@ namespace wavecomb {
 struct ScreenView {
   /// From the world to the camera's space, row vectors; the camera looks along -z.
   std::array<double, 16> to_camera;
-  double centre[2], half[2];  ///< of the window on the plane z = -1, as wide as the picture
-  double pixels;              ///< for each unit on that plane
+  /// What is far is as large as what is near, or all directions are in the picture.
+  bool is_parallel = false, is_all_round = false;
+  double centre[2], half[2];  ///< of the camera's window, as wide as the picture
+  double pixels;              ///< for each unit of the window
 };
 
 /// Length in pixels of the edges of polygons in one placement: the mean of those in the picture,

@@ -2,8 +2,10 @@
 /// Camera rays, and the pixel filter by importance sampling.
 #pragma once
 
+#include <array>
 #include <vector>
 
+#include "wavecomb/core/math.h"
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/film/filter.h"
@@ -18,18 +20,25 @@ inline constexpr float kConeShare = 0.25f;
 
 /// A camera with its window fitted to a picture of width x height pixels.
 struct CameraSetup {
+  Projection projection;
   Affine to_world;
   std::vector<MatrixStep> steps;  ///< over the shutter, where it moves
   Vec3<float> backward;           ///< unit vector along the camera's z axis
-  float x0, y1;                   ///< window's upper left corner on the plane z = -1
+  float x0, y1;                   ///< the window's upper left corner
   float step_x, step_y;           ///< window size of a pixel
   float lens_radius, focus_distance, near_clip, far_clip;
+  std::vector<std::array<float, 4>> clip_planes;
+  float exposure;
   const float* filter;  ///< FilterTable::offsets()
-  bool has_far;         ///< the far plane cuts something off
+  bool has_far;         ///< something is cut off far away
 
-  /// Widens the window to the picture's shape (UsdRender's expandAperture).
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table);
   bool moves() const { return !steps.empty(); }
+  /// Whether all rays are narrow about one direction and meet in one point.
+  bool is_pinhole() const {
+    return projection == Projection::kPerspective && lens_radius == 0 && clip_planes.empty() &&
+           !moves();
+  }
 };
 
 /// Where the camera is at a time of the shutter.
@@ -44,10 +53,13 @@ inline MatrixLanes<F> camera_place(const CameraSetup& camera, const F& time,
       .matrix();
 }
 
-/// Distance of a point along the camera's axis, at a time of the shutter.
+/// Distance of a point along the camera's axis, at a time of the shutter; from a latlong camera,
+/// which has no axis, the distance itself.
 template <typename F>
 inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                       const Mask<F>& active) {
+  if (camera.projection == Projection::kLatlong)
+    return length(Vec3<F>(p - camera_place<F>(camera, time, active).t));
   if (!camera.moves())
     return -dot(Vec3<F>(p - Vec3<F>(camera.to_world.t)), Vec3<F>(camera.backward));
   const MatrixLanes<F> m = camera_place<F>(camera, time, active);
@@ -57,8 +69,8 @@ inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time
 template <typename F>
 struct CameraRay {
   Vec3<F> o, d;
-  F spread;  ///< angle of the ray cone
-  F tfar;    ///< distance to the far plane
+  F width, spread;  ///< of the ray cone: at the origin, and its angle
+  F tfar;           ///< distance to the far plane
 };
 
 /// Inverse CDF of the pixel filter at u, in pixels from the pixel's centre.
@@ -79,30 +91,79 @@ inline F centre_distance2(const CameraSetup& camera, const Sample4<F>& r, const 
   return fma(dx, dx, F(dy * dy));
 }
 
+namespace detail {
+
+/// A ray in the camera's space: points o + s d, from s = near to far.
+template <typename F>
+struct LocalRay {
+  Vec3<F> o, d;
+};
+
+/// The ray through (x, y) of the window, from (u, v) of the lens; d.z = -1, or the length of d is 1
+/// for a latlong camera.
+template <typename F>
+inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, const F& u,
+                             const F& v) {
+  if (camera.projection == Projection::kLatlong) {
+    const SinCos<F> lon = sincos_2pi<F>(F(x * kInv2Pi)), lat = sincos_2pi<F>(F(y * kInv2Pi));
+    return {Vec3<F>(F(0.f)), {lon.sin * lat.cos, lat.sin, F(-lon.cos) * lat.cos}};
+  }
+  const bool is_parallel = camera.projection == Projection::kOrthographic;
+  Vec3<F> o(F(0.f)), d{x, y, F(-1.f)};
+  if (is_parallel) {
+    o = {x, y, F(0.f)};
+    d = {F(0.f), F(0.f), F(-1.f)};
+  }
+  if (camera.lens_radius > 0) {
+    const Vec2<F> lens = square_to_disk(u, v);
+    const Vec3<F> p{lens.x * camera.lens_radius, lens.y * camera.lens_radius, F(0.f)};
+    // Through the point in focus: d * focus_distance, seen from the lens, scaled back to z = -1.
+    d = {fma(p.x, F(-1.f / camera.focus_distance), d.x),
+         fma(p.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
+    o = is_parallel ? Vec3<F>{o.x + p.x, o.y + p.y, F(0.f)} : p;
+  }
+  return {o, d};
+}
+
+/// The part of a ray, from `near` to `far`, that no clipping plane cuts off; far = near where
+/// nothing is left.
+template <typename F>
+inline void clip(const CameraSetup& camera, const LocalRay<F>& ray, F& near, F& far) {
+  for (const auto& [a, b, c, d] : camera.clip_planes) {
+    const Vec3<F> normal{F(a), F(b), F(c)};
+    const F at = dot(normal, ray.o) + d, slope = dot(normal, ray.d), crossing = -at / slope;
+    near = select(slope > 0.f, max(near, crossing), near);
+    far = select(slope < 0.f, min(far, crossing), far);
+    far = select(Mask<F>(slope == 0.f) & Mask<F>(at < 0.f), near, far);
+  }
+  far = max(near, far);
+}
+
+}  // namespace detail
+
 /// The ray through a point of the picture, in pixels, y down from the top; `u`, `v` choose a point
 /// of the lens. `time`: of the shutter.
 template <typename F>
 inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F& fy, const F& u,
                                 const F& v, const F& time, const Mask<F>& active) {
-  Vec3<F> d{fma(fx, F(camera.step_x), F(camera.x0)), fma(fy, F(-camera.step_y), F(camera.y1)),
-            F(-1.f)};
-  Vec3<F> o(F(0.f));
-  if (camera.lens_radius > 0) {
-    const Vec2<F> lens = square_to_disk(u, v);
-    o = {lens.x * camera.lens_radius, lens.y * camera.lens_radius, F(0.f)};
-    // Through the point in focus: d * focus_distance, seen from the lens, scaled back to z = -1.
-    d = {fma(o.x, F(-1.f / camera.focus_distance), d.x),
-         fma(o.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
-  }
-  o = fma(d, F(camera.near_clip), o);
+  const detail::LocalRay<F> local =
+      detail::local_ray<F>(camera, fma(fx, F(camera.step_x), F(camera.x0)),
+                           fma(fy, F(-camera.step_y), F(camera.y1)), u, v);
+  const Vec3<F>& d = local.d;
+  F near(camera.near_clip), far(camera.far_clip);
+  if (!camera.clip_planes.empty()) detail::clip<F>(camera, local, near, far);
+  const Vec3<F> o = fma(d, near, local.o);
   const MatrixLanes<F> m = camera_place<F>(camera, time, active);
   const Vec3<F> world{dot(m.row[0], d), dot(m.row[1], d), dot(m.row[2], d)};
   const F len = length(world);
+  const bool is_parallel = camera.projection == Projection::kOrthographic;
+  const float cone = kConeShare * camera.step_y;
   CameraRay<F> ray;
   ray.o = {dot(m.row[0], o) + m.t.x, dot(m.row[1], o) + m.t.y, dot(m.row[2], o) + m.t.z};
   ray.d = world * F(1.f / len);
-  ray.spread = F(kConeShare * camera.step_y);
-  ray.tfar = len * (camera.far_clip - camera.near_clip);
+  ray.width = F(is_parallel ? cone : 0.f);
+  ray.spread = F(is_parallel ? 0.f : cone);
+  ray.tfar = len * (far - near);
   return ray;
 }
 

@@ -38,6 +38,18 @@ class PathTracer {
   /// Radiance of the last path by light group, rgb side by side; valid until the next one.
   const std::vector<F>& groups() const { return groups_; }
 
+  /// A path as the camera's exposure shows it.
+  PathResult exposed_path(uint32_t pixel, uint32_t sample) {
+    PathResult result = trace_path(pixel, sample);
+    const F exposure = context_.camera->exposure;
+    if (exposure == 1) return result;
+    result.radiance *= exposure;
+    for (Color<F>& part : result.parts) part *= exposure;
+    for (F& value : groups_) value *= exposure;
+    return result;
+  }
+
+ private:
   PathResult trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
@@ -53,7 +65,7 @@ class PathTracer {
       for (uint32_t d = first; d <= last && d < 2; ++d) result.parts[d] = result.radiance;
     };
     Vec3<F> o = ray.o;
-    F cone_at_origin = 0.f;
+    F cone_at_origin = ray.width;
     bool is_seen = true;  // only clear surfaces so far
     PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread};
     ++counts_.samples;
@@ -128,7 +140,6 @@ class PathTracer {
     }
   }
 
- private:
   struct Hit {
     F t, u, v;
     uint32_t prim, geom, inst;
@@ -255,7 +266,7 @@ void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock&
     for (uint32_t s = 0; s < task.samples; ++s) {
       clock.enter(Phase::kGenerate);
       const auto start = PhaseClock::Clock::now();
-      const PathResult path = tracer.trace_path(pixel, task.first_sample + s);
+      const PathResult path = tracer.exposed_path(pixel, task.first_sample + s);
       if (film.aovs().layout().set.has(Aov::kCost))
         film.aovs().add_cost(
             film.index(x, y),

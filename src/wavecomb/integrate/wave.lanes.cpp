@@ -27,8 +27,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   for (; wave.rays.size > 0; ++depth) {
     // Camera rays of a pinhole are coherent as they come, and from one point packets give the same
     // hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
-    const bool coherent =
-        depth == 0 && context.camera->lens_radius == 0 && !context.camera->moves();
+    const bool coherent = depth == 0 && context.camera->is_pinhole();
     RayOrderChoice ray_order;
     clock.enter(Phase::kTrace);
     if (depth > 0) {

@@ -2,25 +2,58 @@
 /// The camera as data.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "wavecomb/core/affine.h"
 
 namespace wavecomb {
 
-/// A perspective thin-lens camera. It looks along -z of its own space, +x right, +y up
-/// (UsdGeomCamera). Lengths are in scene units.
+enum class Projection : uint32_t {
+  kPerspective,
+  kOrthographic,
+  kLatlong,  ///< longitude to the right, latitude up: all directions in one picture
+};
+
+/// What gives way where the shapes of window and picture differ: UsdRender's
+/// aspectRatioConformPolicy.
+enum class Conform : uint32_t {
+  kExpandAperture,
+  kCropAperture,
+  kAdjustApertureWidth,
+  kAdjustApertureHeight,
+  kAdjustPixelAspectRatio,
+};
+
+/// A thin-lens camera. It looks along -z of its own space, +x right, +y up (UsdGeomCamera). Lengths
+/// are in scene units.
 struct Camera {
   Affine to_world;
   /// Places at equal distances over the shutter, with straight lines between; none: it stands still
   /// at to_world. Two or more where it moves.
   std::vector<Affine> steps{};
-  /// Window on the plane z = -1: x from window[0] to window[1], y from window[2] to window[3].
+  Projection projection = Projection::kPerspective;
+  /// What the picture shows: x from window[0] to window[1], y from window[2] to window[3]. On the
+  /// plane z = -1 of a perspective camera; across the axis of an orthographic one; of a latlong
+  /// camera longitude and latitude in radians, (0, 0) along -z.
   float window[4] = {-0.5f, 0.5f, -0.5f, 0.5f};
-  float lens_radius = 0;     ///< 0: pinhole
-  float focus_distance = 1;  ///< along -z, > 0 where lens_radius > 0
-  float near_clip = 0;       ///< along -z
+  Conform conform = Conform::kExpandAperture;  ///< not of latlong cameras, which fill the picture
+  float pixel_aspect = 1;                      ///< width of a pixel / its height
+  float lens_radius = 0;                       ///< 0: all is sharp, as of latlong cameras
+  float focus_distance = 1;                    ///< along -z, > 0 where lens_radius > 0
+  float near_clip = 0;                         ///< along -z; of latlong cameras a distance
   float far_clip = 1e30f;
+  /// Planes in the camera's space; of what it sees itself, points with a x + b y + c z + d < 0 are
+  /// cut off.
+  std::vector<std::array<float, 4>> clip_planes{};
+  float exposure = 1;  ///< what light is multiplied by in the picture
 };
+
+/// A window fitted to a picture of width x height pixels, as the camera's `conform` says.
+struct FittedWindow {
+  float centre_x, centre_y, half_x, half_y;
+};
+FittedWindow fitted_window(const Camera& camera, uint32_t width, uint32_t height);
 
 }  // namespace wavecomb

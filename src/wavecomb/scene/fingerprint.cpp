@@ -145,6 +145,12 @@ uint64_t hash_camera(const Scene& scene) {
   h.add(c.to_world, c.lens_radius, c.focus_distance, c.near_clip, c.far_clip);
   for (const Affine& step : c.steps) h.add(step);
   h.add_array(std::span<const float>(c.window));
+  // Of what is as it was before there was anything else, nothing: old checkpoints go on.
+  if (c.projection != Projection::kPerspective || c.conform != Conform::kExpandAperture)
+    h.add(c.projection, c.conform);
+  if (c.pixel_aspect != 1) h.add(c.pixel_aspect);
+  if (c.exposure != 1) h.add(uint32_t{1}, c.exposure);
+  for (const auto& plane : c.clip_planes) h.add_array(std::span<const float>(plane));
   return h.value();
 }
 

@@ -8,6 +8,10 @@
 
 namespace wavecomb {
 
+namespace {
+constexpr float kHalfTurn = 1.5708f;  // a little above pi / 2
+}
+
 std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
 }
@@ -73,6 +77,15 @@ void check_camera(const Camera& camera) {
   if (!(camera.lens_radius >= 0) || !std::isfinite(camera.lens_radius) ||
       (camera.lens_radius > 0 && !(camera.focus_distance > 0)))
     throw Error("the camera's lens needs a radius of 0 or more and a focus distance above 0");
+  if (camera.projection == Projection::kLatlong && (w[3] > kHalfTurn || w[2] < -kHalfTurn))
+    throw Error("the latlong camera's window must lie between the poles");
+  if (!(camera.pixel_aspect > 0) || !std::isfinite(camera.pixel_aspect))
+    throw Error("the camera's pixel_aspect must be a number above 0");
+  if (!(camera.exposure >= 0) || !std::isfinite(camera.exposure))
+    throw Error("the camera's exposure must be a number of 0 or more");
+  for (const auto& plane : camera.clip_planes)
+    for (const float x : plane)
+      if (!std::isfinite(x)) throw Error("a clipping plane of the camera is not finite; mend it");
   if (!(camera.near_clip >= 0) || !(camera.far_clip > camera.near_clip))
     throw Error("the camera's clipping range must start at 0 or more and end beyond its start");
 }

@@ -18,7 +18,7 @@ def looking(position=(0.0, 0.0, 10.0), window=(-0.4, 0.4, -0.3, 0.3), path="/Cam
 
 def project(pose, point, aspect=4 / 3):
     """Place in the picture: x from -1 left to 1 right, y up; and the depth."""
-    x0, x1, y0, y1 = navigate.fitted_window(pose.window, round(1200 * aspect), 1200)
+    x0, x1, y0, y1 = pose.fitted(round(1200 * aspect), 1200)
     offset = np.asarray(point, float) - pose.position
     depth = -offset @ pose.back
     x, y = offset @ pose.right / depth, offset @ pose.up / depth

@@ -37,7 +37,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const CameraRay<F> ray =
         camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active, time);
     store_path<F>(pool, slot,
-                  {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), F(0.f), ray.spread, key},
+                  {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), ray.width, ray.spread, key},
                   active);
     if (pool.depth) store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
     if (pool.centre) store(pool.centre + i, centre_distance2<F>(camera, r, active));

@@ -32,6 +32,18 @@ inline void add_errors(const float* rows, size_t first, size_t end, const Film::
 
 }  // namespace detail
 
+/// The camera's exposure: multiplies the radiance of all slots, with its parts and light groups.
+inline void expose(const PathPool& pool, float exposure, size_t slots) {
+  const auto scale = [exposure](float* values, size_t count) {
+    for (size_t i = 0; values && i < count; ++i) values[i] *= exposure;
+  };
+  const size_t words = slots * PathPool::kRadianceWords;
+  scale(pool.radiance, words);
+  scale(pool.parts[0], words);
+  scale(pool.parts[1], words);
+  scale(pool.groups, words * pool.light_groups);
+}
+
 /// What slots [slot, end) found beside radiance, into the AOVs of their pixel.
 inline void resolve_aovs(const PathPool& pool, const AovTables* tables, AovFilm& film, size_t pixel,
                          size_t slot, size_t end) {
@@ -81,6 +93,7 @@ inline void resolve_aovs(const PathPool& pool, const AovTables* tables, AovFilm&
 inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask& task) {
   const PathPool& pool = wave.pool;
   Film& film = *context.film;
+  if (context.camera->exposure != 1) expose(pool, context.camera->exposure, task.path_count());
   size_t slot = 0;
   for (uint32_t i = 0; i < task.pixel_count; ++i) {
     const uint32_t x = task.pixels[i] & 0xffffu, y = task.pixels[i] >> 16;

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Products of ``wavecomb render``: what the stage's render settings ask for, under options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from wavecomb import aovs as aov_names
+from wavecomb.cli.aovs import AovOptions
+from wavecomb.cli.job import FrameShot, Names
+from wavecomb.cli.options import StageOptions
+from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.errors import WavecombError
+
+if TYPE_CHECKING:
+    from wavecomb.sequence import Frames
+    from wavecomb.usd.render_settings import RenderChoice
+
+DEFAULT_SIZE = (600, 600)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One product: what the stage asks for, and its files."""
+
+    choice: RenderChoice
+    names: Names
+
+    def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
+        """Layers: those of options, else of the render that goes on, else of the product."""
+        if layers.aovs:
+            return layers.names
+        if before is not None:
+            return tuple(before)
+        return layers.names if self.choice.aovs is None else aov_names.expand(self.choice.aovs)
+
+    def settings(self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool) -> Any:
+        """Checked settings.
+
+        Args:
+            chosen: By options, and by the render that goes on.
+            aovs: Layers that are kept.
+            resumed: Whether a render goes on: it has a size and a region.
+        """
+        from wavecomb.api import make_settings
+
+        chosen = dict(chosen)
+        width, height = self.choice.resolution or DEFAULT_SIZE
+        size = chosen.pop("width", width), chosen.pop("height", height)
+        if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
+            chosen["region"] = region
+        try:
+            return make_settings(size, chosen.pop("spp"), aovs=aovs, **chosen)
+        except WavecombError as error:
+            if size != self.choice.resolution:
+                raise
+            prim = self.choice.product or self.choice.settings
+            raise WavecombError(f"{prim}: {error}; --size goes before it") from None
+
+    def source(self, source: StageOptions) -> StageOptions:
+        """Options that load the stage for this product."""
+        return replace(source, product=self.choice.product or source.product)
+
+    def shot(self, frames: Frames, frame: float | None, settings: Any) -> FrameShot:
+        """For a stage that is open."""
+        size = settings.width, settings.height
+        return FrameShot(frames, frame, product=self.choice.product, size=size)
+
+
+def plan_products(
+    choices: Sequence[RenderChoice],
+    output: str | None,
+    png: str | None,
+    stats: str | None,
+    purpose: PurposeOptions,
+    frames: str | None,
+) -> list[Plan]:
+    """What is to be rendered: with ``-o`` the first product, without it all.
+
+    Raises:
+        WavecombError: Nothing says where a picture goes.
+    """
+    if output is not None:
+        return [Plan(choices[0], Names(output, png, stats))]
+    plans = []
+    for choice in choices:
+        if choice.output is None:
+            prim = choice.product
+            where = f"{prim} has no productName" if prim else "the stage has no render product"
+            raise WavecombError(f"-o is missing, and {where}: give -o FILE.exr")
+        if not choice.output.lower().endswith(".exr"):
+            raise WavecombError(
+                f"{choice.product}: productName {choice.output} must end in .exr; give -o FILE.exr"
+            )
+        plans.append(Plan(choice, Names(choice.output, png, stats)))
+    if len(plans) > 1:
+        single = {
+            "--png": png, "--stats": stats, "--checkpoint": purpose.checkpoint,
+            "--resume": purpose.resume, "--preview": purpose.preview,
+        }  # fmt: skip
+        for option, name in single.items():
+            if name is not None:
+                raise WavecombError(
+                    f"{option} {name}: is of one picture and the stage has {len(plans)} render "
+                    "products; choose one by --product"
+                )
+        names = [plan.names.output for plan in plans]
+        for name in names:
+            if names.count(name) > 1:
+                raise WavecombError(
+                    f"productName {name} is that of several render products; choose one by "
+                    "--product"
+                )
+    return plans
