@@ -161,6 +161,16 @@ class MitsubaScene:
             sensor["type"] = "thinlens"
             sensor["aperture_radius"] = camera["lens_radius"]
             sensor["focus_distance"] = camera["focus_distance"]
+        if camera.get("projection") == "orthographic":
+            if camera.get("lens_radius", 0.0) > 0:
+                raise NotImplementedError("an orthographic camera with a lens")
+            # Mitsuba's sees from -1 to 1: its transform says how much that is.
+            del sensor["fov"], sensor["fov_axis"]
+            window = np.diag([half_x, half_x, 1.0, 1.0])
+            sensor["type"] = "orthographic"
+            sensor["to_world"] = self._transform(window @ _TURN @ camera["transform"])
+        elif camera.get("projection", "perspective") != "perspective":
+            raise NotImplementedError(f"a {camera['projection']} camera")
         return sensor
 
     def _transform(self, rows: Matrix) -> Any:

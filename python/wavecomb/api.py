@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], "bool | None"]
 
+DEFAULT_SIZE = (600, 600)
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
 # Of an adaptive render: sums and layers of errors, and what measuring them takes.
@@ -297,7 +298,7 @@ def import_usd() -> None:
 def render(
     source: str | os.PathLike[str] | LoadedStage | Scene,
     *,
-    size: tuple[int, int] = (600, 600),
+    size: tuple[int, int] | None = None,
     spp: int = 64,
     progress: Progress | None = None,
     camera: str | None = None,
@@ -315,7 +316,7 @@ def render(
 
     Args:
         source: A path, what ``load`` gave, or a ``Scene``.
-        size: Width and height, pixels.
+        size: Width and height, pixels; by default of a path's render settings, else 600 x 600.
         spp: Samples per pixel; with ``adaptive`` or ``noise`` the most of them.
         progress: Called as progress(samples_done, samples_total) about ten times a second; return
             False to stop and keep what is done.
@@ -327,7 +328,7 @@ def render(
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
             from.
         aovs: What to keep beside the beauty: names of docs/aovs.md, "light_NAME" for a light group,
-            "crypto", "all"; by default albedo, normal and depth.
+            "crypto", "all"; by default a path's render vars, else albedo, normal and depth.
         checkpoint: File that the state of the render is saved to, now and then and at the end.
         every: Seconds between checkpoints.
         resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
@@ -352,7 +353,9 @@ def render(
     """
     from wavecomb.stats import make_stats
 
-    own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
+    if isinstance(source, (str, os.PathLike)):
+        size, aovs = _asked_for(source, size, aovs, settings)
+    own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)
     scene, loaded, stage = _resolve(source, camera, frame, subdivision, chosen)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
@@ -360,6 +363,24 @@ def render(
     result = _render(scene, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
     return picture_of(result, stats, scene=scene, aovs=names)
+
+
+def _asked_for(
+    path: str | os.PathLike[str],
+    size: tuple[int, int] | None,
+    aovs: Iterable[str] | None,
+    settings: dict[str, Any],
+) -> tuple[tuple[int, int], Iterable[str] | None]:
+    """Size and AOVs, and the region in ``settings``: as the first render product says, if none."""
+    import_usd()
+    from wavecomb.usd import peek_products
+
+    choice = peek_products(os.fspath(path))[0][0]
+    chosen = size or choice.resolution or DEFAULT_SIZE
+    region = choice.region(*chosen)
+    if region is not None:
+        settings.setdefault("region", region)
+    return chosen, choice.aovs if aovs is None else aovs
 
 
 def prepare(

@@ -63,7 +63,9 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     chosen = {"camera": "/C", "frame": 3.0, "variants": None, "threads": 0}
     chosen |= {"size": (32, 16), "subdivision": "auto"}
     chosen |= {"mask": (), "session_layer": None, "progress": None}
-    chosen |= {"shutter": None, "motion_blur": True, "motion_steps": None}
+    chosen |= {"shutter": None, "motion_blur": None, "motion_steps": None}
+    chosen |= {"depth_of_field": None, "projection": None, "exposure": True}
+    chosen |= {"render_settings": None, "product": None}
     assert fake.loaded[0] == {"path": stage, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)

@@ -230,6 +230,16 @@ def test_options_go_before_settings(tmp_path):
     assert not (tmp_path / "two.exr").exists()
 
 
+def test_render_from_python_takes_the_first_product(tmp_path):
+    settings = "uniform int2 resolution = (30, 20)\n" + PRODUCTS
+    window = "uniform float4 dataWindowNDC = (0, 0, 0.5, 1)\nrel orderedVars"
+    stage = write(tmp_path, stage_text(settings.replace("rel orderedVars", window, 1)))
+    picture = wavecomb.render(stage, spp=1)
+    assert picture.beauty.shape == (20, 30, 3) and picture.chosen == ("beauty", "depth")
+    assert picture.samples.sum() == 300
+    assert wavecomb.render(stage, spp=1, size=(8, 4), aovs=["uv"]).chosen == ("beauty", "uv")
+
+
 @pytest.mark.parametrize(
     ("settings", "arguments", "words"),
     [

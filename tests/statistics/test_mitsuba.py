@@ -271,6 +271,17 @@ def test_depth_of_field(check: Check, recorded: Any, tmp_path: Path) -> None:
     check("depth of field", recorded(view, dome, GREY, BLUE, ground("Grey"), *blocks))
 
 
+def test_orthographic(check: Check, recorded: Any, tmp_path: Path) -> None:
+    # 2 x 0.4 x 50 tenths of a unit: four units wide.
+    view = camera(EYE, (0.0, 0.7, 0.0), half=0.4, lens='token projection = "orthographic"')
+    dome = light("Dome", texture=write_sky(tmp_path))
+    blocks = [
+        box(f"Box{k}", (1.4 * k - 2.0, 0, 2.0 - 2 * k), (1.4 * k - 1.2, 1.0, 2.8 - 2 * k), "Blue")
+        for k in range(3)
+    ]
+    check("orthographic", recorded(view, dome, GREY, BLUE, ground("Grey"), *blocks))
+
+
 def test_texture(check: Check, recorded: Any, tmp_path: Path) -> None:
     """A magnified image without symmetry, bilinear, directly lit (bounces read blurred texels)."""
     from wavecomb.scenes.textures import write_image

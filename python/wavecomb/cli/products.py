@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from wavecomb.sequence import Frames
     from wavecomb.usd.render_settings import RenderChoice
 
-DEFAULT_SIZE = (600, 600)
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -44,7 +42,7 @@ class Plan:
             aovs: Layers that are kept.
             resumed: Whether a render goes on: it has a size and a region.
         """
-        from wavecomb.api import make_settings
+        from wavecomb.api import DEFAULT_SIZE, make_settings
 
         chosen = dict(chosen)
         width, height = self.choice.resolution or DEFAULT_SIZE
