@@ -148,7 +148,9 @@ struct LightTreeView {
   const float* infinite_pdf = nullptr;
   uint32_t root = kNoLight;
   uint32_t numbers = 0;
-  uint32_t count = 0;  ///< lights of the tree
+  /// As many equal lights would be as hard to choose among: 1 / sum of squares of the shares of
+  /// power of the tree's lights. 0: none shines.
+  float effective_lights = 0;
 };
 
 /// What kernels need of all lights. Light i is record i for i < first_triangle, else triangle

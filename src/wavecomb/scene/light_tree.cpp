@@ -16,8 +16,8 @@ namespace {
 constexpr double kPiD = 3.14159265358979323846;
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
-/// Lights from which on the tree pays (docs/light-selection.md).
-constexpr uint32_t kLeastForTree = 8;
+/// Effective lights from which on the tree pays (docs/light-selection.md).
+constexpr float kLeastForTree = 4;
 /// Ranges that are built apart from one another, and the least lights that are worth it.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
@@ -305,13 +305,8 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t l
 }  // namespace
 
 LightTreeView LightTree::view() const {
-  return {nodes.data(),
-          trails.data(),
-          infinite_ends.data(),
-          infinite_pdf.data(),
-          root,
-          numbers,
-          static_cast<uint32_t>(root == kNoLight ? 0 : nodes.size() + 1)};
+  return {nodes.data(), trails.data(), infinite_ends.data(), infinite_pdf.data(),
+          root,         numbers,       effective_lights};
 }
 
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers) {
@@ -325,7 +320,12 @@ LightTree build_light_tree(const LightSet& set, std::span<const double> powers) 
 
   double total = 0, largest = 0;
   for (const uint32_t i : lit) largest = std::max(largest, powers[i]);
-  for (const uint32_t i : lit) total += powers[i] / largest;
+  double squares = 0;
+  for (const uint32_t i : lit) {
+    total += powers[i] / largest;
+    squares += powers[i] / largest * (powers[i] / largest);
+  }
+  tree.effective_lights = static_cast<float>(total * total / squares);
   total *= largest;
   if (!std::isfinite(total)) total = largest;
   std::vector<Item> items(lit.size());
@@ -340,8 +340,9 @@ LightTree build_light_tree(const LightSet& set, std::span<const double> powers) 
 }
 
 bool chooses_by_tree(LightSelection selection, const LightView& lights) {
-  const uint32_t least = selection == LightSelection::kTree ? 1 : kLeastForTree;
-  return selection != LightSelection::kPower && lights.tree.count >= least;
+  const float effective = lights.tree.effective_lights;
+  if (selection == LightSelection::kAuto) return effective >= kLeastForTree;
+  return selection == LightSelection::kTree && effective > 0;
 }
 
 }  // namespace wavecomb

@@ -19,8 +19,9 @@ struct LightTree {
   std::vector<uint32_t> trails;      ///< LightTreeView::trails, of all lights
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
-  uint32_t root = kNoLight;  ///< node 0, or the only light; kNoLight: none shines
-  uint32_t numbers = 0;      ///< of the 2^24 that choose a light of the tree
+  uint32_t root = kNoLight;    ///< node 0, or the only light; kNoLight: none shines
+  float effective_lights = 0;  ///< LightTreeView::effective_lights
+  uint32_t numbers = 0;        ///< of the 2^24 that choose a light of the tree
 
   /// Contract: points into this tree.
   LightTreeView view() const;
@@ -33,7 +34,8 @@ struct LightTree {
 /// as in build_pick_table, one number in a hundred by heads.
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
 
-/// Whether lights are chosen by tree. A scene without a finite light has none.
+/// Whether lights are chosen by tree. A scene without a finite light has none. kAuto: where the
+/// finite lights are many, and of like powers: few strong ones are told from the others by power.
 bool chooses_by_tree(LightSelection selection, const LightView& lights);
 
 }  // namespace wavecomb
