@@ -202,6 +202,7 @@ def load(
     shutter: tuple[float, float] | None = None,
     motion_blur: bool = True,
     motion_steps: int | None = None,
+    texture_limit: float | None = None,
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -227,6 +228,7 @@ def load(
         shutter: When it opens and closes, time codes from the frame; by default the camera's.
         motion_blur: Whether what moves while the shutter is open is blurred.
         motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
+        texture_limit: MB (10^6 bytes) that all textures together may take; by default any.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -254,6 +256,7 @@ def load(
         "shutter": shutter,
         "motion_blur": motion_blur,
         "motion_steps": motion_steps,
+        "texture_limit": texture_limit,
     }
     if isolate:
         from wavecomb.isolate.probe import check

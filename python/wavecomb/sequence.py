@@ -103,6 +103,8 @@ class Frames:
         before, renderer = self._loaded, self._renderer
         if before is None or renderer is None or not self._stock.varying.is_view_only:
             return None
+        if self._options.get("texture_limit") is not None:
+            return None  # another view shows other textures near
         if before.camera_path is None:
             return before if self._is_camera_missing() else None
         prim = self._stage.GetPrimAtPath(before.camera_path)
@@ -165,6 +167,7 @@ def render_frames(
     shutter: tuple[float, float] | None = None,
     motion_blur: bool = True,
     motion_steps: int | None = None,
+    texture_limit: float | None = None,
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -189,6 +192,7 @@ def render_frames(
         shutter: Likewise.
         motion_blur: Likewise.
         motion_steps: Likewise.
+        texture_limit: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -218,6 +222,7 @@ def render_frames(
         shutter=shutter,
         motion_blur=motion_blur,
         motion_steps=motion_steps,
+        texture_limit=texture_limit,
         size=(chosen.width, chosen.height),
         **options,
     )

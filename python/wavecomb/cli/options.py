@@ -101,6 +101,13 @@ def stage_options(command: F) -> F:
             "size in the picture.  [default: auto]",
         ),
         click.option(
+            "--texture-limit",
+            type=Real(0),
+            metavar="MB",
+            help="Memory of all textures; finest levels are left out where it is too little.  "
+            "[default: any]",
+        ),
+        click.option(
             "--session-layer",
             type=click.Path(),
             metavar="FILE",
@@ -175,6 +182,7 @@ class StageOptions:
     shutter: tuple[float, float] | None = None
     no_motion_blur: bool = False
     motion_steps: int | None = None
+    texture_limit: float | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -227,6 +235,7 @@ class StageOptions:
             "shutter": self.shutter,
             "motion_blur": not self.no_motion_blur,
             "motion_steps": self.motion_steps,
+            "texture_limit": self.texture_limit,
         }
 
     def selections(self) -> dict[str, str]:

@@ -28,6 +28,7 @@ from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
+from wavecomb.usd.view_size import ViewSize
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -96,6 +97,8 @@ class _Choice:
     purposes: Sequence[str]
     editable: bool
     blur: Blur
+    texture_limit: float | None
+    size: tuple[int, int]
 
 
 def load_stage(
@@ -117,6 +120,7 @@ def load_stage(
     shutter: tuple[float, float] | None = None,
     motion_blur: bool = True,
     motion_steps: int | None = None,
+    texture_limit: float | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -146,6 +150,8 @@ def load_stage(
         shutter: When it opens and closes, time codes from the frame; None: as the camera says.
         motion_blur: Whether what moves while the shutter is open is blurred.
         motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
+        texture_limit: MB (10^6 bytes) that all textures together may take; None: any. Where it is
+            too little, finest mip levels are left out, those first that the picture shows least.
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -155,6 +161,8 @@ def load_stage(
     unknown = [name for name in purposes if name not in PURPOSES]
     if unknown:
         raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
+    if texture_limit is not None and not texture_limit > 0:
+        raise WavecombError(f"texture limit {texture_limit} MB: must be more than 0")
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
@@ -178,7 +186,7 @@ def load_stage(
             )
 
         try:
-            choice = _Choice(opened, frame, camera, purposes, editable, blur)
+            choice = _Choice(opened, frame, camera, purposes, editable, blur, texture_limit, size)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -304,6 +312,8 @@ def _read(
     lights = LightReader(time, up_axis, textures, groups, report)
     motion = find_motion(view_prim, time, choice.blur, report)
     traversal = Traversal(time, choice.purposes, lights, report, motion)
+    if choice.texture_limit is not None:
+        _limit_textures(stage, traversal, view_prim, choice, textures, report)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
     world = GroupBuilder(
@@ -330,6 +340,32 @@ def _read(
         stock.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
     return chosen, light_paths, None if motion is None else motion.shutter
+
+
+def _limit_textures(
+    stage: Usd.Stage,
+    traversal: Traversal,
+    view_prim: Usd.Prim | None,
+    choice: _Choice,
+    textures: TextureTable,
+    report: LoadReport,
+) -> None:
+    """Says which mip levels the textures leave out."""
+    from wavecomb.usd.texture_limit import MEGABYTE, plan_levels
+
+    view = None
+    if view_prim is not None:
+        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
+        view = read_camera(view_prim, to_world, traversal.time, LoadReport())
+    if view is None:
+        cache = UsdGeom.BBoxCache(traversal.time, list(UsdGeom.Imageable.GetOrderedPurposeTokens()))
+        box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+        bounds = None if box.IsEmpty() else np.array([box.GetMin(), box.GetMax()])
+        view = frame_bounds(bounds, str(UsdGeom.GetStageUpAxis(stage)))
+    limit = float(choice.texture_limit or 0) * MEGABYTE
+    textures.drops = plan_levels(
+        stage, traversal.time, ViewSize(view, choice.size), limit, report, textures.working
+    )
 
 
 def _add_lights(
