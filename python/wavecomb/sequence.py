@@ -168,6 +168,7 @@ def render_frames(
     motion_blur: bool = True,
     motion_steps: int | None = None,
     texture_limit: float | None = None,
+    working_space: str = "rec709",
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -193,6 +194,7 @@ def render_frames(
         motion_blur: Likewise.
         motion_steps: Likewise.
         texture_limit: Likewise.
+        working_space: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -223,6 +225,7 @@ def render_frames(
         motion_blur=motion_blur,
         motion_steps=motion_steps,
         texture_limit=texture_limit,
+        working_space=working_space,
         size=(chosen.width, chosen.height),
         **options,
     )

@@ -101,6 +101,11 @@ def stage_options(command: F) -> F:
             "size in the picture.  [default: auto]",
         ),
         click.option(
+            "--working-space",
+            type=click.Choice(["rec709", "acescg"]),
+            help="Linear colours that the picture is computed in.  [default: rec709]",
+        ),
+        click.option(
             "--texture-limit",
             type=Real(0),
             metavar="MB",
@@ -183,6 +188,7 @@ class StageOptions:
     no_motion_blur: bool = False
     motion_steps: int | None = None
     texture_limit: float | None = None
+    working_space: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -236,6 +242,7 @@ class StageOptions:
             "motion_blur": not self.no_motion_blur,
             "motion_steps": self.motion_steps,
             "texture_limit": self.texture_limit,
+            "working_space": self.working_space or "rec709",
         }
 
     def selections(self) -> dict[str, str]:

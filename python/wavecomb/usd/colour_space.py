@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd
 
-WORKING_SPACES = {"rec709": "Linear Rec.709 (sRGB)", "acescg": "ACEScg"}
-"""What pictures may be computed in, and what OpenColorIO calls it."""
+OCIO_NAMES = {"rec709": "Linear Rec.709 (sRGB)", "acescg": "ACEScg"}
+"""What OpenColorIO calls the working spaces."""
 
-LINEAR = WORKING_SPACES["rec709"]
+LINEAR = OCIO_NAMES["rec709"]
 SRGB = "sRGB Encoded Rec.709 (sRGB)"
 RAW = "Raw"
 
@@ -99,7 +99,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
         buffer = oiio.ImageBuf(np.ascontiguousarray(rows[..., :3]))
         # On this thread alone: OpenImageIO's pool was seen to wait for ever.
         made = oiio.ImageBufAlgo.colorconvert(
-            buffer, source, WORKING_SPACES[working], unpremult=False,
+            buffer, source, OCIO_NAMES[working], unpremult=False,
             colorconfig="ocio://default", nthreads=1,
         )  # fmt: skip
         if made.has_error:
@@ -114,7 +114,7 @@ def convert_colour(
     colour: tuple[float, float, float], source: str, working: str
 ) -> tuple[float, float, float]:
     """One colour, as ``convert``."""
-    if source in (RAW, WORKING_SPACES[working]):
+    if source in (RAW, OCIO_NAMES[working]):
         return colour
     r, g, b = convert(np.array(colour, np.float32).reshape(1, 1, 3), source, working)[0, 0]
     return float(r), float(g), float(b)

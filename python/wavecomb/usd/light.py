@@ -16,6 +16,7 @@ from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import UDIM, TextureTable, asset_file, tile_files
+from wavecomb.working_space import from_rec709
 
 KINDS = {
     "RectLight": "rect",
@@ -108,7 +109,7 @@ class LightReader:
         """Colour * intensity * 2^exposure * colour temperature."""
         # What is not finite stays so, and is warned of.
         bad = math.nan
-        base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
+        authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
         try:
             base = linear_colour(base, prim.GetAttribute("inputs:color"))
         except ValueError as error:
@@ -119,7 +120,11 @@ class LightReader:
         if self._get(prim, "enableColorTemperature", False):
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
             tint = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10000.0))
-        r, g, b = (float(c * t * power) for c, t in zip(base, tint, strict=True))
+        rgb = [float(c * t * power) for c, t in zip(base, tint, strict=True)]
+        working = "rec709" if self.textures is None else self.textures.working
+        r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
+        if min(authored) >= 0:  # what the working space cannot hold is at its edge
+            r, g, b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
         return (r, g, b)
 
     def _sphere(

@@ -29,6 +29,7 @@ from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
 from wavecomb.usd.view_size import ViewSize
+from wavecomb.working_space import WORKING_SPACES, from_rec709
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -58,6 +59,7 @@ class LoadedStage:
             both are named by the first instance.
         frame: Time code that was read; None: default values.
         shutter: When it opens and closes, time codes from the frame; None: no motion blur.
+        working_space: What its colours are in: of ``WORKING_SPACES``.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
     """
 
@@ -73,6 +75,7 @@ class LoadedStage:
     frame: float | None = None
     textures: TextureStock | None = None
     shutter: tuple[float, float] | None = None
+    working_space: str = "rec709"
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,7 @@ def load_stage(
     motion_blur: bool = True,
     motion_steps: int | None = None,
     texture_limit: float | None = None,
+    working_space: str = "rec709",
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -152,6 +156,7 @@ def load_stage(
         motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
         texture_limit: MB (10^6 bytes) that all textures together may take; None: any. Where it is
             too little, finest mip levels are left out, those first that the picture shows least.
+        working_space: What the picture is computed in: "rec709", or "acescg".
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -163,6 +168,9 @@ def load_stage(
         raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
     if texture_limit is not None and not texture_limit > 0:
         raise WavecombError(f"texture limit {texture_limit} MB: must be more than 0")
+    if working_space not in WORKING_SPACES:
+        known = ", ".join(WORKING_SPACES)
+        raise WavecombError(f"working space {working_space!r} is none of {known}")
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
@@ -178,7 +186,7 @@ def load_stage(
     opened = _opener(source, variants or {}, mask, session_layer)
     with captured(report):
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
-        textures = TextureTable(builder, report, threads, reuse)
+        textures = TextureTable(builder, report, threads, reuse, working_space)
 
         def surfaces_of(materials: MaterialTable) -> Surfaces:
             return Surfaces(
@@ -218,6 +226,7 @@ def load_stage(
         filled.frame,
         textures.stock(scene) if editable else None,
         filled.shutter,
+        working_space,
     )
 
 
@@ -389,7 +398,7 @@ def _add_lights(
         report.note("no visible light; the scene is lit by emissive materials or not at all")
         return ()
     report.note("no light: added a soft dome")
-    texture = textures.add_pixels("soft dome", soft_dome())
+    texture = textures.add_pixels("soft dome", from_rec709(soft_dome(), textures.working))
     builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
     return ("",)
 

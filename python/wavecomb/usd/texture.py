@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdShade
 
-from wavecomb.usd.colour_space import LINEAR, RAW, SRGB, WORKING_SPACES, canonical, convert
+from wavecomb.usd.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.halve import halve
 from wavecomb.usd.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.report import LoadReport
+from wavecomb.working_space import from_rec709
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -25,6 +26,8 @@ _WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "bl
 
 
 UDIM = "<UDIM>"
+CURVE = "sRGB curve"
+"""In place of a space to convert from: only the transfer curve of sRGB is undone, by the core."""
 
 
 def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
@@ -130,16 +133,14 @@ class TextureStock:
     ids: dict[tuple[Any, ...], int]
 
 
-def _converts(image: Image, space: str, working: str) -> bool:
-    """Whether the pixels must be made others: the core undoes the curve of sRGB by itself."""
-    if space == SRGB:
-        return working != "rec709" and image.channels >= 3
-    return space != RAW
+def _converts(space: str) -> bool:
+    """Whether the pixels must be made others."""
+    return space not in (RAW, CURVE)
 
 
-def stored_type(image: Image, space: str, working: str) -> Any:
+def stored_type(image: Image, space: str) -> Any:
     """The type of a texture's values: that of its file, but half where 8 bits are converted."""
-    if image.dtype == np.uint8 and _converts(image, space, working):
+    if image.dtype == np.uint8 and _converts(space):
         return np.dtype(np.float16)
     return image.dtype
 
@@ -285,13 +286,16 @@ class TextureTable:
             if tile is not None:
                 added = self.add(file, tile, colour_space, "clamp", "clamp", is_colour=is_colour)
                 tiles.append((number, added))
+        if is_colour:
+            r, g, b = from_rec709(np.array(missing[:3]), self.working)
+            missing = (float(r), float(g), float(b), missing[3])
         key = (path, tuple(tiles), missing)
         if key not in self._ids:
             self._ids[key] = self._builder.add_tiles(path, tiles, missing)
         return self._ids[key]
 
     def _space(self, path: str, image: Image, colour_space: str, is_colour: bool) -> str:
-        """The space to convert from, of OpenColorIO's names; RAW: nothing is to be done."""
+        """The space to convert from, of OpenColorIO's names, or RAW (none), or CURVE."""
         if colour_space == "auto":
             space = SRGB if image.automatic_srgb else LINEAR
         else:
@@ -300,20 +304,21 @@ class TextureTable:
                 self._report.missing(f"colour space {colour_space} (read as auto)", path)
                 return self._space(path, image, "auto", is_colour)
             space = known
+        if space == SRGB and self.working == "rec709":
+            return CURVE
         if not is_colour or image.channels < 3:
-            return SRGB if space == SRGB else RAW
-        return RAW if space == WORKING_SPACES[self.working] else space
+            return CURVE if space == SRGB else RAW
+        return RAW if space == OCIO_NAMES[self.working] else space
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
         # Gone from memory once it is in the scene; a second use in another way reads it again.
         pixels = image.take() if image.is_here else read_image(path).take()
-        srgb = space == SRGB
-        dtype = stored_type(image, space, self.working)
-        if _converts(image, space, self.working):
+        srgb = space == CURVE
+        dtype = stored_type(image, space)
+        if _converts(space):
             top = 65504.0 if dtype == np.float16 else 3.4e38
             linear = np.clip(convert(pixels, space, self.working), -top, top)
             pixels = np.ascontiguousarray(linear, dtype)
-            srgb = False
         elif srgb and pixels.dtype != np.uint8:
             colours = 3 if image.channels >= 3 else 1
             linear = to_linear(pixels[..., :colours])
@@ -333,7 +338,7 @@ class TextureTable:
         return self._ids[key]
 
     def add_pixels(self, name: str, pixels: NDArray[Any]) -> int:
-        """Texture id of generated pixels, linear."""
+        """Texture id of generated pixels, linear Rec.709 where they are colours."""
         return self._builder.add_texture(
             pixels, srgb=False, wrap_s="repeat", wrap_t="clamp", name=name
         )

@@ -102,7 +102,7 @@ class _Plan(TextureTable):
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
         number = self._builder.add_texture(None, srgb=False)  # type: ignore[arg-type]
         height, width = image.size
-        dtype = stored_type(image, space, self.working)
+        dtype = stored_type(image, space)
         key = (path, space, wrap_s, wrap_t)
         self.entries[number] = _Entry(key, width, height, image.channels, dtype)
         return number
