@@ -64,6 +64,7 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     chosen |= {"size": (32, 16), "subdivision": "auto"}
     chosen |= {"mask": (), "session_layer": None, "progress": None}
     chosen |= {"shutter": None, "motion_blur": True, "motion_steps": None}
+    chosen |= {"texture_limit": None, "working_space": "rec709"}
     assert fake.loaded[0] == {"path": stage, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)
@@ -141,7 +142,8 @@ def test_cancel(fake: Fake, stage: Path) -> None:
 def test_schema(fake: Fake, stage: Path) -> None:
     stats = wavecomb.render(stage, size=(4, 4), spp=1).stats
     assert list(stats) == [
-        *("schema", "version", "stage", "camera", "cancelled", "settings", "seconds"),
+        *("schema", "version", "stage", "camera"),
+        *("working_space", "cancelled", "settings", "seconds"),
         *("phases_s", "sort_overhead", "counts", "passes", "resumed_samples", "error"),
         *("mean_path_length", "depths", "lane_utilisation"),
         *("coherence", "programs", "materials", "cost_prediction", "policy_uses"),
