@@ -194,11 +194,15 @@ class TextureTable:
         found = self._twins.get(path)
         if found is None:
             found = path
-            if os.path.isfile(path):
-                others = self._by_size.setdefault(os.path.getsize(path), [])
-                found = next((o for o in others if filecmp.cmp(o, path, shallow=False)), path)
-                if found is path:
-                    others.append(path)
+            try:
+                if os.path.isfile(path):
+                    others = self._by_size.setdefault(os.path.getsize(path), [])
+                    same = (other for other in others if filecmp.cmp(other, path, shallow=False))
+                    found = next(same, path)
+                    if found is path:
+                        others.append(path)
+            except (OSError, ValueError):
+                pass  # reading it says what is wrong
             self._twins[path] = found
         return found
 
