@@ -478,6 +478,7 @@ void bind_scene(nb::module_& m) {
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
       .def("share_texture", &share_texture, "scene"_a, "texture"_a)
+      .def("add_tiles", &SceneBuilder::add_tiles, "name"_a, "tiles"_a, "missing"_a)
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
            "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
            "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,

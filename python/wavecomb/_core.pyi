@@ -96,6 +96,17 @@ class SceneBuilder:
         wrap: repeat, clamp, mirror, black. srgb matters for uint8 only.
         Tiled and mip-mapped inside.
         """
+    def add_tiles(
+        self,
+        name: str,
+        tiles: list[tuple[int, int]],
+        missing: tuple[float, ...],
+    ) -> int:
+        """Texture id of a UDIM texture of textures that were added: (tile number, texture id).
+
+        ``missing``: linear r, g, b, alpha where there is no tile.
+        """
+
     def share_texture(self, scene: Scene, texture: int) -> int:
         """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
     def add_material(

@@ -39,7 +39,7 @@ class Picture:
     """A rendered picture. Row 0 is the top.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709.
+        beauty: (height, width, 3), linear Rec.709, or in the working space of the stage.
         albedo: (height, width, 3). Like normal and depth, None where it was not asked for.
         normal: (height, width, 3), world space.
         depth: (height, width), along the camera's axis; infinite where nothing was hit.
@@ -159,6 +159,7 @@ class Picture:
         """
         from wavecomb.image import write_png
         from wavecomb.output import save_layers
+        from wavecomb.working_space import to_rec709
 
         kind = Path(path).suffix.lower()
         if kind == ".exr":
@@ -174,6 +175,7 @@ class Picture:
             )
         if kind == ".png":
             shown = self.beauty if self.denoised is None else self.denoised
+            shown = to_rec709(shown, self.stats.get("working_space", "rec709"))
             write_png(path, shown, exposure=exposure, tone_map=tone_map)
             return [Path(path)]
         raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
@@ -208,6 +210,8 @@ def load(
     exposure: bool = True,
     render_settings: str | None = None,
     product: str | None = None,
+    texture_limit: float | None = None,
+    working_space: str = "rec709",
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -241,6 +245,8 @@ def load(
         render_settings: Path or name of a RenderSettings prim; by default those that the stage
             names, else the only ones under /Render (docs/cameras.md).
         product: Path or name of one of their products; by default the first.
+        texture_limit: MB (10^6 bytes) that all textures together may take; by default any.
+        working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -273,6 +279,8 @@ def load(
         "exposure": exposure,
         "render_settings": render_settings,
         "product": product,
+        "texture_limit": texture_limit,
+        "working_space": working_space,
     }
     if isolate:
         from wavecomb.isolate.probe import check

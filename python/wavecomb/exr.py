@@ -172,11 +172,13 @@ def _spec(planes: list[NDArray[Any]], halves: list[bool], names: list[str], tile
 
 
 def _attribute(spec: Any, key: str, value: Any) -> None:
-    """Sets an attribute; (4, 4) becomes a matrix of floats."""
+    """Sets an attribute; (4, 4) becomes a matrix of floats, (n,) as many floats."""
     import OpenImageIO as oiio
 
     if np.ndim(value) == 2:
         spec.attribute(key, oiio.TypeMatrix44, tuple(float(v) for v in np.ravel(value)))
+    elif np.ndim(value) == 1:
+        spec.attribute(key, f"float[{len(value)}]", tuple(float(v) for v in value))
     else:
         spec.attribute(key, value)
 

@@ -250,7 +250,7 @@ def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> 
 def _metadata(sources: list[_Source], seeds: tuple[int, ...]) -> dict[str, Any]:
     """The first picture's, with what the sum is."""
     first = sources[0]
-    kept = ("Software", "worldToCamera", "worldToNDC")
+    kept = ("Software", "worldToCamera", "worldToNDC", "chromaticities")
     metadata = {
         key: value
         for key, value in first.attributes.items()

@@ -120,6 +120,8 @@ class Frames:
             return None
         if not self._stock.varying.is_view_only and before.frame != _number(when):
             return None
+        if self._options.get("texture_limit") is not None:
+            return None  # another view shows other textures near
         told = LoadReport()
         seen = self._view(options).on(self._stage, told)
         if before.camera_path is None or seen.camera is None:
@@ -194,6 +196,8 @@ def render_frames(
     exposure: bool = True,
     render_settings: str | None = None,
     product: str | None = None,
+    texture_limit: float | None = None,
+    working_space: str = "rec709",
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -223,6 +227,8 @@ def render_frames(
         exposure: Likewise.
         render_settings: Likewise.
         product: Likewise.
+        texture_limit: Likewise.
+        working_space: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -257,6 +263,8 @@ def render_frames(
         exposure=exposure,
         render_settings=render_settings,
         product=product,
+        texture_limit=texture_limit,
+        working_space=working_space,
         size=(chosen.width, chosen.height),
         **options,
     )

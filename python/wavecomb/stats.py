@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from wavecomb.files import replacing
 from wavecomb.machine import memory_bytes, usable_cores
 from wavecomb.version import version
+from wavecomb.working_space import header_of
 
 if TYPE_CHECKING:
     from wavecomb._core import Result
@@ -67,6 +68,7 @@ def make_stats(
         "version": _build_info()["version"],
         "stage": stage,
         "camera": loaded.camera_path if loaded is not None else None,
+        "working_space": loaded.working_space if loaded is not None else "rec709",
         "cancelled": bool(result.cancelled),
         "settings": core.pop("settings", {}),
         "seconds": {
@@ -152,14 +154,15 @@ def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def picture_metadata(stats: Mapping[str, Any]) -> dict[str, str | int | float]:
+def picture_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
     """What of the statistics goes into the header of a picture."""
     number = stats["version"] if "version" in stats else version()
-    metadata: dict[str, str | int | float] = {"Software": f"Wavecomb {number}"}
+    metadata: dict[str, Any] = {"Software": f"Wavecomb {number}"}
     if stats.get("stage"):
         metadata["wavecomb:stage"] = str(stats["stage"])
     if stats.get("camera"):
         metadata["wavecomb:camera"] = str(stats["camera"])
+    metadata |= header_of(stats.get("working_space", "rec709"))
     if stats.get("settings"):
         metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:

@@ -79,16 +79,20 @@ class PreviewSink(Sink):
         *,
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
+        working_space: str = "rec709",
     ) -> None:
         super().__init__(path, every)
         self._exposure = exposure
         self._tone_map = tone_map
+        self._working = working_space
 
     def write(self, snapshot: Snapshot) -> None:
         """The beauty as a PNG."""
         from wavecomb.image import write_png
+        from wavecomb.working_space import to_rec709
 
-        write_png(self.path, snapshot.beauty(), exposure=self._exposure, tone_map=self._tone_map)
+        shown = to_rec709(snapshot.beauty(), self._working)
+        write_png(self.path, shown, exposure=self._exposure, tone_map=self._tone_map)
 
 
 class Reporter(Protocol):

@@ -3,6 +3,7 @@
 #include "wavecomb/texture/texture.h"
 
 #include <functional>
+#include <tuple>
 
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
@@ -417,6 +418,70 @@ TEST(Lookup, IdPerLane) {
     const Mask<F> none_active(false);
     lookup<F>(views.data(), UInt<F>(12345u), F(0.f), F(0.f), F(0.f), none_active);
   });
+}
+
+/// Tiles 1001, 1002 and 1100 of different sizes and formats.
+Texture make_tiles(std::vector<std::pair<uint32_t, TexturePtr>>& tiles) {
+  for (const uint32_t number : {1001u, 1002u, 1100u}) {
+    Image image = make_image(8 + number % 7, 9, 1 + number % 4, kFormats[number % 3],
+                             number == 1002, Wrap::kClamp, Wrap::kClamp, number);
+    tiles.emplace_back(number, std::make_shared<const Texture>(make_texture(image)));
+  }
+  return Texture("face.<UDIM>.png", tiles, {0.25f, 0.5f, 0.75f, 1.f});
+}
+
+TEST(Tiles, AreLookedUpWhereTheyLie) {
+  std::vector<std::pair<uint32_t, TexturePtr>> tiles;
+  const Texture texture = make_tiles(tiles);
+  EXPECT_EQ(texture.spanned_bytes(), texture.bytes() + tiles[0].second->bytes() +
+                                         tiles[1].second->bytes() + tiles[2].second->bytes());
+  for (const auto& [number, tile] : tiles) {
+    const auto column = static_cast<float>((number - 1001) % 10),
+               row = static_cast<float>((number - 1001) / 10);
+    for (const float at : {0.f, 0.25f, 0.875f})
+      for (const float width : {0.f, 0.25f}) {
+        const auto one = lookup<float>(tile->view(), at, 0.5f, width, true);
+        const auto all = lookup<float>(texture.view(), column + at, row + 0.5f, width, true);
+        EXPECT_EQ(std::tie(one.r, one.g, one.b, one.a), std::tie(all.r, all.g, all.b, all.a));
+      }
+  }
+  // Tile 1003 and all that is outside is missing.
+  for (const auto& [s, t] : {std::pair{2.5f, 0.5f}, {-0.5f, 0.5f}, {0.5f, -1e30f}, {10.f, 0.5f}}) {
+    const auto none = lookup<float>(texture.view(), s, t, 0.25f, true);
+    EXPECT_EQ(std::tie(none.r, none.g, none.b, none.a), std::make_tuple(0.25f, 0.5f, 0.75f, 1.f));
+  }
+}
+
+TEST(Tiles, PacketEqualsScalarBitForBit) {
+  std::vector<std::pair<uint32_t, TexturePtr>> tiles;
+  const Texture texture = make_tiles(tiles);
+  auto s = padded(awkward_floats(), 2048, -0.5f, 2.5f, 71), t = padded({}, s.size(), 0.f, 1.f, 72);
+  t.resize(s.size(), 9.5f);
+  for (size_t i = 0; i < s.size(); i += 3) s[i] = 9.25f, t[i] = 9.75f;  // tile 1100
+  auto width = padded({}, s.size(), -0.1f, 0.4f, 73);
+  width.resize(s.size(), 0.f);
+  const auto scalar = look_up<float>(texture.view(), s, t, width);
+  for_each_packet(
+      [&]<typename F>() { expect_same(scalar, look_up<F>(texture.view(), s, t, width), "tiles"); });
+}
+
+TEST(Tiles, BadOnesAreRefusedByName) {
+  std::vector<std::pair<uint32_t, TexturePtr>> tiles;
+  const auto whole = std::make_shared<const Texture>(make_tiles(tiles));
+  const auto refuse = [](std::vector<std::pair<uint32_t, TexturePtr>> bad) {
+    try {
+      const Texture texture("face", bad, {0, 0, 0, 1});
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  const TexturePtr tile = tiles[0].second;
+  EXPECT_EQ(refuse({}), "texture 'face': has no tiles");
+  EXPECT_EQ(refuse({{1101, tile}}), "texture 'face': tile 1101 is not one of 1001 to 1100");
+  EXPECT_EQ(refuse({{1000, tile}}), "texture 'face': tile 1000 is not one of 1001 to 1100");
+  EXPECT_EQ(refuse({{1004, tile}, {1004, tile}}), "texture 'face': has tile 1004 twice");
+  EXPECT_EQ(refuse({{1004, whole}}), "texture 'face': tile 1004 is no plain texture");
 }
 
 TEST(Texture, BadValuesBecome0AndAreCounted) {

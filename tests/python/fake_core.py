@@ -88,6 +88,7 @@ class Fake:
             scene=scene,
             report=report,
             camera_path="/Camera",
+            working_space="rec709",
             seconds=0.25,
             stage_path=path,
             cameras=("/Camera", "/Closeup"),

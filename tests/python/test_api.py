@@ -66,6 +66,7 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     chosen |= {"shutter": None, "motion_blur": None, "motion_steps": None}
     chosen |= {"depth_of_field": None, "projection": None, "exposure": True}
     chosen |= {"render_settings": None, "product": None}
+    chosen |= {"texture_limit": None, "working_space": "rec709"}
     assert fake.loaded[0] == {"path": stage, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)
@@ -143,7 +144,8 @@ def test_cancel(fake: Fake, stage: Path) -> None:
 def test_schema(fake: Fake, stage: Path) -> None:
     stats = wavecomb.render(stage, size=(4, 4), spp=1).stats
     assert list(stats) == [
-        *("schema", "version", "stage", "camera", "cancelled", "settings", "seconds"),
+        *("schema", "version", "stage", "camera"),
+        *("working_space", "cancelled", "settings", "seconds"),
         *("phases_s", "sort_overhead", "counts", "passes", "resumed_samples", "error"),
         *("mean_path_length", "depths", "lane_utilisation"),
         *("coherence", "programs", "materials", "cost_prediction", "policy_uses"),

@@ -113,7 +113,9 @@ def test_textures_are_shared_until_their_file_changes(path, tmp_path, monkeypatc
 
     read = []
     real = pixels._read_file
-    monkeypatch.setattr(pixels, "_read_file", lambda name: read.append(name) or real(name))
+    monkeypatch.setattr(
+        pixels, "_read_file", lambda name, *rest: read.append(name) or real(name, *rest)
+    )
     first = load_stage(path, editable=True)
     count = len(read)
     again = load_stage(path, editable=True, reuse=first.textures)

@@ -8,6 +8,7 @@ import OpenImageIO as oiio
 import pytest
 from usd_recorder import QUAD, Recorder, load, said, write
 
+import wavecomb
 from wavecomb.usd import load_stage
 
 BIND = '(prepend apiSchemas = ["MaterialBindingAPI"])'
@@ -152,8 +153,7 @@ def test_colour_spaces(tmp_path, channels, kind, space, srgb, dtype):
     assert image["pixels"].dtype == dtype and image["srgb"] == srgb
     if dtype == np.float16:
         assert image["pixels"][0, 0, 0] == pytest.approx(0.2140 if srgb else 0.5, abs=1e-3)
-    if channels == 1:
-        assert scene.material_of("M")["textures"]["base_color"]["channel"] == "r"
+    assert scene.material_of("M")["textures"]["base_color"]["channel"] == "rgb"
 
 
 def test_alpha_is_not_multiplied_in_and_channels_are_picked(tmp_path):
@@ -207,17 +207,54 @@ def test_missing_textures_show(tmp_path):
     assert scene.material_of("M")["base_color"] == (0.5, 1, 0)
 
 
-def test_udim_uses_the_first_tile(tmp_path):
-    write_image(tmp_path / "a.1001.png", np.zeros((2, 2, 3), np.uint8), "uint8")
+def test_udim_tiles_are_one_texture(tmp_path):
+    write_image(tmp_path / "a.1001.png", np.full((2, 2, 3), 255, np.uint8), "uint8")
+    write_image(tmp_path / "a.1012.png", np.zeros((4, 2, 3), np.uint8), "uint8")
+    (tmp_path / "a.1013.png").write_bytes(b"no image")
+    text = surface(
+        "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
+        texture("asset inputs:file = @./a.<UDIM>.png@\nfloat4 inputs:fallback = (0, 0.5, 1, 1)"),
+    )
+    scene, loaded = load(tmp_path, text)
+    use = scene.material_of("M")["textures"]["base_color"]
+    tiled = scene.textures[use["texture"]]
+    assert tiled["missing"] == (0, 0.5, 1, 1)
+    heights = {n: scene.textures[i]["pixels"].shape[0] for n, i in tiled["tiles"].items()}
+    assert heights == {1001: 2, 1012: 4} and "a.1013.png" in said(loaded)
+    assert all(scene.textures[i]["wrap"] == ("clamp", "clamp") for i in tiled["tiles"].values())
+
+
+def test_udim_tiles_lie_side_by_side_in_the_picture(tmp_path):
+    colours = {1001: (255, 0, 0), 1002: (0, 255, 0), 1011: (0, 0, 255)}
+    for number, colour in colours.items():
+        pixels = np.full((4, 4, 3), colour, np.uint8)
+        write_image(tmp_path / f"a.{number}.png", pixels, "uint8")
+    text = surface(
+        "color3f inputs:emissiveColor.connect = </Mat/T.outputs:rgb>",
+        texture("asset inputs:file = @./a.<UDIM>.png@\nfloat4 inputs:fallback = (0.5, 1, 0, 1)"),
+        'custom token wavecomb:program = "emissive"',
+    ).replace(ST, ST.replace("1", "2").replace("prim2", "prim1"))
+    text += """def Camera "C" { float focalLength = 10
+        float horizontalAperture = 10
+        float verticalAperture = 10
+        double3 xformOp:translate = (0.5, 0.5, 1)
+        uniform token[] xformOpOrder = ["xformOp:translate"] }"""
+    picture = wavecomb.render(write(tmp_path, text), size=(8, 8), spp=2).beauty
+    # The lower left corner of the texture is 1001; 1012 is missing.
+    assert picture[6, 1].tolist() == [1, 0, 0] and picture[6, 6].tolist() == [0, 1, 0]
+    assert picture[1, 1].tolist() == [0, 0, 1] and picture[1, 6].tolist() == [0.5, 1, 0]
+
+
+def test_udim_without_tiles_is_missing(tmp_path):
     scene, loaded = load(
         tmp_path,
         surface(
             "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
-            texture("asset inputs:file = @./a.<UDIM>.png@"),
+            texture("asset inputs:file = @./gone.<UDIM>.png@"),
         ),
     )
-    assert scene.textures[0]["pixels"].shape == (2, 2, 3)
-    assert "UDIM" in said(loaded)
+    pixels = scene.textures[scene.material_of("M")["textures"]["base_color"]["texture"]]["pixels"]
+    assert (pixels[0, 0] == (255, 0, 255)).all() and "gone.<UDIM>.png" in said(loaded)
 
 
 def test_texture_in_a_package(tmp_path):
@@ -502,3 +539,182 @@ def test_foreign_surfaces_are_grey_and_listed(tmp_path):
     scene, loaded = load(tmp_path, text)
     assert scene.material_of("M")["base_color"] == (0.5, 0.5, 0.5)
     assert "PxrSurface" in said(loaded)
+
+
+def test_alpha_of_two_channels_is_the_second_and_tints_stay(tmp_path):
+    write_image(tmp_path / "a.png", np.full((2, 2, 2), (200, 10), np.uint8), "uint8")
+    scene, _ = load(
+        tmp_path,
+        surface(
+            "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>\n"
+            "float inputs:opacity.connect = </Mat/T.outputs:a>",
+            texture("asset inputs:file = @a.png@\nfloat4 inputs:scale = (1, 0.5, 0, 1)"),
+        ),
+    )
+    uses = scene.material_of("M")["textures"]
+    # The core gives (first, first, first, second): docs of TextureDesc.
+    assert uses["opacity"]["channel"] == "a" and uses["base_color"]["channel"] == "rgb"
+    assert uses["base_color"]["scale"] == (1, 0.5, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ('token inputs:sourceColorSpace = "sRGB"', "sourceColorSpace is sRGB"),
+        ("float4 inputs:bias = (-1, 1, -1, 0)", "sourceColorSpace is not raw"),
+        ('token inputs:sourceColorSpace = "raw"', ""),
+    ],
+)
+def test_normal_maps_are_never_srgb(tmp_path, extra, words):
+    write_image(tmp_path / "n.png", np.full((2, 2, 3), (128, 128, 255), np.uint8), "uint8")
+    scene, loaded = load(
+        tmp_path,
+        surface(
+            "normal3f inputs:normal.connect = </Mat/T.outputs:rgb>",
+            texture(f"asset inputs:file = @n.png@\n{extra}\nfloat4 inputs:scale = (2, -2, 2, 1)"),
+        ),
+    )
+    use = scene.material_of("M")["textures"]["normal"]
+    assert not scene.textures[use["texture"]]["srgb"]
+    assert use["scale"] == (2, -2, 2, 1)
+    assert use["bias"] == ((-1, 1, -1, 0) if "bias" in extra else (0, 0, 0, 0))
+    assert words in said(loaded) and (words or "normal map" not in said(loaded))
+
+
+def test_constant_normal_is_a_map_of_one_texel(tmp_path):
+    scene, _ = load(tmp_path, surface("normal3f inputs:normal = (0.6, 0, 0.8)"))
+    use = scene.material_of("M")["textures"]["normal"]
+    assert scene.textures[use["texture"]]["pixels"][0, 0].tolist() == pytest.approx([0.6, 0, 0.8])
+    assert use["scale"] == (1, 1, 1, 1) and use["bias"] == (0, 0, 0, 0)
+    scene, _ = load(tmp_path, surface("normal3f inputs:normal = (0, 0, 1)"))
+    assert scene.material_of("M")["textures"] == {}
+
+
+@pytest.mark.parametrize(
+    ("attributes", "inputs", "wraps"),
+    [
+        ({}, "", ("black", "black")),
+        ({"wrapS": "repeat", "wrapT": "mirror"}, "", ("repeat", "mirror")),
+        (
+            {"wrapmodes": "periodic,clamp"},
+            'token inputs:wrapS = "useMetadata"',
+            ("repeat", "clamp"),
+        ),
+        ({"wrapS": "repeat"}, 'token inputs:wrapS = "clamp"', ("clamp", "black")),
+        ({"wrapS": "repeat"}, 'token inputs:wrapS = "tiled"', ("repeat", "black")),
+    ],
+)
+def test_wraps_of_the_file(tmp_path, attributes, inputs, wraps):
+    out = oiio.ImageOutput.create(str(tmp_path / "a.exr"))
+    spec = oiio.ImageSpec(2, 2, 3, "half")
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    assert out.open(str(tmp_path / "a.exr"), spec)
+    assert out.write_image(np.zeros((2, 2, 3), np.float32))
+    out.close()
+    scene, loaded = load(
+        tmp_path,
+        surface(
+            "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
+            texture(f"asset inputs:file = @a.exr@\n{inputs}"),
+        ),
+    )
+    assert scene.textures[0]["wrap"] == wraps
+    assert ("no wrap mode" in said(loaded)) == ("tiled" in inputs)
+
+
+def test_auto_asks_the_file(tmp_path):
+    def one(kind, colour_space, name):
+        out = oiio.ImageOutput.create(str(tmp_path / name))
+        spec = oiio.ImageSpec(2, 2, 3, kind)
+        spec.attribute("oiio:ColorSpace", colour_space)
+        assert out.open(str(tmp_path / name), spec)
+        assert out.write_image(np.full((2, 2, 3), 0.5, np.float32))
+        out.close()
+        scene, _ = load(
+            tmp_path,
+            surface(
+                "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
+                texture(f"asset inputs:file = @{name}@"),
+            ),
+        )
+        return scene.textures[0]
+
+    tagged = one("uint16", "srgb_rec709_scene", "a.tif")  # writes Exif:ColorSpace
+    assert tagged["srgb"] and tagged["pixels"][0, 0, 0] == pytest.approx(0.2140, abs=1e-3)
+    assert not one("uint8", "lin_rec709_scene", "a.png")["srgb"]
+
+
+def test_varying_primvars_of_other_slots_are_per_face(tmp_path):
+    reader = """def Shader "P" { uniform token info:id = "UsdPrimvarReader_float"
+        string inputs:varname = "rough"
+        float outputs:result }"""
+    text = surface("float inputs:roughness.connect = </Mat/P.outputs:result>", reader)
+    strip = """int[] faceVertexCounts = [4, 4]
+        int[] faceVertexIndices = [0, 1, 2, 3, 1, 4, 5, 2]
+        point3f[] points = [(0,0,0), (1,0,0), (1,1,0), (0,1,0), (2,0,0), (2,1,0)]"""
+    scene, loaded = load(
+        tmp_path,
+        text
+        + f"""def Mesh "Own" {BIND} {{ {strip}
+            rel material:binding = </Mat>
+            uniform token subdivisionScheme = "none"
+            float[] primvars:rough = [0.25, 0.75] (interpolation = "uniform") }}""",
+    )
+    faces = scene.mesh("Own")["face_materials"]
+    values = [scene.materials[i]["roughness"] for i in faces]
+    assert values == pytest.approx([0.25, 0.25, 0.75, 0.75], abs=1e-3)
+    assert "one value for each face" in said(loaded)
+
+
+def test_files_with_the_same_bytes_are_one_texture(tmp_path):
+    write_image(tmp_path / "a.png", np.full((2, 2, 3), 9, np.uint8), "uint8")
+    (tmp_path / "b.png").write_bytes((tmp_path / "a.png").read_bytes())
+    other = texture("asset inputs:file = @b.png@").replace('"T"', '"U"').split('def Shader "R"')[0]
+    scene, _ = load(
+        tmp_path,
+        surface(
+            "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>\n"
+            "color3f inputs:emissiveColor.connect = </Mat/U.outputs:rgb>",
+            texture("asset inputs:file = @a.png@") + other,
+        ),
+    )
+    uses = scene.material_of("M")["textures"]
+    assert len(scene.textures) == 1
+    assert uses["base_color"]["texture"] == uses["emission"]["texture"] == 0
+
+
+@pytest.mark.parametrize(
+    ("space", "stored", "linear"),
+    [
+        # From the primaries of each space, by the published matrices to Rec.709 (D65).
+        ("acescg", (255, 0, 0), (1.70505, -0.13026, -0.02400)),
+        ("lin_p3d65_scene", (255, 0, 0), (1.22494, -0.04206, -0.01964)),
+        ("g22_rec709_scene", (128, 255, 0), ((128 / 255) ** 2.2, 1, 0)),
+        ("lin_rec709_scene", (51, 255, 0), (0.2, 1, 0)),
+    ],
+)
+def test_colour_spaces_of_files_and_values(tmp_path, space, stored, linear):
+    write_image(tmp_path / "a.png", np.full((2, 2, 3), stored, np.uint8), "uint8")
+    value = tuple(v / 255 for v in stored)
+    scene, _ = load(
+        tmp_path,
+        surface(
+            "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>\n"
+            f'color3f inputs:emissiveColor = {value} (colorSpace = "{space}")',
+            texture(f'asset inputs:file = @a.png@ (colorSpace = "{space}")'),
+        ),
+    )
+    image = scene.textures[0]
+    pixels = image["pixels"].astype(np.float32)
+    if image["pixels"].dtype == np.uint8:
+        pixels /= 255
+    assert pixels[0, 0].tolist() == pytest.approx(linear, abs=2e-3) and not image["srgb"]
+    assert scene.material_of("M")["emission"] == pytest.approx(linear, abs=1e-4)
+
+
+def test_unknown_colour_space_is_named(tmp_path):
+    _, loaded = load(
+        tmp_path, surface('color3f inputs:diffuseColor = (1, 0, 0) (colorSpace = "my_film")')
+    )
+    assert "colour space my_film" in said(loaded)

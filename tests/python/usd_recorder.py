@@ -27,6 +27,11 @@ class Recorder:
         self.textures.append({"pixels": pixels, "srgb": srgb, "wrap": (wrap_s, wrap_t)})
         return len(self.textures) - 1
 
+    def add_tiles(self, name, tiles, missing):
+        assert tiles and all(1001 <= n <= 1100 and t < len(self.textures) for n, t in tiles)
+        self.textures.append({"tiles": dict(tiles), "missing": missing, "name": name})
+        return len(self.textures) - 1
+
     def add_material(self, program, *, name="", textures=None, **parameters):
         self.materials.append(
             {"program": program, "name": name, "textures": textures or {}, **parameters}

@@ -188,6 +188,7 @@ class Job:
                     purpose.preview_every,
                     exposure=self.exposure,
                     tone_map=self.tone_map,
+                    working_space=loaded.working_space,
                 )
             )
         return sinks, state, seconds

@@ -43,6 +43,7 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
     from wavecomb.image import write_png
     from wavecomb.merge import merge
     from wavecomb.output import save_layers
+    from wavecomb.working_space import to_rec709
 
     layers = AovOptions.take(options)
     seen = {os.path.realpath(name) for name in pictures}
@@ -59,7 +60,8 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
         output, merged.layers, merged.metadata, merged.manifests, **layers.file_options()
     )
     if png is not None:
-        write_png(png, merged.layers["beauty"])
+        working = str(merged.metadata.get("wavecomb:working_space", "rec709"))
+        write_png(png, to_rec709(merged.layers["beauty"], working))
     samples = merged.layers["samples"]
     click.echo(
         f"{len(pictures)} pictures, seeds {', '.join(map(str, merged.seeds))}: "

@@ -102,6 +102,18 @@ def stage_options(command: F) -> F:
             "size in the picture.  [default: auto]",
         ),
         click.option(
+            "--working-space",
+            type=click.Choice(["rec709", "acescg"]),
+            help="Linear colours that the picture is computed in.  [default: rec709]",
+        ),
+        click.option(
+            "--texture-limit",
+            type=Real(0),
+            metavar="MB",
+            help="Memory of all textures; finest levels are left out where it is too little.  "
+            "[default: any]",
+        ),
+        click.option(
             "--session-layer",
             type=click.Path(),
             metavar="FILE",
@@ -209,6 +221,8 @@ class StageOptions:
     camera_projection: str | None = None
     product: str | None = None
     render_settings: str | None = None
+    texture_limit: float | None = None
+    working_space: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -266,6 +280,8 @@ class StageOptions:
             "projection": self.camera_projection,
             "product": self.product,
             "render_settings": self.render_settings,
+            "texture_limit": self.texture_limit,
+            "working_space": self.working_space or "rec709",
         }
 
     def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:

@@ -58,6 +58,7 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
 
     Without STAGE the window opens empty. docs/window.md says more.
     """
+    from wavecomb.errors import WavecombError
     from wavecomb.extras import needed
 
     needed("PySide6.QtWidgets", "the window", extra="gui")
@@ -69,6 +70,9 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
     from wavecomb.gui.setup import Setup
 
     source = StageOptions.take(options)
+    if source.texture_limit is not None or source.working_space not in (None, "rec709"):
+        name = "--working-space" if source.texture_limit is None else "--texture-limit"
+        raise WavecombError(f"{name} is not for the window: leave it out, or use wavecomb render")
     chosen = {name: value for name, value in options.items() if value is not None}
     setup = Setup().changed(width=size[0], height=size[1], denoise=denoise, **chosen)
     from wavecomb.gui.app import run

@@ -120,26 +120,34 @@ class Assigner:
         self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface
     ) -> tuple[int, FaceIds | None]:
         """Ids of a surface; one that reads primvars is made anew with this mesh's values."""
-        faces: FaceIds | None = None
-        for slot, name in surface.primvars.items():
+        by_face: tuple[str, NDArray[Any]] | None = None
+        # One may vary by face: the base colour where it does, for that shows most.
+        slots = sorted(surface.primvars.items(), key=lambda item: item[0] != "base_color")
+        for slot, name in slots:
             width = 3 if slot in COLOUR_SLOTS else 1
             values = self._values(draw, name, mesh.topology, width)
             if values is None or len(values) == 0:
                 continue
             if len(values) == 1:
                 surface = surface.with_value(slot, _plain(values[0]))
-            elif slot == "base_color":
+            elif by_face is None:
                 self.report.note(
                     "varying primvar in a material: one value for each face", draw.prim.GetPath()
                 )
-                palette, index = quantise(values)
-                ids = [self.table.add(surface.with_value(slot, _plain(c))) for c in palette]
-                faces = np.array(ids, np.uint32)[index]
+                by_face = slot, values
+                surface = surface.with_value(slot, _plain(values.mean(axis=0)))
             else:
                 what = f"varying primvar for {slot} (its mean is used)"
                 self.report.missing(what, draw.prim.GetPath())
                 surface = surface.with_value(slot, _plain(values.mean(axis=0)))
-        return self.table.add(surface), faces
+        if by_face is None:
+            return self.table.add(surface), None
+        slot, values = by_face
+        palette, index = quantise(np.repeat(values, 3, axis=1) if values.shape[1] == 1 else values)
+        ids = [
+            self.table.add(surface.with_value(slot, _plain(c[: values.shape[1]]))) for c in palette
+        ]
+        return ids[0], np.array(ids, np.uint32)[index]
 
     def _display(
         self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdLux
 
+from wavecomb.usd.colour_space import linear_colour, space_of
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
-from wavecomb.usd.texture import TextureTable, asset_file
+from wavecomb.usd.texture import UDIM, TextureTable, asset_file, tile_files
+from wavecomb.working_space import from_rec709
 
 KINDS = {
     "RectLight": "rect",
@@ -107,14 +109,22 @@ class LightReader:
         """Colour * intensity * 2^exposure * colour temperature."""
         # What is not finite stays so, and is warned of.
         bad = math.nan
-        base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
+        authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
+        try:
+            base = linear_colour(base, prim.GetAttribute("inputs:color"))
+        except ValueError as error:
+            self.report.missing(f"{error} (read as linear)", prim.GetPath())
         exposure = min(number(self._get(prim, "exposure", 0.0), bad), 200.0)
         power = number(self._get(prim, "intensity", 1.0), bad) * 2.0**exposure
         tint = (1.0, 1.0, 1.0)
         if self._get(prim, "enableColorTemperature", False):
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
             tint = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10000.0))
-        r, g, b = (float(c * t * power) for c, t in zip(base, tint, strict=True))
+        rgb = [float(c * t * power) for c, t in zip(base, tint, strict=True)]
+        working = "rec709" if self.textures is None else self.textures.working
+        r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
+        if min(authored) >= 0:  # what the working space cannot hold is at its edge
+            r, g, b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
         return (r, g, b)
 
     def _sphere(
@@ -136,7 +146,10 @@ class LightReader:
     def _texture(self, prim: Usd.Prim) -> int | None:
         attribute = prim.GetAttribute("inputs:texture:file")
         value = attribute.Get(self.time) if attribute else None
-        path = asset_file(value, attribute, self.report) if value is not None else ""
+        path = asset_file(value, attribute) if value is not None else ""
+        if UDIM in path:
+            self.report.missing("UDIM textures of lights (first tile used)", prim.GetPath())
+            path = next((file for _, file in tile_files(path)), path)
         if not path or self.textures is None:
             return None
         form = prim.GetAttribute("inputs:texture:format")
@@ -146,9 +159,10 @@ class LightReader:
         image = self.textures.image(path, prim.GetPath())
         if image is None:
             return None
+        tag = space_of(attribute) or "auto"
         rect = prim.GetTypeName() == "RectLight"
         wraps = ("clamp", "clamp") if rect else ("repeat", "clamp")
-        return self.textures.add(path, image, "auto", *wraps)
+        return self.textures.add(path, image, tag, *wraps, is_colour=True)
 
     def _pole(self, prim: Usd.Prim) -> NDArray[np.float64]:
         """Where the dome's pole starts: +Y for DomeLight, by poleAxis for DomeLight_1."""

@@ -15,8 +15,9 @@ from wavecomb.usd.materialx import MaterialXReader, model_of
 from wavecomb.usd.network import shader_id
 from wavecomb.usd.preview import PreviewReader
 from wavecomb.usd.report import LoadReport
-from wavecomb.usd.surface import Surface, fallback_surface
+from wavecomb.usd.surface import COLOUR_SLOTS, Surface, fallback_surface
 from wavecomb.usd.texture import TextureTable
+from wavecomb.working_space import from_rec709
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -156,11 +157,16 @@ class MaterialTable:
         number = self._ids.get(key)
         if number is None:
             brightest = surface.brightest()
+            parameters = dict(surface.parameters)
+            for slot in COLOUR_SLOTS if self._textures.working != "rec709" else ():
+                if slot in parameters:
+                    colour = from_rec709(np.array(parameters[slot]), self._textures.working)
+                    parameters[slot] = tuple(float(value) for value in colour)
             self.glows = self.glows or brightest >= LAMP
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,
-                **surface.parameters,
+                **parameters,
                 textures=surface.textures,
             )
             self._ids[key] = number

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
+from wavecomb.usd.colour_space import space_of
 from wavecomb.usd.network import (
     MAX_DEPTH,
     colour,
@@ -221,22 +222,20 @@ class MaterialXReader:
         file = source_of(node, "file", self.time)
         if not slot or file is None:
             return default
-        path = asset_file(file.value, file.attribute, self.report)
+        path = asset_file(file.value, file.attribute)
         image = self.textures.image(path, node.GetPath())
         if image is None:
             if default is not None or slot != "base_color":
                 return default
             texture, channel = self.textures.missing(), "rgb"
         else:
-            attribute = file.attribute
-            tag = attribute.GetColorSpace() if attribute and attribute.HasColorSpace() else ""
             is_colour = "color" in identifier and slot in COLOUR_SLOTS
-            space = "sRGB" if tag.startswith("srgb") else "auto" if is_colour and not tag else "raw"
+            space = space_of(file.attribute) or ("auto" if is_colour else "raw")
             wraps = [
                 _WRAPS.get(str(value_of(node, f"{axis}addressmode", self.time)), "repeat")
                 for axis in "uv"
             ]
-            texture = self.textures.add(path, image, space, wraps[0], wraps[1])
+            texture = self.textures.add(path, image, space, *wraps, is_colour=is_colour)
             wide = slot in (*COLOUR_SLOTS, "normal") and image.channels >= 3
             channel = "rgb" if wide else "r"
         u, v = pair(value_of(node, "uvtiling", self.time), (1.0, 1.0))

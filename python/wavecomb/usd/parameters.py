@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
+from wavecomb.usd.colour_space import space_of
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader
@@ -144,6 +145,8 @@ class _Tracer:
         own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
         path = own if attribute is None else attribute.GetPath()
         value = default if source is None else source.value
+        if slot in COLOUR_SLOTS and (space := space_of(attribute)):
+            return Parameter(slot, reason=f"it is in the colour space {space}")
         if clamped:
             value = constant(slot, value, default)
         elif isinstance(default, tuple):

@@ -36,14 +36,26 @@ class Image:
     """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top.
 
     Attributes:
+        size: Height and width.
         channels: Channels of each pixel.
         dtype: Of the pixels.
         stamp: Of its file before it was read; None: not known.
+        wraps: Modes in s and t that the file asks for: black, clamp, repeat or mirror.
+        encoded: Whether the file says that it is sRGB; None: it does not say.
     """
 
-    def __init__(self, pixels: NDArray[Any], stamp: Stamp | None = None) -> None:
+    def __init__(
+        self,
+        pixels: NDArray[Any],
+        stamp: Stamp | None = None,
+        wraps: tuple[str, str] = ("black", "black"),
+        encoded: bool | None = None,
+    ) -> None:
         self.stamp = stamp
+        self.wraps = wraps
+        self.encoded = encoded
         self._pixels: NDArray[Any] | None = pixels
+        self.size = int(pixels.shape[0]), int(pixels.shape[1])
         self.channels = int(pixels.shape[2])
         self.dtype = pixels.dtype
 
@@ -61,7 +73,12 @@ class Image:
 
     @property
     def automatic_srgb(self) -> bool:
-        """Whether ``sourceColorSpace = auto`` means sRGB: 8 bits, 3 or 4 channels."""
+        """Whether ``sourceColorSpace = auto`` means sRGB.
+
+        As the file says, else of 8 bits with 3 or 4 channels.
+        """
+        if self.encoded is not None:
+            return self.encoded
         return self.dtype == np.uint8 and self.channels >= 3
 
 
@@ -82,13 +99,26 @@ def read_image(path: str) -> Image:
     Raises:
         TextureError: It is missing, unreadable or too large.
     """
+    return _read(path, False)
+
+
+def read_header(path: str) -> Image:
+    """As ``read_image``, but for the pixels: they are all 0 and take no memory.
+
+    Raises:
+        TextureError: Likewise.
+    """
+    return _read(path, True)
+
+
+def _read(path: str, header_only: bool) -> Image:
     if not path:
         raise TextureError("no file name")
     stamp = stamp_of(path)
     if not Ar.IsPackageRelativePath(path):
         if not os.path.isfile(path):
             raise TextureError("no such file")
-        return Image(_read_file(path), stamp)
+        return _read_file(path, stamp, header_only)
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise TextureError("no such file in the package")
@@ -98,12 +128,36 @@ def read_image(path: str) -> Image:
     try:
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)
-        return Image(_read_file(name), stamp)
+        return _read_file(name, stamp, header_only)
     finally:
         os.unlink(name)
 
 
-def _read_file(path: str) -> NDArray[Any]:
+_WRAP_WORDS = {"periodic": "repeat"} | {w: w for w in ("black", "clamp", "repeat", "mirror")}
+
+
+def _wraps(spec: Any) -> tuple[str, str]:
+    """WrapS and wrapT of a file, or ``wrapmodes`` as texture tools write it; else black."""
+    both = str(spec.getattribute("wrapmodes") or "").split(",")
+    words = [
+        spec.getattribute(name) or both[min(i, len(both) - 1)]
+        for i, name in enumerate(("wrapS", "wrapT"))
+    ]
+    s, t = (_WRAP_WORDS.get(str(word).strip(), "black") for word in words)
+    return s, t
+
+
+def _encoded(spec: Any) -> bool | None:
+    """Whether a file of a coloured image says that it is sRGB, or linear; None: neither."""
+    if spec.nchannels < 3:
+        return None
+    if str(spec.getattribute("oiio:ColorSpace") or "").startswith("lin"):
+        return False
+    profile = str(spec.getattribute("ICCProfile:profile_description") or "")
+    return True if spec.getattribute("Exif:ColorSpace") == 1 or "sRGB" in profile else None
+
+
+def _read_file(path: str, stamp: Stamp | None, header_only: bool = False) -> Image:
     # Not before an image is read: the library takes 30 MB as soon as it is loaded.
     import OpenImageIO as oiio
 
@@ -127,6 +181,9 @@ def _read_file(path: str) -> NDArray[Any]:
         size = spec.width * spec.height * channels * np.dtype(dtype).itemsize
         if max(spec.width, spec.height) > MAX_SIDE or size > MAX_BYTES or spec.depth > 1:
             raise TextureError(f"{spec.width} x {spec.height} is too large")
+        if header_only:
+            nothing = np.broadcast_to(np.zeros(1, dtype), (spec.height, spec.width, channels))
+            return Image(nothing, stamp, _wraps(spec), _encoded(spec))
         ask = oiio.TypeDesc(oiio.UINT8 if base == oiio.UINT8 else oiio.FLOAT)
         pixels = source.read_image(0, 0, 0, channels, ask)
         if pixels is None:
@@ -138,7 +195,7 @@ def _read_file(path: str) -> NDArray[Any]:
     if pixels.dtype != np.uint8:
         limit = 65504.0 if dtype == np.float16 else 3.4e38
         pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=limit, neginf=-limit)
-    return np.ascontiguousarray(pixels, dtype)
+    return Image(np.ascontiguousarray(pixels, dtype), stamp, _wraps(spec), _encoded(spec))
 
 
 class ReadAhead:

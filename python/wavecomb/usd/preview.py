@@ -6,8 +6,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pxr import Usd, UsdShade
 
+from wavecomb.usd.colour_space import SRGB, canonical, linear_colour, space_of
 from wavecomb.usd.network import (
     MAX_DEPTH,
     Source,
@@ -23,8 +25,9 @@ from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.texture import asset_file
 
 if TYPE_CHECKING:
+    from wavecomb.usd.pixels import Image
     from wavecomb.usd.report import LoadReport
-    from wavecomb.usd.texture import TextureTable
+    from wavecomb.usd.texture import TextureTable, TiledImage
 
 INPUTS: dict[str, tuple[str, Any]] = {
     "diffuseColor": ("base_color", (0.18, 0.18, 0.18)),
@@ -63,6 +66,9 @@ PROGRAMS = (*USES, "principled")
 
 MAX_EVALUATIONS = 1 << 16
 
+_WRAP_INPUTS = ("wrapS", "wrapT")
+_ONES = (1.0, 1.0, 1.0, 1.0)
+_ZEROS = (0.0, 0.0, 0.0, 0.0)
 _IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -127,7 +133,9 @@ class PreviewReader:
             source = source_of(shader, name, self.time)
             if source is not None:
                 value = self._input(slot, source, default)
-                if value is not None and slot != "normal":
+                if slot == "normal":
+                    self._flat_normal(value)
+                elif value is not None:
                     parameters[slot] = value
         if parameters.get("ior", 1.0) <= 0.0:
             self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
@@ -157,6 +165,19 @@ class PreviewReader:
             displacement,
         )
 
+    def _flat_normal(self, value: Any) -> None:
+        """Tilts the whole surface by a constant normal, as a map of one texel."""
+        if value is None or tuple(value) == INPUTS["normal"][1]:
+            return
+        texel = np.array(value, np.float32).reshape(1, 1, 3)
+        self.slots["normal"] = {
+            "texture": self.textures.add_pixels(f"normal {tuple(value)}", texel),
+            "channel": "rgb",
+            "scale": _ONES,
+            "bias": _ZEROS,
+            "uv": (0.0,) * 6,
+        }
+
     def _displacement(self, surface: UsdShade.Shader) -> float | dict[str, Any] | None:
         """What the material's displacement output leads to: a length or a texture use."""
         shader = UsdShade.Material(self.material).ComputeDisplacementSource()[0]
@@ -181,7 +202,8 @@ class PreviewReader:
     def _input(self, slot: str, source: Source, default: Any) -> Any:
         """A constant for a slot, None for its default; a texture goes to ``slots``."""
         if source.is_value:
-            return constant(slot, source.value, default)
+            value = constant(slot, source.value, default)
+            return self._linear(value, source) if slot in COLOUR_SLOTS else value
         shader = source.shader
         identifier = shader_id(shader) if shader else ""
         if shader is not None and identifier == "UsdUVTexture":
@@ -192,20 +214,30 @@ class PreviewReader:
         if shader is not None and identifier.startswith("UsdPrimvarReader_"):
             name = value_of(shader, "varname", self.time, "")
             fallback = value_of(shader, "fallback", self.time)
-            if name and slot != "normal":
+            if name and slot == "normal":
+                self.report.missing("normals by a primvar of a material", self.material.GetPath())
+            elif name:
                 self.primvars[slot] = str(name)
             return constant(slot, fallback, default)
         what = identifier or "a shader without info:id"
         self.report.missing(f"shading node {what}", self.material.GetPath())
         return default
 
+    def _linear(self, value: Any, source: Source) -> Any:
+        """A colour in linear Rec.709, whatever its attribute holds."""
+        try:
+            return linear_colour(value, source.attribute)
+        except ValueError as error:
+            self.report.missing(f"{error} (read as linear)", self.material.GetPath())
+            return value
+
     def _texture(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """Adds a texture use; gives a constant where there is no image."""
         time = self.time
-        scale = _four(value_of(shader, "scale", time), (1.0, 1.0, 1.0, 1.0))
-        bias = _four(value_of(shader, "bias", time), (0.0, 0.0, 0.0, 0.0))
+        scale = _four(value_of(shader, "scale", time), _ONES)
+        bias = _four(value_of(shader, "bias", time), _ZEROS)
         file = source_of(shader, "file", time)
-        path = asset_file(file.value, file.attribute, self.report) if file is not None else ""
+        path = asset_file(file.value, file.attribute) if file is not None else ""
         image = self.textures.image(path, shader.GetPath())
         channel = output if output in ("rgb", "r", "g", "b", "a") else "rgb"
         if image is None:
@@ -213,24 +245,26 @@ class PreviewReader:
         if channel == "a" and image.channels in (1, 3):
             value = scale[3] + bias[3]
             return (value,) * 3 if isinstance(default, tuple) else value
-        if image.channels <= 2:
-            channel = "g" if channel == "a" else "r"
-        elif channel == "rgb" and slot not in (*COLOUR_SLOTS, "normal"):
+        if channel == "rgb" and slot not in (*COLOUR_SLOTS, "normal"):
             channel = "r"
         space = self._colour_space(shader, file)
-        bare = scale[:3] == (1.0, 1.0, 1.0) and bias[:3] == (0.0, 0.0, 0.0)
-        if slot == "normal" and bare and image.dtype.name in ("uint8", "float16"):
-            scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
-            what = "normal map without scale and bias: read as 2 x - 1, linear"
-            self.report.note(what, shader.GetPath())
-            space = "raw"
-        wraps = [str(value_of(shader, name, time, "useMetadata")) for name in ("wrapS", "wrapT")]
+        if slot == "normal":
+            space = self._linear_normals(space, image, shader)
+            bare = scale[:3] == _ONES[:3] and bias[:3] == _ZEROS[:3]
+            if bare and image.dtype.name in ("uint8", "float16"):
+                scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
+                what = "normal map without scale and bias: read as 2 x - 1, linear"
+                self.report.note(what, shader.GetPath())
+        missing = _four(value_of(shader, "fallback", time), (0.0, 0.0, 0.0, 1.0))
+        wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
         matrix = self._coordinates(shader)
         if not any((*matrix[:2], *matrix[3:5])):
             # One texel for all: its border must not be mixed in.
             wraps = ["clamp", "clamp"]
         self.slots[slot] = {
-            "texture": self.textures.add(path, image, space, wraps[0], wraps[1]),
+            "texture": self.textures.add(
+                path, image, space, *wraps, is_colour=slot in COLOUR_SLOTS, missing=missing
+            ),
             "channel": channel,
             "scale": scale,
             "bias": bias,
@@ -238,16 +272,36 @@ class PreviewReader:
         }
         return None
 
+    def _wrap(self, shader: UsdShade.Shader, name: str, of_file: str) -> str:
+        """A wrap mode, useMetadata being that of the file, else black."""
+        mode = word(value_of(shader, name, self.time), "useMetadata")
+        if mode not in ("black", "clamp", "repeat", "mirror", "useMetadata"):
+            self.report.warn(
+                f"{name} {mode!r} is no wrap mode: read as useMetadata", shader.GetPath()
+            )
+            mode = "useMetadata"
+        return of_file if mode == "useMetadata" else mode
+
+    def _linear_normals(
+        self, space: str, image: Image | TiledImage, shader: UsdShade.Shader
+    ) -> str:
+        """The colour space of a normal map, which is never sRGB, whatever the stage says."""
+        if image.automatic_srgb if space == "auto" else canonical(space) == SRGB:
+            if word(value_of(shader, "sourceColorSpace", self.time)) == "sRGB":
+                what = "normal map whose sourceColorSpace is sRGB: read as raw"
+                self.report.warn(what, shader.GetPath())
+            else:
+                what = "normal map whose sourceColorSpace is not raw: read as raw"
+                self.report.note(what, shader.GetPath())
+        return "raw"
+
     def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
-        """auto, raw or sRGB: by sourceColorSpace, else by the file attribute's colour space."""
+        """By sourceColorSpace, else by the colour space of the file's attribute, else auto."""
         space = word(value_of(shader, "sourceColorSpace", self.time))
-        if space in ("auto", "raw", "sRGB"):
+        if space in ("raw", "sRGB"):
             return str(space)
-        attribute = file.attribute if file is not None else None
-        tag = attribute.GetColorSpace() if attribute and attribute.HasColorSpace() else ""
-        if tag.lower().startswith(("srgb", "gamma_2.2")):
-            return "sRGB"
-        return "raw" if tag.lower().startswith(("raw", "lin", "data")) else "auto"
+        # An explicit auto asks the file; what the stage says of it goes before a default auto.
+        return "auto" if space == "auto" else space_of(file and file.attribute) or "auto"
 
     def _fallback(
         self,
@@ -270,8 +324,8 @@ class PreviewReader:
             self.slots[slot] = {
                 "texture": self.textures.missing(),
                 "channel": "rgb",
-                "scale": (1.0, 1.0, 1.0, 1.0),
-                "bias": (0.0, 0.0, 0.0, 0.0),
+                "scale": _ONES,
+                "bias": _ZEROS,
                 "uv": self._coordinates(shader),
             }
             return None

@@ -30,6 +30,8 @@ from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.traverse import Traversal
 from wavecomb.usd.view_options import Seen, ViewOptions
+from wavecomb.usd.view_size import ViewSize
+from wavecomb.working_space import WORKING_SPACES, from_rec709
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -59,6 +61,7 @@ class LoadedStage:
         frame: Time code that was read; None: default values.
         shutter: When it opens and closes, time codes from the frame; None: no motion blur.
         render: What the stage's render settings ask for.
+        working_space: What its colours are in: of ``WORKING_SPACES``.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
     """
 
@@ -75,6 +78,7 @@ class LoadedStage:
     textures: TextureStock | None = None
     shutter: tuple[float, float] | None = None
     render: RenderChoice = field(default_factory=RenderChoice)
+    working_space: str = "rec709"
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,8 @@ class _Choice:
     frame: float | None
     view: ViewOptions
     editable: bool
+    texture_limit: float | None
+    size: tuple[int, int]
 
 
 def load_stage(
@@ -124,6 +130,8 @@ def load_stage(
     exposure: bool = True,
     render_settings: str | None = None,
     product: str | None = None,
+    texture_limit: float | None = None,
+    working_space: str = "rec709",
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -162,12 +170,20 @@ def load_stage(
         render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
             else the only ones under /Render.
         product: Path or name of one of their products; None: the first.
+        texture_limit: MB (10^6 bytes) that all textures together may take; None: any. Where it is
+            too little, finest mip levels are left out, those first that the picture shows least.
+        working_space: What the picture is computed in: "rec709", or "acescg".
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
         WavecombError: The file or an option is no good.
     """
     started = clock.perf_counter()
+    if texture_limit is not None and not texture_limit > 0:
+        raise WavecombError(f"texture limit {texture_limit} MB: must be more than 0")
+    if working_space not in WORKING_SPACES:
+        known = ", ".join(WORKING_SPACES)
+        raise WavecombError(f"working space {working_space!r} is none of {known}")
     if frame is not None and not np.isfinite(frame):
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
@@ -187,7 +203,7 @@ def load_stage(
     opened = _opener(source, variants or {}, mask, session_layer)
     with captured(report):
         builder = _native_builder(threads) if builder_factory is None else builder_factory()
-        textures = TextureTable(builder, report, threads, reuse)
+        textures = TextureTable(builder, report, threads, reuse, working_space)
 
         def surfaces_of(materials: MaterialTable) -> Surfaces:
             return Surfaces(
@@ -195,7 +211,7 @@ def load_stage(
             )
 
         try:
-            choice = _Choice(opened, frame, view, editable)
+            choice = _Choice(opened, frame, view, editable, texture_limit, size)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -228,6 +244,7 @@ def load_stage(
         textures.stock(scene) if editable else None,
         filled.shutter,
         filled.render,
+        working_space,
     )
 
 
@@ -277,6 +294,7 @@ def _fill(
     chosen, lights, shutter = _read(
         stage,
         time,
+        choice,
         seen,
         builder,
         textures,
@@ -306,6 +324,7 @@ def _give_back_memory() -> None:
 def _read(
     stage: Usd.Stage,
     time: Usd.TimeCode,
+    choice: _Choice,
     seen: Seen,
     builder: _core.SceneBuilder,
     textures: TextureTable,
@@ -323,6 +342,8 @@ def _read(
     lights = LightReader(time, up_axis, textures, groups, report)
     motion = find_motion(view_prim, time, seen.blur, report)
     traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
+    if choice.texture_limit is not None:
+        _limit_textures(stage, traversal, seen, choice, textures, report)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
     world = GroupBuilder(
@@ -351,6 +372,32 @@ def _read(
     return chosen, light_paths, None if motion is None else motion.shutter
 
 
+def _limit_textures(
+    stage: Usd.Stage,
+    traversal: Traversal,
+    seen: Seen,
+    choice: _Choice,
+    textures: TextureTable,
+    report: LoadReport,
+) -> None:
+    """Says which mip levels the textures leave out."""
+    from wavecomb.usd.texture_limit import MEGABYTE, plan_levels
+
+    view = None
+    if seen.camera is not None:
+        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(seen.camera))
+        view = read_camera(seen.camera, to_world, traversal.time, LoadReport(), seen.lens)
+    if view is None:
+        cache = UsdGeom.BBoxCache(traversal.time, list(UsdGeom.Imageable.GetOrderedPurposeTokens()))
+        box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+        bounds = None if box.IsEmpty() else np.array([box.GetMin(), box.GetMax()])
+        view = frame_bounds(bounds, str(UsdGeom.GetStageUpAxis(stage)), seen.lens)
+    limit = float(choice.texture_limit or 0) * MEGABYTE
+    textures.drops = plan_levels(
+        stage, traversal.time, ViewSize(view, choice.size), limit, report, textures.working
+    )
+
+
 def _add_lights(
     world: Group,
     lit: bool,
@@ -372,7 +419,7 @@ def _add_lights(
         report.note("no visible light; the scene is lit by emissive materials or not at all")
         return ()
     report.note("no light: added a soft dome")
-    texture = textures.add_pixels("soft dome", soft_dome())
+    texture = textures.add_pixels("soft dome", from_rec709(soft_dome(), textures.working))
     builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
     return ("",)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdShade
 
+from wavecomb.usd.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
+from wavecomb.usd.halve import halve
 from wavecomb.usd.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.report import LoadReport
+from wavecomb.working_space import from_rec709
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -21,20 +25,32 @@ if TYPE_CHECKING:
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black"}
 
 
-def asset_file(value: Any, attribute: Usd.Attribute | None, report: LoadReport) -> str:
-    """The file that an asset value names: resolved where it resolves, else as authored."""
+UDIM = "<UDIM>"
+CURVE = "sRGB curve"
+"""In place of a space to convert from: only the transfer curve of sRGB is undone, by the core."""
+
+
+def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
+    """The file that an asset value names: resolved where it resolves, else as authored.
+
+    Of a UDIM texture its pattern, with ``<UDIM>`` in it.
+    """
     if not isinstance(value, Sdf.AssetPath):
         return str(value or "")
     path = value.resolvedPath or value.path
-    if "<UDIM>" not in path and "<UDIM>" not in value.path:
+    if UDIM not in path and UDIM not in value.path:
         return path
-    report.missing("UDIM textures (first tile used for all)", os.path.basename(value.path))
-    if "<UDIM>" not in path:
-        return path
+    if UDIM in value.resolvedPath:
+        return value.resolvedPath
     layers = attribute.GetPropertyStack() if attribute else []
     layer = layers[0].layer if layers else None
-    tiles = UsdShade.UdimUtils.ResolveUdimTilePaths(value.path, layer)
-    return str(tiles[0][0]) if tiles else path.replace("<UDIM>", "1001")
+    return UsdShade.UdimUtils.ResolveUdimPath(value.path, layer) or value.path
+
+
+def tile_files(pattern: str) -> list[tuple[int, str]]:
+    """Tile numbers and files that are there of a UDIM pattern, 1001 to 1100."""
+    found = UsdShade.UdimUtils.ResolveUdimTilePaths(pattern, None)
+    return [(int(number), path) for path, number in found]
 
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
@@ -43,7 +59,11 @@ def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
         for attribute in prim.GetAuthoredAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
                 value = attribute.Get(time)
-                if value is not None and value.resolvedPath:
+                if value is None:
+                    continue
+                if UDIM in value.path:
+                    yield from (path for _, path in tile_files(asset_file(value, attribute)))
+                elif value.resolvedPath:
                     yield value.resolvedPath
 
 
@@ -61,6 +81,43 @@ def checker() -> NDArray[np.uint8]:
     return np.where(squares[..., None] == 0, (255, 0, 255), (40, 0, 40)).astype(np.uint8)
 
 
+Key = tuple[str, str, str, str]
+"""A plain texture: its file, the space that it is converted from, and its wrap modes."""
+
+
+@dataclass(frozen=True)
+class TiledImage:
+    """The images of a UDIM texture; what holds for all is asked of the first.
+
+    Attributes:
+        first: That of the lowest number.
+        tiles: Their files by number.
+    """
+
+    first: Image
+    tiles: tuple[tuple[int, str], ...]
+
+    @property
+    def channels(self) -> int:
+        """Channels of each pixel."""
+        return self.first.channels
+
+    @property
+    def dtype(self) -> Any:
+        """Of the pixels."""
+        return self.first.dtype
+
+    @property
+    def wraps(self) -> tuple[str, str]:
+        """Tiles do not wrap."""
+        return ("clamp", "clamp")
+
+    @property
+    def automatic_srgb(self) -> bool:
+        """As of an ``Image``."""
+        return self.first.automatic_srgb
+
+
 @dataclass(frozen=True)
 class TextureStock:
     """The textures of a scene, for later ones to share.
@@ -76,6 +133,18 @@ class TextureStock:
     ids: dict[tuple[Any, ...], int]
 
 
+def _converts(space: str) -> bool:
+    """Whether the pixels must be made others."""
+    return space not in (RAW, CURVE)
+
+
+def stored_type(image: Image, space: str) -> Any:
+    """The type of a texture's values: that of its file, but half where 8 bits are converted."""
+    if image.dtype == np.uint8 and _converts(space):
+        return np.dtype(np.float16)
+    return image.dtype
+
+
 class TextureTable:
     """Adds textures to the scene, equal ones once."""
 
@@ -85,8 +154,14 @@ class TextureTable:
         report: LoadReport,
         threads: int = 0,
         reuse: TextureStock | None = None,
+        working: str = "rec709",
     ) -> None:
-        """``reuse``: textures to share where their files are what they were."""
+        """``reuse``: textures to share where their files are what they were.
+
+        ``working``: the space that colours are converted to, of ``WORKING_SPACES``. ``drops`` may
+        be set to say how many of its finest levels a texture leaves out.
+        """
+        self.working = working
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
         self._builder = builder
@@ -95,10 +170,13 @@ class TextureTable:
         self._images: dict[str, Image | TextureError] = {}
         self._ids: dict[tuple[Any, ...], int] = {}
         self._taken: dict[str, Image] = {}
+        self.drops: dict[Key, int] = {}
+        self._twins: dict[str, str] = {}
+        self._by_size: dict[int, list[str]] = {}
 
     def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
         """Starts to read the images of a material that will be used."""
-        files = image_files(material, time)
+        files = [self._twin(file) for file in image_files(material, time)]
         self._ahead.want(file for file in files if self._known(file) is None)
 
     def _known(self, path: str) -> Image | None:
@@ -111,8 +189,40 @@ class TextureTable:
             self._unchanged[path] = image if same else None
         return self._unchanged[path]
 
-    def image(self, path: str, prim: object) -> Image | None:
-        """The image of a file, read once; None and a warning where that fails."""
+    def _twin(self, path: str) -> str:
+        """The first file asked for with the same bytes; mostly the file itself."""
+        found = self._twins.get(path)
+        if found is None:
+            found = path
+            try:
+                if os.path.isfile(path):
+                    others = self._by_size.setdefault(os.path.getsize(path), [])
+                    same = (other for other in others if filecmp.cmp(other, path, shallow=False))
+                    found = next(same, path)
+                    if found is path:
+                        others.append(path)
+            except (OSError, ValueError):
+                pass  # reading it says what is wrong
+            self._twins[path] = found
+        return found
+
+    def image(self, path: str, prim: object) -> Image | TiledImage | None:
+        """The image of a file, read once; None and a warning where that fails.
+
+        Files with the same bytes are read once for all. Of a UDIM pattern all tiles.
+        """
+        if UDIM in path:
+            tiles = tile_files(path)
+            for _, tile in tiles:
+                first = self._image(self._twin(tile), prim)
+                if first is not None:
+                    return TiledImage(first, tuple(tiles))
+            if not tiles:
+                self._report.warn(f"texture {path} cannot be read (no tile is there)", prim)
+            return None
+        return self._image(self._twin(path), prim)
+
+    def _image(self, path: str, prim: object) -> Image | None:
         found = self._images.get(path)
         if found is None:
             try:
@@ -126,36 +236,100 @@ class TextureTable:
             return None
         return found
 
-    def add(self, path: str, image: Image, colour_space: str, wrap_s: str, wrap_t: str) -> int:
+    def add(
+        self,
+        path: str,
+        image: Image | TiledImage,
+        colour_space: str,
+        wrap_s: str,
+        wrap_t: str,
+        *,
+        is_colour: bool = False,
+        missing: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0),
+    ) -> int:
         """Texture id of an image.
 
         Args:
             path: Its file, which names it.
             image: From ``image``.
-            colour_space: auto, raw or sRGB.
+            colour_space: auto, or a name that OpenColorIO's built-in config knows.
             wrap_s: repeat, clamp, mirror or black; anything else is black, as UsdUVTexture says.
             wrap_t: Likewise.
+            is_colour: Whether what is read is a colour, which is converted to the working space;
+                of anything else only an sRGB curve is undone.
+            missing: Linear colour and alpha of tiles of a UDIM texture that are not there.
         """
-        srgb = image.automatic_srgb if colour_space == "auto" else colour_space == "sRGB"
+        if isinstance(image, TiledImage):
+            return self._add_tiles(path, image, colour_space, is_colour, missing)
+        path = self._twin(path)
+        space = self._space(path, image, colour_space, is_colour)
         wraps = _WRAPS.get(wrap_s, "black"), _WRAPS.get(wrap_t, "black")
-        key = (path, srgb, *wraps)
+        texture: Key = (path, space, *wraps)
+        key = (*texture, self.drops.get(texture, 0))
         if key not in self._ids:
             reuse = self._reuse
             if reuse is not None and key in reuse.ids and image is self._known(path):
                 self._ids[key] = self._builder.share_texture(reuse.scene, reuse.ids[key])
             else:
-                self._ids[key] = self._add(path, image, srgb, *wraps)
+                self._ids[key] = self._add(path, image, space, *wraps)
             self._report.tally("textures")
         return self._ids[key]
 
-    def _add(self, path: str, image: Image, srgb: bool, wrap_s: str, wrap_t: str) -> int:
+    def _add_tiles(
+        self,
+        path: str,
+        image: TiledImage,
+        colour_space: str,
+        is_colour: bool,
+        missing: tuple[float, ...],
+    ) -> int:
+        """One texture of all tiles that can be read. In auto each is as its own file says."""
+        tiles = []
+        for number, file in image.tiles:
+            tile = self._image(self._twin(file), path)
+            if tile is not None:
+                added = self.add(file, tile, colour_space, "clamp", "clamp", is_colour=is_colour)
+                tiles.append((number, added))
+        if is_colour:
+            r, g, b = from_rec709(np.array(missing[:3]), self.working)
+            missing = (float(r), float(g), float(b), missing[3])
+        key = (path, tuple(tiles), missing)
+        if key not in self._ids:
+            self._ids[key] = self._builder.add_tiles(path, tiles, missing)
+        return self._ids[key]
+
+    def _space(self, path: str, image: Image, colour_space: str, is_colour: bool) -> str:
+        """The space to convert from, of OpenColorIO's names, or RAW (none), or CURVE."""
+        if colour_space == "auto":
+            space = SRGB if image.automatic_srgb else LINEAR
+        else:
+            known = canonical(colour_space)
+            if known is None:
+                self._report.missing(f"colour space {colour_space} (read as auto)", path)
+                return self._space(path, image, "auto", is_colour)
+            space = known
+        if space == SRGB and self.working == "rec709":
+            return CURVE
+        if not is_colour or image.channels < 3:
+            return CURVE if space == SRGB else RAW
+        return RAW if space == OCIO_NAMES[self.working] else space
+
+    def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
         # Gone from memory once it is in the scene; a second use in another way reads it again.
         pixels = image.take() if image.is_here else read_image(path).take()
-        if srgb and pixels.dtype != np.uint8:
+        srgb = space == CURVE
+        dtype = stored_type(image, space)
+        if _converts(space):
+            top = 65504.0 if dtype == np.float16 else 3.4e38
+            linear = np.clip(convert(pixels, space, self.working), -top, top)
+            pixels = np.ascontiguousarray(linear, dtype)
+        elif srgb and pixels.dtype != np.uint8:
             colours = 3 if image.channels >= 3 else 1
             linear = to_linear(pixels[..., :colours])
             linear = np.concatenate([linear, pixels[..., colours:]], axis=2)
             pixels = np.ascontiguousarray(linear, image.dtype)
+        for _ in range(self.drops.get((path, space, wrap_s, wrap_t), 0)):
+            pixels = halve(pixels, srgb)
         return self._builder.add_texture(pixels, srgb=srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path)
 
     def missing(self) -> int:
@@ -168,7 +342,7 @@ class TextureTable:
         return self._ids[key]
 
     def add_pixels(self, name: str, pixels: NDArray[Any]) -> int:
-        """Texture id of generated pixels, linear."""
+        """Texture id of generated pixels, linear Rec.709 where they are colours."""
         return self._builder.add_texture(
             pixels, srgb=False, wrap_s="repeat", wrap_t="clamp", name=name
         )

@@ -53,7 +53,7 @@ std::vector<MaterialTraits> material_traits(const Scene& scene) {
     t.program = static_cast<uint32_t>(material.program);
     for (const TextureUse& use : material.textures) {
       if (use.texture == kNoTexture) continue;
-      const uint64_t bytes = scene.textures()[use.texture]->bytes();
+      const uint64_t bytes = scene.textures()[use.texture]->spanned_bytes();
       if (t.texture == MaterialTraits::kNone || bytes > t.texture_bytes) {
         t.texture = use.texture;
         t.texture_bytes = bytes;

@@ -104,6 +104,10 @@ uint64_t hash_textures(const Scene& scene) {
     h.add(v.format, v.channels, v.srgb, v.has_alpha, v.wrap_s, v.wrap_t, v.level_count);
     for (uint32_t l = 0; l < v.level_count; ++l) h.add(v.levels[l].width, v.levels[l].height);
     h.add_bytes(v.texels, texture->bytes());
+    // Tiles are textures of the scene too, so their places say which they are.
+    for (const auto& [number, tile] : texture->tiles())
+      for (uint32_t at = 0; at < scene.textures().size(); ++at)
+        if (scene.textures()[at] == tile) h.add(number, at);
   }
   return h.value();
 }

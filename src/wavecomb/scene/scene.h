@@ -125,6 +125,11 @@ class SceneBuilder {
   uint32_t add_texture(const TextureDesc& desc);
   /// A texture of another scene, which may end before this one.
   uint32_t add_texture(TexturePtr texture);
+  /// A UDIM texture of textures that were added, by tile number from 1001 to 1100; `missing`:
+  /// linear r, g, b, alpha where there is no tile.
+  uint32_t add_tiles(const std::string& name,
+                     const std::vector<std::pair<uint32_t, uint32_t>>& tiles,
+                     const std::array<float, 4>& missing);
   /// A texture that was added; valid until the builder is gone or build() is called.
   const Texture& texture(uint32_t id) const;
   /// Texture ids in the material must exist.

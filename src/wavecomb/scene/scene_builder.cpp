@@ -130,6 +130,17 @@ uint32_t SceneBuilder::add_texture(TexturePtr texture) {
   return static_cast<uint32_t>(textures_.size() - 1);
 }
 
+uint32_t SceneBuilder::add_tiles(const std::string& name,
+                                 const std::vector<std::pair<uint32_t, uint32_t>>& tiles,
+                                 const std::array<float, 4>& missing) {
+  std::vector<std::pair<uint32_t, TexturePtr>> parts;
+  for (const auto& [number, id] : tiles) {
+    texture(id);
+    parts.emplace_back(number, textures_[id]);
+  }
+  return add_texture(std::make_shared<const Texture>(name, parts, missing));
+}
+
 const Texture& SceneBuilder::texture(uint32_t id) const {
   if (id >= textures_.size()) throw Error("texture " + std::to_string(id) + " was never added");
   return *textures_[id];

@@ -199,26 +199,19 @@ inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level,
   return lerp_texel<F>(top, low, y.weight);
 }
 
-}  // namespace detail
-
-/// Trilinear lookup in one texture (the same in all lanes). `s`, `t`: texture coordinates, t up
-/// (USD's convention: (0, 0) is the lower left corner of the image, texel centres are at half
-/// texels). `width`: footprint in uv units (lod = log2(width * max(texture width, height)),
-/// clamped); width <= 0 or NaN reads the finest level. Any s and t are safe; NaN counts as 0. Off a
-/// texture that is black outside, each tap is black, and transparent if the texture has alpha.
-/// Inactive lanes are unspecified.
+/// `lookup` in a texture that is not made of tiles.
 template <typename F>
-inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const F& width,
-                       const Mask<F>& active) {
-  const F s_in = detail::wrap_coordinate<F>(texture.wrap_s, s);
-  const F t_in = detail::wrap_coordinate<F>(texture.wrap_t, t);
+inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t, const F& width,
+                             const Mask<F>& active) {
+  const F s_in = wrap_coordinate<F>(texture.wrap_s, s);
+  const F t_in = wrap_coordinate<F>(texture.wrap_t, t);
   const TextureLevel& finest = texture.levels[0];
   const float size =
       static_cast<float>(finest.width > finest.height ? finest.width : finest.height);
   const F texels_wide = width * size;
   const Mask<F> coarse = (texels_wide > 1.f) & active;
   if (none(coarse)) {
-    return detail::bilinear<F>(texture, detail::broadcast_level<F>(finest), s_in, t_in, active);
+    return bilinear<F>(texture, broadcast_level<F>(finest), s_in, t_in, active);
   }
   const uint32_t last = texture.level_count - 1;
   // Lanes that are not coarse have lod 0: level 0 with weight 0 of the next, the same as above.
@@ -226,14 +219,71 @@ inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const
   const F base = max(floor(lod), F(0.f));
   const F weight = select(coarse, F(lod - base), F(0.f));
   const UInt<F> level = select(coarse, UInt<F>(to_int<F>(base)), UInt<F>(0u));
-  const Texel<F> fine = detail::bilinear<F>(
-      texture, detail::gather_level<F>(texture, level, active), s_in, t_in, active);
+  const Texel<F> fine =
+      bilinear<F>(texture, gather_level<F>(texture, level, active), s_in, t_in, active);
   const Mask<F> mixed = (weight > 0.f) & active;
   if (none(mixed)) return fine;
   const UInt<F> next = select(mixed, level + 1u, level);
-  const Texel<F> rough = detail::bilinear<F>(texture, detail::gather_level<F>(texture, next, mixed),
-                                             s_in, t_in, mixed);
-  return detail::select_texel<F>(mixed, detail::lerp_texel<F>(fine, rough, weight), fine);
+  const Texel<F> rough =
+      bilinear<F>(texture, gather_level<F>(texture, next, mixed), s_in, t_in, mixed);
+  return select_texel<F>(mixed, lerp_texel<F>(fine, rough, weight), fine);
+}
+
+/// The first active lane's value.
+template <typename F>
+inline uint32_t first_of(const UInt<F>& value, const Mask<F>& active) {
+  if constexpr (kIsScalar<F>)
+    return value;
+  else
+    return lane(value, static_cast<size_t>(std::countr_zero(lane_bits<F>(active))));
+}
+
+/// `lookup` in a UDIM texture: `lookup_plain` once for each tile that the active lanes are in. A
+/// point on the border of two tiles belongs to the upper or right one; filters do not cross it.
+template <typename F>
+[[gnu::noinline]] Texel<F> lookup_tiles(const TextureView& texture, const F& s, const F& t,
+                                        const F& width, const Mask<F>& active) {
+  using U = UInt<F>;
+  const F zero(0.f), columns(static_cast<float>(TileSet::kColumns));
+  // NaN counts as 0; what is far off stays off and fits an integer.
+  const auto clean = [&](const F& x) { return clamp(select(x == x, x, zero), F(-1.f), columns); };
+  const F column = floor(clean(s)), row = floor(clean(t));
+  const Mask<F> inside =
+      (column >= zero) & (row >= zero) & (column < columns) & (row < columns) & active;
+  const U tile = select(Mask<U>(inside), U(to_int<F>(fma(row, columns, column))), U(0u));
+  Texel<F> result = lookup_plain<F>(texture, zero, zero, zero, active);
+  Mask<F> pending = inside;
+  while (any(pending)) {
+    const uint32_t one = first_of<F>(tile, pending);
+    const Mask<F> same = pending & Mask<F>(tile == U(one));
+    if (const TextureView* view = texture.tiles->views[one]) {
+      const Texel<F> texel = lookup_plain<F>(*view, F(s - column), F(t - row), width, same);
+      result = select_texel<F>(same, texel, result);
+    }
+    pending = pending & not_(same);
+  }
+  return result;
+}
+
+}  // namespace detail
+
+/// Trilinear lookup in one texture (the same in all lanes). `s`, `t`: texture coordinates, t up
+/// (USD's convention: (0, 0) is the lower left corner of the image, texel centres are at half
+/// texels). `width`: footprint in uv units (lod = log2(width * max(texture width, height)),
+/// clamped); width <= 0 or NaN reads the finest level. Any s and t are safe; NaN counts as 0. Off a
+/// texture that is black outside, each tap is black, and transparent if the texture has alpha.
+/// Inactive lanes are unspecified. A UDIM texture gives the tile's texel, and that of missing tiles
+/// where there is none.
+template <typename F>
+inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const F& width,
+                       const Mask<F>& active) {
+  if (texture.tiles) [[unlikely]] {
+    // Copies, so that what all other textures use may stay in registers.
+    const F u = s, v = t, w = width;
+    const Mask<F> on = active;
+    return detail::lookup_tiles<F>(texture, u, v, w, on);
+  }
+  return detail::lookup_plain<F>(texture, s, t, width, active);
 }
 
 /// Lookup where each lane has its own texture id (index into `textures`); runs `lookup` once per
@@ -244,12 +294,7 @@ inline Texel<F> lookup(const TextureView* textures, const UInt<F>& id, const F& 
   Texel<F> result{F(0.f), F(0.f), F(0.f), F(1.f)};
   Mask<F> pending = active & Mask<F>(id != UInt<F>(kNoTexture));
   while (any(pending)) {
-    const uint32_t one = [&] {
-      if constexpr (kIsScalar<F>)
-        return id;
-      else
-        return lane(id, static_cast<size_t>(std::countr_zero(lane_bits<F>(pending))));
-    }();
+    const uint32_t one = detail::first_of<F>(id, pending);
     const Mask<F> same = pending & Mask<F>(id == UInt<F>(one));
     result = detail::select_texel<F>(same, lookup<F>(textures[one], s, t, width, same), result);
     pending = pending & not_(same);

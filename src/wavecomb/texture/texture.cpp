@@ -76,6 +76,50 @@ Texture::Texture(const TextureDesc& desc, const ForEach& for_each) : name_(desc.
   if (view_.channels == 1) mean_[1] = mean_[2] = mean_[0];
 }
 
+namespace {
+
+TextureDesc one_texel(std::string name, const std::array<float, 4>& color) {
+  TextureDesc desc;
+  desc.name = std::move(name);
+  desc.data = color.data();
+  desc.width = desc.height = 1;
+  desc.channels = 4;
+  desc.format = TexelFormat::kF32;
+  desc.wrap_s = desc.wrap_t = Wrap::kClamp;
+  return desc;
+}
+
+}  // namespace
+
+Texture::Texture(std::string name,
+                 const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles,
+                 const std::array<float, 4>& missing)
+    : Texture(one_texel(std::move(name), missing)) {
+  const std::string where = "texture '" + name_ + "': ";
+  if (tiles.empty()) throw Error(where + "has no tiles");
+  tiles_ = tiles;
+  tile_set_ = std::make_unique<TileSet>();
+  std::array<float, 4> sum{};
+  for (const auto& [number, tile] : tiles_) {
+    const uint32_t i = number - 1001u;
+    if (i >= TileSet::kCount)
+      throw Error(where + "tile " + std::to_string(number) + " is not one of 1001 to 1100");
+    if (tile_set_->views[i]) throw Error(where + "has tile " + std::to_string(number) + " twice");
+    if (!tile || tile->view().tiles)
+      throw Error(where + "tile " + std::to_string(number) + " is no plain texture");
+    tile_set_->views[i] = &tile->view();
+    for (size_t c = 0; c < 4; ++c) sum[c] += tile->mean()[c];
+  }
+  for (size_t c = 0; c < 4; ++c) mean_[c] = sum[c] / static_cast<float>(tiles_.size());
+  view_.tiles = tile_set_.get();
+}
+
+size_t Texture::spanned_bytes() const {
+  size_t sum = bytes_;
+  for (const auto& [number, tile] : tiles_) sum += tile->bytes();
+  return sum;
+}
+
 void in_order(size_t n, const std::function<void(size_t)>& body) {
   for (size_t i = 0; i < n; ++i) body(i);
 }

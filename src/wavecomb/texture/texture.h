@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace wavecomb {
@@ -41,6 +42,8 @@ struct TextureLevel {
 };
 static_assert(sizeof(TextureLevel) == 24);
 
+struct TileSet;
+
 /// What kernels need of a texture, without ownership. Texels are stored in square tiles of
 /// kTile x kTile, row by row; one-channel textures as one value a texel, all others as four.
 /// Every stored value is finite; storage is shorter than 2^31 words of 32 bits.
@@ -55,6 +58,16 @@ struct TextureView {
   Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
   uint32_t level_count = 0;
   TextureLevel levels[kMaxLevels] = {};
+  /// Of a UDIM texture: what is looked up in its place; its own only texel is that of tiles that
+  /// are missing.
+  const TileSet* tiles = nullptr;
+};
+
+/// The tiles of a UDIM texture. Tile i, called 1001 + i, covers s in [i % 10, i % 10 + 1) and t in
+/// [i / 10, i / 10 + 1); null where it is missing.
+struct TileSet {
+  static constexpr uint32_t kColumns = 10, kCount = 100;
+  std::array<const TextureView*, kCount> views{};
 };
 
 /// Linear r, g, b, a of the texel in column x, row y (0: top) of a level. For tools and tests;
@@ -80,11 +93,23 @@ class Texture {
   /// desc.name for sizes of 0 or above kMaxSize, bad channels, no data, or more than 8 GiB.
   /// `for_each` may share the rows among threads; it changes no bit.
   explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order);
+  /// A UDIM texture of others, which it shares: `tiles` are pairs of tile number (1001 to 1100) and
+  /// texture. `missing`: linear r, g, b, alpha wherever there is none. Throws Error naming `name`
+  /// for a number out of range or given twice, no tiles, and tiles that are made of tiles.
+  Texture(std::string name,
+          const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles,
+          const std::array<float, 4>& missing);
 
   const TextureView& view() const { return view_; }
   const std::string& name() const { return name_; }
-  /// Memory of all levels.
+  /// Memory of all levels, without that of tiles.
   size_t bytes() const { return bytes_; }
+  /// The textures that a UDIM texture is made of, by tile number.
+  const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles() const {
+    return tiles_;
+  }
+  /// Memory that lookups may reach: of all levels and tiles.
+  size_t spanned_bytes() const;
   /// Mean of the finest level in linear light (r, g, b, a).
   const float* mean() const { return mean_; }
   /// Values of the finest level that were infinite or NaN and read as 0.
@@ -98,6 +123,8 @@ class Texture {
   std::string name_;
   TextureView view_;
   std::unique_ptr<std::byte[], Free> storage_;
+  std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>> tiles_;
+  std::unique_ptr<TileSet> tile_set_;
   size_t bytes_ = 0;
   uint64_t nonfinite_count_ = 0;
   float mean_[4] = {0, 0, 0, 1};

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The colour spaces that pictures may be computed in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+WORKING_SPACES = ("rec709", "acescg")
+"""Linear Rec.709 (the default), and ACEScg: the primaries AP1 with the white of ACES."""
+
+CHROMATICITIES = {
+    "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+}
+"""x and y of red, green, blue and white, for headers of EXR files; those of Rec.709 go without."""
+
+# AP1 to Rec.709, the whites adapted by Bradford's method: S-2014-004, TB-2014-004 (ACES).
+_ACESCG_TO_REC709 = np.array(
+    [
+        [1.7050509, -0.6217921, -0.0832588],
+        [-0.1302564, 1.1408047, -0.0105483],
+        [-0.0240034, -0.1289690, 1.1529723],
+    ]
+)
+
+
+def to_rec709(rgb: NDArray[Any], working: str) -> NDArray[Any]:
+    """Colours (..., 3) of the working space in linear Rec.709."""
+    if working == "rec709":
+        return rgb
+    return np.asarray(rgb @ _ACESCG_TO_REC709.T, np.float32)
+
+
+def from_rec709(rgb: NDArray[Any], working: str) -> NDArray[Any]:
+    """The inverse of ``to_rec709``."""
+    if working == "rec709":
+        return rgb
+    return np.asarray(rgb @ np.linalg.inv(_ACESCG_TO_REC709).T, np.float32)
+
+
+def header_of(working: str) -> dict[str, Any]:
+    """Attributes of EXR files of pictures in the working space."""
+    if working == "rec709":
+        return {}
+    return {"chromaticities": CHROMATICITIES[working], "wavecomb:working_space": working}
