@@ -202,6 +202,7 @@ def load(
     shutter: tuple[float, float] | None = None,
     motion_blur: bool = True,
     motion_steps: int | None = None,
+    lights: str = "visible",
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -227,6 +228,8 @@ def load(
         shutter: When it opens and closes, time codes from the frame; by default the camera's.
         motion_blur: Whether what moves while the shutter is open is blurred.
         motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
+        lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
+            (docs/decisions/light-shapes.md).
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -254,6 +257,7 @@ def load(
         "shutter": shutter,
         "motion_blur": motion_blur,
         "motion_steps": motion_steps,
+        "lights": lights,
     }
     if isolate:
         from wavecomb.isolate.probe import check

@@ -165,6 +165,7 @@ def render_frames(
     shutter: tuple[float, float] | None = None,
     motion_blur: bool = True,
     motion_steps: int | None = None,
+    lights: str = "visible",
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -189,6 +190,7 @@ def render_frames(
         shutter: Likewise.
         motion_blur: Likewise.
         motion_steps: Likewise.
+        lights: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -218,6 +220,7 @@ def render_frames(
         shutter=shutter,
         motion_blur=motion_blur,
         motion_steps=motion_steps,
+        lights=lights,
         size=(chosen.width, chosen.height),
         **options,
     )

@@ -131,6 +131,12 @@ def stage_options(command: F) -> F:
             "[default: the camera's]",
         ),
         click.option(
+            "--lights",
+            type=click.Choice(["visible", "hidden"]),
+            help="Whether rays meet the shapes of lights; hidden ones shine all the same.  "
+            "[default: visible]",
+        ),
+        click.option(
             "--variant",
             "variants",
             multiple=True,
@@ -175,6 +181,7 @@ class StageOptions:
     shutter: tuple[float, float] | None = None
     no_motion_blur: bool = False
     motion_steps: int | None = None
+    lights: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -227,6 +234,7 @@ class StageOptions:
             "shutter": self.shutter,
             "motion_blur": not self.no_motion_blur,
             "motion_steps": self.motion_steps,
+            "lights": self.lights or "visible",
         }
 
     def selections(self) -> dict[str, str]:

@@ -19,7 +19,8 @@ from wavecomb.usd.camera import camera_motion, find_camera, frame_bounds, read_c
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
-from wavecomb.usd.light import LightReader, soft_dome, up_rotation
+from wavecomb.usd.ies import IesTable
+from wavecomb.usd.light import LIGHT_SHAPES, LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport
@@ -96,6 +97,7 @@ class _Choice:
     purposes: Sequence[str]
     editable: bool
     blur: Blur
+    lights: str
 
 
 def load_stage(
@@ -117,6 +119,7 @@ def load_stage(
     shutter: tuple[float, float] | None = None,
     motion_blur: bool = True,
     motion_steps: int | None = None,
+    lights: str = "visible",
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -146,6 +149,8 @@ def load_stage(
         shutter: When it opens and closes, time codes from the frame; None: as the camera says.
         motion_blur: Whether what moves while the shutter is open is blurred.
         motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
+        lights: Whether rays meet the shapes of lights: "visible" or "hidden"
+            (docs/decisions/light-shapes.md).
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -159,6 +164,8 @@ def load_stage(
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
         raise WavecombError("mask and session_layer are chosen when the stage is opened")
+    if lights not in LIGHT_SHAPES:
+        raise WavecombError(f"lights {lights!r}: there are {', '.join(LIGHT_SHAPES)}")
     level = parse_level(subdivision)
     if not (len(size) == 2 and min(size) >= 1):
         raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
@@ -178,7 +185,7 @@ def load_stage(
             )
 
         try:
-            choice = _Choice(opened, frame, camera, purposes, editable, blur)
+            choice = _Choice(opened, frame, camera, purposes, editable, blur, lights)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -301,7 +308,8 @@ def _read(
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = find_camera(stage, choice.camera)
     groups = LightGroups(report)
-    lights = LightReader(time, up_axis, textures, groups, report)
+    profiles, hidden = IesTable(builder, report), choice.lights == "hidden"
+    lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden)
     motion = find_motion(view_prim, time, choice.blur, report)
     traversal = Traversal(time, choice.purposes, lights, report, motion)
     meshes = None if stock is None else stock.meshes

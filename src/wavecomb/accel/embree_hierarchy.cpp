@@ -62,6 +62,7 @@ std::vector<LightRecord> light_shapes(const Scene& scene) {
     shape.kind = kNoLight;
     const auto kind = static_cast<LightKind>(record.kind);
     const bool has_shape = kind == LightKind::kRect || kind == LightKind::kDisk ||
+                           kind == LightKind::kCylinder ||
                            (kind == LightKind::kSphere && record.radius > 0);
     if (!has_shape || !(record.area > 0)) continue;
     shape.kind = record.kind;

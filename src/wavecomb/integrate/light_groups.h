@@ -24,7 +24,8 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
                               const Add& add) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> all =
-      path.throughput * escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active);
+      path.throughput *
+      escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active, depth == 0);
   const Mask<F> ok = active & is_finite(all.x) & is_finite(all.y) & is_finite(all.z);
   const float limit = clamp_limit(settings, depth);
   const F y = luminance(all);
@@ -33,7 +34,7 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
     const uint32_t group = kept[i];
     if (group == kNoGroup) continue;
     const Color<F> le =
-        infinite_light_radiance<F>(scene.lights, i, path.dir, path.pdf, delta, active);
+        infinite_light_radiance<F>(scene.lights, i, path.dir, path.pdf, delta, active, depth == 0);
     add(group, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
   }
 }

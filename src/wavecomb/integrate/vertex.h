@@ -129,7 +129,9 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
                                uint32_t depth, const UInt<F>& light, const Vec3<F>& o, const F& t,
                                const PathState<F>& path, const Mask<F>& active) {
   const LightHit<F> hit = light_hit<F>(scene.lights, light, o, path.dir, t, active);
-  const F w = bounce_weight<F>(path.pdf, hit.pdf);
+  F w = bounce_weight<F>(path.pdf, hit.pdf);
+  if (scene.lights.has_multipliers)
+    w *= LightEffect<F>(scene.lights, light, active).of_hit(not_(path.pdf > 0.f), depth == 0);
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
 
@@ -139,7 +141,8 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      uint32_t depth, const PathState<F>& path,
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
-  const Color<F> le = escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active);
+  const Color<F> le =
+      escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active, depth == 0);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
@@ -294,9 +297,17 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         settings.cosine_sampling && kOpaque
             ? select(F(wo.z * wi.z) > 0.f, cosine_hemisphere_pdf(abs(wi.z)), F(0.f))
             : e.pdf;
-    const F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
+    F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
+    Color<F> f_cos = e.f_cos;
+    if (scene.lights.has_multipliers) [[unlikely]] {
+      const LightEffect<F> effect(scene.lights, chosen_light<F>(scene.lights, rl.x, lit), lit);
+      const Color<F> diffuse = bsdf.diffuse_f_cos(wo, wi);
+      f_cos = select<F>(effect.sampled_only,
+                        fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
+      w = select(effect.sampled_only, F(1.f), w);
+    }
     const Color<F> c =
-        clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
+        clean<F>(path.throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
     if (wants_lights) aovs->lit_by = chosen_light<F>(scene.lights, rl.x, lit);

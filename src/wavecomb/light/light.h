@@ -7,10 +7,12 @@
 #pragma once
 
 #include "wavecomb/core/vec.h"
+#include "wavecomb/light/cylinder.h"
 #include "wavecomb/light/disk.h"
 #include "wavecomb/light/distant.h"
 #include "wavecomb/light/dome.h"
 #include "wavecomb/light/rect.h"
+#include "wavecomb/light/shaping.h"
 #include "wavecomb/light/sphere.h"
 #include "wavecomb/light/triangle.h"
 #include "wavecomb/scene/light_data.h"
@@ -78,6 +80,8 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const Li
       return sample_disk<F>(light, p, u, v);
     case LightKind::kSphere:
       return sample_sphere<F>(light, p, u, v);
+    case LightKind::kCylinder:
+      return sample_cylinder<F>(light, p, u, v);
     case LightKind::kDistant:
       return sample_distant<F>(light, u, v);
     case LightKind::kDome:
@@ -135,8 +139,12 @@ inline LightSample<F> sample_light(const LightView& view, const Vec3<F>& p, cons
                              // Often there is one light of a kind, whose record is the same in all
                              // its lanes.
                              const detail::LightReader<F> light(view.lights, index, lanes);
-                             put(detail::sample_kind<F>(kind, view, light, p, u, v, lanes),
-                                 light.pick_pdf(), lanes);
+                             detail::KindSample<F> s =
+                                 detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
+                             if (view.shapings)
+                               s.radiance = detail::shaped<F>(view, light.shaping(), -s.wi,
+                                                              s.radiance, lanes & (s.pdf > 0.f));
+                             put(s, light.pick_pdf(), lanes);
                            });
   return result;
 }
@@ -147,7 +155,7 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` (rect, disk, sphere) sends back along the ray origin + t dir which
+/// Radiance that light `light` (rect, disk, sphere, cylinder) sends back along the ray origin + t dir which
 /// hit it at distance t. Other kinds and inactive lanes give 0.
 template <typename F>
 inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const Vec3<F>& origin,
@@ -164,6 +172,10 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const 
           hit = detail::hit_rect<F>(reader, view.materials.textures, origin, dir, t, lanes);
         if (kind == LightKind::kDisk) hit = detail::hit_disk<F>(reader, dir, t);
         if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
+        if (kind == LightKind::kCylinder) hit = detail::hit_cylinder<F>(reader, origin, dir, t);
+        if (view.shapings)
+          hit.radiance =
+              detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
         result.radiance = select<F>(lanes, hit.radiance, result.radiance);
         result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
       });
@@ -179,12 +191,34 @@ inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const V
   return select(lanes, detail::triangle_pdf<F>(view, light, dir, t, lanes), F(0.f));
 }
 
+/// What becomes of the light that the two techniques bring where lights do not give all surfaces
+/// the same. Run only where LightView::has_multipliers.
+template <typename F>
+struct LightEffect {
+  F diffuse, specular;   ///< factors of the two parts of the response
+  Mask<F> sampled_only;  ///< LightRecord::sampled_only
+
+  LightEffect(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
+    const Mask<F> known = active & Mask<F>(light < UInt<F>(view.first_triangle));
+    const detail::LightReader<F> reader(view.lights, light, known);
+    diffuse = select(known, reader.real(offsetof(LightRecord, diffuse)), F(1.f));
+    specular = select(known, reader.real(offsetof(LightRecord, specular)), F(1.f));
+    sampled_only = known & Mask<F>(reader.bits(offsetof(LightRecord, sampled_only)) != UInt<F>(0u));
+  }
+
+  /// Factor of what a path gets that meets the light; a mirror's image of it is specular.
+  F of_hit(const Mask<F>& bsdf_is_delta, bool from_camera) const {
+    const F mirrored = from_camera ? F(1.f) : specular;
+    return select(sampled_only, select(bsdf_is_delta, mirrored, F(0.f)), F(1.f));
+  }
+};
+
 /// Radiance * MIS weight of infinite light `light` for a ray that left the scene along dir, as
 /// escaped_radiance sums them up.
 template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& dir,
                                         const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
-                                        const Mask<F>& active) {
+                                        const Mask<F>& active, bool from_camera = false) {
   const LightRecord& record = view.lights[light];
   const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
   const detail::KindHit<F> hit =
@@ -192,6 +226,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
               : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
   const F weight =
       select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
+  if (view.has_multipliers)
+    return hit.radiance * F(weight * LightEffect<F>(view, UInt<F>(light), active)
+                                         .of_hit(bsdf_is_delta, from_camera));
   return hit.radiance * weight;
 }
 
@@ -200,10 +237,11 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 /// too).
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
-                                 const Mask<F>& bsdf_is_delta, const Mask<F>& active) {
+                                 const Mask<F>& bsdf_is_delta, const Mask<F>& active,
+                                 bool from_camera = false) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
-    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active);
+    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active, from_camera);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

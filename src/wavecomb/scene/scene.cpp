@@ -66,7 +66,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());
-    check_light(light, textures().size());
+    check_light(light, textures().size(), geometry_->profiles.size());
     if (light.group >= light_groups().size())
       throw_unknown("light group", light.group, light_groups().size());
   }
@@ -128,7 +128,8 @@ SceneBytes Scene::bytes() const {
          g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
          g.instance_motions) +
       of(materials_->materials, materials_->records, materials_->uses, materials_->programs) +
-      of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins) +
+      of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins,
+         set.shapings, set.ies, set.ies_numbers) +
       g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;

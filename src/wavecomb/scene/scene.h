@@ -151,6 +151,8 @@ class SceneBuilder {
   /// A name for instances; the first `asset_length` characters name the asset that they are part
   /// of, 0 where that is not known.
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
+  /// A profile for Shaping::ies.
+  uint32_t add_ies(IesProfile profile);
   uint32_t add_light(Light light);
   /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
   uint32_t light_group(const std::string& name);
@@ -188,6 +190,7 @@ class SceneBuilder {
   std::vector<Affine> node_steps_;
   std::vector<Material> materials_;
   std::vector<TexturePtr> textures_;
+  std::vector<IesProfile> profiles_;
   std::vector<Light> lights_;
   std::vector<std::string> light_groups_{kOtherLights};
   NameTable names_;

@@ -244,8 +244,14 @@ uint32_t SceneBuilder::light_group(const std::string& name) {
   return static_cast<uint32_t>(light_groups_.size() - 1);
 }
 
+uint32_t SceneBuilder::add_ies(IesProfile profile) {
+  check_profile(profile);
+  profiles_.push_back(std::move(profile));
+  return static_cast<uint32_t>(profiles_.size() - 1);
+}
+
 uint32_t SceneBuilder::add_light(Light light) {
-  check_light(light, textures_.size());
+  check_light(light, textures_.size(), profiles_.size());
   lights_.push_back(std::move(light));
   return static_cast<uint32_t>(lights_.size() - 1);
 }
@@ -372,6 +378,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->meshes = std::move(meshes_);
   geometry->groups = std::move(groups_);
   geometry->textures = std::move(textures_);
+  geometry->profiles = std::move(profiles_);
   geometry->light_groups = std::move(light_groups_);
   geometry->names = std::move(names_);
   geometry->warnings = std::move(warnings_);

@@ -67,6 +67,7 @@ struct SceneGeometry {
   std::vector<Group> groups;
   std::vector<Instance> instances;
   std::vector<TexturePtr> textures;
+  std::vector<IesProfile> profiles;
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;
