@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -359,7 +360,8 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    std::optional<uint32_t> texture, const std::string& group, float focus,
                    const Color3& focus_tint, float cone_angle, float cone_softness,
                    std::optional<uint32_t> ies, float ies_angle_scale, bool ies_normalize,
-                   float diffuse, float specular) {
+                   float diffuse, float specular, bool visible,
+                   std::optional<uint32_t> light_link, std::optional<uint32_t> shadow_link) {
   Light light;
   light.group = builder.light_group(group);
   light.name = name;
@@ -383,7 +385,20 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    ies_angle_scale, ies_normalize};
   light.diffuse = diffuse;
   light.specular = specular;
+  light.visible = visible;
+  light.light_link = light_link.value_or(kNoSet);
+  light.shadow_link = shadow_link.value_or(kNoSet);
   return builder.add_light(std::move(light));
+}
+
+uint32_t add_geometry_set(SceneBuilder& builder, const std::map<std::string, std::string>& rules) {
+  GeometrySet set;
+  for (const auto& [path, rule] : rules)
+    set.entries.push_back({path, choose<PathRule>("rule", rule,
+                                                  {{"exclude", PathRule::kExclude},
+                                                   {"explicit", PathRule::kExplicit},
+                                                   {"expand", PathRule::kExpand}})});
+  return builder.add_geometry_set(std::move(set));
 }
 
 uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector<float> horizontal,
@@ -518,7 +533,9 @@ void bind_scene(nb::module_& m) {
            "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(), "group"_a = "",
            "focus"_a = 0.f, "focus_tint"_a = black, "cone_angle"_a = 180.f, "cone_softness"_a = 0.f,
            "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f, "ies_normalize"_a = false,
-           "diffuse"_a = 1.f, "specular"_a = 1.f)
+           "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true, "light_link"_a = nb::none(),
+           "shadow_link"_a = nb::none())
+      .def("add_geometry_set", &add_geometry_set, "rules"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
            "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,

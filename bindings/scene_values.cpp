@@ -49,7 +49,8 @@ const Members<Shaping, float> kShapingNumbers{{"focus", &Shaping::focus},
                                               {"cone_softness", &Shaping::cone_softness},
                                               {"ies_angle_scale", &Shaping::ies_angle_scale}};
 const Members<Shaping, bool> kShapingSwitches{{"ies_normalize", &Shaping::ies_normalize}};
-const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize}};
+const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize},
+                                          {"visible", &Light::visible}};
 const Members<Camera, float> kCameraNumbers{{"lens_radius", &Camera::lens_radius},
                                             {"focus_distance", &Camera::focus_distance},
                                             {"near_clip", &Camera::near_clip},

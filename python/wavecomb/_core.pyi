@@ -263,10 +263,18 @@ class SceneBuilder:
         ies_normalize: bool = False,
         diffuse: float = 1,
         specular: float = 1,
+        visible: bool = True,
+        light_link: int | None = None,
+        shadow_link: int | None = None,
     ) -> int:
         """Kinds: rect, disk, sphere, cylinder, distant, dome, as UsdLux. color = colour *
         intensity * 2^exposure * colour temperature. The shaping (focus to ies_normalize, angles in
-        degrees, a cone_angle of 180 is none) is UsdLuxShapingAPI's."""
+        degrees, a cone_angle of 180 is none) is UsdLuxShapingAPI's. visible: whether rays meet its
+        shape. light_link, shadow_link: sets of geometry that it shines on, and that casts shadows
+        in its light; None: all."""
+    def add_geometry_set(self, rules: dict[str, str]) -> int:
+        """A set for add_light, by the rules of a UsdCollectionMembershipQuery: prim paths to
+        exclude, explicit or expand."""
     def add_ies(
         self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]
     ) -> int:

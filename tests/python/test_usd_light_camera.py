@@ -114,17 +114,41 @@ def test_what_lights_ask_for_and_do_not_get(tmp_path):
         def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {
             float inputs:shaping:focus = 2 }
         def RectLight "Spot" {
-            rel light:filters = </Window>
-            rel collection:lightLink:includes = </Window> }""",
+            rel light:filters = </Window> }""",
     )
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
         "PortalLight",
         "shaping of DistantLights",
-        "light linking (lightLink)",
         "light filters",
     ]
     assert len(scene.lights) == 2
+
+
+def test_linking(tmp_path):
+    scene, loaded = load(
+        tmp_path,
+        """def SphereLight "A" {
+            uniform bool collection:lightLink:includeRoot = false
+            rel collection:lightLink:includes = [</World/Ball>, </World/Box>]
+            rel collection:lightLink:excludes = </World/Box/Lid>
+            rel collection:shadowLink:excludes = </World/Floor>
+        }
+        def SphereLight "B" { rel collection:shadowLink:excludes = </World/Floor>
+        }
+        def SphereLight "C" { rel collection:lightLink:includes = </World/Floor>
+        }""",
+    )
+    a, b, c = scene.lights
+    assert scene.sets[a["light_link"]] == {
+        "/World/Ball": "expand",
+        "/World/Box": "expand",
+        "/World/Box/Lid": "exclude",
+    }
+    assert scene.sets[a["shadow_link"]] == {"/": "expand", "/World/Floor": "exclude"}
+    assert b["shadow_link"] == a["shadow_link"] and "light_link" not in b
+    assert "light_link" not in c  # includeRoot is true: all is in it anyway
+    assert not loaded.report.unsupported
 
 
 def test_cylinder_lights(tmp_path):

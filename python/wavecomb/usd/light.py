@@ -13,6 +13,7 @@ from pxr import Usd, UsdLux
 
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.ies import IesTable
+from wavecomb.usd.links import LinkTable
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import TextureTable, asset_file
@@ -62,9 +63,12 @@ class LightReader:
         report: LoadReport,
         profiles: IesTable | None = None,
         hidden: bool = False,
+        links: LinkTable | None = None,
     ) -> None:
-        """``textures``, ``profiles``: None: lights are read without theirs. ``hidden``: no ray meets
-        their shapes."""
+        """``textures``, ``profiles``, ``links``: None: lights are read without theirs.
+
+        ``hidden``: no ray meets their shapes.
+        """
         self.time = time
         self.up_axis = up_axis
         self.textures = textures
@@ -72,6 +76,7 @@ class LightReader:
         self.report = report
         self.profiles = profiles
         self.hidden = hidden
+        self.links = links
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
@@ -107,6 +112,10 @@ class LightReader:
         self._shaping(prim, kind, options)
         if self.hidden and kind not in ("distant", "dome"):
             options["visible"] = False
+        for name, option in (("lightLink", "light_link"), ("shadowLink", "shadow_link")):
+            linked = self.links.set_of(prim, name) if self.links else None
+            if linked is not None:
+                options[option] = linked
         for name in ("diffuse", "specular"):
             factor = number(self._get(prim, name, 1.0), 1.0)
             if factor != 1.0:
@@ -224,11 +233,6 @@ class LightReader:
     def _say_unsupported(self, prim: Usd.Prim) -> None:
         path = prim.GetPath()
 
-        for name in ("lightLink", "shadowLink"):
-            for side in ("includes", "excludes"):
-                relation = prim.GetRelationship(f"collection:{name}:{side}")
-                if relation and relation.HasAuthoredTargets():
-                    self.report.missing(f"light linking ({name})", path)
         for name in ("light:filters", "portals"):
             relation = prim.GetRelationship(name)
             if relation and relation.HasAuthoredTargets():

@@ -20,6 +20,7 @@ from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.ies import IesTable
+from wavecomb.usd.links import LinkTable
 from wavecomb.usd.light import LIGHT_SHAPES, LightReader, soft_dome, up_rotation
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
@@ -309,7 +310,8 @@ def _read(
     view_prim = find_camera(stage, choice.camera)
     groups = LightGroups(report)
     profiles, hidden = IesTable(builder, report), choice.lights == "hidden"
-    lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden)
+    links = LinkTable(builder)
+    lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, choice.blur, report)
     traversal = Traversal(time, choice.purposes, lights, report, motion)
     meshes = None if stock is None else stock.meshes

@@ -33,8 +33,8 @@ void for_first_hits(const Arguments& args, RTCRayN* ray, const Found& found) {
     if (args.valid[i] == 0) continue;
     for (const CurveHit& hit : meet(curves, ray, args.N, i, args.primID)) {
       if (curves.is_filtered &&
-          !is_present(*context->scene, inst == RTC_INVALID_GEOMETRY_ID ? 0 : inst, curves.id,
-                      args.primID, hit.u, hit.v, RTCRayN_id(ray, args.N, i), *context->keys))
+          !is_met(*context, inst, args.geomID, curves.id, args.primID, hit.u, hit.v,
+                  RTCRayN_id(ray, args.N, i)))
         continue;
       found(i, hit);
       break;

@@ -20,13 +20,14 @@ namespace wavecomb {
 /// Contract: owned by one wave. AOVs are there only where asked for.
 class PathPool {
  public:
-  /// Words of a row: 15 for a path, 10 for its shadow ray, 3 for its radiance.
+  /// Words of a row: 16 for a path, 12 for its shadow ray, 3 for its radiance.
   static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
   /// And 8 for what was hit first: albedo, normal, uv.
   static constexpr uint32_t kFirstWords = 8;
   static constexpr uint32_t kHitWords = 8;      ///< of AovHit
   static constexpr uint32_t kGuideWords = 8;    ///< 7: albedo, normal, 1 once they are final
   static constexpr uint32_t kShadowGroup = 10;  ///< word of a shadow ray's row
+  static constexpr uint32_t kShadowSet = 11;    ///< VertexResult::shadow_set, likewise
 
   PathPool() = default;
   /// `moves`: something moves while the shutter is open.
@@ -56,7 +57,7 @@ class PathPool {
   }
 
   float* paths = nullptr;     ///< rows of load_path
-  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group
+  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group, shadow set
   float* radiance = nullptr;  ///< r, g, b so far
   float* time = nullptr;      ///< of the shutter, in [0, 1); null where nothing moves
   // Null where not asked for.
@@ -91,6 +92,7 @@ struct PathLanes {
   F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
   SampleKey<F> key;
+  UInt<F> link{0u};  ///< PathState::link
 };
 
 template <typename F>
@@ -105,7 +107,8 @@ WAVECOMB_INLINE PathLanes<F> load_path(const PathPool& pool, const UInt<F>& slot
           r[10],
           r[11],
           r[12],
-          {float_bits<F>(r[13]), float_bits<F>(r[14])}};
+          {float_bits<F>(r[13]), float_bits<F>(r[14])},
+          float_bits<F>(r[15])};
 }
 
 template <typename F>
@@ -115,7 +118,7 @@ WAVECOMB_INLINE void store_path(const PathPool& pool, const UInt<F>& slot, const
       pool.paths, slot * PathPool::kPathWords,
       {p.o.x, p.o.y, p.o.z, p.d.x, p.d.y, p.d.z, p.throughput.x, p.throughput.y, p.throughput.z,
        p.pdf, p.eta_scale, p.cone_width, p.cone_spread, bits_float<F>(p.key.pixel_hash),
-       bits_float<F>(p.key.sample), F(0.f)},
+       bits_float<F>(p.key.sample), bits_float<F>(p.link)},
       active);
 }
 

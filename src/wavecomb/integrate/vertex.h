@@ -54,6 +54,7 @@ struct PathState {
   F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
+  UInt<F> link{0u};  ///< class of the surface that the ray left, where lights are linked
 };
 
 /// What shading a vertex gives. Lanes outside the masks hold anything.
@@ -63,6 +64,7 @@ struct VertexResult {
   Mask<F> has_shadow;  ///< a shadow ray is wanted
   Vec3<F> shadow_o, shadow_d;
   F shadow_tfar;
+  UInt<F> shadow_set;  ///< of shadow_set, 0 where nothing is linked
   Color<F> direct;  ///< to add where the shadow ray is free, clamped
   Mask<F> alive;    ///< the path goes on
   Vec3<F> o;        ///< of the next ray; its direction and the rest is in `next`
@@ -123,6 +125,19 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
                 F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
+/// The class that linking knows geometry `geom` of instance `inst` by.
+template <typename F>
+inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                          const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+  const U first = gather<U>(
+      scene.instances,
+      inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+      Mask<U>(active));
+  return gather<U>(scene.lights.links.classes, first + geom, Mask<U>(active));
+}
+
 /// Radiance of a light's own shape met by a path.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
@@ -130,8 +145,10 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
                                const PathState<F>& path, const Mask<F>& active) {
   const LightHit<F> hit = light_hit<F>(scene.lights, light, o, path.dir, t, active);
   F w = bounce_weight<F>(path.pdf, hit.pdf);
-  if (scene.lights.has_multipliers)
+  if (scene.lights.has_sampled_only)
     w *= LightEffect<F>(scene.lights, light, active).of_hit(not_(path.pdf > 0.f), depth == 0);
+  if (scene.lights.links.members)
+    w = select(shines_on<F>(scene.lights, path.link, light, active), w, F(0.f));
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
 
@@ -142,7 +159,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le =
-      escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active, depth == 0);
+      escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active, depth == 0, path.link);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
@@ -199,6 +216,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.direct = Color<F>(F(0.f));
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
+  out.shadow_set = U(0u);
+  out.next.link = U(0u);
   const bool wants_lights = aovs && aovs->wants_lights;
   if (wants_lights) aovs->emitter = aovs->lit_by = U(kNoLight);
 
@@ -278,6 +297,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     if (aovs->wants_uv) aovs->uv = s.uv;
   }
   if (depth >= settings.max_depth) return out;
+  if (scene.lights.links.members) [[unlikely]]
+    out.next.link = link_class<F>(scene, hit.inst, geom, active);
 
   const Sample4<F> rl = sample_4d<F>(settings.sampler, key, light_set(depth));
 
@@ -299,12 +320,17 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
             : e.pdf;
     F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
     Color<F> f_cos = e.f_cos;
-    if (scene.lights.has_multipliers) [[unlikely]] {
+    if (scene.lights.has_sampled_only) [[unlikely]] {
       const LightEffect<F> effect(scene.lights, chosen_light<F>(scene.lights, rl.x, lit), lit);
       const Color<F> diffuse = bsdf.diffuse_f_cos(wo, wi);
       f_cos = select<F>(effect.sampled_only,
                         fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
       w = select(effect.sampled_only, F(1.f), w);
+    }
+    if (scene.lights.links.members) [[unlikely]] {
+      const U light = chosen_light<F>(scene.lights, rl.x, lit);
+      w = select(shines_on<F>(scene.lights, out.next.link, light, lit), w, F(0.f));
+      out.shadow_set = shadow_set<F>(scene.lights, light, lit);
     }
     const Color<F> c =
         clean<F>(path.throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));

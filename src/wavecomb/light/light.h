@@ -11,6 +11,7 @@
 #include "wavecomb/light/disk.h"
 #include "wavecomb/light/distant.h"
 #include "wavecomb/light/dome.h"
+#include "wavecomb/light/link.h"
 #include "wavecomb/light/rect.h"
 #include "wavecomb/light/shaping.h"
 #include "wavecomb/light/sphere.h"
@@ -192,7 +193,7 @@ inline F triangle_light_pdf(const LightView& view, const UInt<F>& light, const V
 }
 
 /// What becomes of the light that the two techniques bring where lights do not give all surfaces
-/// the same. Run only where LightView::has_multipliers.
+/// the same. Run only where LightView::has_sampled_only.
 template <typename F>
 struct LightEffect {
   F diffuse, specular;   ///< factors of the two parts of the response
@@ -218,17 +219,19 @@ struct LightEffect {
 template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& dir,
                                         const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
-                                        const Mask<F>& active, bool from_camera = false) {
+                                        const Mask<F>& active, bool from_camera = false,
+                                        const UInt<F>& link = UInt<F>(0u)) {
   const LightRecord& record = view.lights[light];
   const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
   const detail::KindHit<F> hit =
       is_dome ? detail::hit_dome<F>(view, record, dir, active)
               : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
-  const F weight =
+  F weight =
       select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * record.pick_pdf)));
-  if (view.has_multipliers)
-    return hit.radiance * F(weight * LightEffect<F>(view, UInt<F>(light), active)
-                                         .of_hit(bsdf_is_delta, from_camera));
+  if (view.has_sampled_only)
+    weight *= LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera);
+  if (view.links.members)
+    weight = select(shines_on<F>(view, link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
 }
 
@@ -238,10 +241,12 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
                                  const Mask<F>& bsdf_is_delta, const Mask<F>& active,
-                                 bool from_camera = false) {
+                                 bool from_camera = false,
+                                 const UInt<F>& link = UInt<F>(0u)) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
-    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active, from_camera);
+    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active, from_camera,
+                                      link);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

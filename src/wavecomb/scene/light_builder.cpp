@@ -300,7 +300,11 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
   r.shaping = kNoShaping;
   r.diffuse = std::max(0.f, light.diffuse);
   r.specular = std::max(0.f, light.specular);
-  r.sampled_only = r.diffuse != 1 || r.specular != 1;
+  r.hidden = !light.visible && !is_infinite(light.kind);
+  r.light_link = light.light_link;
+  r.shadow_link = light.shadow_link;
+  r.sampled_only =
+      r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet;
   if (light.kind == LightKind::kRect || light.kind == LightKind::kDome) r.texture = light.texture;
 
   const Double3 color = {std::max(0.0, double{light.color.x}), std::max(0.0, double{light.color.y}),
@@ -448,7 +452,7 @@ LightView LightSet::view(const MaterialView& materials) const {
     v.ies = ies.data();
     v.ies_numbers = ies_numbers.data();
   }
-  for (const LightRecord& record : records) v.has_multipliers |= record.sampled_only != 0;
+  for (const LightRecord& record : records) v.has_sampled_only |= record.sampled_only != 0;
   v.materials = materials;
   return v;
 }

@@ -17,6 +17,8 @@ inline constexpr uint32_t kLightKindCount = 7;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
+/// All geometry: no GeometrySet. kNoSet + 1 is 0.
+inline constexpr uint32_t kNoSet = 0xffffffffu;
 
 /// UsdLuxShapingAPI: how emission depends on its direction. The light's axis is its -z.
 struct Shaping {
@@ -66,6 +68,9 @@ struct Light {
   /// What the light gives to the diffuse and to the specular response of materials is multiplied by
   /// these (UsdLux: not physical).
   float diffuse = 1, specular = 1;
+  /// SceneBuilder::add_geometry_set: what it shines on, and what casts shadows in its light.
+  uint32_t light_link = kNoSet, shadow_link = kNoSet;
+  bool visible = true;  ///< whether rays meet its shape
 };
 
 /// A light as lanes read it, triangles of meshes apart: 32 words. Vectors are in world space. Use
@@ -89,10 +94,12 @@ struct alignas(64) LightRecord {
   uint32_t distribution;  ///< dome: index into LightView::distributions
   uint32_t shaping;       ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
-  /// 1: paths that meet the light by a bounce that light sampling could have made get nothing of
+  /// Not 0: paths that meet the light by a bounce that light sampling could have made get nothing of
   /// it; what light samples bring counts in full. So it is where a light does not give all surfaces
   /// the same, which a path that meets it does not know.
   uint32_t sampled_only;
+  uint32_t hidden;  ///< 1: rays do not meet its shape
+  uint32_t light_link, shadow_link;
 };
 static_assert(sizeof(LightRecord) == 128);
 
@@ -170,6 +177,13 @@ struct PickTable {
   uint32_t triangle_bins = 0;  ///< first bin of the triangles
 };
 
+/// Scene/links.h: null where no light is linked.
+struct LinkView {
+  const uint32_t* classes = nullptr;
+  const uint32_t* members = nullptr;
+  uint32_t words = 0;
+};
+
 /// What kernels need of all lights. Light i is record i for i < first_triangle, else triangle
 /// i - first_triangle. Infinite lights (distant, dome) come first.
 struct LightView {
@@ -185,7 +199,8 @@ struct LightView {
   const ShapingRecord* shapings = nullptr;
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
-  bool has_multipliers = false;  ///< some record's diffuse or specular is not 1
+  bool has_sampled_only = false;  ///< some record is that
+  LinkView links;
   MaterialView materials;  ///< textures, and emission of textured triangle lights
 };
 

@@ -45,7 +45,8 @@ void check_material(const Material& material, size_t texture_count) {
                 std::to_string(kMaxEvaluations) + " are possible");
 }
 
-void check_light(const Light& light, size_t texture_count, size_t profile_count) {
+void check_light(const Light& light, size_t texture_count, size_t profile_count,
+                 size_t set_count) {
   const auto name = quoted("light", light.name);
   if (!finite(light.to_world)) throw Error(name + " has a transform that is not finite; mend it");
   if (!finite(light.color) || light.color.x < 0 || light.color.y < 0 || light.color.z < 0)
@@ -64,6 +65,9 @@ void check_light(const Light& light, size_t texture_count, size_t profile_count)
       throw Error(name + " has a multiplier that is negative or not finite; give one of 0 or more");
   if (s.ies != kNoIes && s.ies >= profile_count)
     throw Error(name + " has an IES profile that was never added; add profiles before lights");
+  for (const uint32_t set : {light.light_link, light.shadow_link})
+    if (set != kNoSet && set >= set_count)
+      throw Error(name + " is linked to a set that was never added; add sets before lights");
 }
 
 void check_profile(const IesProfile& p) {

@@ -98,7 +98,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     PathState<F> state;
     if (any(wanted)) {
       path = load_path<F>(wave.pool, slot, wanted);
-      state = {path.d, path.throughput, path.pdf, path.eta_scale, F(0.f), F(0.f)};
+      state = {path.d, path.throughput, path.pdf, path.eta_scale, F(0.f), F(0.f), path.link};
     }
     if (any(ended)) {
       Color<F> c(F(0.f));
