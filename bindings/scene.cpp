@@ -360,8 +360,8 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    std::optional<uint32_t> texture, const std::string& group, float focus,
                    const Color3& focus_tint, float cone_angle, float cone_softness,
                    std::optional<uint32_t> ies, float ies_angle_scale, bool ies_normalize,
-                   float diffuse, float specular, bool visible,
-                   std::optional<uint32_t> light_link, std::optional<uint32_t> shadow_link) {
+                   float diffuse, float specular, bool visible, std::optional<uint32_t> light_link,
+                   std::optional<uint32_t> shadow_link) {
   Light light;
   light.group = builder.light_group(group);
   light.name = name;
@@ -381,8 +381,9 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   light.angle = angle;
   light.normalize = normalize;
   light.texture = texture.value_or(kNoTexture);
-  light.shaping = {focus,           vec3(focus_tint), cone_angle, cone_softness, ies.value_or(kNoIes),
-                   ies_angle_scale, ies_normalize};
+  light.shaping = {focus,         vec3(focus_tint),     cone_angle,
+                   cone_softness, ies.value_or(kNoIes), ies_angle_scale,
+                   ies_normalize};
   light.diffuse = diffuse;
   light.specular = specular;
   light.visible = visible;
@@ -529,12 +530,12 @@ void bind_scene(nb::module_& m) {
            "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
            "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none())
       .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
-           "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f, "length"_a = 1.f,
-           "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(), "group"_a = "",
-           "focus"_a = 0.f, "focus_tint"_a = black, "cone_angle"_a = 180.f, "cone_softness"_a = 0.f,
-           "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f, "ies_normalize"_a = false,
-           "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true, "light_link"_a = nb::none(),
-           "shadow_link"_a = nb::none())
+           "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f,
+           "length"_a = 1.f, "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(),
+           "group"_a = "", "focus"_a = 0.f, "focus_tint"_a = black, "cone_angle"_a = 180.f,
+           "cone_softness"_a = 0.f, "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f,
+           "ies_normalize"_a = false, "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true,
+           "light_link"_a = nb::none(), "shadow_link"_a = nb::none())
       .def("add_geometry_set", &add_geometry_set, "rules"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,

@@ -36,13 +36,10 @@ const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material:
                                                 {"presence", &Material::presence}};
 const Members<Material, uint32_t> kMaterialCounts{{"evaluations", &Material::evaluations}};
 const Members<Light, Vec3<float>> kLightColors{{"color", &Light::color}};
-const Members<Light, float> kLightNumbers{{"width", &Light::width},
-                                          {"height", &Light::height},
-                                          {"radius", &Light::radius},
-                                          {"length", &Light::length},
-                                          {"angle", &Light::angle},
-                                          {"diffuse", &Light::diffuse},
-                                          {"specular", &Light::specular}};
+const Members<Light, float> kLightNumbers{
+    {"width", &Light::width},      {"height", &Light::height}, {"radius", &Light::radius},
+    {"length", &Light::length},    {"angle", &Light::angle},   {"diffuse", &Light::diffuse},
+    {"specular", &Light::specular}};
 const Members<Shaping, Vec3<float>> kShapingColors{{"focus_tint", &Shaping::focus_tint}};
 const Members<Shaping, float> kShapingNumbers{{"focus", &Shaping::focus},
                                               {"cone_angle", &Shaping::cone_angle},

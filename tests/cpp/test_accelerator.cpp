@@ -592,8 +592,8 @@ TEST(Accelerator, CylinderLightsAreOpenAtTheirEnds) {
   const EmbreeAccelerator accel(b.build(), 1);
   Rays rays(5);
   rays.aim(0, {0, 0, 0}, {1.9, 0, 3});
-  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});  // beside its end
-  rays.aim(2, {-5, 0, 3}, {5, 0, 3});     // along its axis, through it
+  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});   // beside its end
+  rays.aim(2, {-5, 0, 3}, {5, 0, 3});      // along its axis, through it
   rays.aim(3, {-3, 0, 3}, {-2, 0.25, 3});  // in at an end, to its inside
   rays.aim(4, {0, 0, 3}, {0, 1, 3});       // from within
   const Keys keys(5);

@@ -35,7 +35,8 @@ double cylinder_irradiance(double length, double radius, const Vec3<float>& from
     for (int i = 0; i < kN; ++i) {
       const double x = ((i + 0.5) / kN - 0.5) * length, phi = 2 * kPiD * (j + 0.5) / kN;
       const double m[3] = {0, std::cos(phi), std::sin(phi)};
-      const double d[3] = {x - static_cast<double>(from.x), radius * m[1] - static_cast<double>(from.y),
+      const double d[3] = {x - static_cast<double>(from.x),
+                           radius * m[1] - static_cast<double>(from.y),
                            radius * m[2] - static_cast<double>(from.z)};
       const double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
       const double out = -(d[1] * m[1] + d[2] * m[2]);
@@ -51,12 +52,11 @@ TEST(Cylinder, IrradianceIsTheSumOverItsSurface) {
     float length, radius;
     Vec3<float> from, n;
   };
-  for (const Case& c : {Case{2, 0.5f, {0, 0, -2}, {0, 0, 1}},
-                        Case{2, 0.5f, {0.4f, 0, -0.6f}, {0, 0, 1}},  // close
-                        Case{1, 0.5f, {3, 0.7f, -1}, {-0.8f, 0, 0.6f}},  // from its end
-                        Case{0.5f, 2, {0.2f, 5, 1}, {0, -1, 0}},
-                        Case{40, 0.01f, {1, 0, -1}, {0, 0, 1}},
-                        Case{0.1f, 0.05f, {30, 0, -40}, {-0.6f, 0, 0.8f}}}) {  // far
+  for (const Case& c :
+       {Case{2, 0.5f, {0, 0, -2}, {0, 0, 1}}, Case{2, 0.5f, {0.4f, 0, -0.6f}, {0, 0, 1}},  // close
+        Case{1, 0.5f, {3, 0.7f, -1}, {-0.8f, 0, 0.6f}},  // from its end
+        Case{0.5f, 2, {0.2f, 5, 1}, {0, -1, 0}}, Case{40, 0.01f, {1, 0, -1}, {0, 0, 1}},
+        Case{0.1f, 0.05f, {30, 0, -40}, {-0.6f, 0, 0.8f}}}) {  // far
     Light light = make_light(LightKind::kCylinder);
     light.length = c.length;
     light.radius = c.radius;
@@ -157,7 +157,7 @@ TEST(Ies, BilinearBetweenItsAngles) {
   EXPECT_NEAR(candela(15, 45, shaping), 6, 6e-4);
   EXPECT_NEAR(candela(60, 90, shaping), 1.5, 1e-3);
   EXPECT_NEAR(candela(60, 225, shaping), 2.25, 2e-3);  // half way from 90 to 360 degrees
-  EXPECT_EQ(candela(91, 0, shaping), 0);                // outside
+  EXPECT_EQ(candela(91, 0, shaping), 0);               // outside
   Shaping wide = shaping;
   wide.ies_angle_scale = 2;  // theta / 2
   EXPECT_NEAR(candela(30, 0, wide), 7, 7e-4);
@@ -192,8 +192,8 @@ TEST(Ies, MeanIsExactAndNormalizes) {
     for (int i = 0; i < kN; ++i) {
       const double z = 2 * (j + 0.5) / kN - 1, phi = 2 * kPiD * (i + 0.5) / kN,
                    r = std::sqrt(1 - z * z);
-      const Vec3<float> p(static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)),
-                          static_cast<float>(z));
+      const Vec3<float> p(static_cast<float>(r * std::cos(phi)),
+                          static_cast<float>(r * std::sin(phi)), static_cast<float>(z));
       const auto s = sample_light<float>(lights.view(), p, 0.5f, 0.5f, 0.5f, true);
       if (s.valid) sum += static_cast<double>(s.weight.y) / kN / kN;
     }

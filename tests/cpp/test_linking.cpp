@@ -95,7 +95,8 @@ TEST(Multipliers, PartsAddUpToTheWhole) {
       stage.b.add_light(light);
       return mean_of(checked(stage.b.build(), settings(1024)), 1);
     };
-    const Mean both = mean(1, 1), diffuse = mean(1, 0), specular = mean(0, 1), mixed = mean(2, 0.5f);
+    const Mean both = mean(1, 1), diffuse = mean(1, 0), specular = mean(0, 1),
+               mixed = mean(2, 0.5f);
     const auto name = kProgramNames[static_cast<size_t>(program)];
     EXPECT_NEAR(both.mean, diffuse.mean + specular.mean,
                 kSigmas * (both.error + diffuse.error + specular.error))
@@ -183,8 +184,8 @@ TEST(ShadowLinks, OnlyLinkedGeometryCastsShadows) {
     for (const bool casts : {false, true}) {
       Stage stage(grey());
       const uint32_t black = stage.b.add_material(make_material(ProgramId::kDiffuse, {0, 0, 0}));
-      const uint32_t lid = add_mesh(stage.b, ground(3, 0.5f), black,
-                                    instanced ? "/Lid/Mesh" : "/World/Lid/Mesh");
+      const uint32_t lid =
+          add_mesh(stage.b, ground(3, 0.5f), black, instanced ? "/Lid/Mesh" : "/World/Lid/Mesh");
       if (instanced) {
         const uint32_t group = stage.b.add_group("lid", "/Lid");
         stage.b.add_to_group(group, lid);
@@ -194,8 +195,9 @@ TEST(ShadowLinks, OnlyLinkedGeometryCastsShadows) {
         stage.b.add_to_group(0, lid);
       }
       Light light = disk();
-      light.shadow_link = stage.set({{"/", PathRule::kExpand},
-                                     {"/World/Lid", casts ? PathRule::kExpand : PathRule::kExclude}});
+      light.shadow_link =
+          stage.set({{"/", PathRule::kExpand},
+                     {"/World/Lid", casts ? PathRule::kExpand : PathRule::kExclude}});
       stage.b.add_light(light);
       stage.b.set_camera(make_camera({4, 0.3, 0.5}, {0, 0, 0}, 1e-3f));
       expect_mean(checked(stage.b.build(), settings()), casts ? 0 : 0.6 / kPiD * kUnderDisk,

@@ -20,8 +20,8 @@ from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.ies import IesTable
-from wavecomb.usd.links import LinkTable
 from wavecomb.usd.light import LIGHT_SHAPES, LightReader, soft_dome, up_rotation
+from wavecomb.usd.links import LinkTable
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.report import LoadReport

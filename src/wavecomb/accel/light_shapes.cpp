@@ -65,8 +65,7 @@ Bounds round_light_bounds(const LightRecord& light) {
   const auto kind = static_cast<LightKind>(light.kind);
   float lo[3], hi[3];
   for (int i = 0; i < 3; ++i) {
-    const float half =
-        kind == LightKind::kDisk ? std::hypot(light.u[i], light.v[i]) : light.radius;
+    const float half = kind == LightKind::kDisk ? std::hypot(light.u[i], light.v[i]) : light.radius;
     const float end = kind == LightKind::kCylinder ? light.p[i] + light.u[i] : light.p[i];
     const float slack = 1e-6f * std::max(std::abs(light.p[i]), std::abs(end)) + 1e-5f * half;
     lo[i] = std::min(light.p[i], end) - half - slack;

@@ -65,9 +65,9 @@ struct VertexResult {
   Vec3<F> shadow_o, shadow_d;
   F shadow_tfar;
   UInt<F> shadow_set;  ///< of shadow_set, 0 where nothing is linked
-  Color<F> direct;  ///< to add where the shadow ray is free, clamped
-  Mask<F> alive;    ///< the path goes on
-  Vec3<F> o;        ///< of the next ray; its direction and the rest is in `next`
+  Color<F> direct;     ///< to add where the shadow ray is free, clamped
+  Mask<F> alive;       ///< the path goes on
+  Vec3<F> o;           ///< of the next ray; its direction and the rest is in `next`
   PathState<F> next;
 };
 
@@ -131,10 +131,10 @@ inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UIn
                           const Mask<F>& active) {
   using U = UInt<F>;
   constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
-  const U first = gather<U>(
-      scene.instances,
-      inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
-      Mask<U>(active));
+  const U first =
+      gather<U>(scene.instances,
+                inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+                Mask<U>(active));
   return gather<U>(scene.lights.links.classes, first + geom, Mask<U>(active));
 }
 

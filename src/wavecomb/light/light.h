@@ -156,8 +156,8 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` (rect, disk, sphere, cylinder) sends back along the ray origin + t dir which
-/// hit it at distance t. Other kinds and inactive lanes give 0.
+/// Radiance that light `light` (rect, disk, sphere, cylinder) sends back along the ray origin + t
+/// dir which hit it at distance t. Other kinds and inactive lanes give 0.
 template <typename F>
 inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const Vec3<F>& origin,
                              const Vec3<F>& dir, const F& t, const Mask<F>& hit_lanes) {
@@ -175,8 +175,7 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const 
         if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
         if (kind == LightKind::kCylinder) hit = detail::hit_cylinder<F>(reader, origin, dir, t);
         if (view.shapings)
-          hit.radiance =
-              detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
+          hit.radiance = detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
         result.radiance = select<F>(lanes, hit.radiance, result.radiance);
         result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
       });
@@ -241,8 +240,7 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
                                  const Mask<F>& bsdf_is_delta, const Mask<F>& active,
-                                 bool from_camera = false,
-                                 const UInt<F>& link = UInt<F>(0u)) {
+                                 bool from_camera = false, const UInt<F>& link = UInt<F>(0u)) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
     sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active, from_camera,

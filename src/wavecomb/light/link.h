@@ -14,8 +14,7 @@ inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<
   using U = UInt<F>;
   const Mask<F> asked = active & Mask<F>(set != U(kNoSet)) & Mask<F>(link != U(0u));
   if (none(asked)) return Mask<F>(true);
-  const U word =
-      gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(asked));
+  const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(asked));
   return not_(asked) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u));
 }
 

@@ -65,8 +65,9 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
           a23 = corner_angle(r.x0, r.y1, x02, y12), a30 = corner_angle(r.x0, r.y0, x02, y02);
   r.solid_angle = F(a12 - a01) + F(a30 - a23);
   r.begin = kPi + F(a23 - a30);
-  r.b0 = -r.y0 / sqrt(F(z2 + y02));
-  r.b1 = r.y1 / sqrt(F(z2 + y12));
+  const F least(1e-30f);  // a point on the line of an edge
+  r.b0 = -r.y0 / sqrt(max(F(z2 + y02), least));
+  r.b1 = r.y1 / sqrt(max(F(z2 + y12), least));
   r.usable = (abs(dot(r.x, r.y)) < 1e-5f) & (r.z > 0.f) & (r.solid_angle > kLeastRectSolidAngle) &
              is_finite(r.solid_angle);
   return r;

@@ -72,8 +72,7 @@ void check(const Light& light, size_t texture_count, size_t profile_count) {
     throw Error(where + "its transform is not finite");
   }
   if (!finite(light.color)) throw Error(where + "its colour times intensity is not finite");
-  for (const float size :
-       {light.width, light.height, light.radius, light.length, light.angle}) {
+  for (const float size : {light.width, light.height, light.radius, light.length, light.angle}) {
     if (!std::isfinite(size)) throw Error(where + "its size is not finite");
   }
   const Shaping& s = light.shaping;
@@ -303,8 +302,7 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
   r.hidden = !light.visible && !is_infinite(light.kind);
   r.light_link = light.light_link;
   r.shadow_link = light.shadow_link;
-  r.sampled_only =
-      r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet;
+  r.sampled_only = r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet;
   if (light.kind == LightKind::kRect || light.kind == LightKind::kDome) r.texture = light.texture;
 
   const Double3 color = {std::max(0.0, double{light.color.x}), std::max(0.0, double{light.color.y}),

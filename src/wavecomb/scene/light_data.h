@@ -94,9 +94,9 @@ struct alignas(64) LightRecord {
   uint32_t distribution;  ///< dome: index into LightView::distributions
   uint32_t shaping;       ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
-  /// Not 0: paths that meet the light by a bounce that light sampling could have made get nothing of
-  /// it; what light samples bring counts in full. So it is where a light does not give all surfaces
-  /// the same, which a path that meets it does not know.
+  /// Not 0: paths that meet the light by a bounce that light sampling could have made get nothing
+  /// of it; what light samples bring counts in full. So it is where a light does not give all
+  /// surfaces the same, which a path that meets it does not know.
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1: rays do not meet its shape
   uint32_t light_link, shadow_link;

@@ -32,8 +32,8 @@ bool same_emission(const Material& a, const Material& b) {
 
 Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
              std::shared_ptr<const SceneMaterials> materials,
-             std::shared_ptr<const SceneLights> lights,
-             std::shared_ptr<const SceneLinks> links, const Camera& camera)
+             std::shared_ptr<const SceneLights> lights, std::shared_ptr<const SceneLinks> links,
+             const Camera& camera)
     : geometry_(std::move(geometry)),
       materials_(std::move(materials)),
       lights_(std::move(lights)),
@@ -99,8 +99,9 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
                                                        lights_.get());
     });
   }
-  return std::shared_ptr<const Scene>(new Scene(
-      geometry_, std::move(new_materials), std::move(new_lights), links_, edit.camera.value_or(camera_)));
+  return std::shared_ptr<const Scene>(new Scene(geometry_, std::move(new_materials),
+                                                std::move(new_lights), links_,
+                                                edit.camera.value_or(camera_)));
 }
 
 uint64_t Scene::unique_triangles() const {

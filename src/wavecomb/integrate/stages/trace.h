@@ -84,9 +84,9 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
   PhaseClock::Clock::time_point start;
   if (wave.pool.cost_ns) start = PhaseClock::Clock::now();
-  context.accel->occluded(rays, q.occluded, context.traversal_width, false,
-                          presence_keys(wave.pool, depth, true,
-                                        context.scene.lights.links.members != nullptr));
+  context.accel->occluded(
+      rays, q.occluded, context.traversal_width, false,
+      presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);

@@ -73,7 +73,8 @@ class PrincipledBsdf {
     const F side = side_of(wo);
     const Vec3<F> o = mirror_z(wo, side), i = mirror_z(wi, side);
     const F cosine = select(o.z > 0.f, lambert_cos(i), F(0.f));
-    const Color<F> through = seen_through_coat(interface_(f0_, o.z), interface_(f0_, i.z), average_);
+    const Color<F> through =
+        seen_through_coat(interface_(f0_, o.z), interface_(f0_, i.z), average_);
     const F passed = select(clearcoat_ > 0.f, below_coat(o, i), F(1.f));
     return diffuse_ * through * F(cosine * passed);
   }
