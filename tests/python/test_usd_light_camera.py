@@ -110,17 +110,19 @@ def test_hidden_lights_stay_off(tmp_path):
 def test_what_lights_ask_for_and_do_not_get(tmp_path):
     scene, loaded = load(
         tmp_path,
-        """def PortalLight "Window" {}
-        def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {
-            float inputs:shaping:focus = 2 }
-        def RectLight "Spot" {
-            rel light:filters = </Window> }""",
+        f"""def PortalLight "Window" {{}}
+        def Mesh "Glow" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} }}
+        def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {{
+            float inputs:shaping:focus = 2 }}
+        def RectLight "Spot" {{
+            rel light:filters = </Window> }}""",
     )
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
         "PortalLight",
         "shaping of DistantLights",
         "light filters",
+        "MeshLightAPI (a mesh shines by its material alone)",
     ]
     assert len(scene.lights) == 2
 
