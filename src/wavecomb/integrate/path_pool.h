@@ -20,7 +20,7 @@ namespace wavecomb {
 /// Contract: owned by one wave. AOVs are there only where asked for.
 class PathPool {
  public:
-  /// Words of a row: 16 for a path, 12 for its shadow ray, 3 for its radiance.
+  /// Words of a row: 15 for a path, 12 for its shadow ray, 3 for its radiance.
   static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
   /// And 8 for what was hit first: albedo, normal, uv.
   static constexpr uint32_t kFirstWords = 8;
@@ -30,8 +30,8 @@ class PathPool {
   static constexpr uint32_t kShadowSet = 11;    ///< VertexResult::shadow_set, likewise
 
   PathPool() = default;
-  /// `moves`: something moves while the shutter is open.
-  PathPool(size_t capacity, const AovLayout& aovs, bool moves)
+  /// `moves`: something moves while the shutter is open. `linked`: lights are linked to geometry.
+  PathPool(size_t capacity, const AovLayout& aovs, bool moves, bool linked = false)
       : light_groups(aovs.light_groups),
         rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)) {
     paths = rows_.floats(0);
@@ -53,6 +53,9 @@ class PathPool {
     block(aov_blocks_[7], cost_ns, set.has(Aov::kCost), 1);
     block(aov_blocks_[8], guides, set.guides(), kGuideWords);
     block(times_, time, moves, 1);
+    float* words = nullptr;
+    block(links_, words, linked, 1);
+    link = reinterpret_cast<uint32_t*>(words);
     wants_uv = set.has(Aov::kUv);
   }
 
@@ -60,6 +63,7 @@ class PathPool {
   float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group, shadow set
   float* radiance = nullptr;  ///< r, g, b so far
   float* time = nullptr;      ///< of the shutter, in [0, 1); null where nothing moves
+  uint32_t* link = nullptr;   ///< PathState::link; null where no light is linked
   // Null where not asked for.
   float* first = nullptr;   ///< albedo, normal, uv
   float* depth = nullptr;   ///< along the camera's axis; infinite where nothing was hit
@@ -73,13 +77,13 @@ class PathPool {
   uint32_t light_groups = 0;
   bool wants_uv = false;
   size_t bytes() const {
-    size_t n = rows_.bytes() + times_.bytes();
+    size_t n = rows_.bytes() + times_.bytes() + links_.bytes();
     for (const SoaBlock& block : aov_blocks_) n += block.bytes();
     return n;
   }
 
  private:
-  SoaBlock rows_, times_;
+  SoaBlock rows_, times_, links_;
   std::array<SoaBlock, 9> aov_blocks_;
 };
 
@@ -92,7 +96,6 @@ struct PathLanes {
   F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
   SampleKey<F> key;
-  UInt<F> link{0u};  ///< PathState::link
 };
 
 template <typename F>
@@ -107,8 +110,7 @@ WAVECOMB_INLINE PathLanes<F> load_path(const PathPool& pool, const UInt<F>& slot
           r[10],
           r[11],
           r[12],
-          {float_bits<F>(r[13]), float_bits<F>(r[14])},
-          float_bits<F>(r[15])};
+          {float_bits<F>(r[13]), float_bits<F>(r[14])}};
 }
 
 template <typename F>
@@ -118,7 +120,7 @@ WAVECOMB_INLINE void store_path(const PathPool& pool, const UInt<F>& slot, const
       pool.paths, slot * PathPool::kPathWords,
       {p.o.x, p.o.y, p.o.z, p.d.x, p.d.y, p.d.z, p.throughput.x, p.throughput.y, p.throughput.z,
        p.pdf, p.eta_scale, p.cone_width, p.cone_spread, bits_float<F>(p.key.pixel_hash),
-       bits_float<F>(p.key.sample), bits_float<F>(p.link)},
+       bits_float<F>(p.key.sample), F(0.f)},
       active);
 }
 

@@ -98,7 +98,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     PathState<F> state;
     if (any(wanted)) {
       path = load_path<F>(wave.pool, slot, wanted);
-      state = {path.d, path.throughput, path.pdf, path.eta_scale, F(0.f), F(0.f), path.link};
+      state = {path.d, path.throughput, path.pdf, path.eta_scale, F(0.f), F(0.f)};
+      if (wave.pool.link && depth > 0)
+        state.link = gather<U>(wave.pool.link, slot, Mask<U>(wanted));
     }
     if (any(ended)) {
       Color<F> c(F(0.f));

@@ -99,8 +99,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     if (any(v.alive))
       store_path<F>(pool, slot,
                     {v.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
-                     v.next.cone_width, v.next.cone_spread, path.key, v.next.link},
+                     v.next.cone_width, v.next.cone_spread, path.key},
                     v.alive);
+    if (pool.link) scatter<U>(pool.link, v.next.link, slot, Mask<U>(v.alive));
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }
