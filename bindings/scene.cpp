@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -356,8 +357,12 @@ void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
 uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
                    const std::string& name, const Color3& color, float width, float height,
-                   float radius, float angle, bool normalize, std::optional<uint32_t> texture,
-                   const std::string& group) {
+                   float radius, float length, float angle, bool normalize,
+                   std::optional<uint32_t> texture, const std::string& group, float focus,
+                   const Color3& focus_tint, float cone_angle, float cone_softness,
+                   std::optional<uint32_t> ies, float ies_angle_scale, bool ies_normalize,
+                   float diffuse, float specular, bool visible, std::optional<uint32_t> light_link,
+                   std::optional<uint32_t> shadow_link) {
   Light light;
   light.group = builder.light_group(group);
   light.name = name;
@@ -365,6 +370,7 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                                  {{"rect", LightKind::kRect},
                                   {"disk", LightKind::kDisk},
                                   {"sphere", LightKind::kSphere},
+                                  {"cylinder", LightKind::kCylinder},
                                   {"distant", LightKind::kDistant},
                                   {"dome", LightKind::kDome}});
   light.to_world = affine(transform);
@@ -372,10 +378,36 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   light.width = width;
   light.height = height;
   light.radius = radius;
+  light.length = length;
   light.angle = angle;
   light.normalize = normalize;
   light.texture = texture.value_or(kNoTexture);
+  light.shaping = {focus,         vec3(focus_tint),     cone_angle,
+                   cone_softness, ies.value_or(kNoIes), ies_angle_scale,
+                   ies_normalize};
+  light.diffuse = diffuse;
+  light.specular = specular;
+  light.visible = visible;
+  light.light_link = light_link.value_or(kNoSet);
+  light.shadow_link = shadow_link.value_or(kNoSet);
   return builder.add_light(std::move(light));
+}
+
+uint32_t add_geometry_set(SceneBuilder& builder, const std::map<std::string, std::string>& rules) {
+  GeometrySet set;
+  for (const auto& [path, rule] : rules)
+    set.entries.push_back({path, choose<PathRule>("rule", rule,
+                                                  {{"exclude", PathRule::kExclude},
+                                                   {"explicit", PathRule::kExplicit},
+                                                   {"expand", PathRule::kExpand}})});
+  return builder.add_geometry_set(std::move(set));
+}
+
+uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector<float> horizontal,
+                 const Array<float>& candela) {
+  IesProfile profile{std::move(vertical), std::move(horizontal), {}};
+  profile.candela.assign(candela.data(), candela.data() + candela.size());
+  return builder.add_ies(std::move(profile));
 }
 
 void set_camera(SceneBuilder& builder,
@@ -508,7 +540,13 @@ void bind_scene(nb::module_& m) {
            "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none())
       .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
            "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f,
-           "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(), "group"_a = "")
+           "length"_a = 1.f, "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(),
+           "group"_a = "", "focus"_a = 0.f, "focus_tint"_a = black, "cone_angle"_a = 180.f,
+           "cone_softness"_a = 0.f, "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f,
+           "ies_normalize"_a = false, "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true,
+           "light_link"_a = nb::none(), "shadow_link"_a = nb::none())
+      .def("add_geometry_set", &add_geometry_set, "rules"_a)
+      .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
            "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,
            "far_clip"_a = 1e30f, "motion"_a = nb::none(), "projection"_a = "perspective",

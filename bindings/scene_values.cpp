@@ -39,11 +39,18 @@ const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material:
                                                 {"presence", &Material::presence}};
 const Members<Material, uint32_t> kMaterialCounts{{"evaluations", &Material::evaluations}};
 const Members<Light, Vec3<float>> kLightColors{{"color", &Light::color}};
-const Members<Light, float> kLightNumbers{{"width", &Light::width},
-                                          {"height", &Light::height},
-                                          {"radius", &Light::radius},
-                                          {"angle", &Light::angle}};
-const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize}};
+const Members<Light, float> kLightNumbers{
+    {"width", &Light::width},      {"height", &Light::height}, {"radius", &Light::radius},
+    {"length", &Light::length},    {"angle", &Light::angle},   {"diffuse", &Light::diffuse},
+    {"specular", &Light::specular}};
+const Members<Shaping, Vec3<float>> kShapingColors{{"focus_tint", &Shaping::focus_tint}};
+const Members<Shaping, float> kShapingNumbers{{"focus", &Shaping::focus},
+                                              {"cone_angle", &Shaping::cone_angle},
+                                              {"cone_softness", &Shaping::cone_softness},
+                                              {"ies_angle_scale", &Shaping::ies_angle_scale}};
+const Members<Shaping, bool> kShapingSwitches{{"ies_normalize", &Shaping::ies_normalize}};
+const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize},
+                                          {"visible", &Light::visible}};
 const Members<Camera, float> kCameraNumbers{
     {"lens_radius", &Camera::lens_radius},   {"focus_distance", &Camera::focus_distance},
     {"near_clip", &Camera::near_clip},       {"far_clip", &Camera::far_clip},
@@ -241,7 +248,7 @@ Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
 }
 
 const char* light_kind_name(LightKind kind) {
-  constexpr const char* kKinds[kLightKindCount] = {"rect",    "disk", "sphere",
+  constexpr const char* kKinds[kLightKindCount] = {"rect",    "disk", "sphere",  "cylinder",
                                                    "distant", "dome", "triangle"};
   return kKinds[static_cast<size_t>(kind)];
 }
@@ -273,6 +280,10 @@ nb::dict light_dict(const Scene& scene, uint32_t light) {
   put(d, l, kLightColors);
   put(d, l, kLightNumbers);
   put(d, l, kLightSwitches);
+  put(d, l.shaping, kShapingColors);
+  put(d, l.shaping, kShapingNumbers);
+  put(d, l.shaping, kShapingSwitches);
+  d["ies"] = l.shaping.ies == kNoIes ? nb::none() : nb::cast(l.shaping.ies);
   d["group"] = scene.light_groups()[l.group];
   d["texture"] =
       l.texture == kNoTexture ? nb::none() : nb::cast(scene.textures()[l.texture]->name());
@@ -342,6 +353,9 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     reader.take(changed, kLightColors);
     reader.take(changed, kLightNumbers);
     reader.take(changed, kLightSwitches);
+    reader.take(changed.shaping, kShapingColors);
+    reader.take(changed.shaping, kShapingNumbers);
+    reader.take(changed.shaping, kShapingSwitches);
     reader.end();
     edit.lights[i] = std::move(changed);
   });

@@ -259,13 +259,37 @@ class SceneBuilder:
         width: float = 1,
         height: float = 1,
         radius: float = 0.5,
+        length: float = 1,
         angle: float = 0.53,
         normalize: bool = False,
         texture: int | None = None,
         group: str = "",
+        focus: float = 0,
+        focus_tint: tuple[float, float, float] = (0, 0, 0),
+        cone_angle: float = 180,
+        cone_softness: float = 0,
+        ies: int | None = None,
+        ies_angle_scale: float = 0,
+        ies_normalize: bool = False,
+        diffuse: float = 1,
+        specular: float = 1,
+        visible: bool = True,
+        light_link: int | None = None,
+        shadow_link: int | None = None,
     ) -> int:
-        """Kinds: rect, disk, sphere, distant, dome, as UsdLux. color = colour * intensity *
-        2^exposure * colour temperature."""
+        """Kinds: rect, disk, sphere, cylinder, distant, dome, as UsdLux. color = colour *
+        intensity * 2^exposure * colour temperature. The shaping (focus to ies_normalize, angles in
+        degrees, a cone_angle of 180 is none) is UsdLuxShapingAPI's. visible: whether rays meet its
+        shape. light_link, shadow_link: sets of geometry that it shines on, and that casts shadows
+        in its light; None: all."""
+    def add_geometry_set(self, rules: dict[str, str]) -> int:
+        """A set for add_light, by the rules of a UsdCollectionMembershipQuery: prim paths to
+        exclude, explicit or expand."""
+    def add_ies(
+        self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]
+    ) -> int:
+        """A profile for add_light. Angles in degrees, ascending: vertical within [0, 180],
+        horizontal from 0 to 360 or a single one; candela (horizontal, vertical). Raises Error."""
     def set_camera(
         self,
         transform: NDArray[Any],

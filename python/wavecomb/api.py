@@ -212,6 +212,7 @@ def load(
     product: str | None = None,
     texture_limit: float | None = None,
     working_space: str = "rec709",
+    lights: str = "visible",
 ) -> LoadedStage:
     """Reads a USD stage.
 
@@ -247,6 +248,8 @@ def load(
         product: Path or name of one of their products; by default the first.
         texture_limit: MB (10^6 bytes) that all textures together may take; by default any.
         working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
+        lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
+            (docs/decisions/light-shapes.md).
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -281,6 +284,7 @@ def load(
         "product": product,
         "texture_limit": texture_limit,
         "working_space": working_space,
+        "lights": lights,
     }
     if isolate:
         from wavecomb.isolate.probe import check

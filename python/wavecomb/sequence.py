@@ -198,6 +198,7 @@ def render_frames(
     product: str | None = None,
     texture_limit: float | None = None,
     working_space: str = "rec709",
+    lights: str = "visible",
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
@@ -229,6 +230,7 @@ def render_frames(
         product: Likewise.
         texture_limit: Likewise.
         working_space: Likewise.
+        lights: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
@@ -265,6 +267,7 @@ def render_frames(
         product=product,
         texture_limit=texture_limit,
         working_space=working_space,
+        lights=lights,
         size=(chosen.width, chosen.height),
         **options,
     )

@@ -15,6 +15,7 @@ inline constexpr double kPiD = 3.14159265358979323846;
 struct Lights {
   std::vector<TexturePtr> textures;
   std::vector<TextureView> views;
+  std::vector<IesProfile> profiles;
   std::vector<TextureUseRecord> uses;  ///< of materials; only emission slots are set
   LightSet set;
 
@@ -42,7 +43,7 @@ struct Lights {
              float scene_radius = 10.f) {
     set = build_lights(
         lights, triangles.size(), [&triangles](size_t i) { return triangles[i]; }, {0, 0, 0},
-        scene_radius, textures);
+        scene_radius, textures, nullptr, profiles);
   }
   LightView view() const { return set.view({nullptr, uses.data(), views.data(), false}); }
 };
@@ -91,7 +92,8 @@ inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b
   return t;
 }
 
-/// Distance along dir to the geometry of the first light: a rect, disk, sphere or triangle.
+/// Distance along dir to the geometry of the first light: a rect, disk, sphere, cylinder or
+/// triangle.
 inline std::optional<float> trace(const LightView& view, const Vec3<float>& origin,
                                   const Vec3<float>& dir) {
   LightRecord r{};
@@ -117,6 +119,23 @@ inline std::optional<float> trace(const LightView& view, const Vec3<float>& orig
     if (discriminant < 0 || (c > 0 && b > 0)) return std::nullopt;
     const double root = std::sqrt(discriminant);
     return static_cast<float>(c > 0 ? (-b - root) / dd : (-b + root) / dd);
+  }
+  if (kind == LightKind::kCylinder) {
+    const double a[3] = {r.u[0], r.u[1], r.u[2]};
+    const double aa = dot(a, a), oa = dot(o, a) / aa, da = dot(d, a) / aa;
+    double po[3], pd[3];
+    for (int i = 0; i < 3; ++i) {
+      po[i] = o[i] - oa * a[i];
+      pd[i] = d[i] - da * a[i];
+    }
+    const double b = dot(po, pd), dd = dot(pd, pd),
+                 c = dot(po, po) - static_cast<double>(r.radius) * r.radius;
+    if (b * b - dd * c < 0) return std::nullopt;
+    for (const double sign : {-1.0, 1.0}) {
+      const double t = (-b + sign * std::sqrt(b * b - dd * c)) / dd, along = oa + t * da;
+      if (t > 0 && along >= 0 && along <= 1) return static_cast<float>(t);
+    }
+    return std::nullopt;
   }
   const double u[3] = {r.u[0], r.u[1], r.u[2]}, v[3] = {r.v[0], r.v[1], r.v[2]};
   const double m[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],

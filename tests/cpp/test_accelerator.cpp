@@ -584,14 +584,37 @@ TEST(Accelerator, LightShapesAreFoundByTheirRecord) {
   }
 }
 
+TEST(Accelerator, CylinderLightsAreOpenAtTheirEnds) {
+  SceneBuilder b;
+  Light tube = make_light(LightKind::kCylinder, {1, 1, 1}, translate(0, 0, 3));  // along x
+  tube.length = 4;
+  b.add_light(tube);
+  const EmbreeAccelerator accel(b.build(), 1);
+  Rays rays(5);
+  rays.aim(0, {0, 0, 0}, {1.9, 0, 3});
+  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});   // beside its end
+  rays.aim(2, {-5, 0, 3}, {5, 0, 3});      // along its axis, through it
+  rays.aim(3, {-3, 0, 3}, {-2, 0.25, 3});  // in at an end, to its inside
+  rays.aim(4, {0, 0, 3}, {0, 1, 3});       // from within
+  const Keys keys(5);
+  const Hits hits = trace(accel, rays, 4, false, keys.keys());
+  const double s = std::sqrt(1.9 * 1.9 + 9);
+  EXPECT_NEAR(hits.t[0], s * 2.5 / 3, 1e-5);
+  EXPECT_EQ(hits.inst[1], kNoHit);
+  EXPECT_EQ(hits.inst[2], kNoHit);
+  EXPECT_NEAR(hits.t[3], std::sqrt(1 + 0.0625) * 2, 1e-5);
+  EXPECT_NEAR(hits.t[4], 0.5, 1e-6);
+}
+
 TEST(Accelerator, LightShapesDoNotDependOnPackets) {
   SceneBuilder b;
   std::mt19937 rng(4);
   std::uniform_real_distribution<float> uniform(-2, 2);
   for (int i = 0; i < 60; ++i) {
-    const LightKind kind = i % 3 == 0   ? LightKind::kRect
-                           : i % 3 == 1 ? LightKind::kDisk
-                                        : LightKind::kSphere;
+    const LightKind kind = i % 4 == 0   ? LightKind::kRect
+                           : i % 4 == 1 ? LightKind::kDisk
+                           : i % 4 == 2 ? LightKind::kSphere
+                                        : LightKind::kCylinder;
     const float x = uniform(rng), y = uniform(rng), z = uniform(rng), a = uniform(rng);
     b.add_light(make_light(kind, {1, 1, 1},
                            translate(x, y, z) * rotate(i % 2, 90 * a) * scale(0.8f, 0.5f, 0.5f)));

@@ -61,6 +61,13 @@ std::vector<Case> sampling_cases() {
   add("sphere", sphere);
   sphere.radius = 0.83f;
   add("sphere, close", sphere);
+  Light tube = make_light(LightKind::kCylinder, rotate(30, 70) * translate(0.4f, 0.9f, -0.3f));
+  tube.length = 2;
+  add("cylinder", tube);
+  tube.radius = 0.93f;
+  add("cylinder, close", tube);
+  tube.to_world = translate(2.5f, 0.3f, 0.5f);
+  add("cylinder, from its end", tube);
   Light distant = make_light(LightKind::kDistant, rotate(40, 110));
   distant.angle = 60;
   add("distant", distant);
@@ -427,7 +434,7 @@ Lights all_kinds() {
   const uint32_t first = lights.add_texture(24, 12, rgb), second = lights.add_texture(12, 24, rgb);
   std::vector<Light> all;
   for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere,
-                               LightKind::kDistant, LightKind::kDome})
+                               LightKind::kCylinder, LightKind::kDistant, LightKind::kDome})
     for (int i = 0; i < 4; ++i) {
       const auto f = static_cast<float>(i);
       all.push_back(make_light(
@@ -435,12 +442,17 @@ Lights all_kinds() {
       if (i > 1 && (kind == LightKind::kRect || kind == LightKind::kDome))
         all.back().texture = i == 2 ? first : second;
       if (i == 1) all.back().angle = all.back().radius = 0;
+      if (i == 2) all.back().shaping = {1.5f, {0.2f, 0, 1}, 70, 0.5f};
+      if (i == 3) all.back().shaping = {0, {}, 100, 0, i % 2u, -0.7f, true};
+      if (i == 2) all.back().specular = 0.5f;
       if (kind == LightKind::kDome) all.back().color = {0.001f, 0.002f, 0.003f};
     }
   std::vector<EmissiveTriangle> triangles = {make_triangle({0, 0, 3}, {2, 0, 3}, {0, 2, 3}),
                                              make_triangle({0, 0, -3}, {4, 0, -3}, {0, 4, -4}),
                                              make_triangle({1, 1, 1}, {1, 1, 1}, {1, 1, 1})};
   triangles[1].material = lights.add_material(first);
+  lights.profiles = {{{0, 40, 40, 90}, {0}, {1, 3, 0, 2}},
+                     {{0, 90, 180}, {0, 100, 360}, {1, 2, 3, 3, 0, 1, 1, 2, 3}}};
   lights.build(all, triangles, 1.f);
   return lights;
 }
@@ -509,7 +521,8 @@ TEST(LightEdges, NoLightsAndDarkLights) {
 
 TEST(LightEdges, PointsOnAndInsideLightsGiveNoNan) {
   std::vector<Light> all;
-  for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere}) {
+  for (const LightKind kind :
+       {LightKind::kRect, LightKind::kDisk, LightKind::kSphere, LightKind::kCylinder}) {
     for (const float size : {1.f, 1e-12f, 1e12f, 0.f})
       all.push_back(make_light(kind, scale(size, size, size)));
   }

@@ -110,21 +110,82 @@ def test_hidden_lights_stay_off(tmp_path):
 def test_what_lights_ask_for_and_do_not_get(tmp_path):
     scene, loaded = load(
         tmp_path,
-        """def CylinderLight "Tube" {}
-        def RectLight "Spot" { float inputs:shaping:cone:angle = 20
-            float inputs:specular = 0
-            rel light:filters = </Tube>
-            rel collection:lightLink:includes = </Tube> }""",
+        f"""def PortalLight "Window" {{}}
+        def Mesh "Glow" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} }}
+        def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {{
+            float inputs:shaping:focus = 2 }}
+        def RectLight "Spot" {{
+            rel light:filters = </Window> }}""",
     )
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
-        "CylinderLight",
-        "light shaping cone",
-        "light multiplier specular",
-        "light linking (lightLink)",
+        "PortalLight",
+        "shaping of DistantLights",
         "light filters",
+        "MeshLightAPI (a mesh shines by its material alone)",
     ]
-    assert len(scene.lights) == 1
+    assert len(scene.lights) == 2
+
+
+def test_linking(tmp_path):
+    scene, loaded = load(
+        tmp_path,
+        """def SphereLight "A" {
+            uniform bool collection:lightLink:includeRoot = false
+            rel collection:lightLink:includes = [</World/Ball>, </World/Box>]
+            rel collection:lightLink:excludes = </World/Box/Lid>
+            rel collection:shadowLink:excludes = </World/Floor>
+        }
+        def SphereLight "B" { rel collection:shadowLink:excludes = </World/Floor>
+        }
+        def SphereLight "C" { rel collection:lightLink:includes = </World/Floor>
+        }""",
+    )
+    a, b, c = scene.lights
+    assert scene.sets[a["light_link"]] == {
+        "/World/Ball": "expand",
+        "/World/Box": "expand",
+        "/World/Box/Lid": "exclude",
+    }
+    assert scene.sets[a["shadow_link"]] == {"/": "expand", "/World/Floor": "exclude"}
+    assert b["shadow_link"] == a["shadow_link"] and "light_link" not in b
+    assert "light_link" not in c  # includeRoot is true: all is in it anyway
+    assert not loaded.report.unsupported
+
+
+def test_cylinder_lights(tmp_path):
+    text = """def CylinderLight "L" { float inputs:length = 3
+        float inputs:radius = RADIUS
+        bool inputs:normalize = NORMALIZE }"""
+    found, loaded = light(tmp_path, text.replace("RADIUS", "0.2").replace("NORMALIZE", "false"))
+    assert (found["kind"], found["length"], found["radius"]) == ("cylinder", 3, pytest.approx(0.2))
+    assert not found["normalize"] and not loaded.report.unsupported
+    found, loaded = light(tmp_path, text.replace("RADIUS", "0").replace("NORMALIZE", "false"))
+    assert found["radius"] == pytest.approx(0.003) and found["normalize"]
+    assert "radius 0" in said(loaded)
+
+
+def test_shaping_and_multipliers(tmp_path):
+    found, loaded = light(
+        tmp_path,
+        """def DiskLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
+        float inputs:shaping:focus = 2.5
+        color3f inputs:shaping:focusTint = (1, 0.5, -1)
+        float inputs:shaping:cone:angle = 35
+        float inputs:shaping:cone:softness = 3
+        float inputs:diffuse = 0.5
+        float inputs:specular = 0 }""",
+    )
+    assert found["focus"] == 2.5 and found["focus_tint"] == (1, 0.5, 0)
+    assert (found["cone_angle"], found["cone_softness"]) == (35, 1)
+    assert (found["diffuse"], found["specular"]) == (0.5, 0)
+    assert not loaded.report.unsupported
+
+
+def test_cones_come_with_the_api_only(tmp_path):
+    assert "cone_angle" not in light(tmp_path, 'def DiskLight "L" {}')[0]
+    api = 'def DiskLight "L" (prepend apiSchemas = ["ShapingAPI"]) {}'
+    assert light(tmp_path, api)[0]["cone_angle"] == 90
 
 
 @pytest.mark.parametrize(("up", "axis"), [("Y", 1), ("Z", 2)])

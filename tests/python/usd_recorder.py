@@ -17,6 +17,7 @@ class Recorder:
 
     def __init__(self):
         self.textures, self.materials, self.meshes, self.lights = [], [], [], []
+        self.profiles, self.sets = [], []
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
         self.motions = []  # (name of a group, its transforms over the shutter)
@@ -148,6 +149,15 @@ class Recorder:
         assert np.shape(transform) == (4, 4)
         self.lights.append({"kind": kind, "transform": np.asarray(transform), **options})
         return len(self.lights) - 1
+
+    def add_geometry_set(self, rules):
+        self.sets.append(dict(rules))
+        return len(self.sets) - 1
+
+    def add_ies(self, vertical, horizontal, candela):
+        assert candela.shape == (len(horizontal), len(vertical)) and candela.dtype == np.float32
+        self.profiles.append({"vertical": vertical, "horizontal": horizontal, "candela": candela})
+        return len(self.profiles) - 1
 
     def set_camera(self, transform, **options):
         self.camera = {"transform": np.asarray(transform), **options}

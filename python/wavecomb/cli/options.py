@@ -171,6 +171,12 @@ def stage_options(command: F) -> F:
             "[default: the camera's]",
         ),
         click.option(
+            "--lights",
+            type=click.Choice(["visible", "hidden"]),
+            help="Whether rays meet the shapes of lights; hidden ones shine all the same.  "
+            "[default: visible]",
+        ),
+        click.option(
             "--variant",
             "variants",
             multiple=True,
@@ -223,6 +229,7 @@ class StageOptions:
     render_settings: str | None = None
     texture_limit: float | None = None
     working_space: str | None = None
+    lights: str | None = None
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
@@ -282,6 +289,7 @@ class StageOptions:
             "render_settings": self.render_settings,
             "texture_limit": self.texture_limit,
             "working_space": self.working_space or "rec709",
+            "lights": self.lights or "visible",
         }
 
     def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:

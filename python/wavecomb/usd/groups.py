@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux
 
 from wavecomb.isolate import trail
 from wavecomb.usd.assign import Assigner, Draw
@@ -239,6 +239,9 @@ class GroupBuilder:
             what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
             self.report.note(what, draw.prim.GetPath())
             return
+        if draw.prim.HasAPI(UsdLux.LightAPI):
+            what = "MeshLightAPI (a mesh shines by its material alone)"
+            self.report.missing(what, draw.prim.GetPath())
         material, faces = self._materials(draw, shape, scope)
         name = self.report.place(draw.prim.GetPath())
         may_shine = material == INHERIT_MATERIAL or self.materials.any_emits(material, faces)

@@ -13,6 +13,8 @@ from pxr import Usd, UsdLux
 
 from wavecomb.usd.colour_space import linear_colour, space_of
 from wavecomb.usd.identity import LightGroups
+from wavecomb.usd.ies import IesTable
+from wavecomb.usd.links import LinkTable
 from wavecomb.usd.network import colour, number
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import UDIM, TextureTable, asset_file, tile_files
@@ -22,11 +24,15 @@ KINDS = {
     "RectLight": "rect",
     "DiskLight": "disk",
     "SphereLight": "sphere",
+    "CylinderLight": "cylinder",
     "DistantLight": "distant",
     "DomeLight": "dome",
     "DomeLight_1": "dome",
 }
 """Lights that are drawn, by prim type."""
+
+LIGHT_SHAPES = ("visible", "hidden")
+"""Whether rays meet the shapes of lights."""
 
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
 """Turns +Y to +Z, row vectors: what UsdLux does to a dome on a Z-up stage."""
@@ -37,7 +43,7 @@ class Light:
     """A light as ``SceneBuilder.add_light`` takes it, before its transform is known in full.
 
     Attributes:
-        kind: rect, disk, sphere, distant or dome.
+        kind: rect, disk, sphere, cylinder, distant or dome.
         options: Keyword arguments.
         local: (4, 4) applied before the prim's transform.
     """
@@ -57,13 +63,22 @@ class LightReader:
         textures: TextureTable | None,
         groups: LightGroups,
         report: LoadReport,
+        profiles: IesTable | None = None,
+        hidden: bool = False,
+        links: LinkTable | None = None,
     ) -> None:
-        """``textures``: None: lights are read without theirs."""
+        """``textures``, ``profiles``, ``links``: None: lights are read without theirs.
+
+        ``hidden``: no ray meets their shapes.
+        """
         self.time = time
         self.up_axis = up_axis
         self.textures = textures
         self.groups = groups
         self.report = report
+        self.profiles = profiles
+        self.hidden = hidden
+        self.links = links
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
@@ -87,6 +102,8 @@ class LightReader:
         elif kind == "sphere":
             self._sphere(prim, options, normalize, scale)
             normalize = normalize and options["radius"] > 0
+        elif kind == "cylinder":
+            normalize = self._cylinder(prim, options, normalize)
         elif kind == "distant":
             options["angle"] = min(max(number(self._get(prim, "angle", 0.53), 0.53), 0.0), 360.0)
         else:
@@ -94,6 +111,17 @@ class LightReader:
             local = self._pole(prim)
             normalize = False
         options["normalize"] = normalize
+        self._shaping(prim, kind, options)
+        if self.hidden and kind not in ("distant", "dome"):
+            options["visible"] = False
+        for name, option in (("lightLink", "light_link"), ("shadowLink", "shadow_link")):
+            linked = self.links.set_of(prim, name) if self.links else None
+            if linked is not None:
+                options[option] = linked
+        for name in ("diffuse", "specular"):
+            factor = number(self._get(prim, name, 1.0), 1.0)
+            if factor != 1.0:
+                options[name] = max(factor, 0.0)
         return Light(kind, options, local)
 
     def _get(self, prim: Usd.Prim, name: str, default: Any) -> Any:
@@ -143,6 +171,50 @@ class LightReader:
         if radius == 0 and not normalize:
             self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
 
+    def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
+        """Length and radius; whether it is normalized. A thin one stands for a line."""
+        length = abs(number(self._get(prim, "length", 1.0), 1.0))
+        radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        if radius == 0 and length > 0:
+            self.report.note(
+                "cylinder light of radius 0: taken for a thin one, normalized", prim.GetPath()
+            )
+            radius, normalize = 1e-3 * length, True
+        options["length"], options["radius"] = length, radius
+        return normalize
+
+    def _shaping(self, prim: Usd.Prim, kind: str, options: dict[str, Any]) -> None:
+        """UsdLuxShapingAPI: where it is not applied its attributes are not there."""
+
+        def read(name: str, default: float) -> float:
+            return number(self._get(prim, f"shaping:{name}", default), default)
+
+        shaping: dict[str, Any] = {}
+        focus = read("focus", 0.0)
+        if focus > 0:
+            tint = colour(self._get(prim, "shaping:focusTint", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
+            shaping["focus"] = focus
+            shaping["focus_tint"] = tuple(min(max(float(c), 0.0), 1e6) for c in tint)
+        angle = read("cone:angle", 180.0)
+        if angle < 180:
+            shaping["cone_angle"] = max(angle, 0.0)
+            shaping["cone_softness"] = min(max(read("cone:softness", 0.0), 0.0), 1.0)
+        if path := self._profile_file(prim):
+            profile = self.profiles.add(path, prim.GetPath()) if self.profiles else None
+            if profile is not None:
+                shaping["ies"] = profile
+                shaping["ies_angle_scale"] = read("ies:angleScale", 0.0)
+                shaping["ies_normalize"] = bool(self._get(prim, "shaping:ies:normalize", False))
+        if kind not in ("distant", "dome"):
+            options.update(shaping)
+        elif "focus" in shaping or "ies" in shaping or angle < 90:
+            self.report.missing(f"shaping of {prim.GetTypeName()}s", prim.GetPath())
+
+    def _profile_file(self, prim: Usd.Prim) -> str:
+        attribute = prim.GetAttribute("inputs:shaping:ies:file")
+        value = attribute.Get(self.time) if attribute else None
+        return asset_file(value, attribute, self.report) if value is not None else ""
+
     def _texture(self, prim: Usd.Prim) -> int | None:
         attribute = prim.GetAttribute("inputs:texture:file")
         value = attribute.Get(self.time) if attribute else None
@@ -175,26 +247,6 @@ class LightReader:
     def _say_unsupported(self, prim: Usd.Prim) -> None:
         path = prim.GetPath()
 
-        def authored(name: str) -> Any:
-            attribute = prim.GetAttribute(name)
-            value = attribute and attribute.HasAuthoredValue() and attribute.Get(self.time)
-            return value or None
-
-        if number(authored("inputs:shaping:cone:angle"), 180.0) < 180.0:
-            self.report.missing("light shaping cone", path)
-        if authored("inputs:shaping:focus"):
-            self.report.missing("light shaping focus", path)
-        if authored("inputs:shaping:ies:file"):
-            self.report.missing("IES profiles", path)
-        for name in ("diffuse", "specular"):
-            attribute = prim.GetAttribute(f"inputs:{name}")
-            if attribute and attribute.HasAuthoredValue() and attribute.Get(self.time) != 1.0:
-                self.report.missing(f"light multiplier {name}", path)
-        for name in ("lightLink", "shadowLink"):
-            for side in ("includes", "excludes"):
-                relation = prim.GetRelationship(f"collection:{name}:{side}")
-                if relation and relation.HasAuthoredTargets():
-                    self.report.missing(f"light linking ({name})", path)
         for name in ("light:filters", "portals"):
             relation = prim.GetRelationship(name)
             if relation and relation.HasAuthoredTargets():

@@ -19,7 +19,9 @@ from wavecomb.usd.camera import camera_motion, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
 from wavecomb.usd.identity import LightGroups
-from wavecomb.usd.light import LightReader, soft_dome, up_rotation
+from wavecomb.usd.ies import IesTable
+from wavecomb.usd.light import LIGHT_SHAPES, LightReader, soft_dome, up_rotation
+from wavecomb.usd.links import LinkTable
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
 from wavecomb.usd.render_settings import RenderChoice
@@ -104,6 +106,7 @@ class _Choice:
     editable: bool
     texture_limit: float | None
     size: tuple[int, int]
+    lights: str
 
 
 def load_stage(
@@ -132,6 +135,7 @@ def load_stage(
     product: str | None = None,
     texture_limit: float | None = None,
     working_space: str = "rec709",
+    lights: str = "visible",
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
@@ -173,6 +177,8 @@ def load_stage(
         texture_limit: MB (10^6 bytes) that all textures together may take; None: any. Where it is
             too little, finest mip levels are left out, those first that the picture shows least.
         working_space: What the picture is computed in: "rec709", or "acescg".
+        lights: Whether rays meet the shapes of lights: "visible" or "hidden"
+            (docs/decisions/light-shapes.md).
         builder_factory: Makes the scene builder; None: the native one.
 
     Raises:
@@ -188,6 +194,8 @@ def load_stage(
         raise WavecombError(f"frame must be a number, not {frame}")
     if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
         raise WavecombError("mask and session_layer are chosen when the stage is opened")
+    if lights not in LIGHT_SHAPES:
+        raise WavecombError(f"lights {lights!r}: there are {', '.join(LIGHT_SHAPES)}")
     level = parse_level(subdivision)
     if not (len(size) == 2 and min(size) >= 1):
         raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
@@ -211,7 +219,7 @@ def load_stage(
             )
 
         try:
-            choice = _Choice(opened, frame, view, editable, texture_limit, size)
+            choice = _Choice(opened, frame, view, editable, texture_limit, size, lights)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -339,7 +347,9 @@ def _read(
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = seen.camera
     groups = LightGroups(report)
-    lights = LightReader(time, up_axis, textures, groups, report)
+    profiles, hidden = IesTable(builder, report), choice.lights == "hidden"
+    links = LinkTable(builder)
+    lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, seen.blur, report)
     traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
     if choice.texture_limit is not None:

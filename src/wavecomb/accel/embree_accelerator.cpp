@@ -32,10 +32,12 @@ struct PacketTypes<16> {
 
 /// How closest hits are asked for.
 RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView& scene,
-                                          const PresenceKeys& keys, bool coherent) {
+                                          const PresenceKeys& keys, uint32_t first_world,
+                                          bool coherent) {
   rtcInitRayQueryContext(&context.base);
   context.scene = &scene;
   context.keys = &keys;
+  context.first_world = first_world;
   RTCIntersectArguments args;
   rtcInitIntersectArguments(&args);
   args.flags = static_cast<RTCRayQueryFlags>(
@@ -88,7 +90,7 @@ struct EmbreeAccelerator::Impl {
     for (size_t i = 0; i < rays.size; ++i) {
       RTCRayHit rh{};
       QueryContext context;
-      RTCIntersectArguments args = intersect_arguments(context, view, keys, coherent);
+      RTCIntersectArguments args = intersect_arguments(context, view, keys, first_world, coherent);
       rh.ray = load_ray(rays, i);
       rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
       rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -133,7 +135,7 @@ struct EmbreeAccelerator::Impl {
                          const PresenceKeys& keys) const {
     alignas(64) typename PacketTypes<W>::RayHit rh;
     QueryContext context;
-    RTCIntersectArguments args = intersect_arguments(context, view, keys, coherent);
+    RTCIntersectArguments args = intersect_arguments(context, view, keys, first_world, coherent);
     alignas(64) int valid[W];
     context.inst = rh.hit.instID[0];
     context.geom = rh.hit.geomID;
@@ -236,6 +238,7 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
   rtcInitRayQueryContext(&context.base);
   context.scene = &impl_->view;
   context.keys = &keys;
+  context.first_world = impl_->first_world;
   RTCOccludedArguments args;
   rtcInitOccludedArguments(&args);
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;

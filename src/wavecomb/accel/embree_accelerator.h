@@ -38,6 +38,9 @@ struct PresenceKeys {
   uint32_t stride = 1;  ///< words from one slot's to the next one's
   /// Different for every depth and for shadow rays, so that crossings are independent.
   uint32_t salt = 0;
+  /// Of shadow rays where lights are linked: 1 + the set of geometry that is in their way, 0: all.
+  const uint32_t* shadow_set = nullptr;
+  uint32_t shadow_stride = 0;
 };
 
 /// Which of equally close hits a hierarchy is built to give.

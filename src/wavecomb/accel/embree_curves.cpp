@@ -32,9 +32,8 @@ void for_first_hits(const Arguments& args, RTCRayN* ray, const Found& found) {
   for (unsigned i = 0; i < args.N; ++i) {
     if (args.valid[i] == 0) continue;
     for (const CurveHit& hit : meet(curves, ray, args.N, i, args.primID)) {
-      if (curves.is_filtered &&
-          !is_present(*context->scene, inst == RTC_INVALID_GEOMETRY_ID ? 0 : inst, curves.id,
-                      args.primID, hit.u, hit.v, RTCRayN_id(ray, args.N, i), *context->keys))
+      if (curves.is_filtered && !is_met(*context, inst, args.geomID, curves.id, args.primID, hit.u,
+                                        hit.v, RTCRayN_id(ray, args.N, i)))
         continue;
       found(i, hit);
       break;

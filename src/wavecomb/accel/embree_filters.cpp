@@ -47,17 +47,27 @@ float meet_round_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
 
 }  // namespace
 
+bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
+            uint32_t prim, float u, float v, uint32_t slot) {
+  const bool instanced = hit_inst != RTC_INVALID_GEOMETRY_ID;
+  const uint32_t inst = instanced ? hit_inst : 0;
+  if (context.keys->shadow_set &&
+      !casts_shadow(*context.scene, inst, instanced ? geom : geom - context.first_world, slot,
+                    *context.keys))
+    return false;
+  return is_present(*context.scene, inst, mesh, prim, u, v, slot, *context.keys);
+}
+
 void presence_filter(const RTCFilterFunctionNArguments* args) {
   const auto mesh = static_cast<uint32_t>(reinterpret_cast<uintptr_t>(args->geometryUserPtr));
   const auto* context = reinterpret_cast<const QueryContext*>(args->context);
   const unsigned n = args->N;
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] != -1) continue;
-    const unsigned inst = RTCHitN_instID(args->hit, n, i, 0);
     const bool present =
-        is_present(*context->scene, inst == RTC_INVALID_GEOMETRY_ID ? 0 : inst, mesh,
-                   RTCHitN_primID(args->hit, n, i), RTCHitN_u(args->hit, n, i),
-                   RTCHitN_v(args->hit, n, i), RTCRayN_id(args->ray, n, i), *context->keys);
+        is_met(*context, RTCHitN_instID(args->hit, n, i, 0), RTCHitN_geomID(args->hit, n, i), mesh,
+               RTCHitN_primID(args->hit, n, i), RTCHitN_u(args->hit, n, i),
+               RTCHitN_v(args->hit, n, i), RTCRayN_id(args->ray, n, i));
     if (!present) args->valid[i] = 0;
   }
 }

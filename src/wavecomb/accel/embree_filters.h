@@ -15,6 +15,7 @@ struct alignas(64) QueryContext {
   RTCRayQueryContext base;
   const SceneView* scene;  ///< whose materials say what is present
   const PresenceKeys* keys;
+  uint32_t first_world;                ///< geometry id of the world's first mesh
   const unsigned *inst, *geom, *prim;  ///< of the hits that Embree holds, W each
   alignas(64) float t[16];             ///< their true distances
 };
@@ -22,8 +23,13 @@ struct alignas(64) QueryContext {
 /// Hits farther than the closest by less than this fraction are looked at still.
 inline constexpr float kSlack = 1.f + 0x1p-20f;
 
-/// Filter of geometries with partly present materials, whose user pointer is the number of the
-/// mesh.
+/// Whether a ray of path `slot` meets a hit, whose ids are Embree's: it is present, and for a
+/// shadow ray, in the way of its light.
+bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
+            uint32_t prim, float u, float v, uint32_t slot);
+
+/// Filter of geometries with partly present materials, and of all where lights are linked; their
+/// user pointer is the number of the mesh.
 void presence_filter(const RTCFilterFunctionNArguments* args);
 /// Filter of queries: makes the closest hit independent of the order in which triangles are tried.
 void closest_filter(const RTCFilterFunctionNArguments* args);

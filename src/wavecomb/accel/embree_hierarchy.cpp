@@ -42,7 +42,8 @@ namespace {
 std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   const SceneGeometry& geometry = *scene.geometry();
   std::vector<uint8_t> filtered(geometry.meshes.size(), 0);
-  if (!scene.view().has_presence) return filtered;
+  if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
+  if (scene.view().lights.links.members || !scene.view().has_presence) return filtered;
   const auto needs = [&](uint32_t m) { return scene.materials()[m].needs_presence(); };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),
@@ -62,8 +63,9 @@ std::vector<LightRecord> light_shapes(const Scene& scene) {
     shape.kind = kNoLight;
     const auto kind = static_cast<LightKind>(record.kind);
     const bool has_shape = kind == LightKind::kRect || kind == LightKind::kDisk ||
+                           kind == LightKind::kCylinder ||
                            (kind == LightKind::kSphere && record.radius > 0);
-    if (!has_shape || !(record.area > 0)) continue;
+    if (!has_shape || !(record.area > 0) || record.hidden != 0) continue;
     shape.kind = record.kind;
     shape.radius = record.radius;
     for (int i = 0; i < 3; ++i) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/accel/light_shapes.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace wavecomb {
@@ -25,6 +26,26 @@ double intersect_sphere(const double* o, const double* d, double radius) {
   return (-b - root > 0 ? -b - root : -b + root) / a;
 }
 
+/// The nearer point ahead of the open cylinder of axis u from 0 on.
+double intersect_cylinder(const double* o, const double* d, const double* u, double radius) {
+  const double uu = dot(u, u), ou = dot(o, u) / uu, du = dot(d, u) / uu;
+  double across_o[3], across_d[3];
+  for (int i = 0; i < 3; ++i) {
+    across_o[i] = o[i] - ou * u[i];
+    across_d[i] = d[i] - du * u[i];
+  }
+  const double a = dot(across_d, across_d), b = dot(across_o, across_d),
+               c = dot(across_o, across_o) - radius * radius;
+  const double discriminant = b * b - a * c;
+  if (!(discriminant >= 0) || !(a > 0)) return 0;
+  const double root = std::sqrt(discriminant);
+  for (const double t : {(-b - root) / a, (-b + root) / a}) {
+    const double along = ou + t * du;
+    if (t > 0 && along >= 0 && along <= 1) return t;
+  }
+  return 0;
+}
+
 /// o + t d = x u + y v with x^2 + y^2 <= 1.
 double intersect_disk(const double* o, const double* d, const double* u, const double* v) {
   double m[3], hv[3], uh[3];
@@ -41,13 +62,14 @@ double intersect_disk(const double* o, const double* d, const double* u, const d
 }  // namespace
 
 Bounds round_light_bounds(const LightRecord& light) {
-  const bool is_sphere = static_cast<LightKind>(light.kind) == LightKind::kSphere;
+  const auto kind = static_cast<LightKind>(light.kind);
   float lo[3], hi[3];
   for (int i = 0; i < 3; ++i) {
-    const float half = is_sphere ? light.radius : std::hypot(light.u[i], light.v[i]);
-    const float slack = 1e-6f * std::abs(light.p[i]) + 1e-5f * half;
-    lo[i] = light.p[i] - half - slack;
-    hi[i] = light.p[i] + half + slack;
+    const float half = kind == LightKind::kDisk ? std::hypot(light.u[i], light.v[i]) : light.radius;
+    const float end = kind == LightKind::kCylinder ? light.p[i] + light.u[i] : light.p[i];
+    const float slack = 1e-6f * std::max(std::abs(light.p[i]), std::abs(end)) + 1e-5f * half;
+    lo[i] = std::min(light.p[i], end) - half - slack;
+    hi[i] = std::max(light.p[i], end) + half + slack;
   }
   return {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
 }
@@ -61,8 +83,17 @@ float intersect_round_light(const LightRecord& light, const float (&origin)[3],
     u[i] = light.u[i];
     v[i] = light.v[i];
   }
-  const bool is_sphere = static_cast<LightKind>(light.kind) == LightKind::kSphere;
-  const double t = is_sphere ? intersect_sphere(o, d, light.radius) : intersect_disk(o, d, u, v);
+  double t = 0;
+  switch (static_cast<LightKind>(light.kind)) {
+    case LightKind::kSphere:
+      t = intersect_sphere(o, d, light.radius);
+      break;
+    case LightKind::kCylinder:
+      t = intersect_cylinder(o, d, u, light.radius);
+      break;
+    default:
+      t = intersect_disk(o, d, u, v);
+  }
   return t > 0 ? static_cast<float>(t) : 0.f;
 }
 

@@ -55,6 +55,15 @@ float opacity_at(const SceneView& scene, const MaterialRecord& material, uint32_
 
 }  // namespace
 
+bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
+                  const PresenceKeys& keys) {
+  const uint32_t set = keys.shadow_set[size_t{slot} * keys.shadow_stride];
+  if (set == 0) return true;
+  const LinkView& links = scene.lights.links;
+  const uint32_t link = links.classes[scene.instances[instance].emissive + geom];
+  return (links.members[(link - 1) * links.words + (set - 1) / 32] >> ((set - 1) % 32) & 1) != 0;
+}
+
 bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
                 float v, uint32_t slot, const PresenceKeys& keys) {
   const MeshRecord& record = scene.meshes[mesh];

@@ -15,4 +15,9 @@ namespace wavecomb {
 bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
                 float v, uint32_t slot, const PresenceKeys& keys);
 
+/// Whether geometry `geom` of an instance is in the way of the shadow ray of a slot, by what the
+/// keys say of linking.
+bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
+                  const PresenceKeys& keys);
+
 }  // namespace wavecomb

@@ -20,17 +20,18 @@ namespace wavecomb {
 /// Contract: owned by one wave. AOVs are there only where asked for.
 class PathPool {
  public:
-  /// Words of a row: 16 for a path, 10 for its shadow ray, 3 for its radiance.
+  /// Words of a row: 16 for a path, 12 for its shadow ray, 3 for its radiance.
   static constexpr uint32_t kPathWords = 16, kShadowWords = 16, kRadianceWords = 4;
   /// And 8 for what was hit first: albedo, normal, uv.
   static constexpr uint32_t kFirstWords = 8;
   static constexpr uint32_t kHitWords = 8;      ///< of AovHit
   static constexpr uint32_t kGuideWords = 8;    ///< 7: albedo, normal, 1 once they are final
   static constexpr uint32_t kShadowGroup = 10;  ///< word of a shadow ray's row
+  static constexpr uint32_t kShadowSet = 11;    ///< VertexResult::shadow_set, likewise
 
   PathPool() = default;
-  /// `moves`: something moves while the shutter is open.
-  PathPool(size_t capacity, const AovLayout& aovs, bool moves)
+  /// `moves`: something moves while the shutter is open. `linked`: lights are linked to geometry.
+  PathPool(size_t capacity, const AovLayout& aovs, bool moves, bool linked = false)
       : light_groups(aovs.light_groups),
         rows_(1, capacity * (kPathWords + kShadowWords + kRadianceWords)) {
     paths = rows_.floats(0);
@@ -52,13 +53,17 @@ class PathPool {
     block(aov_blocks_[7], cost_ns, set.has(Aov::kCost), 1);
     block(aov_blocks_[8], guides, set.guides(), kGuideWords);
     block(times_, time, moves, 1);
+    float* words = nullptr;
+    block(links_, words, linked, 1);
+    link = reinterpret_cast<uint32_t*>(words);
     wants_uv = set.has(Aov::kUv);
   }
 
   float* paths = nullptr;     ///< rows of load_path
-  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group
+  float* shadows = nullptr;   ///< origin, direction, tfar, r, g, b, light group, shadow set
   float* radiance = nullptr;  ///< r, g, b so far
   float* time = nullptr;      ///< of the shutter, in [0, 1); null where nothing moves
+  uint32_t* link = nullptr;   ///< PathState::link; null where no light is linked
   // Null where not asked for.
   float* first = nullptr;   ///< albedo, normal, uv
   float* depth = nullptr;   ///< along the camera's axis; infinite where nothing was hit
@@ -72,13 +77,13 @@ class PathPool {
   uint32_t light_groups = 0;
   bool wants_uv = false;
   size_t bytes() const {
-    size_t n = rows_.bytes() + times_.bytes();
+    size_t n = rows_.bytes() + times_.bytes() + links_.bytes();
     for (const SoaBlock& block : aov_blocks_) n += block.bytes();
     return n;
   }
 
  private:
-  SoaBlock rows_, times_;
+  SoaBlock rows_, times_, links_;
   std::array<SoaBlock, 9> aov_blocks_;
 };
 

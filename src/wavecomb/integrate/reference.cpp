@@ -123,6 +123,7 @@ class PathTracer {
       }
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
+        shadow_set_ = v.shadow_set;
         if (!occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth)) {
           result.radiance += v.direct;
           add_light(aovs.lit_by, v.direct);
@@ -146,6 +147,7 @@ class PathTracer {
     Hit h;
     const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1, times()};
     keys_.salt = 2 * depth;
+    keys_.shadow_set = nullptr;
     context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
     counts_.add_rays(depth, 1);
     return h;
@@ -155,6 +157,7 @@ class PathTracer {
     const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1, times()};
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
+    keys_.shadow_set = context_.scene.lights.links.members ? &shadow_set_ : nullptr;
     context_.accel->occluded(ray, &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);
     return blocked != 0;
@@ -219,6 +222,7 @@ class PathTracer {
   PhaseClock& clock_;
   Counts& counts_;
   PresenceKeys keys_;
+  uint32_t shadow_set_ = 0;
   F time_ = 0.f;  ///< of the path
   bool wants_guides_;
   std::vector<F> groups_;

@@ -54,8 +54,9 @@ struct PathState {
   F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
-  Vec3<F> o;         ///< origin of the ray that arrived
-  UInt<F> receiver;  ///< LightReceiver::normal of the vertex before
+  Vec3<F> o;           ///< origin of the ray that arrived
+  UInt<F> receiver;    ///< LightReceiver::normal of the vertex before
+  UInt<F> link{0u};    ///< class of the surface that the ray left, where lights are linked
 
   LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };
@@ -67,9 +68,10 @@ struct VertexResult {
   Mask<F> has_shadow;  ///< a shadow ray is wanted
   Vec3<F> shadow_o, shadow_d;
   F shadow_tfar;
-  Color<F> direct;    ///< to add where the shadow ray is free, clamped
-  Mask<F> alive;      ///< the path goes on
-  PathState<F> next;  ///< the next ray and what goes with it
+  UInt<F> shadow_set;  ///< of shadow_set, 0 where nothing is linked
+  Color<F> direct;     ///< to add where the shadow ray is free, clamped
+  Mask<F> alive;       ///< the path goes on
+  PathState<F> next;   ///< the next ray and what goes with it
 };
 
 /// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
@@ -126,6 +128,19 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
                 F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
+/// The class that linking knows geometry `geom` of instance `inst` by.
+template <typename F>
+inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                          const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+  const U first =
+      gather<U>(scene.instances,
+                inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+                Mask<U>(active));
+  return gather<U>(scene.lights.links.classes, first + geom, Mask<U>(active));
+}
+
 /// Radiance of a light's own shape met by a path.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
@@ -133,7 +148,11 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
                                const PathState<F>& path, const Mask<F>& active) {
   const LightHit<F> hit =
       light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
-  const F w = bounce_weight<F>(path.pdf, hit.pdf);
+  F w = bounce_weight<F>(path.pdf, hit.pdf);
+  if (scene.lights.has_sampled_only)
+    w *= LightEffect<F>(scene.lights, light, active).of_hit(not_(path.pdf > 0.f), depth == 0);
+  if (scene.lights.links.members)
+    w = select(shines_on<F>(scene.lights, path.link, light, active), w, F(0.f));
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
 
@@ -143,7 +162,8 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      uint32_t depth, const PathState<F>& path,
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
-  const Color<F> le = escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active);
+  const Color<F> le =
+      escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active, depth == 0, path.link);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
@@ -200,6 +220,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.direct = Color<F>(F(0.f));
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
+  out.shadow_set = U(0u);
+  out.next.link = U(0u);
   const bool wants_lights = aovs && aovs->wants_lights;
   if (wants_lights) aovs->emitter = aovs->lit_by = U(kNoLight);
 
@@ -280,6 +302,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     if (aovs->wants_uv) aovs->uv = s.uv;
   }
   if (depth >= settings.max_depth) return out;
+  if (scene.lights.links.members) [[unlikely]]
+    out.next.link = link_class<F>(scene, hit.inst, geom, active);
 
   const Sample4<F> rl = sample_4d<F>(settings.sampler, key, light_set(depth));
 
@@ -305,9 +329,22 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         settings.cosine_sampling && kOpaque
             ? select(F(wo.z * wi.z) > 0.f, cosine_hemisphere_pdf(abs(wi.z)), F(0.f))
             : e.pdf;
-    const F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
+    F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
+    Color<F> f_cos = e.f_cos;
+    if (scene.lights.has_sampled_only) [[unlikely]] {
+      const LightEffect<F> effect(scene.lights, chosen_light<F>(scene.lights, receiver, rl.x, lit), lit);
+      const Color<F> diffuse = bsdf.diffuse_f_cos(wo, wi);
+      f_cos = select<F>(effect.sampled_only,
+                        fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
+      w = select(effect.sampled_only, F(1.f), w);
+    }
+    if (scene.lights.links.members) [[unlikely]] {
+      const U light = chosen_light<F>(scene.lights, receiver, rl.x, lit);
+      w = select(shines_on<F>(scene.lights, out.next.link, light, lit), w, F(0.f));
+      out.shadow_set = shadow_set<F>(scene.lights, light, lit);
+    }
     const Color<F> c =
-        clean<F>(path.throughput * e.f_cos * l.weight * w, clamp_limit(settings, depth + 1));
+        clean<F>(path.throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
     if (wants_lights) aovs->lit_by = chosen_light<F>(scene.lights, receiver, rl.x, lit);

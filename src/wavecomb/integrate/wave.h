@@ -68,7 +68,8 @@ struct WaveTask {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.film->aovs().layout(), context.moves()),
+      : pool(capacity, context.film->aovs().layout(), context.moves(),
+             context.scene.lights.links.members != nullptr),
         rays(capacity),
         hits(capacity),
         shading(capacity),

@@ -7,11 +7,14 @@
 #pragma once
 
 #include "wavecomb/core/vec.h"
+#include "wavecomb/light/cylinder.h"
 #include "wavecomb/light/disk.h"
 #include "wavecomb/light/distant.h"
 #include "wavecomb/light/dome.h"
+#include "wavecomb/light/link.h"
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/rect.h"
+#include "wavecomb/light/shaping.h"
 #include "wavecomb/light/sphere.h"
 #include "wavecomb/light/triangle.h"
 #include "wavecomb/scene/light_data.h"
@@ -110,6 +113,8 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const Li
       return sample_disk<F>(light, p, u, v);
     case LightKind::kSphere:
       return sample_sphere<F>(light, p, u, v);
+    case LightKind::kCylinder:
+      return sample_cylinder<F>(light, p, u, v);
     case LightKind::kDistant:
       return sample_distant<F>(light, u, v);
     case LightKind::kDome:
@@ -173,8 +178,12 @@ inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>
                              // Often there is one light of a kind, whose record is the same in all
                              // its lanes.
                              const detail::LightReader<F> light(view.lights, index, lanes);
-                             put(detail::sample_kind<F>(kind, view, light, p, u, v, lanes),
-                                 pick.pdf(light.pick_pdf()), lanes);
+                             detail::KindSample<F> s =
+                                 detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
+                             if (view.shapings)
+                               s.radiance = detail::shaped<F>(view, light.shaping(), -s.wi,
+                                                              s.radiance, lanes & (s.pdf > 0.f));
+                             put(s, pick.pdf(light.pick_pdf()), lanes);
                            });
   return result;
 }
@@ -185,8 +194,8 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` (rect, disk, sphere) sends back along the ray from.p + t dir which
-/// hit it at distance t. Other kinds and inactive lanes give 0.
+/// Radiance that light `light` (rect, disk, sphere, cylinder) sends back along the ray from.p + t
+/// dir which hit it at distance t. Other kinds and inactive lanes give 0.
 template <typename F>
 inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
                              const LightReceiver<F>& from, const Vec3<F>& dir, const F& t,
@@ -204,6 +213,9 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
           hit = detail::hit_rect<F>(reader, view.materials.textures, origin, dir, t, lanes);
         if (kind == LightKind::kDisk) hit = detail::hit_disk<F>(reader, dir, t);
         if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
+        if (kind == LightKind::kCylinder) hit = detail::hit_cylinder<F>(reader, origin, dir, t);
+        if (view.shapings)
+          hit.radiance = detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
         result.radiance = select<F>(lanes, hit.radiance, result.radiance);
         result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
       });
@@ -222,20 +234,46 @@ inline F triangle_light_pdf(const LightView& view, const UInt<F>& light,
   return select(lanes, F(d.solid_angle * pick_pdf), F(0.f));
 }
 
+/// What becomes of the light that the two techniques bring where lights do not give all surfaces
+/// the same. Run only where LightView::has_sampled_only.
+template <typename F>
+struct LightEffect {
+  F diffuse, specular;   ///< factors of the two parts of the response
+  Mask<F> sampled_only;  ///< LightRecord::sampled_only
+
+  LightEffect(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
+    const Mask<F> known = active & Mask<F>(light < UInt<F>(view.first_triangle));
+    const detail::LightReader<F> reader(view.lights, light, known);
+    diffuse = select(known, reader.real(offsetof(LightRecord, diffuse)), F(1.f));
+    specular = select(known, reader.real(offsetof(LightRecord, specular)), F(1.f));
+    sampled_only = known & Mask<F>(reader.bits(offsetof(LightRecord, sampled_only)) != UInt<F>(0u));
+  }
+
+  /// Factor of what a path gets that meets the light; a mirror's image of it is specular.
+  F of_hit(const Mask<F>& bsdf_is_delta, bool from_camera) const {
+    const F mirrored = from_camera ? F(1.f) : specular;
+    return select(sampled_only, select(bsdf_is_delta, mirrored, F(0.f)), F(1.f));
+  }
+};
+
 /// Radiance * MIS weight of infinite light `light` for a ray that left the scene along dir, as
 /// escaped_radiance sums them up.
 template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& dir,
                                         const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
-                                        const Mask<F>& active) {
+                                        const Mask<F>& active, bool from_camera = false,
+                                        const UInt<F>& link = UInt<F>(0u)) {
   const LightRecord& record = view.lights[light];
   const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
   const detail::KindHit<F> hit =
       is_dome ? detail::hit_dome<F>(view, record, dir, active)
               : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
   const float pick_pdf = view.by_tree ? view.tree.infinite_pdf[light] : record.pick_pdf;
-  const F weight =
-      select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * pick_pdf)));
+  F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * pick_pdf)));
+  if (view.has_sampled_only)
+    weight *= LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera);
+  if (view.links.members)
+    weight = select(shines_on<F>(view, link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
 }
 
@@ -244,10 +282,12 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 /// too).
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
-                                 const Mask<F>& bsdf_is_delta, const Mask<F>& active) {
+                                 const Mask<F>& bsdf_is_delta, const Mask<F>& active,
+                                 bool from_camera = false, const UInt<F>& link = UInt<F>(0u)) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
-    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active);
+    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active, from_camera,
+                                      link);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

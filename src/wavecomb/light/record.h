@@ -65,6 +65,7 @@ struct LightReader {
   F one_minus_cos() const { return real(offsetof(LightRecord, one_minus_cos)); }
   F pick_pdf() const { return real(offsetof(LightRecord, pick_pdf)); }
   UInt<F> texture() const { return bits(offsetof(LightRecord, texture)); }
+  UInt<F> shaping() const { return bits(offsetof(LightRecord, shaping)); }
 };
 
 /// What one light gives a shading point, before the choice of the light is counted.

@@ -114,9 +114,23 @@ uint64_t hash_textures(const Scene& scene) {
 
 uint64_t hash_lights(const Scene& scene) {
   Hash h;
-  for (const Light& l : scene.lights())
-    h.add(l.kind, l.to_world, l.color, l.width, l.height, l.radius, l.angle, l.normalize, l.texture,
-          l.group);
+  for (const Light& l : scene.lights()) {
+    const Shaping& s = l.shaping;
+    h.add(l.kind, l.to_world, l.color, l.width, l.height, l.radius, l.length, l.angle, l.normalize,
+          l.texture, l.group, l.diffuse, l.specular, s.focus, s.focus_tint, s.cone_angle,
+          s.cone_softness, s.ies, s.ies_angle_scale, s.ies_normalize, l.light_link, l.shadow_link,
+          l.visible);
+  }
+  for (const GeometrySet& set : scene.geometry()->sets)
+    for (const GeometrySet::Entry& entry : set.entries) {
+      h.add_bytes(entry.path.data(), entry.path.size());
+      h.add(entry.rule);
+    }
+  for (const IesProfile& p : scene.geometry()->profiles) {
+    h.add_array(std::span<const float>(p.vertical));
+    h.add_array(std::span<const float>(p.horizontal));
+    h.add_array(std::span<const float>(p.candela));
+  }
   for (const Mesh& m : scene.meshes()) h.add(m.light_group);
   return h.value();
 }

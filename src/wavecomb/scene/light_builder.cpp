@@ -65,15 +65,23 @@ bool finite(const Vec3<float>& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-void check(const Light& light, size_t texture_count) {
+void check(const Light& light, size_t texture_count, size_t profile_count) {
   const std::string where = "light '" + light.name + "': ";
   const Affine& m = light.to_world;
   if (!finite(m.row[0]) || !finite(m.row[1]) || !finite(m.row[2]) || !finite(m.t)) {
     throw Error(where + "its transform is not finite");
   }
   if (!finite(light.color)) throw Error(where + "its colour times intensity is not finite");
-  for (const float size : {light.width, light.height, light.radius, light.angle}) {
+  for (const float size : {light.width, light.height, light.radius, light.length, light.angle}) {
     if (!std::isfinite(size)) throw Error(where + "its size is not finite");
+  }
+  const Shaping& s = light.shaping;
+  for (const float value : {s.focus, s.focus_tint.x, s.focus_tint.y, s.focus_tint.z, s.cone_angle,
+                            s.cone_softness, s.ies_angle_scale, light.diffuse, light.specular}) {
+    if (!std::isfinite(value)) throw Error(where + "its shaping or multipliers are not finite");
+  }
+  if (s.ies != kNoIes && s.ies >= profile_count) {
+    throw Error(where + "there is no IES profile " + std::to_string(s.ies));
   }
   if (static_cast<uint32_t>(light.kind) >= static_cast<uint32_t>(LightKind::kTriangle)) {
     throw Error(where + "is of no kind that a stage can give");
@@ -139,6 +147,87 @@ void make_sphere(Made& made, const Light& light, const Double3& color, double me
   if (!there) made.record.radius = 1e-18f;  // 0 would make it a point light
 }
 
+/// A round cylinder of as much volume as the transformed one has, about its transformed axis.
+void make_cylinder(Made& made, const Light& light, const Double3& color, double mean) {
+  const Affine& m = light.to_world;
+  const Double3 x = to_double(m.axis(0)), y = to_double(m.axis(1)), z = to_double(m.axis(2));
+  const Double3 axis = x * std::fabs(double{light.length});
+  const double stretch = length(x) > 0 ? std::fabs(dot(x, cross(y, z))) / length(x) : 0;
+  const double radius = std::fabs(double{light.radius}) * std::sqrt(stretch);
+  const double area = 2 * kPiD * radius * length(axis);
+  put(made.record.p, subtract(to_double(m.t), axis * 0.5));
+  put(made.record.u, axis);
+  made.record.radius = static_cast<float>(radius);
+  made.record.area = static_cast<float>(area);
+  const double scale = area < kLeastArea ? 0 : (light.normalize ? 1 / area : 1);
+  put_radiance(made.record, color * scale);
+  made.power = kPiD * area * scale * mean;
+}
+
+/// The shaping of a light with a shape or of a point, and what share of its power it lets out: each
+/// part by its mean over all directions, as if they had nothing to do with one another.
+void make_shaping(Made& made, LightSet& set, const Light& light,
+                  std::span<const IesProfile> profiles) {
+  const Shaping& s = light.shaping;
+  const Double3 minus_z = unit(to_double(light.to_world.axis(2)) * -1.0);
+  ShapingRecord r{};
+  put(r.axis, minus_z);
+  // The rows of the inverse; a length in common does not matter.
+  const Double3 axes[3] = {to_double(light.to_world.axis(0)), to_double(light.to_world.axis(1)),
+                           to_double(light.to_world.axis(2))};
+  const double side = dot(axes[0], cross(axes[1], axes[2])) < 0 ? -1 : 1;
+  double largest = 0;
+  Double3 rows[3];
+  for (size_t i = 0; i < 3; ++i) {
+    rows[i] = cross(axes[(i + 1) % 3], axes[(i + 2) % 3]) * side;
+    largest = std::max(largest, length(rows[i]));
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    const Double3 row = rows[i] * (largest > 0 ? 1 / largest : 0);
+    const double values[3] = {row.x, row.y, row.z};
+    for (size_t j = 0; j < 3; ++j) r.to_light[3 * i + j] = static_cast<float>(values[j]);
+  }
+  const auto tint = [](float x) { return std::max(0.0, double{x}); };
+  put(r.tint, {tint(s.focus_tint.x), tint(s.focus_tint.y), tint(s.focus_tint.z)});
+  r.focus = std::max(0.f, s.focus);
+  const double cone = std::max(0.0, double{s.cone_angle}) * kPiD / 180;
+  r.cone = s.cone_angle < 180 ? static_cast<float>(cone) : 4.f;
+  r.cone_start = r.cone * (1 - std::clamp(s.cone_softness, 0.f, 1.f));
+  r.ies = s.ies;
+  r.angle_scale = s.ies_angle_scale;
+  if (s.focus > 0) {
+    const double left = 1.0 / (1.0 + double{s.focus});
+    made.power *= left + (1 - left) * std::min(1.0, luminance(double{r.tint[0]}, double{r.tint[1]},
+                                                              double{r.tint[2]}));
+  }
+  if (s.cone_angle < 180) made.power *= (1 - std::cos(cone)) / 2;
+  if (s.ies != kNoIes) {
+    const IesProfile& profile = profiles[s.ies];
+    const double mean = profile.mean();
+    r.ies_scale = s.ies_normalize && mean > 0 ? static_cast<float>(1 / mean) : 1.f;
+    made.power *= mean * double{r.ies_scale} * (profile.covers_sphere() ? 1 : 0.5);
+  }
+  made.record.shaping = static_cast<uint32_t>(set.shapings.size());
+  set.shapings.push_back(r);
+}
+
+void put_profiles(LightSet& set, std::span<const IesProfile> profiles) {
+  const auto append = [&](const std::vector<float>& values) {
+    const auto first = static_cast<uint32_t>(set.ies_numbers.size());
+    set.ies_numbers.insert(set.ies_numbers.end(), values.begin(), values.end());
+    return first;
+  };
+  for (const IesProfile& p : profiles) {
+    IesRecord r{};
+    r.vertical_count = static_cast<uint32_t>(p.vertical.size());
+    r.horizontal_count = static_cast<uint32_t>(p.horizontal.size());
+    r.vertical = append(p.vertical);
+    r.horizontal = append(p.horizontal);
+    append(p.candela);
+    set.ies.push_back(r);
+  }
+}
+
 void make_distant(Made& made, const Light& light, const Double3& color, double mean,
                   double scene_radius) {
   put(made.record.n, unit(to_double(light.to_world.axis(2)) * -1.0));
@@ -201,11 +290,19 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
 }
 
 Made make_light(LightSet& set, const Light& light, double scene_radius,
-                std::span<const TexturePtr> textures, const LightSet* before) {
+                std::span<const TexturePtr> textures, const LightSet* before,
+                std::span<const IesProfile> profiles) {
   Made made;
   LightRecord& r = made.record;
   r.kind = static_cast<uint32_t>(light.kind);
   r.texture = kNoTexture;
+  r.shaping = kNoShaping;
+  r.diffuse = std::max(0.f, light.diffuse);
+  r.specular = std::max(0.f, light.specular);
+  r.hidden = !light.visible && !is_infinite(light.kind);
+  r.light_link = light.light_link;
+  r.shadow_link = light.shadow_link;
+  r.sampled_only = r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet;
   if (light.kind == LightKind::kRect || light.kind == LightKind::kDome) r.texture = light.texture;
 
   const Double3 color = {std::max(0.0, double{light.color.x}), std::max(0.0, double{light.color.y}),
@@ -237,6 +334,9 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
     case LightKind::kSphere:
       make_sphere(made, light, color, mean);
       break;
+    case LightKind::kCylinder:
+      make_cylinder(made, light, color, mean);
+      break;
     case LightKind::kDistant:
       make_distant(made, light, color, mean, scene_radius);
       break;
@@ -246,6 +346,8 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
     case LightKind::kTriangle:
       break;
   }
+  if (!light.shaping.is_plain() && !is_infinite(light.kind))
+    make_shaping(made, set, light, profiles);
   return made;
 }
 
@@ -344,13 +446,20 @@ LightView LightSet::view(const MaterialView& materials) const {
   v.first_triangle = first_triangle();
   v.infinite_count = infinite_count;
   v.distributions = distributions.data();
+  if (!shapings.empty()) {
+    v.shapings = shapings.data();
+    v.ies = ies.data();
+    v.ies_numbers = ies_numbers.data();
+  }
+  for (const LightRecord& record : records) v.has_sampled_only |= record.sampled_only != 0;
   v.materials = materials;
   return v;
 }
 
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const TexturePtr> textures, const LightSet* before) {
+                      std::span<const TexturePtr> textures, const LightSet* before,
+                      std::span<const IesProfile> profiles) {
   (void)centre;  // directions of infinite lights do not depend on it
   if (lights.size() + triangle_count > kMaxLights) {
     throw Error("the scene has " + std::to_string(lights.size() + triangle_count) +
@@ -362,12 +471,13 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   set.records.reserve(lights.size());
   powers.reserve(lights.size() + triangle_count);
   set.of_input.resize(lights.size());
+  put_profiles(set, profiles);
   for (const bool infinite : {true, false}) {
     for (size_t i = 0; i < lights.size(); ++i) {
-      if (infinite) check(lights[i], textures.size());
+      if (infinite) check(lights[i], textures.size(), profiles.size());
       if (is_infinite(lights[i].kind) != infinite) continue;
       set.of_input[i] = static_cast<uint32_t>(set.records.size());
-      const Made made = make_light(set, lights[i], scene_radius, textures, before);
+      const Made made = make_light(set, lights[i], scene_radius, textures, before, profiles);
       set.records.push_back(made.record);
       powers.push_back(sane_power(made.power));
     }

@@ -28,8 +28,8 @@ struct EmissiveTriangle {
   float mean_scale = 1;
 };
 
-/// All lights of a scene, ready for kernels. Order: infinite lights, then rects, disks and spheres
-/// (`records`), then the triangles; each kind of group in the order of the input.
+/// All lights of a scene, ready for kernels. Order: infinite lights, then those with a shape and
+/// points (`records`), then the triangles; each kind of group in the order of the input.
 struct LightSet {
   std::vector<LightRecord> records;
   std::vector<TriangleLight> triangles;
@@ -38,6 +38,9 @@ struct LightSet {
   PickTable pick;  ///< without its pointer
   LightTree tree;
   std::vector<Distribution2D> distributions;
+  std::vector<ShapingRecord> shapings;
+  std::vector<IesRecord> ies;
+  std::vector<float> ies_numbers;
   uint32_t infinite_count = 0;
   std::vector<uint32_t> of_input;  ///< record of each input light
   double total_power = 0;          ///< estimate that the choice of lights rests on, W
@@ -64,7 +67,7 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 ///
 /// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the light's
 /// size:
-///   rect, disk, sphere   the area in world space as transformed
+///   rect, disk, sphere, cylinder   the area in world space as transformed
 ///   distant              pi sin^2(half angle) up to 90 degrees, pi (2 - sin^2) above, 1 for angle
 ///   0 dome                 not at all
 /// A distant light of angle 0 gives the irradiance `color` at normal incidence. A sphere of radius
@@ -78,7 +81,8 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 /// not finite, unknown textures and more than kMaxLights lights.
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const TexturePtr> textures, const LightSet* before = nullptr);
+                      std::span<const TexturePtr> textures, const LightSet* before = nullptr,
+                      std::span<const IesProfile> profiles = {});
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,

@@ -124,6 +124,16 @@ LightCluster bound_light(const LightRecord& light, double power) {
       c.emission = kPiD / 2;
       c.intensity = power / (4 * kPiD);
       break;
+    case LightKind::kCylinder:
+      include(c, {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]});
+      for (size_t k = 0; k < 3; ++k) {
+        c.lo[k] -= light.radius;
+        c.hi[k] += light.radius;
+      }
+      c.normals.angle = kPiD;
+      c.emission = kPiD / 2;
+      c.intensity = power / (kPiD * kPiD);  // seen from the side
+      break;
     case LightKind::kDistant:
     case LightKind::kDome:
     case LightKind::kTriangle:

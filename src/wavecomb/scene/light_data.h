@@ -12,9 +12,39 @@
 
 namespace wavecomb {
 
-enum class LightKind : uint8_t { kRect, kDisk, kSphere, kDistant, kDome, kTriangle };
-inline constexpr uint32_t kLightKindCount = 6;
+enum class LightKind : uint8_t { kRect, kDisk, kSphere, kCylinder, kDistant, kDome, kTriangle };
+inline constexpr uint32_t kLightKindCount = 7;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
+inline constexpr uint32_t kNoShaping = 0xffffffffu;
+inline constexpr uint32_t kNoIes = 0xffffffffu;
+/// All geometry: no GeometrySet. kNoSet + 1 is 0.
+inline constexpr uint32_t kNoSet = 0xffffffffu;
+
+/// UsdLuxShapingAPI: how emission depends on its direction. The light's axis is its -z.
+struct Shaping {
+  float focus = 0;  ///< exponent; 0 or less: none
+  Vec3<float> focus_tint{0, 0, 0};
+  float cone_angle = 180;      ///< degrees off the axis; 180 or more: none
+  float cone_softness = 0;     ///< share of the cone over which light falls to 0
+  uint32_t ies = kNoIes;       ///< SceneBuilder::add_ies
+  float ies_angle_scale = 0;   ///< as UsdLux defines it; 0: none
+  bool ies_normalize = false;  ///< divide by IesProfile::mean
+
+  bool is_plain() const { return !(focus > 0) && !(cone_angle < 180) && ies == kNoIes; }
+};
+
+/// The distribution of an IES file, expanded to the whole circle: candela at a grid of angles in
+/// degrees, both ascending. Between them it is bilinear, outside the vertical ones 0.
+struct IesProfile {
+  std::vector<float> vertical;    ///< from the axis: within [0, 180], two or more
+  std::vector<float> horizontal;  ///< 0 to 360; a single one: alike all around
+  std::vector<float> candela;     ///< [horizontal][vertical]
+
+  /// Mean over the directions of the profile: of the sphere, or where its vertical angles span no
+  /// more than a hemisphere of that; exact for what is linear in both angles.
+  double mean() const;
+  bool covers_sphere() const { return vertical.back() - vertical.front() > 95.7f; }
+};
 
 /// A light as the stage gives it, in its own space (UsdLux: rect, disk in the xy plane, shining
 /// along -z; distant shining along -z; dome's pole +y, texture's centre towards +z ... as
@@ -27,12 +57,20 @@ struct Light {
   /// a sphere of radius 0 (a point light), see `color`'s use in light/.
   Vec3<float> color{1, 1, 1};
   float width = 1, height = 1;  ///< rect, before to_world
-  float radius = 0.5f;          ///< disk, sphere, before to_world
+  float radius = 0.5f;          ///< disk, sphere, cylinder, before to_world
+  float length = 1;             ///< cylinder, along x, before to_world
   float angle = 0.53f;          ///< distant: apparent diameter in degrees
   /// UsdLux: divide by the area in world space (distant: by its solid angle).
   bool normalize = false;
   uint32_t texture = kNoTexture;  ///< rect (u right, v up as seen from the front), dome (latlong)
   uint32_t group = 0;             ///< SceneBuilder::light_group
+  Shaping shaping;                ///< of lights with a shape and of points
+  /// What the light gives to the diffuse and to the specular response of materials is multiplied by
+  /// these (UsdLux: not physical).
+  float diffuse = 1, specular = 1;
+  /// SceneBuilder::add_geometry_set: what it shines on, and what casts shadows in its light.
+  uint32_t light_link = kNoSet, shadow_link = kNoSet;
+  bool visible = true;  ///< whether rays meet its shape
 };
 
 /// A light as lanes read it, triangles of meshes apart: 32 words. Vectors are in world space. Use
@@ -40,6 +78,7 @@ struct Light {
 ///   rect      p corner, u, v edges, n unit normal (direction of emission), area
 ///   disk      p centre, u, v half axes, n, area
 ///   sphere    p centre, radius (0: point light, radiance then is radiant intensity), area
+///   cylinder  p centre of one end, u axis to the other, radius, area
 ///   distant   n unit direction the light travels, one_minus_cos of its half angle (0: a direction,
 ///             radiance then is irradiance at normal incidence)
 ///   dome      u, v, n: world axes of the dome's local x, y, z
@@ -53,8 +92,34 @@ struct alignas(64) LightRecord {
   uint32_t kind;
   uint32_t texture;
   uint32_t distribution;  ///< dome: index into LightView::distributions
+  uint32_t shaping;       ///< index into LightView::shapings, or kNoShaping
+  float diffuse, specular;
+  /// Not 0: paths that meet the light by a bounce that light sampling could have made get nothing
+  /// of it; what light samples bring counts in full. So it is where a light does not give all
+  /// surfaces the same, which a path that meets it does not know.
+  uint32_t sampled_only;
+  uint32_t hidden;  ///< 1: rays do not meet its shape
+  uint32_t light_link, shadow_link;
 };
 static_assert(sizeof(LightRecord) == 128);
+
+/// Shaping as lanes read it.
+struct alignas(64) ShapingRecord {
+  float axis[3];      ///< unit, world: the middle of the emission
+  float to_light[9];  ///< rows of the map from world directions to the light's space
+  float focus;        ///< 0: none
+  float tint[3];
+  float cone, cone_start;  ///< radians: where light ends, and where it begins to fall
+  float ies_scale;
+  float angle_scale;
+  uint32_t ies;  ///< index into LightView::ies, or kNoIes
+};
+static_assert(sizeof(ShapingRecord) == 128);
+
+/// Where the parts of an IesProfile lie in LightView::ies_numbers.
+struct IesRecord {
+  uint32_t vertical, vertical_count, horizontal, horizontal_count;  ///< candela follow those
+};
 
 /// A triangle of an emissive mesh, in world space, which shines to both sides. There may be
 /// millions, chosen at random: one is one cache line.
@@ -153,6 +218,13 @@ struct LightTreeView {
   float effective_lights = 0;
 };
 
+/// Scene/links.h: null where no light is linked.
+struct LinkView {
+  const uint32_t* classes = nullptr;
+  const uint32_t* members = nullptr;
+  uint32_t words = 0;
+};
+
 /// What kernels need of all lights. Light i is record i for i < first_triangle, else triangle
 /// i - first_triangle. Infinite lights (distant, dome) come first.
 struct LightView {
@@ -166,6 +238,12 @@ struct LightView {
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
   const Distribution2D* distributions = nullptr;
+  // Null where no light is shaped.
+  const ShapingRecord* shapings = nullptr;
+  const IesRecord* ies = nullptr;
+  const float* ies_numbers = nullptr;
+  bool has_sampled_only = false;  ///< some record is that
+  LinkView links;
   MaterialView materials;  ///< textures, and emission of textured triangle lights
 };
 

@@ -32,10 +32,12 @@ bool same_emission(const Material& a, const Material& b) {
 
 Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
              std::shared_ptr<const SceneMaterials> materials,
-             std::shared_ptr<const SceneLights> lights, const Camera& camera)
+             std::shared_ptr<const SceneLights> lights, std::shared_ptr<const SceneLinks> links,
+             const Camera& camera)
     : geometry_(std::move(geometry)),
       materials_(std::move(materials)),
       lights_(std::move(lights)),
+      links_(std::move(links)),
       camera_(camera) {
   SceneView& v = view_;
   v.meshes = geometry_->mesh_records.data();
@@ -56,6 +58,13 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
                              [](const Mesh& mesh) { return mesh.is_curved(); });
   v.has_presence = materials_->has_presence;
+  if (links_) v.lights.links = links_->view();
+}
+
+void Scene::link() {
+  if (geometry_->sets.empty()) return;
+  links_ = std::make_shared<const SceneLinks>(ObjectNames(*this), geometry_->sets);
+  view_.lights.links = links_->view();
 }
 
 std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threads) const {
@@ -66,7 +75,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());
-    check_light(light, textures().size());
+    check_light(light, textures().size(), geometry_->profiles.size(), geometry_->sets.size());
     if (light.group >= light_groups().size())
       throw_unknown("light group", light.group, light_groups().size());
   }
@@ -90,8 +99,9 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
                                                        lights_.get());
     });
   }
-  return std::shared_ptr<const Scene>(new Scene(
-      geometry_, std::move(new_materials), std::move(new_lights), edit.camera.value_or(camera_)));
+  return std::shared_ptr<const Scene>(new Scene(geometry_, std::move(new_materials),
+                                                std::move(new_lights), links_,
+                                                edit.camera.value_or(camera_)));
 }
 
 uint64_t Scene::unique_triangles() const {
@@ -129,7 +139,7 @@ SceneBytes Scene::bytes() const {
          g.instance_motions) +
       of(materials_->materials, materials_->records, materials_->uses, materials_->programs) +
       of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins,
-         set.tree.nodes, set.tree.trails) +
+         set.tree.nodes, set.tree.trails, set.shapings, set.ies, set.ies_numbers) +
       g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;

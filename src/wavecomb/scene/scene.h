@@ -102,11 +102,14 @@ class Scene {
   friend class SceneBuilder;
   Scene(std::shared_ptr<const SceneGeometry> geometry,
         std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
-        const Camera& camera);
+        std::shared_ptr<const SceneLinks> links, const Camera& camera);
+  /// Works out which objects are in which sets.
+  void link();
 
   std::shared_ptr<const SceneGeometry> geometry_;
   std::shared_ptr<const SceneMaterials> materials_;
   std::shared_ptr<const SceneLights> lights_;
+  std::shared_ptr<const SceneLinks> links_;  ///< null where there are no sets
   Camera camera_;
   SceneView view_;
 };
@@ -156,6 +159,10 @@ class SceneBuilder {
   /// A name for instances; the first `asset_length` characters name the asset that they are part
   /// of, 0 where that is not known.
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
+  /// A set for Light::light_link and shadow_link.
+  uint32_t add_geometry_set(GeometrySet set);
+  /// A profile for Shaping::ies.
+  uint32_t add_ies(IesProfile profile);
   uint32_t add_light(Light light);
   /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
   uint32_t light_group(const std::string& name);
@@ -193,6 +200,8 @@ class SceneBuilder {
   std::vector<Affine> node_steps_;
   std::vector<Material> materials_;
   std::vector<TexturePtr> textures_;
+  std::vector<IesProfile> profiles_;
+  std::vector<GeometrySet> sets_;
   std::vector<Light> lights_;
   std::vector<std::string> light_groups_{kOtherLights};
   NameTable names_;

@@ -255,8 +255,20 @@ uint32_t SceneBuilder::light_group(const std::string& name) {
   return static_cast<uint32_t>(light_groups_.size() - 1);
 }
 
+uint32_t SceneBuilder::add_ies(IesProfile profile) {
+  check_profile(profile);
+  profiles_.push_back(std::move(profile));
+  return static_cast<uint32_t>(profiles_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_geometry_set(GeometrySet set) {
+  std::ranges::sort(set.entries, {}, &GeometrySet::Entry::path);
+  sets_.push_back(std::move(set));
+  return static_cast<uint32_t>(sets_.size() - 1);
+}
+
 uint32_t SceneBuilder::add_light(Light light) {
-  check_light(light, textures_.size());
+  check_light(light, textures_.size(), profiles_.size(), sets_.size());
   lights_.push_back(std::move(light));
   return static_cast<uint32_t>(lights_.size() - 1);
 }
@@ -383,6 +395,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->meshes = std::move(meshes_);
   geometry->groups = std::move(groups_);
   geometry->textures = std::move(textures_);
+  geometry->profiles = std::move(profiles_);
+  geometry->sets = std::move(sets_);
   geometry->light_groups = std::move(light_groups_);
   geometry->names = std::move(names_);
   geometry->warnings = std::move(warnings_);
@@ -394,8 +408,9 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
   });
-  std::shared_ptr<const Scene> scene(
-      new Scene(std::move(geometry), std::move(materials), std::move(lights), camera_));
+  std::shared_ptr<Scene> scene(
+      new Scene(std::move(geometry), std::move(materials), std::move(lights), nullptr, camera_));
+  scene->link();
   *this = SceneBuilder(threads_);
   return scene;
 }

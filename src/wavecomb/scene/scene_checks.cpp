@@ -49,16 +49,50 @@ void check_material(const Material& material, size_t texture_count) {
                 std::to_string(kMaxEvaluations) + " are possible");
 }
 
-void check_light(const Light& light, size_t texture_count) {
+void check_light(const Light& light, size_t texture_count, size_t profile_count, size_t set_count) {
   const auto name = quoted("light", light.name);
   if (!finite(light.to_world)) throw Error(name + " has a transform that is not finite; mend it");
   if (!finite(light.color) || light.color.x < 0 || light.color.y < 0 || light.color.z < 0)
     throw Error(name + " has a colour that is negative or not finite; give one of 0 or more");
-  for (float x : {light.width, light.height, light.radius, light.angle})
+  for (float x : {light.width, light.height, light.radius, light.length, light.angle})
     if (!std::isfinite(x) || x < 0)
       throw Error(name + " has a size that is negative or not finite; give one of 0 or more");
   if (light.texture != kNoTexture && light.texture >= texture_count)
     throw Error(name + " reads a texture that was never added; add textures before lights");
+  const Shaping& s = light.shaping;
+  for (float x : {s.focus, s.focus_tint.x, s.focus_tint.y, s.focus_tint.z, s.cone_angle,
+                  s.cone_softness, s.ies_angle_scale})
+    if (!std::isfinite(x))
+      throw Error(name + " has shaping that is not finite; give finite numbers");
+  for (float x : {light.diffuse, light.specular})
+    if (!std::isfinite(x) || x < 0)
+      throw Error(name + " has a multiplier that is negative or not finite; give one of 0 or more");
+  if (s.ies != kNoIes && s.ies >= profile_count)
+    throw Error(name + " has an IES profile that was never added; add profiles before lights");
+  for (const uint32_t set : {light.light_link, light.shadow_link})
+    if (set != kNoSet && set >= set_count)
+      throw Error(name + " is linked to a set that was never added; add sets before lights");
+}
+
+void check_profile(const IesProfile& p) {
+  const auto ascending = [](const std::vector<float>& x) {
+    for (size_t i = 0; i + 1 < x.size(); ++i)
+      if (!(x[i] <= x[i + 1])) return false;
+    return true;
+  };
+  if (p.vertical.size() < 2 || p.horizontal.empty() || !ascending(p.vertical) ||
+      !ascending(p.horizontal) || !(p.vertical.front() >= 0) || !(p.vertical.back() <= 180) ||
+      !(p.vertical.back() > p.vertical.front()))
+    throw Error(
+        "an IES profile needs two or more vertical angles in [0, 180], ascending, and "
+        "horizontal ones likewise");
+  if (p.horizontal.size() > 1 && (p.horizontal.front() != 0 || p.horizontal.back() != 360))
+    throw Error("the horizontal angles of an IES profile must go from 0 to 360");
+  if (p.candela.size() != p.vertical.size() * p.horizontal.size())
+    throw Error("an IES profile needs a value for each pair of angles");
+  for (const float x : p.candela)
+    if (!std::isfinite(x) || x < 0)
+      throw Error("an IES profile has a value that is negative or not finite");
 }
 
 void check_camera(const Camera& camera) {

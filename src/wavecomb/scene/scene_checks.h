@@ -24,7 +24,8 @@ std::string quoted(const std::string& kind, const std::string& name);
 
 /// `texture_count`: textures that there are.
 void check_material(const Material& material, size_t texture_count);
-void check_light(const Light& light, size_t texture_count);
+void check_light(const Light& light, size_t texture_count, size_t profile_count, size_t set_count);
+void check_profile(const IesProfile& profile);
 void check_camera(const Camera& camera);
 
 }  // namespace wavecomb

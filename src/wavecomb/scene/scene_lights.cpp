@@ -98,7 +98,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   const Bounds& b = geometry.bounds;
   const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
   set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
-                     before ? &before->set : nullptr);
+                     before ? &before->set : nullptr, geometry.profiles);
   // Table entries now point at the first triangle; make them light ids.
   for (uint32_t& entry : emissive)
     if (entry != kNoLight) entry += set.first_triangle();

@@ -11,6 +11,7 @@
 
 #include "wavecomb/scene/light_builder.h"
 #include "wavecomb/scene/light_data.h"
+#include "wavecomb/scene/links.h"
 #include "wavecomb/scene/material_data.h"
 #include "wavecomb/scene/mesh.h"
 #include "wavecomb/scene/motion.h"
@@ -67,6 +68,8 @@ struct SceneGeometry {
   std::vector<Group> groups;
   std::vector<Instance> instances;
   std::vector<TexturePtr> textures;
+  std::vector<IesProfile> profiles;
+  std::vector<GeometrySet> sets;
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;

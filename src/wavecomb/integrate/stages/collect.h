@@ -100,6 +100,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       path = load_path<F>(wave.pool, slot, wanted);
       state = {path.d, path.throughput, path.pdf, path.eta_scale,
                F(0.f), F(0.f),          path.o,   path.receiver};
+      if (wave.pool.link && depth > 0)
+        state.link = gather<U>(wave.pool.link, slot, Mask<U>(wanted));
     }
     if (any(ended)) {
       Color<F> c(F(0.f));

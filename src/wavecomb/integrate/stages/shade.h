@@ -94,7 +94,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       store_rows<PathPool::kShadowWords, F>(
           pool.shadows, slot * PathPool::kShadowWords,
           {v.shadow_o.x, v.shadow_o.y, v.shadow_o.z, v.shadow_d.x, v.shadow_d.y, v.shadow_d.z,
-           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, lit_by, none, none, none, none, none},
+           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, lit_by, bits_float<F>(v.shadow_set),
+           none, none, none, none},
           v.has_shadow);
     }
     if (any(v.alive))
@@ -102,6 +103,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                     {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
                      v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
                     v.alive);
+    if (pool.link) scatter<U>(pool.link, v.next.link, slot, Mask<U>(v.alive));
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }

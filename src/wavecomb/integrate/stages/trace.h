@@ -46,9 +46,16 @@ const float* fetch_times(Wave& wave, const Queue& q) {
 }
 
 /// Keys of presence for rays of `depth`; shadow rays draw other numbers than the rays themselves.
-inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow) {
+/// `linked`: and stop at the geometry of their own set.
+inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow,
+                                  bool linked = false) {
   const auto* words = reinterpret_cast<const uint32_t*>(pool.paths);
-  return {words + 13, words + 14, PathPool::kPathWords, 2 * depth + (shadow ? 1u : 0u)};
+  PresenceKeys keys{words + 13, words + 14, PathPool::kPathWords, 2 * depth + (shadow ? 1u : 0u)};
+  if (linked) {
+    keys.shadow_set = reinterpret_cast<const uint32_t*>(pool.shadows) + PathPool::kShadowSet;
+    keys.shadow_stride = PathPool::kShadowWords;
+  }
+  return keys;
 }
 
 /// Closest hits of the ray queue into the hit buffer. `times`: of fetch_times.
@@ -77,8 +84,9 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
   PhaseClock::Clock::time_point start;
   if (wave.pool.cost_ns) start = PhaseClock::Clock::now();
-  context.accel->occluded(rays, q.occluded, context.traversal_width, false,
-                          presence_keys(wave.pool, depth, true));
+  context.accel->occluded(
+      rays, q.occluded, context.traversal_width, false,
+      presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);

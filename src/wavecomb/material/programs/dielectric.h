@@ -35,6 +35,11 @@ class DielectricBsdf {
     return {select<F>(smooth_, Color<F>(F(0.f)), e.f_cos), select(smooth_, F(0.f), e.pdf)};
   }
 
+  /// All of it counts as specular.
+  Color<F> diffuse_f_cos(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
+    return Color<F>(F(0.f));
+  }
+
   BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
     BsdfSample<F> s = empty_sample<F>();
     if (any(smooth_)) s = sample_smooth_dielectric(wo, ior_, tint_, schlick_, u_lobe);

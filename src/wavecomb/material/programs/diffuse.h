@@ -26,6 +26,8 @@ class DiffuseBsdf {
     return {base_ * pdf, pdf};
   }
 
+  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const { return eval(wo, wi).f_cos; }
+
   BsdfSample<F> sample(const Vec3<F>& wo, const F& /*u_lobe*/, const F& u, const F& v) const {
     const Vec3<F> wi = square_to_cosine_hemisphere(u, v);
     const F pdf = select(wo.z != 0.f, lambert_cos(wi), F(0.f));

@@ -20,6 +20,9 @@ class EmissiveBsdf {
   BsdfEval<F> eval(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
     return {Color<F>(F(0.f)), F(0.f)};
   }
+  Color<F> diffuse_f_cos(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
+    return Color<F>(F(0.f));
+  }
   BsdfSample<F> sample(const Vec3<F>& /*wo*/, const F& /*u_lobe*/, const F& /*u*/,
                        const F& /*v*/) const {
     return empty_sample<F>();

@@ -50,6 +50,11 @@ class MetalBsdf {
     return eval_above(o, mirror_z(wi, side), lost, multiple_probability(lost));
   }
 
+  /// All of it counts as specular.
+  Color<F> diffuse_f_cos(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
+    return Color<F>(F(0.f));
+  }
+
   BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
     const F side = side_of(wo_);
     const Vec3<F> wo = mirror_z(wo_, side);

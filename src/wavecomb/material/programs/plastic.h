@@ -39,6 +39,12 @@ class PlasticBsdf {
     return eval_above(o, mirror_z(wi, side), coat, coat_probability(coat));
   }
 
+  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F side = side_of(wo);
+    const Vec3<F> o = mirror_z(wo, side), i = mirror_z(wi, side);
+    return base_ * below_coat(reflectance(o.z), i, select(o.z > 0.f, lambert_cos(i), F(0.f)));
+  }
+
   BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
     const F side = side_of(wo_);
     const Vec3<F> wo = mirror_z(wo_, side);
@@ -73,12 +79,17 @@ class PlasticBsdf {
     return select(is_black(base_), F(1.f), clamp(share, F(0.05f), F(0.95f)));
   }
 
+  /// The base's f_cos, without its colour.
+  F below_coat(const F& coat_o, const Vec3<F>& wi, const F& cosine) const {
+    return seen_through_coat(coat_o, reflectance(wi.z), average_) * cosine;
+  }
+
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const F& coat_o, const F& p) const {
     const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
     const F glossy = select(smooth_, F(0.f), F(m.f_cos * reflectance(m.cos_h)));
     const F glossy_pdf = select(smooth_, F(0.f), m.pdf);
     const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
-    const F through = seen_through_coat(coat_o, reflectance(wi.z), average_) * cosine;
+    const F through = below_coat(coat_o, wi, cosine);
     return {fma(base_, through, Color<F>(glossy)), fma(p, glossy_pdf, F(F(1.f - p) * cosine))};
   }
 

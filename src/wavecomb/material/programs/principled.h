@@ -69,6 +69,16 @@ class PrincipledBsdf {
     return eval_above(o, mirror_z(wi, side), make_view(o));
   }
 
+  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F side = side_of(wo);
+    const Vec3<F> o = mirror_z(wo, side), i = mirror_z(wi, side);
+    const F cosine = select(o.z > 0.f, lambert_cos(i), F(0.f));
+    const Color<F> through =
+        seen_through_coat(interface_(f0_, o.z), interface_(f0_, i.z), average_);
+    const F passed = select(clearcoat_ > 0.f, below_coat(o, i), F(1.f));
+    return diffuse_ * through * F(cosine * passed);
+  }
+
   BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
     const F side = side_of(wo_);
     const Vec3<F> wo = mirror_z(wo_, side);
@@ -114,6 +124,11 @@ class PrincipledBsdf {
 
  private:
   static constexpr float kCoatIor = 1.5f;
+
+  /// What the clearcoat leaves of the light below it.
+  F below_coat(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    return F(1.f - coat_reflectance(min(wo.z, abs(wi.z))));
+  }
 
   /// What depends on wo alone: reflectances towards it and the probabilities of the lobes.
   struct View {
@@ -162,7 +177,7 @@ class PrincipledBsdf {
     }
     const Mask<F> coated = clearcoat_ > 0.f;
     if (any(coated)) {
-      f = select<F>(coated, f * F(1.f - coat_reflectance(min(wo.z, abs(wi.z)))), f);
+      f = select<F>(coated, f * below_coat(wo, wi), f);
       const Mask<F> rough = coated & not_(coat_smooth_);
       if (any(rough)) {
         const MicrofacetEval<F> m = eval_microfacet(coat_ggx_, wo, wi);

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Cylinder lights: open at both ends, shining outwards.
+#pragma once
+
+#include "wavecomb/light/record.h"
+
+namespace wavecomb::detail {
+
+/// The cylinder as a point outside of it sees it, in the frame of its axis a and of the unit
+/// vectors e, across towards the axis, and f. A direction
+///   cos(gamma) (cos(alpha) e + sin(alpha) f) + sin(gamma) a
+/// meets the endless cylinder at the distance s(alpha) across, on the near side. What of the real
+/// one is seen at alpha is an interval of sin(gamma), and so directions uniform in alpha and, given
+/// that, in sin(gamma) have the density 1 / (2 alpha_most (sin(gamma_1) - sin(gamma_0))): that of
+/// the solid angle of all that is seen, but for the share that each alpha has of it.
+template <typename F>
+struct CylinderFrame {
+  Vec3<F> a, e, f;
+  F distance;        ///< across, to the axis
+  F radius, length;  ///< of the cylinder
+  F begin;           ///< of the cylinder along a, as seen from the point
+  F alpha;           ///< the most that is seen, radians
+  Mask<F> outside;
+};
+
+template <typename F>
+inline CylinderFrame<F> make_cylinder_frame(const LightReader<F>& light, const Vec3<F>& from) {
+  CylinderFrame<F> c;
+  const Direction<F> axis = make_direction<F>(light.u());
+  c.a = axis.wi;
+  c.length = axis.length;
+  c.radius = light.radius();
+  const Vec3<F> to_end = light.p() - from;
+  c.begin = dot(to_end, c.a);
+  const Direction<F> across = make_direction<F>(to_end - c.a * c.begin);
+  c.e = across.wi;
+  c.f = cross(c.a, c.e);
+  c.distance = across.length;
+  c.outside = (c.length > 0.f) & (c.radius > 0.f) & (c.distance > c.radius);
+  const F r = min(c.radius, c.distance);
+  c.alpha = atan2(r, safe_sqrt(F((c.distance - r) * (c.distance + r))));
+  return c;
+}
+
+/// s(alpha): d cos(alpha) - sqrt(r^2 - d^2 sin^2(alpha)).
+template <typename F>
+inline F cylinder_across(const CylinderFrame<F>& c, const F& sin_alpha, const F& cos_alpha) {
+  const F off = c.distance * sin_alpha;
+  const F half_chord = safe_sqrt(F((c.radius - off) * (c.radius + off)));
+  return max(fma(c.distance, cos_alpha, F(-half_chord)), F(0.f));
+}
+
+/// The sine of gamma for the ends of what is seen at distance s across, and their difference.
+template <typename F>
+struct CylinderSpan {
+  F begin, size;
+};
+/// z_1 / h_1 - z_0 / h_0, h = sqrt(z^2 + s^2); where both are on one side, the numerator
+/// z_1 h_0 - z_0 h_1 is s^2 (z_1^2 - z_0^2) / (z_1 h_0 + z_0 h_1), without a difference of near
+/// equals.
+template <typename F>
+inline CylinderSpan<F> cylinder_span(const CylinderFrame<F>& c, const F& s) {
+  const F z0 = c.begin, z1 = c.begin + c.length;
+  const F s2 = s * s;
+  const F h0 = sqrt(fma(z0, z0, s2)), h1 = sqrt(fma(z1, z1, s2));
+  const Mask<F> good = (h0 > 0.f) & (h1 > 0.f);
+  const F x = z1 * h0, y = z0 * h1;
+  const F sum = x + y;
+  const Mask<F> one_side = z0 * z1 > 0.f;
+  const F numerator =
+      select(one_side, F(s2 * c.length * F(z0 + z1) / select(one_side, sum, F(1.f))), F(x - y));
+  return {z0 / select(h0 > 0.f, h0, F(1.f)),
+          select(good, F(numerator / select(good, F(h0 * h1), F(1.f))), F(0.f))};
+}
+
+/// Density over solid angle of any direction that meets the near side at an angle whose span is
+/// `size`.
+template <typename F>
+inline F cylinder_pdf(const CylinderFrame<F>& c, const F& size) {
+  const F area = 2.f * c.alpha * size;
+  const Mask<F> good = c.outside & (area > 0.f);
+  const F pdf = 1.f / select(good, area, F(1.f));
+  return select(good & is_finite(pdf), pdf, F(0.f));
+}
+
+template <typename F>
+inline KindSample<F> sample_cylinder(const LightReader<F>& light, const Vec3<F>& from, const F& u,
+                                     const F& v) {
+  const CylinderFrame<F> c = make_cylinder_frame<F>(light, from);
+  const F alpha = fma(F(2.f), u, F(-1.f)) * c.alpha;
+  const auto [sin_alpha, cos_alpha] = sincos_2pi(F(alpha * kInv2Pi));
+  const F s = cylinder_across<F>(c, sin_alpha, cos_alpha);
+  const CylinderSpan<F> span = cylinder_span<F>(c, s);
+  const F sin_gamma = clamp(fma(v, span.size, span.begin), F(-1.f), F(1.f));
+  const F cos_gamma = safe_sqrt(F((1.f - sin_gamma) * (1.f + sin_gamma)));
+  const Vec3<F> across = fma(c.e, cos_alpha, c.f * sin_alpha);
+  const Vec3<F> wi = fma(across, cos_gamma, c.a * sin_gamma);
+  const Mask<F> good = cos_gamma > 0.f;
+  return {wi, s / select(good, cos_gamma, F(1.f)), light.radiance(),
+          select(good, cylinder_pdf<F>(c, span.size), F(0.f)), Mask<F>(false)};
+}
+
+/// What a ray from `origin` gets that met the cylinder at distance t; its inside is dark.
+template <typename F>
+inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origin,
+                               const Vec3<F>& dir, const F& t) {
+  const CylinderFrame<F> c = make_cylinder_frame<F>(light, origin);
+  const F x = dot(dir, c.e), y = dot(dir, c.f);
+  const F flat2 = fma(x, x, F(y * y));
+  const Mask<F> good = c.outside & (flat2 > 0.f);
+  const F inverse = 1.f / sqrt(select(good, flat2, F(1.f)));
+  // The near side is met before the ray is abreast of the axis.
+  const Mask<F> front = good & (F(t * flat2) <= F(c.distance * x));
+  const F s = cylinder_across<F>(c, F(y * inverse), F(x * inverse));
+  const F size = cylinder_span<F>(c, s).size;
+  return {select<F>(front, light.radiance(), Color<F>(F(0.f))),
+          select(front, cylinder_pdf<F>(c, size), F(0.f))};
+}
+
+}  // namespace wavecomb::detail

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+/// How much of its radiance a shaped light sends in a direction: UsdLuxShapingAPI.
+///
+/// With e the direction of emission and a the light's axis, both unit, and angle = acos(e . a),
+///   focus   lerp(focusTint, 1, |e . a|^focus)
+///   cone    1 - smoothstep(lerp(coneAngle, 0, softness), coneAngle, angle)
+///   IES     candela at (theta, phi) of e in the light's space, theta scaled by angleScale
+/// multiply the radiance.
+#pragma once
+
+#include "wavecomb/light/record.h"
+
+namespace wavecomb::detail {
+
+/// The last of n ascending numbers from `first` on that is at most x, but no more than the last but
+/// one.
+template <typename F>
+inline UInt<F> interval_below(const float* numbers, const UInt<F>& first, const UInt<F>& n,
+                              const F& x, const Mask<F>& active) {
+  using U = UInt<F>;
+  U low(0u), high = n - 1u;
+  for (;;) {
+    const Mask<F> open = active & Mask<F>(high - low > U(1u));
+    if (none(open)) return low;
+    const U middle = (low + high) >> 1;
+    const Mask<U> below(gather<F>(numbers, first + middle, open) <= x);
+    low = select(Mask<U>(open) & below, middle, low);
+    high = select(Mask<U>(open) & not_(below), middle, high);
+  }
+}
+
+/// Where x lies between two neighbours of ascending numbers.
+template <typename F>
+struct Between {
+  UInt<F> index;
+  F part;  ///< in [0, 1]
+};
+template <typename F>
+inline Between<F> find_between(const float* numbers, const UInt<F>& first, const UInt<F>& n,
+                               const F& x, const Mask<F>& active) {
+  const UInt<F> i = interval_below<F>(numbers, first, n, x, active);
+  const F a = gather<F>(numbers, first + i, active), b = gather<F>(numbers, first + i + 1u, active);
+  const F width = b - a;
+  const F part = (x - a) / select(width > 0.f, width, F(1.f));
+  return {i, clamp(part, F(0.f), F(1.f))};
+}
+
+/// Candela of profiles `ies` at angles in degrees, theta from the axis and phi around it in
+/// [0, 360].
+template <typename F>
+inline F ies_candela(const LightView& view, const UInt<F>& ies, const F& theta, const F& phi,
+                     const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t kWords = sizeof(IesRecord) / 4;
+  const auto field = [&](size_t offset_bytes) {
+    return gather<U>(view.ies, ies * kWords + static_cast<uint32_t>(offset_bytes / 4),
+                     Mask<U>(active));
+  };
+  const float* const numbers = view.ies_numbers;
+  const U vertical = field(offsetof(IesRecord, vertical)),
+          rows = field(offsetof(IesRecord, vertical_count)),
+          horizontal = field(offsetof(IesRecord, horizontal)),
+          columns = field(offsetof(IesRecord, horizontal_count));
+  const Mask<F> inside = active & (theta >= gather<F>(numbers, vertical, active)) &
+                         (theta <= gather<F>(numbers, vertical + rows - 1u, active));
+  if (none(inside)) return F(0.f);
+  const Between<F> v = find_between<F>(numbers, vertical, rows, theta, inside);
+  const U first = horizontal + columns;
+  const auto at = [&](const U& column, const Mask<F>& lanes) {
+    const U index = first + column * rows + v.index;
+    const F a = gather<F>(numbers, index, lanes), b = gather<F>(numbers, index + 1u, lanes);
+    return F(fma(v.part, F(b - a), a));
+  };
+  const Mask<F> around = inside & Mask<F>(columns > U(1u));
+  if (none(around)) return select(inside, at(U(0u), inside), F(0.f));
+  const Between<F> h = find_between<F>(numbers, horizontal, columns, phi, around);
+  const U column = select(Mask<U>(around), h.index, U(0u));
+  const F a = at(column, inside), b = select(around, at(column + 1u, around), a);
+  return select(inside, F(fma(h.part, F(b - a), a)), F(0.f));
+}
+
+/// Radiance as shaping `shaping` lets it out along `emitted`; as it is where that is kNoShaping.
+template <typename F>
+inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3<F>& emitted,
+                       const Color<F>& radiance, const Mask<F>& lanes) {
+  using U = UInt<F>;
+  const Mask<F> active = lanes & Mask<F>(shaping != U(kNoShaping));
+  if (none(active)) return radiance;
+  using R = ShapingRecord;
+  const U word = shaping * static_cast<uint32_t>(sizeof(R) / 4);
+  const auto real = [&](size_t offset_bytes, uint32_t i = 0) {
+    return gather<F>(view.shapings, word + (static_cast<uint32_t>(offset_bytes / 4) + i), active);
+  };
+  const auto vec3 = [&](size_t offset_bytes, uint32_t i = 0) {
+    return Vec3<F>(real(offset_bytes, i), real(offset_bytes, i + 1), real(offset_bytes, i + 2));
+  };
+  Color<F> result = radiance;
+
+  const Vec3<F> axis = vec3(offsetof(R, axis));
+  const F cosine = clamp(dot(emitted, axis), F(-1.f), F(1.f));
+  const F focus = real(offsetof(R, focus));
+  const Mask<F> focused = active & (focus > 0.f);
+  if (any(focused)) {
+    const F power = pow(max(abs(cosine), F(1e-30f)), focus);
+    const Color<F> tint = lerp(Color<F>(vec3(offsetof(R, tint))), Color<F>(F(1.f)), power);
+    result = select<F>(focused, result * tint, result);
+  }
+
+  const F cone = real(offsetof(R, cone)), start = real(offsetof(R, cone_start));
+  const Mask<F> coned = active & (cone < kPi);
+  if (any(coned)) {
+    const Vec3<F> across = cross(emitted, axis);  // the sine keeps small angles exact
+    const F angle = atan2(F(sqrt(length_squared(across))), cosine);
+    const F width = cone - start;
+    const F x = clamp(F((angle - start) / select(width > 0.f, width, F(1.f))), F(0.f), F(1.f));
+    const F soft = 1.f - F(x * x) * fnma(F(2.f), x, F(3.f));
+    const F hard = select(angle <= cone, F(1.f), F(0.f));
+    result = select<F>(coned, result * select(width > 0.f, soft, hard), result);
+  }
+
+  const U ies = float_bits<F>(real(offsetof(R, ies)));
+  const Mask<F> profiled = active & Mask<F>(ies != U(kNoIes));
+  if (any(profiled)) {
+    const size_t m = offsetof(R, to_light);
+    const Vec3<F> e(dot(emitted, vec3(m)), dot(emitted, vec3(m, 3)), dot(emitted, vec3(m, 6)));
+    constexpr float kDegrees = 57.29577951308232f;
+    const F flat = sqrt(fma(e.x, e.x, F(e.y * e.y)));
+    F theta = atan2(flat, F(-e.z)) * kDegrees;  // from -z
+    const F scale = real(offsetof(R, angle_scale));
+    const F safe = select(scale == 0.f, F(1.f), abs(scale));
+    theta = select(scale < 0.f, F(F(theta - 180.f) / safe + 180.f), F(theta / safe));
+    theta = clamp(theta, F(0.f), F(180.f));
+    const F turn = atan2(F(-e.y), F(-e.x)) * kDegrees;
+    const F phi = select(turn < 0.f, F(turn + 360.f), turn);
+    const F candela = ies_candela<F>(view, ies, theta, phi, profiled);
+    result = select<F>(profiled, result * F(candela * real(offsetof(R, ies_scale))), result);
+  }
+  return result;
+}
+
+}  // namespace wavecomb::detail
