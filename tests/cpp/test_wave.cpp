@@ -64,6 +64,13 @@ TEST(Wave, AllProgramsAreOnePicture) {
 TEST(Wave, EmissiveMeshesAreOnePicture) {
   expect_one_picture(emissive_meshes(), small_settings());
 }
+TEST(Wave, LightsByTreeAreOnePicture) {
+  Settings s = small_settings();
+  s.light_selection = LightSelection::kTree;
+  s.width = s.height = 19;
+  for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes()})
+    expect_one_picture(scene, s);
+}
 TEST(Wave, PresenceIsOnePicture) {
   expect_one_picture(presence(), small_settings());
 }
