@@ -70,7 +70,7 @@ TEST(Cylinder, IrradianceIsTheSumOverItsSurface) {
 TEST(Cylinder, NothingLeavesItsInside) {
   const Lights lights({make_light(LightKind::kCylinder)});
   const LightView view = lights.view();
-  EXPECT_FALSE(sample_light<float>(view, {0.1f, 0, 0.2f}, 0.5f, 0.5f, 0.5f, true).valid);
+  EXPECT_FALSE(sample_light<float>(view, Vec3<float>(0.1f, 0, 0.2f), 0.5f, 0.5f, 0.5f, true).valid);
   // In at an open end, to the wall behind the axis.
   const Vec3<float> from{-2, 0, 0.1f}, dir{0.98058068f, 0, 0.19611614f};
   const auto t = trace(view, from, dir);
@@ -213,11 +213,11 @@ TEST(Shaping, BothTechniquesSeeTheSame) {
     std::mt19937 rng(4);
     const auto number = [&rng] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
     for (int i = 0; i < 2000; ++i) {
-      const auto s = sample_light<float>(view, {0, 0, 0}, number(), number(), number(), true);
+      const auto s = sample_light<float>(view, Vec3<float>(0, 0, 0), number(), number(), number(), true);
       if (!s.valid) continue;
       const auto t = trace(view, {0, 0, 0}, s.wi);
       if (!t) continue;  // rounded over an edge
-      const auto hit = light_hit<float>(view, 0u, {0, 0, 0}, s.wi, *t, true);
+      const auto hit = light_hit<float>(view, 0u, Vec3<float>(0, 0, 0), s.wi, *t, true);
       if (hit.pdf == 0) continue;
       EXPECT_NEAR(hit.radiance.x, s.weight.x * s.pdf, 2e-3 * hit.radiance.x + 1e-4);
       ++seen;
