@@ -213,7 +213,8 @@ TEST(Shaping, BothTechniquesSeeTheSame) {
     std::mt19937 rng(4);
     const auto number = [&rng] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
     for (int i = 0; i < 2000; ++i) {
-      const auto s = sample_light<float>(view, Vec3<float>(0, 0, 0), number(), number(), number(), true);
+      const auto s =
+          sample_light<float>(view, Vec3<float>(0, 0, 0), number(), number(), number(), true);
       if (!s.valid) continue;
       const auto t = trace(view, {0, 0, 0}, s.wi);
       if (!t) continue;  // rounded over an edge

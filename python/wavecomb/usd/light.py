@@ -213,7 +213,7 @@ class LightReader:
     def _profile_file(self, prim: Usd.Prim) -> str:
         attribute = prim.GetAttribute("inputs:shaping:ies:file")
         value = attribute.Get(self.time) if attribute else None
-        return asset_file(value, attribute, self.report) if value is not None else ""
+        return asset_file(value, attribute) if value is not None else ""
 
     def _texture(self, prim: Usd.Prim) -> int | None:
         attribute = prim.GetAttribute("inputs:texture:file")

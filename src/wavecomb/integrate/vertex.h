@@ -54,9 +54,9 @@ struct PathState {
   F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
-  Vec3<F> o;           ///< origin of the ray that arrived
-  UInt<F> receiver;    ///< LightReceiver::normal of the vertex before
-  UInt<F> link{0u};    ///< class of the surface that the ray left, where lights are linked
+  Vec3<F> o;         ///< origin of the ray that arrived
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex before
+  UInt<F> link{0u};  ///< class of the surface that the ray left, where lights are linked
 
   LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };
@@ -332,7 +332,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
     Color<F> f_cos = e.f_cos;
     if (scene.lights.has_sampled_only) [[unlikely]] {
-      const LightEffect<F> effect(scene.lights, chosen_light<F>(scene.lights, receiver, rl.x, lit), lit);
+      const LightEffect<F> effect(scene.lights, chosen_light<F>(scene.lights, receiver, rl.x, lit),
+                                  lit);
       const Color<F> diffuse = bsdf.diffuse_f_cos(wo, wi);
       f_cos = select<F>(effect.sampled_only,
                         fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
