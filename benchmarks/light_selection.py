@@ -6,6 +6,8 @@
 
 The street of `wavecomb scene lights`, whose light is as strong with 10 lights as with 10,000. For
 each number, in rounds of `--rounds` seeds: a render by power and one by tree, side by side.
+Errors are of the layers `direct` and `indirect` together: lights that the camera sees are no matter
+of choice.
 
 Figures, by tree / by power unless said otherwise:
 
@@ -46,8 +48,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--lights", nargs="+", type=int, default=[4, 10, 100, 1000, 10_000])
     parser.add_argument("--size", nargs=2, type=int, default=[120, 80], metavar=("W", "H"))
     parser.add_argument("--spp", type=int, default=32)
-    parser.add_argument("--reference", type=int, default=4096, help="samples a pixel")
-    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--reference", type=int, default=1024, help="samples a pixel")
+    parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--max-depth", type=int, default=4)
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--folder", type=Path, default=ROOT / "out" / "quick", help="of stages")
@@ -70,23 +72,25 @@ def measure(count: int, args: argparse.Namespace) -> dict[str, Any]:
     scene = wavecomb.load(path).scene
     size = (args.size[0], args.size[1])
 
-    def render(selection: str, seed: int, spp: int) -> wavecomb.Picture:
-        return wavecomb.render(
+    def render(selection: str, seed: int, spp: int) -> tuple[np.ndarray, Any]:
+        picture = wavecomb.render(
             scene, size=size, spp=spp, seed=seed, threads=args.threads,
-            max_depth=args.max_depth, light_selection=selection,
+            max_depth=args.max_depth, light_selection=selection, aovs=["direct", "indirect"],
         )  # fmt: skip
+        lit = picture.aovs["direct"].astype(np.float64) + picture.aovs["indirect"]
+        return lit, picture.stats
 
-    truth = render("tree", 1000, args.reference).beauty.astype(np.float64)
+    truth, _ = render("tree", 1000, args.reference)
     weight = 1.0 / (truth**2 + 0.01 * truth.mean() ** 2)
     error: dict[str, list[float]] = {"power": [], "tree": []}
     seconds: dict[str, list[float]] = {"power": [], "tree": []}
     samples = 0
     for seed in range(args.rounds):
         for selection in ("power", "tree") if seed % 2 else ("tree", "power"):
-            picture = render(selection, seed, args.spp)
-            error[selection].append(float(((picture.beauty - truth) ** 2 * weight).mean()))
-            seconds[selection].append(picture.stats["seconds"]["render"])
-            samples = picture.stats["counts"]["samples"]
+            lit, stats = render(selection, seed, args.spp)
+            error[selection].append(float(((lit - truth) ** 2 * weight).mean()))
+            seconds[selection].append(stats["seconds"]["render"])
+            samples = stats["counts"]["samples"]
     mean = {selection: float(np.mean(of)) for selection, of in error.items()}
     time = ratio(seconds["tree"], seconds["power"])
     return {
