@@ -7,6 +7,7 @@ on other threads, and what they have to say arrives as signals.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from collections.abc import Callable, Mapping
@@ -430,15 +431,17 @@ class Session(QObject):
                 work()
             except Exception as error:
                 message = describe(error)
-                self._call.emit(lambda: self.failed.emit(message))
-            self._call.emit(lambda: self._done(key))
+                self.later(lambda: self.failed.emit(message))
+            self.later(lambda: self._done(key))
 
         self._work(key, what)
         threading.Thread(target=body, name="wavecomb-work", daemon=True).start()
 
     def later(self, call: Callable[[], None]) -> None:
         """Runs something on the UI thread soon; to be called from any thread."""
-        self._call.emit(call)
+        # Where the window is gone there is nobody to be told.
+        with contextlib.suppress(RuntimeError):
+            self._call.emit(call)
 
     def _work(self, key: str, what: str) -> None:
         self._jobs = [job for job in self._jobs if job[0] != key] + [(key, what)]
