@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
+from PySide6.QtCore import QModelIndex, QObject, Qt
 from PySide6.QtGui import QColor, QFont
 from PySide6.QtWidgets import QTableView
 
+from wavecomb.gui.headed_model import HeadedModel
+
 Cell = tuple[str, Any]
 """What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``), whole in a tooltip."""
-
-_NOWHERE = QModelIndex()
 
 
 def compact(view: QTableView) -> None:
@@ -25,14 +25,13 @@ def compact(view: QTableView) -> None:
     view.setShowGrid(False)
 
 
-class Table(QAbstractTableModel):
+class Table(HeadedModel):
     """Rows of cells under a header; ``left``: columns of text, others are aligned right."""
 
     def __init__(
         self, header: Mapping[str, str], left: Collection[int], parent: QObject | None = None
     ) -> None:
-        super().__init__(parent)
-        self._header = list(header.items())
+        super().__init__(list(header), parent, list(header.values()))
         self._left = left
         self._rows: list[Sequence[Cell]] = []
         self._bold: Collection[int] = ()
@@ -56,27 +55,12 @@ class Table(QAbstractTableModel):
         elif more < 0:
             self.endRemoveRows()
         if rows:
-            self.dataChanged.emit(
-                self.index(0, 0), self.index(len(rows) - 1, len(self._header) - 1)
-            )
+            last = self.index(len(rows) - 1, self.columnCount() - 1)
+            self.dataChanged.emit(self.index(0, 0), last)
 
-    def rowCount(self, parent: QModelIndex = _NOWHERE) -> int:
-        """Rows."""
-        return 0 if parent.isValid() else len(self._rows)
-
-    def columnCount(self, parent: QModelIndex = _NOWHERE) -> int:
-        """Columns."""
-        return 0 if parent.isValid() else len(self._header)
-
-    def headerData(
-        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
-    ) -> Any:
-        """Names and tooltips of columns."""
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        if role == Qt.ItemDataRole.DisplayRole:
-            return self._header[section][0]
-        return self._header[section][1] if role == Qt.ItemDataRole.ToolTipRole else None
+    def row_count(self) -> int:
+        """How many rows there are."""
+        return len(self._rows)
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Of one cell."""

@@ -107,12 +107,10 @@ class CurveReader:
         positions = strands.controls(points, "vertex")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
-        bounds = extent(positions)
-        widths, kind = self._widths(prim, strands)
+        widths, kind = read_widths(prim, strands, self.time, self.report)
         scale = 0.5 * (uniform_scale(matrix) or 1.0)
         radii = np.maximum(strands.controls(widths, kind)[:, 0] * np.float32(scale), 0)
-        reach = float(radii.max(initial=0.0))
-        bounds += np.array([[-reach], [reach]], np.float32)
+        bounds = thick_extent(positions, radii)
         normals = self.normals(prim, strands)
         if normals is not None and matrix != IDENTITY:
             normals = bake_normals(normals, matrix)
@@ -144,9 +142,6 @@ class CurveReader:
         if value not in known:
             raise MeshError(f"its {name} is {value!r}; there are {', '.join(known)}")
         return value
-
-    def _widths(self, prim: Usd.Prim, strands: Strands) -> tuple[NDArray[Any], str]:
-        return read_widths(prim, strands, self.time, self.report)
 
     def normals(self, prim: Usd.Prim, strands: Strands) -> Array | None:
         """At control points, for ribbons; None for tubes."""
@@ -215,10 +210,15 @@ def over_shutter(
             then = CurveReader(Usd.TimeCode(time), LoadReport()).normals(prim, layout)
             normals.append(shape.normals if then is None else bake_normals(then, matrix))
     positions = np.stack(steps)
-    reach = float(shape.radii.max(initial=0.0))
-    bounds = extent(positions.reshape(-1, 3)) + np.array([[-reach], [reach]], np.float32)
+    bounds = thick_extent(positions.reshape(-1, 3), shape.radii)
     together = np.stack(normals) if normals else None
     return replace(shape, positions=positions, normals=together, bounds=bounds)
+
+
+def thick_extent(positions: Array, radii: Array) -> Array:
+    """Bounds (2, 3) of curves or points with the largest of the radii around them."""
+    reach = float(radii.max(initial=0.0))
+    return extent(positions) + np.array([[-reach], [reach]], np.float32)
 
 
 def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:

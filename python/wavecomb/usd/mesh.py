@@ -228,7 +228,7 @@ class MeshReader:
         topology = triangulate(points, counts, indices, holes, flip)
         scheme = _scheme(prim, names, time)
         subdivided = self.subdivide and scheme in SCHEMES
-        normals = self._normals(prim, points, topology, scheme)
+        normals = self._normals(prim, points, topology, scheme, names)
         primvar = self._coordinates(prim, topology, uv_names, inherited) if uv_names else None
         uvs, primvar = self._uvs(prim, topology, primvar)
         if normals is not None and not _moves_only(matrix):
@@ -275,11 +275,12 @@ class MeshReader:
         scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
         positions = np.stack([bake(p, m) for p, m in zip(shapes, matrices, strict=True)])
         normals: list[Array] = []
+        names = authored_names(prim)
         for points, to_group, time in zip(shapes, matrices, times, strict=True):
             if mesh.normals is None:
                 break
             then = MeshReader(Usd.TimeCode(time), LoadReport(), self.subdivide, self.skeletons)
-            found = then._normals(prim, points, topology, scheme)
+            found = then._normals(prim, points, topology, scheme, names)
             if found is not None:
                 found = bake_normals(found, to_group)
                 normals.append(_reverse(found) if mirrored else found)
@@ -297,7 +298,12 @@ class MeshReader:
         return None if self.skeletons is None else self.skeletons.of(prim)
 
     def _normals(
-        self, prim: Usd.Prim, points: Array, topology: Topology, scheme: str | None
+        self,
+        prim: Usd.Prim,
+        points: Array,
+        topology: Topology,
+        scheme: str | None,
+        names: frozenset[str],
     ) -> Array | None:
         """(n, 3), (m, 3, 3), or None for flat: authored, else smooth for subdivision surfaces.
 
@@ -307,15 +313,17 @@ class MeshReader:
             if scheme not in (None, "none"):
                 what = f"subdivisionScheme {scheme!r} is none of {', '.join(SCHEMES)}: polygons"
                 self.report.warn(what, prim.GetPath())
-            return self._authored_normals(prim, points, topology)
-        authored = None if self.subdivide else self._authored_normals(prim, points, topology)
+            return self._authored_normals(prim, points, topology, names)
+        authored = None if self.subdivide else self._authored_normals(prim, points, topology, names)
         if authored is not None or scheme == "bilinear":
             return authored
-        return smooth_normals(points, topology, self._creases(prim, topology))
+        return smooth_normals(points, topology, self._creases(prim, topology, names))
 
-    def _creases(self, prim: Usd.Prim, topology: Topology) -> NDArray[np.int64] | None:
+    def _creases(
+        self, prim: Usd.Prim, topology: Topology, names: frozenset[str]
+    ) -> NDArray[np.int64] | None:
         get, time = prim.GetAttribute, self.time
-        if "creaseIndices" not in authored_names(prim):
+        if "creaseIndices" not in names:
             return None
         indices = as_integers(get("creaseIndices").Get(time))
         lengths = as_integers(get("creaseLengths").Get(time))
@@ -329,9 +337,11 @@ class MeshReader:
         creases = crease_pairs(indices, lengths, sharpness[:, 0])
         return None if creases is None else creases[0][creases[1] >= SHARP].astype(np.int64)
 
-    def _authored_normals(self, prim: Usd.Prim, points: Array, topology: Topology) -> Array | None:
+    def _authored_normals(
+        self, prim: Usd.Prim, points: Array, topology: Topology, names: frozenset[str]
+    ) -> Array | None:
         """primvars:normals, else normals; None where there are none that fit."""
-        if authored_names(prim).isdisjoint(_NORMALS):
+        if names.isdisjoint(_NORMALS):
             return None
         try:
             primvar = read_primvar(prim, "normals", self.time)

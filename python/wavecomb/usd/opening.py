@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -72,34 +73,48 @@ def open_render_settings(
     Raises:
         WavecombError: A file is none, or cannot be read.
     """
+    with _layers(file, session_layer) as (root, session):
+        paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
+        kept = {path for path in map(_prim_path, paths) if path is not None}
+        mask = Usd.StagePopulationMask(sorted(kept))
+        stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
+        # Settings name products, these name vars, and both name cameras. (ExpandPopulationMask
+        # with predicates of Python's can wait for itself.)
+        for _ in range(2):
+            named = {path for path in _named_by(stage) if not mask.Includes(path)}
+            if not named:
+                break
+            for path in named:
+                mask.Add(path)
+            stage.SetPopulationMask(mask)
+    return stage
+
+
+@contextmanager
+def _layers(
+    file: Path, session_layer: Path | None, overrides: Sdf.Layer | None = None
+) -> Iterator[tuple[Sdf.Layer, Sdf.Layer]]:
+    """Root and session layer of a stage, to be composed within the time that it may take.
+
+    Arguments are those of ``open_stage``; errors of USD become WavecombError.
+    """
     _check_file(file)
     if session_layer is not None:
         _check_file(session_layer)
     trail.note("opening", file)
     try:
         session = Sdf.Layer.CreateAnonymous("session.usda")
+        if overrides is not None:
+            session.TransferContent(overrides)
         if session_layer is not None:
             session.subLayerPaths.append(_session(session_layer).identifier)
         with patience.watched(file):
             root = Sdf.Layer.FindOrOpen(str(file))
             if not root:
                 raise WavecombError(f"{file}: cannot be read as USD")
-            paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
-            kept = {path for path in map(_prim_path, paths) if path is not None}
-            mask = Usd.StagePopulationMask(sorted(kept))
-            stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
-            # Settings name products, these name vars, and both name cameras. (ExpandPopulationMask
-            # with predicates of Python's can wait for itself.)
-            for _ in range(2):
-                named = {path for path in _named_by(stage) if not mask.Includes(path)}
-                if not named:
-                    break
-                for path in named:
-                    mask.Add(path)
-                stage.SetPopulationMask(mask)
+            yield root, session
     except Tf.ErrorException as error:
         raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
-    return stage
 
 
 def _named_by(stage: Usd.Stage) -> set[Sdf.Path]:
@@ -147,21 +162,8 @@ def open_stage(
     Raises:
         WavecombError: A file is none, or cannot be read; there are no such variants or prims.
     """
-    _check_file(file)
-    if session_layer is not None:
-        _check_file(session_layer)
-    trail.note("opening", file)
-    try:
-        session = Sdf.Layer.CreateAnonymous("session.usda")
-        if overrides is not None:
-            session.TransferContent(overrides)
-        if session_layer is not None:
-            session.subLayerPaths.append(_session(session_layer).identifier)
-        with patience.watched(file):
-            root = Sdf.Layer.FindOrOpen(str(file))
-            stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll) if root else None
-    except Tf.ErrorException as error:
-        raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
+    with _layers(file, session_layer, overrides) as (root, session):
+        stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll)
     if not stage:
         raise WavecombError(f"{file}: cannot be read as USD")
     select_variants(stage, variants or {})

@@ -9,8 +9,15 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Usd
 
-from wavecomb.usd.curves import CurveArrays, read_points, read_uvs, read_widths, uniform_scale
-from wavecomb.usd.mesh import IDENTITY, bake, check_matrix, extent
+from wavecomb.usd.curves import (
+    CurveArrays,
+    read_points,
+    read_uvs,
+    read_widths,
+    thick_extent,
+    uniform_scale,
+)
+from wavecomb.usd.mesh import IDENTITY, bake, check_matrix
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.strands import lay_out_points
 
@@ -40,13 +47,11 @@ class PointReader:
         layout = lay_out_points(len(positions))
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
-        bounds = extent(positions)
         widths, _ = read_widths(prim, layout, self.time, self.report)
         radii = np.asarray(widths[:, 0] * (0.5 * (uniform_scale(matrix) or 1.0)), np.float32)
         if len(radii) == 1:
             radii = np.repeat(radii, len(positions))
-        reach = float(radii.max(initial=0.0))
-        bounds += np.array([[-reach], [reach]], np.float32)
+        bounds = thick_extent(positions, radii)
         uvs = None
         if uv_names:
             found = read_uvs(prim, layout, uv_names, inherited, self.time, self.report)

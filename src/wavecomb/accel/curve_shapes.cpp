@@ -93,7 +93,7 @@ uint32_t first_point(const Mesh& mesh, uint32_t prim) {
 /// The values of a mesh's points at a time, bit for bit those of detail::MovingRows.
 class PointsAt {
  public:
-  PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(step_place(time, mesh.steps - 1)) {}
+  PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(time, mesh.steps - 1) {}
 
   Vec3<float> position(size_t point) const { return at(mesh_.positions, point); }
   Vec3<float> normal(size_t point) const { return at(mesh_.normals, point); }
@@ -109,7 +109,7 @@ class PointsAt {
   }
 
   const Mesh& mesh_;
-  const StepPlace place_;
+  const BetweenSteps<float> place_;
 };
 
 /// One segment and one ray.

@@ -29,20 +29,6 @@ struct MatrixLanes {
 
 namespace detail {
 
-/// A place between two steps.
-template <typename F>
-struct BetweenSteps {
-  UInt<F> before;  ///< step, counted from the first
-  F part;          ///< share of the way to the next
-
-  BetweenSteps(const F& time, const UInt<F>& segments) {
-    const F at = time * F(Int<F>(segments));
-    const UInt<F> whole(to_int<F>(at)), last = segments - 1u;
-    before = select(Mask<UInt<F>>(whole < last), whole, last);
-    part = at - F(Int<F>(before));
-  }
-};
-
 /// The transforms of two steps, and what lies between.
 template <typename F>
 struct MatrixPair {
@@ -80,10 +66,10 @@ class MovingRows {
     for (size_t i = 0; i < kWidth<F>; ++i) {
       const MeshRecord& record = scene.meshes[(bits >> i & 1u) != 0 ? index.value[i] : 0u];
       const MeshMotion& motion = scene.motion.meshes[record.motion];
-      const auto [before, part] = step_place(at[i], motion.segments);
-      before_[i] = record.*array + before * (motion.*stride);
+      const BetweenSteps<float> place(at[i], motion.segments);
+      before_[i] = record.*array + place.before * (motion.*stride);
       after_[i] = before_[i] + (motion.*stride);  // 0 for a mesh that keeps its shape
-      parts[i] = part;
+      parts[i] = place.part;
     }
     part_ = load<F>(parts);
   }

@@ -331,16 +331,17 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
             : e.pdf;
     F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
     Color<F> f_cos = e.f_cos;
+    U light(kNoLight);
+    if (scene.lights.has_sampled_only || scene.lights.links.members || wants_lights) [[unlikely]]
+      light = chosen_light<F>(scene.lights, receiver, rl.x, lit);
     if (scene.lights.has_sampled_only) [[unlikely]] {
-      const LightEffect<F> effect(scene.lights, chosen_light<F>(scene.lights, receiver, rl.x, lit),
-                                  lit);
+      const LightEffect<F> effect(scene.lights, light, lit);
       const Color<F> diffuse = bsdf.diffuse_f_cos(wo, wi);
       f_cos = select<F>(effect.sampled_only,
                         fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
       w = select(effect.sampled_only, F(1.f), w);
     }
     if (scene.lights.links.members) [[unlikely]] {
-      const U light = chosen_light<F>(scene.lights, receiver, rl.x, lit);
       w = select(shines_on<F>(scene.lights, out.next.link, light, lit), w, F(0.f));
       out.shadow_set = shadow_set<F>(scene.lights, light, lit);
     }
@@ -348,7 +349,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         clean<F>(path.throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
-    if (wants_lights) aovs->lit_by = chosen_light<F>(scene.lights, receiver, rl.x, lit);
+    if (wants_lights) aovs->lit_by = light;
     out.shadow_o = spawn_origin<F>(s, l.wi);
     out.shadow_d = l.wi;
     out.shadow_tfar = l.distance * 0.9999f;

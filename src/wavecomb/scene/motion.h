@@ -3,13 +3,13 @@
 /// between.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "wavecomb/core/affine.h"
+#include "wavecomb/core/math.h"
 
 namespace wavecomb {
 
@@ -26,17 +26,19 @@ struct MeshMotion {
 };
 static_assert(sizeof(MeshMotion) == 24);
 
-/// The step before a time in [0, 1], and the share of the way to the next.
-struct StepPlace {
-  uint32_t before;
-  float part;
+/// Where a time in [0, 1] lies among equal steps, of which there is one more than `segments`.
+template <typename F>
+struct BetweenSteps {
+  UInt<F> before;  ///< step, counted from the first
+  F part;          ///< share of the way to the next
+
+  BetweenSteps(const F& time, const UInt<F>& segments) {
+    const F at = time * F(Int<F>(segments));
+    const UInt<F> whole(to_int<F>(at)), last = segments - 1u;
+    before = select(Mask<UInt<F>>(whole < last), whole, last);
+    part = at - F(Int<F>(before));
+  }
 };
-inline StepPlace step_place(float time, uint32_t segments) {
-  const float place = time * static_cast<float>(segments);
-  const uint32_t last = segments > 0 ? segments - 1 : 0;
-  const uint32_t before = std::min(static_cast<uint32_t>(place), last);
-  return {before, place - static_cast<float>(before)};
-}
 
 /// Steps [first, first + segments] of a list of steps; 0 segments: it stands still.
 struct StepRange {
