@@ -19,6 +19,9 @@ wavecomb::Affine affine(const T* m) {
 wavecomb::Affine affine(
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& m);
 
+/// The parameters of program "openpbr" by name; throws Error for others.
+wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
+
 const char* light_kind_name(wavecomb::LightKind kind);
 
 /// As add_material, add_light and set_camera take them. Throw Error for ids that are not there.

@@ -14,6 +14,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/material/energy_tables.h"
 
 namespace wavecomb {
 namespace {
@@ -101,6 +102,12 @@ struct WavefrontRenderer::Impl {
 };
 
 namespace {
+
+bool needs_energy_tables(const Scene& scene) {
+  const auto& all = scene.materials();
+  return std::any_of(all.begin(), all.end(),
+                     [](const Material& m) { return m.program == ProgramId::kOpenPbr; });
+}
 
 /// Says that a render goes on, for as long as it lives.
 template <typename Impl>
@@ -226,8 +233,10 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   if (options.resume) options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();
   const uint32_t wave_size = wave_size_for(settings, pixels);
+  SceneView view = scene.view();
+  if (needs_energy_tables(scene)) view.materials.energy = EnergyTables::shared().data();
   const WaveContext context{
-      scene.view(),
+      view,
       impl_->accel.get(),
       &settings,
       &camera,
