@@ -33,6 +33,20 @@ from wavecomb.files import replacing
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 CAMERAS = {"iesTest": ("/cameras/iesTop", "/cameras/iesBottom")}
 """Of stages whose reference has a picture of each, one above the other."""
+VISIBLE = ("visibleRect",)
+"""Stages whose lights are seen."""
+LAMBERT = """#usda 1.0
+over "materials" {
+    over "usdpreviewsurface1" {
+        over "usdpreviewsurface1" {
+            int inputs:useSpecularWorkflow = 0
+        }
+    }
+}
+"""
+"""The references are of Lambert's surfaces. The stages ask for a specularColor of 0 at the index 1.
+By UsdPreviewSurface's specular workflow that still reflects at grazing angles (F90 is 1); by its
+metallic workflow it is Lambert's."""
 NAME = re.compile(r"(?P<stage>\w+)-embree\.(?P<frame>\d+)\.exr")
 
 PAGE = """<!doctype html>
@@ -83,7 +97,10 @@ def read(file: Path) -> Pixels:
 
 def render(stage: Path, frame: int, camera: str | None, options: argparse.Namespace) -> Pixels:
     """Our picture of a frame."""
-    scene = wavecomb.load(stage, frame=frame, camera=camera, lights="hidden")
+    lambert = options.out / "lambert.usda"
+    lambert.write_text(LAMBERT, encoding="utf-8")
+    lights = "visible" if stage.stem in VISIBLE else "hidden"
+    scene = wavecomb.load(stage, frame=frame, camera=camera, lights=lights, session_layer=lambert)
     picture = wavecomb.render(
         scene,
         size=(options.size, options.size),

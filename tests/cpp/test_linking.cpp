@@ -93,7 +93,7 @@ TEST(Multipliers, PartsAddUpToTheWhole) {
       light.diffuse = diffuse;
       light.specular = specular;
       stage.b.add_light(light);
-      return mean_of(WavefrontRenderer(stage.b.build()).render(settings(1024)), 1);
+      return mean_of(WavefrontRenderer(stage.b.build()).render(settings(256)), 1);
     };
     const Mean both = mean(1, 1), diffuse = mean(1, 0), specular = mean(0, 1),
                mixed = mean(2, 0.5f);

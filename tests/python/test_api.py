@@ -67,6 +67,7 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     chosen |= {"depth_of_field": None, "projection": None, "exposure": True}
     chosen |= {"render_settings": None, "product": None}
     chosen |= {"texture_limit": None, "working_space": "rec709"}
+    chosen |= {"lights": "visible"}
     assert fake.loaded[0] == {"path": stage, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)

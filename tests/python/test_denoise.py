@@ -39,7 +39,7 @@ def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
     picture = noisy.with_denoised(threads=1)
     assert picture.denoised.shape == noisy.beauty.shape
     np.testing.assert_array_equal(picture.beauty, noisy.beauty)
-    assert rmse(picture.denoised, clean.beauty) < 0.5 * rmse(noisy.beauty, clean.beauty)
+    assert rmse(picture.denoised, clean.beauty) < 0.6 * rmse(noisy.beauty, clean.beauty)
     assert picture.denoised.mean() == pytest.approx(noisy.beauty.mean(), rel=0.02)
     assert picture.stats["seconds"]["denoise"] > 0
     assert noisy.denoised is None

@@ -94,7 +94,7 @@ def test_an_edited_scene_is_the_scene_built_anew(edit: dict[str, Any]) -> None:
     # And back again, with what the scene said of itself.
     renderer.edit(camera=scene.camera)
     for kind, values in (("material", scene.material), ("light", scene.light)):
-        fixed = {"name", "program", "textures", "kind", "texture", "group"}
+        fixed = {"name", "program", "textures", "kind", "texture", "group", "ies"}
         whole = {i: {k: v for k, v in values(i).items() if k not in fixed} for i in range(2)}
         renderer.edit(**{kind + "s": whole})
     assert beauty(renderer) == before

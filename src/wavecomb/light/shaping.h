@@ -129,7 +129,6 @@ inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3
     const F scale = real(offsetof(R, angle_scale));
     const F safe = select(scale == 0.f, F(1.f), abs(scale));
     theta = select(scale < 0.f, F(F(theta - 180.f) / safe + 180.f), F(theta / safe));
-    theta = clamp(theta, F(0.f), F(180.f));
     const F turn = atan2(F(-e.y), F(-e.x)) * kDegrees;
     const F phi = select(turn < 0.f, F(turn + 360.f), turn);
     const F candela = ies_candela<F>(view, ies, theta, phi, profiled);
