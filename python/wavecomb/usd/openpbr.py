@@ -15,6 +15,9 @@ Colour = tuple[float, float, float]
 WHITE: Colour = (1.0, 1.0, 1.0)
 PALE: Colour = (0.8, 0.8, 0.8)
 
+OPENPBR_COLOURS = ("transmission_color", "subsurface_color", "fuzz_color", "coat_color")
+"""Which of the parameters are colours."""
+
 
 class Inputs(Protocol):
     """Constants of a shader's inputs."""
