@@ -109,6 +109,17 @@ TEST(OpenPbr, CoatAndFuzzKeepEnergy) {
     }
 }
 
+TEST(OpenPbr, CoatedGlassKeepsEnergy) {
+  for (float r : {0.f, 0.45f, 1.f}) {
+    P p = white();
+    p.transmission_weight = 1;
+    p.roughness = 0.2f;
+    p.clearcoat = 1;
+    p.clearcoat_roughness = r;
+    expect_keeps_energy(p, "coated glass", 0.012, 0.006, 20000);
+  }
+}
+
 TEST(OpenPbr, FilmsNeverGain) {
   for (float r : {0.f, 0.3f, 0.8f})
     for (float nm : {0.f, 100.f, 350.f, 900.f})

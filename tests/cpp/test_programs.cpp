@@ -66,6 +66,10 @@ void add_openpbr_cases(std::vector<Case>& cases) {
       p.clearcoat = 0.8f, p.clearcoat_roughness = r, p.coat_color = Vec(1, 0.6f, 0.3f);
     });
   }
+  // Facets of this coat often reflect to below, where the base transmits.
+  add("coated glass", [](P& p) {
+    p.transmission_weight = 1, p.roughness = 0.2f, p.clearcoat = 1, p.clearcoat_roughness = 1;
+  });
   add("brushed",
       [](P& p) { p.metallic = 1, p.roughness = 0.4f, p.anisotropy = 0.8f, p.rotation = 0.15f; });
   add("fuzz", [](P& p) { p.fuzz_weight = 0.7f, p.fuzz_roughness = 0.4f; });
@@ -210,6 +214,34 @@ TEST(Programs, WeightIsValueOverDensity) {
               << c.name << " " << wo.z;
           EXPECT_EQ(s.eta != 1.f, s.wi.z * wo.z < 0 && c.bends()) << c.name;
         }
+    });
+}
+
+TEST(Programs, DiffusePartIsOfTheWhole) {
+  for (const Case& c : all_cases())
+    with_bsdf(c, [&](const auto& bsdf) {
+      double diffuse = 0, rest = 0;
+      for (const Vec& wo : views(c))
+        for (uint32_t i = 0; i < 300; ++i) {
+          const auto [l, u, v] = kronecker(i);
+          const Vec wi = direction(2.0 * u - 1, 7.0 * v);
+          const Vec whole = bsdf.eval(wo, wi).f_cos, part = bsdf.diffuse_f_cos(wo, wi);
+          for (const auto& [a, b] :
+               {std::pair(part.x, whole.x), {part.y, whole.y}, {part.z, whole.z}}) {
+            EXPECT_GE(a, 0.f) << c.name;
+            EXPECT_LE(a, b * 1.00001f) << c.name << " " << wo.z << " " << wi.z;
+          }
+          diffuse += part.x;
+          rest += whole.x - part.x;
+        }
+      if (c.program != ProgramId::kOpenPbr) return;
+      // Metal and glass have no diffuse part, EON without a specular lobe has no other.
+      const P& p = c.params;
+      const bool opaque = p.metallic < 1 && p.transmission_weight < 1;
+      EXPECT_EQ(diffuse > 0, opaque) << c.name;
+      if (c.name.find("reciprocal diffuse") != std::string::npos) {
+        EXPECT_NEAR(rest, 0, 1e-5 * diffuse) << c.name;
+      }
     });
 }
 

@@ -110,9 +110,13 @@ class OpenPbrBsdf {
     }
     if (any(is_fuzz)) wi = select<F>(is_fuzz, view.fuzz.sample(o, u, v), wi);
     const Vec3<F> mirror(-o.x, -o.y, o.z);
-    if (any(is_coat))
-      wi = select<F>(is_coat,
-                     select<F>(coat_smooth_, mirror, sample_microfacet(coat_ggx_, o, u, v)), wi);
+    if (any(is_coat)) {
+      // A facet of the coat may reflect to below, where only what the base transmits has a density:
+      // no sample.
+      const Vec3<F> c = sample_microfacet(coat_ggx_, o, u, v);
+      const Vec3<F> rough = select<F>(c.z > 0.f, c, Vec3<F>(F(1.f), F(0.f), F(0.f)));
+      wi = select<F>(is_coat, select<F>(coat_smooth_, mirror, rough), wi);
+    }
     Mask<F> refracted(false);
     if (any(is_base)) {
       const auto b = base_.sample(view.base, o, left, u, v);
