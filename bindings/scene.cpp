@@ -146,7 +146,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
                       float metallic, float clearcoat, float clearcoat_roughness, float opacity,
                       float ior, float opacity_threshold, const Color3& conductor_eta,
                       const Color3& conductor_k, bool specular_workflow, bool presence,
-                      uint32_t evaluations, const nb::dict& textures) {
+                      uint32_t evaluations, const nb::dict& openpbr, const nb::dict& textures) {
   Material m;
   m.name = name;
   m.program = program(program_name);
@@ -165,6 +165,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   m.specular_workflow = specular_workflow;
   m.presence = presence;
   m.evaluations = evaluations;
+  m.openpbr = openpbr_of(name, openpbr);
   for (const auto& [key, value] : textures)
     m.textures[static_cast<size_t>(slot(nb::cast<std::string>(key)))] =
         texture_use(nb::cast<nb::dict>(value));
@@ -517,7 +518,7 @@ void bind_scene(nb::module_& m) {
            "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f, "ior"_a = 1.5f,
            "opacity_threshold"_a = 0.f, "conductor_eta"_a = black, "conductor_k"_a = black,
            "specular_workflow"_a = false, "presence"_a = false, "evaluations"_a = 1,
-           "textures"_a = nb::dict())
+           "openpbr"_a = nb::dict(), "textures"_a = nb::dict())
       .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "name"_a = "", "light_group"_a = "",

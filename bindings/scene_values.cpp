@@ -38,6 +38,28 @@ const Members<Material, float> kMaterialNumbers{
 const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material::specular_workflow},
                                                 {"presence", &Material::presence}};
 const Members<Material, uint32_t> kMaterialCounts{{"evaluations", &Material::evaluations}};
+const Members<OpenPbr, Vec3<float>> kOpenPbrColors{
+    {"transmission_color", &OpenPbr::transmission_color},
+    {"subsurface_color", &OpenPbr::subsurface_color},
+    {"fuzz_color", &OpenPbr::fuzz_color},
+    {"coat_color", &OpenPbr::coat_color}};
+const Members<OpenPbr, float> kOpenPbrNumbers{
+    {"diffuse_roughness", &OpenPbr::diffuse_roughness},
+    {"specular_weight", &OpenPbr::specular_weight},
+    {"anisotropy", &OpenPbr::anisotropy},
+    {"rotation", &OpenPbr::rotation},
+    {"transmission_weight", &OpenPbr::transmission_weight},
+    {"transmission_depth", &OpenPbr::transmission_depth},
+    {"subsurface_weight", &OpenPbr::subsurface_weight},
+    {"subsurface_anisotropy", &OpenPbr::subsurface_anisotropy},
+    {"fuzz_weight", &OpenPbr::fuzz_weight},
+    {"fuzz_roughness", &OpenPbr::fuzz_roughness},
+    {"coat_ior", &OpenPbr::coat_ior},
+    {"coat_darkening", &OpenPbr::coat_darkening},
+    {"film_weight", &OpenPbr::film_weight},
+    {"film_thickness", &OpenPbr::film_thickness},
+    {"film_ior", &OpenPbr::film_ior}};
+const Members<OpenPbr, bool> kOpenPbrSwitches{{"thin_walled", &OpenPbr::thin_walled}};
 const Members<Light, Vec3<float>> kLightColors{{"color", &Light::color}};
 const Members<Light, float> kLightNumbers{
     {"width", &Light::width},      {"height", &Light::height}, {"radius", &Light::radius},
@@ -205,6 +227,12 @@ nb::list matrix(const Affine& m) {
   return rows;
 }
 
+void take_openpbr(Reader& reader, OpenPbr& to) {
+  reader.take(to, kOpenPbrColors);
+  reader.take(to, kOpenPbrNumbers);
+  reader.take(to, kOpenPbrSwitches);
+}
+
 void check_index(const char* kind, uint32_t i, size_t count) {
   if (i >= count)
     throw Error(std::string(kind) + " " + std::to_string(i) + " is not there; the scene has " +
@@ -240,6 +268,14 @@ void for_each_change(const char* kind, const nb::dict& changes, const Change& ch
 
 }  // namespace
 
+OpenPbr openpbr_of(const std::string& material, const nb::dict& values) {
+  OpenPbr to;
+  Reader reader("openpbr of material '" + material + "'", values);
+  take_openpbr(reader, to);
+  reader.end();
+  return to;
+}
+
 Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
   if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4) throw Error("a transform must be 4 x 4");
   if (m.dtype() == nb::dtype<double>()) return affine(static_cast<const double*>(m.data()));
@@ -267,6 +303,13 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
     if (m.has_texture(static_cast<Slot>(s)))
       textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
   d["textures"] = textures;
+  if (m.program == ProgramId::kOpenPbr) {
+    nb::dict openpbr;
+    put(openpbr, m.openpbr, kOpenPbrColors);
+    put(openpbr, m.openpbr, kOpenPbrNumbers);
+    put(openpbr, m.openpbr, kOpenPbrSwitches);
+    d["openpbr"] = openpbr;
+  }
   return d;
 }
 
@@ -342,6 +385,7 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     reader.take(changed, kMaterialNumbers);
     reader.take(changed, kMaterialSwitches);
     reader.take(changed, kMaterialCounts);
+    if (changed.program == ProgramId::kOpenPbr) take_openpbr(reader, changed.openpbr);
     reader.end();
     edit.materials[id] = std::move(changed);
   });

@@ -24,6 +24,8 @@ wavecomb::Affine affine(
 /// By their names in Python and USD; throw Error for others.
 wavecomb::Projection projection_of(const std::string& name);
 wavecomb::Conform conform_of(const std::string& name);
+/// The parameters of program "openpbr" by name; throws Error for others.
+wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
 
 const char* light_kind_name(wavecomb::LightKind kind);
 

@@ -5,7 +5,8 @@ What corresponds exactly: geometry; rect, disk, sphere and dome lights; emissive
 closed (ours shine to both sides, Mitsuba's outwards); diffuse, smooth metal of a measured index,
 smooth dielectric; the camera, with a box filter. GGX agrees to within noise where little is
 scattered between facets (Mitsuba does not give that back). What is only the nearest: metal by
-colour (no Schlick there), plastic, principled. A distant light of some angle becomes a far sphere.
+colour (no Schlick there), plastic, principled, OpenPBR but for its glass and its metal without a
+tint. A distant light of some angle becomes a far sphere.
 """
 
 from __future__ import annotations
@@ -369,11 +370,17 @@ class MitsubaScene:
         program = m["program"]
         if program == "dielectric":
             return self._dielectric(m)
+        if program == "openpbr" and m.get("openpbr", {}).get("transmission_weight", 0.0) >= 0.5:
+            colour = m["openpbr"].get("transmission_color", (1.0,) * 3)
+            absorbs = m["openpbr"].get("transmission_depth", 0.0) > 0
+            plain = {"base_color": (1.0,) * 3 if absorbs else colour}
+            return self._dielectric({"roughness": m["roughness"], "ior": m["ior"], **plain})
         makers = {
             "diffuse": self._diffuse,
             "metal": self._metal,
             "plastic": self._plastic,
             "principled": self._principled,
+            "openpbr": self._principled,
         }
         if program == "emissive":
             inner: dict[str, Any] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}

@@ -129,9 +129,10 @@ class SceneBuilder:
         specular_workflow: bool = False,
         presence: bool = False,
         evaluations: int = 1,
+        openpbr: dict[str, Any] = {},
         textures: dict[str, dict[str, Any]] = {},
     ) -> int:
-        """Programs: diffuse, metal, dielectric, plastic, emissive, principled.
+        """Programs: diffuse, metal, dielectric, plastic, emissive, principled, openpbr.
 
         textures: slot -> {"texture": id, "channel": "rgb"|"r"|"g"|"b"|"a", "scale": 4 floats,
         "bias": 4 floats, "uv": 6 floats}; value = texel * scale + bias at
@@ -141,6 +142,11 @@ class SceneBuilder:
         For a metal: base_color is the reflectance at normal incidence, specular_color the tint at
         82 degrees (black: none given, untinted). evaluations: how often a hit evaluates the
         parameters; costs time and changes no picture.
+        openpbr, for the program of that name: diffuse_roughness, specular_weight, anisotropy,
+        rotation (turns), transmission_weight, transmission_color, transmission_depth,
+        subsurface_weight, subsurface_color, subsurface_anisotropy, fuzz_weight, fuzz_color,
+        fuzz_roughness, coat_color, coat_ior, coat_darkening, film_weight, film_thickness
+        (nanometres), film_ior, thin_walled. Its coat takes clearcoat and clearcoat_roughness.
         """
     def add_mesh(
         self,

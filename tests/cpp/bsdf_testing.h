@@ -15,6 +15,8 @@
 #include <vector>
 
 #include "wavecomb/material/bsdf.h"
+#include "wavecomb/material/energy_tables.h"
+#include "wavecomb/material/openpbr_params.h"
 
 namespace wavecomb::bsdf_testing {
 
@@ -166,6 +168,45 @@ inline ChiSquareResult chi_square(const Sampler& s, uint32_t seed, int samples =
   }
   const double p = used > 1 ? chi_square_p(statistic, used - 1) : 1;
   return {p, mass, accepted / samples};
+}
+
+/// Light seen on a surface in a uniform white surrounding: the mean weight in the brightest
+/// channel, radiance scaling undone.
+template <typename Bsdf>
+double furnace(const Bsdf& bsdf, const Vec3<float>& wo, uint32_t samples = 40000) {
+  double sum[3] = {0, 0, 0};
+  for (uint32_t i = 0; i < samples; ++i) {
+    const auto [l, u, v] = kronecker(i);
+    const auto s = bsdf.sample(wo, l, u, v);
+    const Vec3<float> w = s.weight * (s.eta * s.eta);
+    sum[0] += static_cast<double>(w.x);
+    sum[1] += static_cast<double>(w.y);
+    sum[2] += static_cast<double>(w.z);
+  }
+  return std::max({sum[0], sum[1], sum[2]}) / samples;
+}
+
+/// Parameters at their defaults, with a colour.
+inline OpenPbrParams<float> plain_params() {
+  const Vec3<float> black(0.f), white(1.f);
+  OpenPbrParams<float> p{};
+  p.base_color = {0.8f, 0.5f, 0.2f};
+  p.specular_color = p.emission = p.conductor_eta = p.conductor_k = p.extinction = black;
+  p.roughness = p.fuzz_roughness = 0.5f;
+  p.metallic = p.clearcoat = 0;
+  p.clearcoat_roughness = 0.01f;
+  p.opacity = 1;
+  p.normal = {0, 0, 1};
+  p.ior = 1.5f;
+  p.flags = 0;
+  p.specular_weight = p.coat_darkening = 1;
+  p.transmission_tint = p.fuzz_color = p.coat_color = white;
+  p.subsurface_color = {0.8f, 0.8f, 0.8f};
+  p.coat_ior = 1.6f;
+  p.film_thickness = 500;
+  p.film_ior = 1.4f;
+  p.energy = EnergyTables::shared().data();
+  return p;
 }
 
 }  // namespace wavecomb::bsdf_testing

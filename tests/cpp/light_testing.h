@@ -45,7 +45,7 @@ struct Lights {
         lights, triangles.size(), [&triangles](size_t i) { return triangles[i]; }, {0, 0, 0},
         scene_radius, textures, nullptr, profiles);
   }
-  LightView view() const { return set.view({nullptr, uses.data(), views.data(), false}); }
+  LightView view() const { return set.view({.uses = uses.data(), .textures = views.data()}); }
 };
 
 inline Light make_light(LightKind kind, const Affine& to_world = {}) {

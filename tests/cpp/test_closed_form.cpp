@@ -3,9 +3,8 @@
 #include "curve_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/integrate/surface.h"
+#include "wavecomb/integrate/vertex.h"
 #include "wavecomb/light/light.h"
-#include "wavecomb/material/params.h"
 #include "wavecomb/material/program_table.h"
 
 namespace wavecomb {
@@ -305,7 +304,7 @@ DirectLight direct_light(const std::shared_ptr<const Scene>& scene, uint32_t blo
   visit_program<float>(
       static_cast<ProgramId>(view.material_program[material]), [&]<typename Bsdf>() {
         const auto params =
-            fetch_params<Bsdf::kSlots, float>(view.materials, material, s.uv, 0.f, true);
+            fetch_for<Bsdf, Bsdf::kSlots, float>(view.materials, material, s.uv, 0.f, true);
         const Bsdf bsdf(params, false);
         for (uint32_t block = 0; block < blocks; ++block) {
           double bsdf_sum = 0, light_sum = 0;

@@ -82,7 +82,8 @@ TEST(Multipliers, ScaleTheDiffuseResponse) {
 }
 
 TEST(Multipliers, PartsAddUpToTheWhole) {
-  for (const ProgramId program : {ProgramId::kPlastic, ProgramId::kPrincipled, ProgramId::kMetal}) {
+  for (const ProgramId program :
+       {ProgramId::kPlastic, ProgramId::kPrincipled, ProgramId::kMetal, ProgramId::kOpenPbr}) {
     Material material = make_material(program, {0.5f, 0.5f, 0.5f}, 0.6f);
     material.clearcoat = 0.5f;
     material.clearcoat_roughness = 0.5f;

@@ -14,34 +14,29 @@ namespace wavecomb {
 namespace {
 
 using bsdf_testing::direction;
+using bsdf_testing::furnace;
 using bsdf_testing::kronecker;
+using bsdf_testing::plain_params;
 using Vec = Vec3<float>;
 
 /// A material as a program sees it.
 struct Case {
   std::string name;
   ProgramId program;
-  ShadingParams<float> params;
+  OpenPbrParams<float> params;
   bool schlick = false;
-  bool two_sided() const { return program != ProgramId::kDielectric; }
+  bool two_sided() const {
+    const bool clear = params.transmission_weight > 0 && params.thin_walled == 0;
+    return program != ProgramId::kDielectric && !(program == ProgramId::kOpenPbr && clear);
+  }
+  /// Whether light that crosses the surface bends. All but thin walls.
+  bool bends() const { return program != ProgramId::kOpenPbr || params.thin_walled == 0; }
+  /// OpenPBR scales what lies below a layer by what the viewer's side loses.
+  bool reciprocal() const {
+    return program != ProgramId::kOpenPbr || name.find("reciprocal") != std::string::npos;
+  }
   double ior() const { return static_cast<double>(params.ior); }
 };
-
-ShadingParams<float> plain_params() {
-  ShadingParams<float> p;
-  p.base_color = Vec(0.8f, 0.5f, 0.2f);
-  p.specular_color = Vec(0, 0, 0);
-  p.emission = Vec(0, 0, 0);
-  p.roughness = 0.5f;
-  p.metallic = p.clearcoat = 0;
-  p.clearcoat_roughness = 0.01f;
-  p.opacity = 1;
-  p.normal = Vec(0, 0, 1);
-  p.ior = 1.5f;
-  p.conductor_eta = p.conductor_k = Vec(0, 0, 0);
-  p.flags = 0;
-  return p;
-}
 
 template <typename Edit>
 Case make_case(std::string name, ProgramId program, Edit edit, bool schlick = false) {
@@ -50,7 +45,47 @@ Case make_case(std::string name, ProgramId program, Edit edit, bool schlick = fa
   return c;
 }
 
-using P = ShadingParams<float>;
+using P = OpenPbrParams<float>;
+
+/// OpenPBR lobe by lobe, and all of them.
+void add_openpbr_cases(std::vector<Case>& cases) {
+  const auto add = [&](std::string name, auto edit) {
+    cases.push_back(make_case("openpbr " + std::move(name), ProgramId::kOpenPbr, [&](P& p) {
+      p.specular_color = Vec(1, 1, 1);
+      edit(p);
+    }));
+  };
+  for (float r : {0.f, 0.5f, 1.f})
+    add("reciprocal diffuse", [&](P& p) { p.diffuse_roughness = r, p.specular_weight = 0; });
+  for (float r : {0.f, 0.2f, 0.7f}) {
+    add("metal",
+        [&](P& p) { p.metallic = 1, p.roughness = r, p.specular_color = Vec(0.8f, 0.9f, 1); });
+    add("glossy", [&](P& p) { p.roughness = r, p.diffuse_roughness = 0.5f; });
+    add("glass", [&](P& p) { p.transmission_weight = 1, p.roughness = r; });
+    add("coat", [&](P& p) {
+      p.clearcoat = 0.8f, p.clearcoat_roughness = r, p.coat_color = Vec(1, 0.6f, 0.3f);
+    });
+  }
+  // Facets of this coat often reflect to below, where the base transmits.
+  add("coated glass", [](P& p) {
+    p.transmission_weight = 1, p.roughness = 0.2f, p.clearcoat = 1, p.clearcoat_roughness = 1;
+  });
+  add("brushed",
+      [](P& p) { p.metallic = 1, p.roughness = 0.4f, p.anisotropy = 0.8f, p.rotation = 0.15f; });
+  add("fuzz", [](P& p) { p.fuzz_weight = 0.7f, p.fuzz_roughness = 0.4f; });
+  add("wall", [](P& p) {
+    p.thin_walled = 1, p.transmission_weight = 0.5f, p.roughness = 0.4f;
+    p.subsurface_weight = 0.6f, p.subsurface_anisotropy = 0.2f;
+  });
+  add("film", [](P& p) { p.film_weight = 0.9f, p.metallic = 0.3f, p.transmission_weight = 0.4f; });
+  add("all", [](P& p) {
+    p.metallic = 0.3f, p.transmission_weight = 0.4f, p.roughness = 0.4f, p.anisotropy = 0.3f;
+    p.specular_weight = 0.7f, p.diffuse_roughness = 0.8f, p.clearcoat = 0.6f;
+    p.clearcoat_roughness = 0.2f, p.coat_color = Vec(0.9f, 0.8f, 0.7f), p.fuzz_weight = 0.5f;
+    p.fuzz_color = Vec(0.9f, 0.5f, 0.5f), p.film_weight = 0.5f;
+    p.subsurface_weight = 0.5f, p.specular_color = Vec(0.9f, 0.9f, 0.5f);
+  });
+}
 
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
@@ -94,6 +129,7 @@ std::vector<Case> all_cases() {
   add("principled pane", ProgramId::kPrincipled,
       [](P& p) { p.opacity = 0.3f, p.clearcoat = 0.7f; });
   add("principled schlick", ProgramId::kPrincipled, [](P&) {}, true);
+  add_openpbr_cases(cases);
   return cases;
 }
 
@@ -176,8 +212,36 @@ TEST(Programs, WeightIsValueOverDensity) {
               << c.name << " " << wo.z;
           EXPECT_NEAR(s.weight.z, e.f_cos.z / e.pdf, 5e-3 * s.weight.z + 1e-5)
               << c.name << " " << wo.z;
-          EXPECT_EQ(s.eta != 1.f, s.wi.z * wo.z < 0) << c.name;
+          EXPECT_EQ(s.eta != 1.f, s.wi.z * wo.z < 0 && c.bends()) << c.name;
         }
+    });
+}
+
+TEST(Programs, DiffusePartIsOfTheWhole) {
+  for (const Case& c : all_cases())
+    with_bsdf(c, [&](const auto& bsdf) {
+      double diffuse = 0, rest = 0;
+      for (const Vec& wo : views(c))
+        for (uint32_t i = 0; i < 300; ++i) {
+          const auto [l, u, v] = kronecker(i);
+          const Vec wi = direction(2.0 * u - 1, 7.0 * v);
+          const Vec whole = bsdf.eval(wo, wi).f_cos, part = bsdf.diffuse_f_cos(wo, wi);
+          for (const auto& [a, b] :
+               {std::pair(part.x, whole.x), {part.y, whole.y}, {part.z, whole.z}}) {
+            EXPECT_GE(a, 0.f) << c.name;
+            EXPECT_LE(a, b * 1.00001f) << c.name << " " << wo.z << " " << wi.z;
+          }
+          diffuse += part.x;
+          rest += whole.x - part.x;
+        }
+      if (c.program != ProgramId::kOpenPbr) return;
+      // Metal and glass have no diffuse part, EON without a specular lobe has no other.
+      const P& p = c.params;
+      const bool opaque = p.metallic < 1 && p.transmission_weight < 1;
+      EXPECT_EQ(diffuse > 0, opaque) << c.name;
+      if (c.name.find("reciprocal diffuse") != std::string::npos) {
+        EXPECT_NEAR(rest, 0, 1e-5 * diffuse) << c.name;
+      }
     });
 }
 
@@ -185,7 +249,8 @@ TEST(Programs, ReciprocityHolds) {
   // f(o, i) / n_o^2 = f(i, o) / n_i^2 (Veach 1997, eq. 5.14).
   std::mt19937 rng(11);
   std::uniform_real_distribution<double> unit(-1, 1);
-  for (const Case& c : all_cases())
+  for (const Case& c : all_cases()) {
+    if (!c.reciprocal()) continue;
     with_bsdf(c, [&](const auto& bsdf) {
       int compared = 0;
       for (int i = 0; i < 2000; ++i) {
@@ -204,29 +269,16 @@ TEST(Programs, ReciprocityHolds) {
         EXPECT_GT(compared, 50) << c.name;
       }
     });
-}
-
-/// Light seen on a surface in a uniform white surrounding: the mean weight in the brightest
-/// channel, radiance scaling undone.
-template <typename Bsdf>
-double furnace(const Bsdf& bsdf, const Vec& wo, uint32_t samples = 40000) {
-  double sum[3] = {0, 0, 0};
-  for (uint32_t i = 0; i < samples; ++i) {
-    const auto [l, u, v] = kronecker(i);
-    const auto s = bsdf.sample(wo, l, u, v);
-    const Vec w = s.weight * (s.eta * s.eta);
-    sum[0] += static_cast<double>(w.x);
-    sum[1] += static_cast<double>(w.y);
-    sum[2] += static_cast<double>(w.z);
   }
-  return std::max({sum[0], sum[1], sum[2]}) / samples;
 }
 
 TEST(Programs, WhiteFurnaceNeverGains) {
   for (Case c : all_cases()) {
     c.params.base_color = Vec(1, 1, 1);
     with_bsdf(c, [&](const auto& bsdf) {
-      for (const Vec& wo : views(c)) EXPECT_LE(furnace(bsdf, wo), 1.004) << c.name << " " << wo.z;
+      // Of brushed surfaces the energy is known less well.
+      const double most = c.params.anisotropy > 0.5f ? 1.03 : 1.004;
+      for (const Vec& wo : views(c)) EXPECT_LE(furnace(bsdf, wo), most) << c.name << " " << wo.z;
     });
   }
 }
@@ -307,7 +359,7 @@ constexpr size_t kRecorded = 18;
 
 /// One random input of every kind, some at the edges.
 struct Inputs {
-  ShadingParams<float> params;
+  OpenPbrParams<float> params;
   Vec wo, wi;
   float l, u, v;
 };
@@ -331,6 +383,18 @@ Inputs random_inputs(std::mt19937& rng) {
   in.params.conductor_eta = Vec(3 * edgy(), 3 * edgy(), 3 * edgy());
   in.params.conductor_k = Vec(5 * edgy(), 5 * edgy(), 5 * edgy());
   in.params.flags = rng() % 8;
+  P& p = in.params;
+  const auto colour = [&] { return Vec(edgy(), edgy(), edgy()); };
+  for (float* x : {&p.diffuse_roughness, &p.specular_weight, &p.anisotropy, &p.rotation,
+                   &p.transmission_weight, &p.subsurface_weight, &p.subsurface_anisotropy,
+                   &p.fuzz_weight, &p.fuzz_roughness, &p.coat_darkening, &p.film_weight})
+    *x = edgy();
+  for (Vec* c : {&p.transmission_tint, &p.subsurface_color, &p.fuzz_color, &p.coat_color})
+    *c = colour();
+  p.coat_ior = iors[rng() % 9];
+  p.film_thickness = 2000 * edgy();
+  p.film_ior = 1 + edgy();
+  p.thin_walled = static_cast<float>(rng() % 2);
   const auto any_direction = [&] {
     const double grazing[] = {0, 1e-7, -1e-7, 1e-3, -1e-3, 1, -1};
     const double z = rng() % 4 == 0 ? grazing[rng() % 7] : 2.0 * unit(rng) - 1;
@@ -367,7 +431,35 @@ void expect_packet_equals_scalar(ProgramId id) {
                      packet([&](const Inputs& i) { return get(i).y; }),
                      packet([&](const Inputs& i) { return get(i).z; }));
     };
-    ShadingParams<F> p;
+    OpenPbrParams<F> p;
+    p.energy = in[0].params.energy;
+    using Q = OpenPbrParams<F>;
+    const std::pair<Vec P::*, Color<F> Q::*> colours[] = {
+        {&P::transmission_tint, &Q::transmission_tint},
+        {&P::extinction, &Q::extinction},
+        {&P::subsurface_color, &Q::subsurface_color},
+        {&P::fuzz_color, &Q::fuzz_color},
+        {&P::coat_color, &Q::coat_color}};
+    for (const auto& [from, to] : colours)
+      p.*to = vec([from = from](const Inputs& i) { return i.params.*from; });
+    const std::pair<float P::*, F Q::*> numbers[] = {
+        {&P::diffuse_roughness, &Q::diffuse_roughness},
+        {&P::specular_weight, &Q::specular_weight},
+        {&P::anisotropy, &Q::anisotropy},
+        {&P::rotation, &Q::rotation},
+        {&P::transmission_weight, &Q::transmission_weight},
+        {&P::subsurface_weight, &Q::subsurface_weight},
+        {&P::subsurface_anisotropy, &Q::subsurface_anisotropy},
+        {&P::fuzz_weight, &Q::fuzz_weight},
+        {&P::fuzz_roughness, &Q::fuzz_roughness},
+        {&P::coat_ior, &Q::coat_ior},
+        {&P::coat_darkening, &Q::coat_darkening},
+        {&P::film_weight, &Q::film_weight},
+        {&P::film_thickness, &Q::film_thickness},
+        {&P::film_ior, &Q::film_ior},
+        {&P::thin_walled, &Q::thin_walled}};
+    for (const auto& [from, to] : numbers)
+      p.*to = packet([from = from](const Inputs& i) { return i.params.*from; });
     p.base_color = vec([](const Inputs& i) { return i.params.base_color; });
     p.specular_color = vec([](const Inputs& i) { return i.params.specular_color; });
     p.emission = vec([](const Inputs& i) { return i.params.emission; });

@@ -72,6 +72,88 @@ def texture_scene() -> Any:
     return builder.build()
 
 
+OPENPBR_LOBES: dict[str, dict[str, Any]] = {
+    "Rough": {"openpbr": {"diffuse_roughness": 0.8, "specular_weight": 0.0}},
+    "Gloss": {"roughness": 0.2, "specular_color": (0.5, 0.8, 1.0)},
+    "Brushed": {
+        "metallic": 1.0,
+        "roughness": 0.4,
+        "openpbr": {"anisotropy": 0.8, "rotation": 0.15},
+    },
+    "Mirror": {"metallic": 1.0, "roughness": 0.0},
+    "Glass": {"roughness": 0.0, "openpbr": {"transmission_weight": 1.0}},
+    "Absorbing": {
+        "roughness": 0.3,
+        "openpbr": {
+            "transmission_weight": 1.0,
+            "transmission_color": (0.2, 0.8, 0.4),
+            "transmission_depth": 0.5,
+        },
+    },
+    "Wall": {
+        "openpbr": {
+            "thin_walled": True,
+            "transmission_weight": 0.5,
+            "subsurface_weight": 0.6,
+            "subsurface_anisotropy": 0.2,
+        }
+    },
+    "Coat": {
+        "clearcoat": 0.9,
+        "clearcoat_roughness": 0.3,
+        "openpbr": {"coat_color": (0.9, 0.5, 0.3)},
+    },
+    "Varnish": {"clearcoat": 1.0, "clearcoat_roughness": 0.0, "roughness": 0.5},
+    "Film": {"roughness": 0.1, "openpbr": {"film_weight": 1.0, "film_thickness": 350.0}},
+    "Fuzz": {"openpbr": {"fuzz_weight": 1.0, "fuzz_color": (0.9, 0.6, 0.6)}},
+    "All": {
+        "metallic": 0.3,
+        "roughness": 0.4,
+        "clearcoat": 0.6,
+        "clearcoat_roughness": 0.2,
+        "emission": (0.1, 0.0, 0.0),
+        "openpbr": {
+            "transmission_weight": 0.4,
+            "fuzz_weight": 0.5,
+            "film_weight": 0.5,
+            "subsurface_weight": 0.5,
+            "anisotropy": 0.3,
+        },
+    },
+}
+"""Materials by name: each lobe of OpenPBR, and all of them."""
+
+
+def openpbr_scene() -> Any:
+    """Closed boxes of each of ``OPENPBR_LOBES``, side by side before a wall."""
+    builder = wavecomb.SceneBuilder()
+    corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)), np.float32)
+    faces = [
+        (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
+        (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+    ]  # fmt: skip
+    turned = np.linalg.qr(np.array([[2.0, 1.0, 0.5], [-1.0, 2.0, 0.7], [0.3, -0.8, 2.0]]))[0]
+    turned *= np.sign(np.linalg.det(turned))
+    for i, (name, values) in enumerate(OPENPBR_LOBES.items()):
+        material = builder.add_material("openpbr", name=name, base_color=(0.8, 0.7, 0.5), **values)
+        points = corners @ turned.T + np.array([1.5 * (i % 4) - 2.25, 1.5 * (i // 4) - 1.5, -8.0])
+        mesh = builder.add_mesh(
+            points.astype(np.float32), np.array(faces, np.uint32), material=material
+        )
+        builder.add_to_group(0, mesh)
+    grey = builder.add_material("diffuse", name="Grey", base_color=(0.6, 0.6, 0.6))
+    back = np.array([[-9, -9, -9.5], [9, -9, -9.5], [9, 9, -9.5], [-9, 9, -9.5]], np.float32)
+    builder.add_to_group(
+        0, builder.add_mesh(back, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), material=grey)
+    )
+    builder.add_light("dome", np.eye(4), color=(0.4, 0.5, 0.6), name="Sky")
+    lamp = np.eye(4)
+    lamp[3, :3] = (1.0, 3.0, 0.0)
+    builder.add_light("sphere", lamp, color=(40, 38, 35), radius=0.5, name="Lamp")
+    builder.set_camera(np.eye(4), window=(-0.45, 0.45, -0.3, 0.3))
+    return builder.build()
+
+
 @pytest.fixture(scope="session")
 def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Scenes by name, each made once."""
@@ -80,6 +162,8 @@ def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
         if name not in _loaded:
             if name == "textures":
                 _loaded[name] = texture_scene()
+            elif name == "openpbr":
+                _loaded[name] = openpbr_scene()
             else:
                 from wavecomb.scenes import write_scene
 
@@ -246,6 +330,21 @@ def test_a_senseless_order_gives_the_same_picture(scene: str, scene_of: Any) -> 
             scene_of(scene), (48, 32), 8, policy=Shuffled(), roulette=roulette, costs="model"
         )
         expect_equal(picture, plain(scene_of, scene, roulette, (48, 32), 8), roulette)
+
+
+def test_all_lobes_of_openpbr_are_one_picture(scene_of: Any) -> None:
+    scene, size = scene_of("openpbr"), (48, 32)
+    expected = render(scene, size, 8, integrator="reference", threads=1)
+    assert np.isfinite(expected.beauty).all() and expected.beauty.mean() > 0.05
+    widths = _core.lane_widths()
+    for lanes, policy, threads in itertools.product(
+        (widths[0], widths[-1]), ("none", "material"), (1, 2)
+    ):
+        picture = render(scene, size, 8, lanes=lanes, policy=policy, threads=threads, wave_size=256)
+        same = picture.beauty.tobytes() == expected.beauty.tobytes()
+        assert same, (lanes, policy, threads)
+    used = {material["name"] for material in picture.stats["materials"] if material["records"]}
+    assert used >= set(OPENPBR_LOBES)
 
 
 def test_roulettes_are_different_estimates(scene_of: Any) -> None:

@@ -479,7 +479,7 @@ def test_primvar_readers(tmp_path):
             "ND_standard_surface_surfaceshader",
             "color3f inputs:base_color = (1, 0.5, 0)\nfloat inputs:base = 0.5\n"
             "float inputs:metalness = 1\nfloat inputs:specular_roughness = 0.25",
-            "principled",
+            "openpbr",
             {"base_color": (0.5, 0.25, 0), "metallic": 1, "roughness": 0.25},
         ),
         (
@@ -487,14 +487,18 @@ def test_primvar_readers(tmp_path):
             "float inputs:transmission_weight = 1\nfloat inputs:specular_ior = 1.25\n"
             "float inputs:specular_roughness = 0\n"
             "color3f inputs:transmission_color = (0.5, 1, 1)",
-            "dielectric",
-            {"base_color": (0.5, 1, 1), "ior": 1.25, "roughness": 0},
+            "openpbr",
+            {
+                "ior": 1.25,
+                "roughness": 0,
+                "openpbr": {"transmission_weight": 1, "transmission_color": (0.5, 1, 1)},
+            },
         ),
         (
             "ND_gltf_pbr_surfaceshader",
             "color3f inputs:base_color = (1, 0.5, 0)\nfloat inputs:metallic = 0\n"
             "float inputs:roughness = 0.5\nfloat inputs:clearcoat = 0.5",
-            "principled",
+            "openpbr",
             {"base_color": (1, 0.5, 0), "metallic": 0, "roughness": 0.5, "clearcoat": 0.5},
         ),
         (
@@ -514,9 +518,57 @@ def test_materialx_constants(tmp_path, identifier, inputs, program, expected):
     got = scene.material_of("M")
     assert got["program"] == program
     for key, value in expected.items():
-        assert got[key] == pytest.approx(value), key
-    if "UsdPreview" not in identifier:
-        assert "MaterialX" in said(loaded) and "/Mat" in said(loaded)
+        if key == "openpbr":
+            for layer, number in value.items():
+                assert got[key][layer] == pytest.approx(number), layer
+        else:
+            assert got[key] == pytest.approx(value), key
+    assert "MaterialX" not in said(loaded)
+
+
+def test_materialx_layers(tmp_path):
+    """Standard Surface as its published translation to OpenPBR has it, and what has no effect."""
+    text = surface(
+        """float inputs:sheen = 0.5
+        float inputs:thin_film_thickness = 300
+        float inputs:coat_affect_color = 0.25
+        float inputs:specular_anisotropy = 0.5
+        float inputs:subsurface = 0.75
+        bool inputs:thin_walled = true
+        float inputs:transmission_dispersion = 20
+        float inputs:diffuse_roughness.connect = </Mat/I.outputs:out>""",
+        """def Shader "I" { uniform token info:id = "ND_image_float"
+        float inputs:default = 0.125
+        float outputs:out }""",
+    ).replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader")
+    scene, loaded = load(tmp_path, text)
+    layers = scene.material_of("M")["openpbr"]
+    assert layers["fuzz_weight"] == 0.5 and layers["fuzz_roughness"] == pytest.approx(0.3)
+    assert layers["film_weight"] == 1 and layers["film_thickness"] == 300
+    assert layers["coat_darkening"] == 0.25 and layers["anisotropy"] == 0.5
+    assert layers["thin_walled"] is True
+    assert layers["diffuse_roughness"] == 0.125
+    told = said(loaded)
+    assert "subsurface scattering" in told and "/Mat" in told
+    assert "transmission_dispersion (ignored)" in told
+    assert "diffuse_roughness by a node" in told
+
+
+def test_gltf_glass_is_a_wall_or_absorbs(tmp_path):
+    glass = """float inputs:transmission = 1
+        color3f inputs:attenuation_color = (0.5, 1, 0.5)
+        float inputs:attenuation_distance = 2
+        float inputs:thickness = {}"""
+    found = []
+    for thickness in (0, 1):
+        text = surface(glass.format(thickness))
+        text = text.replace("UsdPreviewSurface", "ND_gltf_pbr_surfaceshader")
+        scene, _ = load(tmp_path, text)
+        found.append(scene.material_of("M")["openpbr"])
+    wall, solid = found
+    assert wall["thin_walled"] and wall["transmission_depth"] == 0
+    assert not solid["thin_walled"] and solid["transmission_depth"] == 2
+    assert solid["transmission_color"] == pytest.approx((0.5, 1, 0.5))
 
 
 def test_materialx_image(tmp_path):

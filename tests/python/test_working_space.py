@@ -63,6 +63,29 @@ def test_all_colours_are_converted(tmp_path):
     assert scene.lights[0]["color"] == pytest.approx(2 * red)
 
 
+def test_colours_of_openpbr_are_converted(tmp_path):
+    layers = ("transmission_color", "subsurface_color", "fuzz_color", "coat_color")
+    colours = "\n".join(f"color3f inputs:{name} = {RED}" for name in (*layers, "specular_color"))
+    text = f"""def Material "Mat" {{
+        token outputs:mtlx:surface.connect = </Mat/S.outputs:out>
+        def Shader "S" {{
+            uniform token info:id = "ND_open_pbr_surface_surfaceshader"
+            {colours}
+            token outputs:out
+        }}
+    }}
+    def Mesh "M" (prepend apiSchemas = ["MaterialBindingAPI"]) {{ {QUAD}
+        rel material:binding = </Mat> }}"""
+    for space in ("rec709", "acescg"):
+        scene, _ = load(tmp_path, text, working_space=space)
+        got = scene.material_of("M")
+        expected = from_rec709(np.array(RED), space)
+        assert got["specular_color"] == pytest.approx(expected)
+        for name in layers:
+            assert got["openpbr"][name] == pytest.approx(expected), name
+        assert got["openpbr"]["coat_ior"] == pytest.approx(1.6)  # a number is left alone
+
+
 def test_colours_beyond_rec709_are_kept(tmp_path):
     text = STAGE.replace(
         f"inputs:color = {RED}", 'inputs:color = (1, 0, 0) (colorSpace = "acescg")'

@@ -158,6 +158,8 @@ _KINDS = {
     "specularColor": "color3f",
     "emissiveColor": "color3f",
     "useSpecularWorkflow": "int",
+    "base_color": "color3f",
+    "transmission_color": "color3f",
 }
 
 

@@ -214,6 +214,33 @@ def test_gold(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> 
     check(f"gold {roughness}", scene)
 
 
+def open_pbr(name: str, **inputs: Any) -> str:
+    """A MaterialX OpenPBR Surface."""
+    text = material(name, "", **inputs).replace('custom string wavecomb:program = ""', "")
+    text = text.replace('"UsdPreviewSurface"', '"ND_open_pbr_surface_surfaceshader"')
+    return text.replace("outputs:surface.connect", "outputs:mtlx:surface.connect")
+
+
+@pytest.mark.parametrize("lobe", ["metal", "rough metal", "glass", "rough glass"])
+def test_openpbr(check: Check, recorded: Any, tmp_path: Path, lobe: str) -> None:
+    """Metal is Mitsuba's principled of metallic 1, glass its dielectric; see test_gold."""
+    roughness = 0.2 if lobe.startswith("rough") else 0.0
+    if lobe.endswith("metal"):
+        body = open_pbr(
+            "M", base_color=(0.9, 0.6, 0.3), base_metalness=1.0, specular_roughness=roughness
+        )
+    else:
+        body = open_pbr(
+            "M", transmission_weight=1.0, transmission_color=(0.9, 1.0, 0.8),
+            specular_roughness=roughness, specular_ior=1.5,
+        )  # fmt: skip
+    ball = sphere("Ball", "M", (0, 1.01, 0), rings=8)
+    dome = light("Dome", texture=write_sky(tmp_path))
+    scene = recorded(VIEW, dome, GREY, body, ground("Grey"), ball)
+    assert any(m["program"] == "openpbr" for m in scene.materials)
+    check(f"openpbr {lobe}", scene, max_depth=8)
+
+
 @pytest.mark.parametrize("program", ["metal", "dielectric"])
 def test_highlight(check: Check, recorded: Any, program: str) -> None:
     """A small lamp in a rough surface: the width of the lobe (5 % of alpha would be found).

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.usd.materialx import MaterialXReader, model_of
 from wavecomb.usd.network import shader_id
+from wavecomb.usd.openpbr import OPENPBR_COLOURS
 from wavecomb.usd.preview import PreviewReader
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface, fallback_surface
@@ -157,11 +158,7 @@ class MaterialTable:
         number = self._ids.get(key)
         if number is None:
             brightest = surface.brightest()
-            parameters = dict(surface.parameters)
-            for slot in COLOUR_SLOTS if self._textures.working != "rec709" else ():
-                if slot in parameters:
-                    colour = from_rec709(np.array(parameters[slot]), self._textures.working)
-                    parameters[slot] = tuple(float(value) for value in colour)
+            parameters = self._in_working_space(surface.parameters)
             self.glows = self.glows or brightest >= LAMP
             number = self._builder.add_material(
                 surface.program,
@@ -176,6 +173,25 @@ class MaterialTable:
         # Holding the surface keeps its address from being used again.
         self._surface_ids[id(surface)] = (surface, number)
         return number
+
+    def _in_working_space(self, parameters: dict[str, Any]) -> dict[str, Any]:
+        """Parameters whose colours are those of the working space."""
+        working = self._textures.working
+        if working == "rec709":
+            return parameters
+
+        def converted(values: dict[str, Any], colours: Iterable[str]) -> dict[str, Any]:
+            there = {
+                name: tuple(float(x) for x in from_rec709(np.array(values[name]), working))
+                for name in colours
+                if name in values
+            }
+            return {**values, **there}
+
+        parameters = converted(parameters, COLOUR_SLOTS)
+        if "openpbr" in parameters:
+            parameters["openpbr"] = converted(parameters["openpbr"], OPENPBR_COLOURS)
+        return parameters
 
     def paths(self) -> tuple[str, ...]:
         """Prim of each material by id, "" of display colours."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX surface shaders, approximated by the programs there are.
+"""MaterialX surface shaders, as the program "openpbr".
 
 Constants, and images that are connected directly or through simple nodes, of standard_surface,
 open_pbr_surface, gltf_pbr and MaterialX's UsdPreviewSurface.
@@ -22,6 +22,7 @@ from wavecomb.usd.network import (
     source_of,
     value_of,
 )
+from wavecomb.usd.openpbr import layers_of
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.texture import asset_file
 
@@ -53,6 +54,7 @@ class Model:
     emission_weight: tuple[str, float] = ("emission", 0.0)
     clearcoat: tuple[str, float] = ("coat", 0.0)
     clearcoat_roughness: tuple[str, float] = ("coat_roughness", 0.1)
+    specular_color: tuple[str, Colour] = ("specular_color", _WHITE)
     opacity: tuple[str, float] = ("opacity", 1.0)
     normal: str = "normal"
 
@@ -71,6 +73,7 @@ MODELS: dict[str, Model] = {
         ("emission_luminance", 0.0),
         ("coat_weight", 0.0),
         ("coat_roughness", 0.0),
+        ("specular_color", _WHITE),
         ("geometry_opacity", 1.0),
         "geometry_normal",
     ),
@@ -86,6 +89,7 @@ MODELS: dict[str, Model] = {
         ("emissive_strength", 1.0),
         ("clearcoat", 0.0),
         ("clearcoat_roughness", 0.0),
+        ("specular_color", _WHITE),
         ("alpha", 1.0),
     ),
 }
@@ -111,33 +115,26 @@ class MaterialXReader:
         self._tried: set[tuple[str, str, str]] = set()
 
     def read(self, shader: UsdShade.Shader, model_name: str) -> Surface:
-        """The nearest surface: dielectric where it mostly transmits, else principled."""
+        """The surface: slots, and layers beside them."""
         model = MODELS[model_name]
-        self.report.missing(f"MaterialX {model_name} (approximated)", self.material.GetPath())
-        metallic = self._number(shader, "metallic", model.metallic)
-        transmission = self._number(shader, "", model.transmission)
         weight = self._number(shader, "", model.base_weight)
-        base = self._colour(shader, "base_color", model.base_color, weight)
-        roughness = self._number(shader, "roughness", model.roughness)
+        ior = self._number(shader, "", model.ior)
+        if ior <= 0.0:
+            self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
+            ior = 1.5
         parameters: dict[str, Any] = {
-            "roughness": roughness,
-            "ior": self._number(shader, "", model.ior),
-        }
-        if transmission >= 0.5 and metallic < 0.5:
-            tint = self._colour(shader, "", model.transmission_color, 1.0)
-            slots = {k: v for k, v in self.slots.items() if k == "roughness"}
-            if not model.transmission_color[0]:
-                tint = base
-            return self._surface("dielectric", {**parameters, "base_color": tint}, slots)
-        parameters |= {
-            "base_color": base,
-            "metallic": metallic,
+            "base_color": self._colour(shader, "base_color", model.base_color, weight),
+            "specular_color": self._colour(shader, "specular_color", model.specular_color, 1.0),
+            "roughness": self._number(shader, "roughness", model.roughness),
+            "metallic": self._number(shader, "metallic", model.metallic),
+            "ior": ior,
             "clearcoat": self._number(shader, "clearcoat", model.clearcoat),
             "clearcoat_roughness": self._number(
                 shader, "clearcoat_roughness", model.clearcoat_roughness
             ),
             "opacity": self._number(shader, "opacity", model.opacity),
             "presence": True,
+            "openpbr": layers_of(model_name, _Constants(self, shader, model_name)),
         }
         glow = self._number(shader, "", model.emission_weight)
         if model_name == "open_pbr_surface":
@@ -146,7 +143,7 @@ class MaterialXReader:
         if glow > 0:
             parameters["emission"] = self._colour(shader, "emission", model.emission, glow)
         self._normal(shader, model.normal)
-        return self._surface("principled", parameters, self.slots)
+        return self._surface("openpbr", parameters, self.slots)
 
     def _surface(self, program: str, parameters: dict[str, Any], slots: dict[str, Any]) -> Surface:
         names = tuple(dict.fromkeys(self.uv_names))
@@ -164,6 +161,10 @@ class MaterialXReader:
         value = self._value(shader, name, slot, weight) if name else None
         r, g, b = colour(value, default)
         return (r * weight, g * weight, b * weight)
+
+    def constant(self, shader: UsdShade.Shader, name: str) -> Any:
+        """What an input comes to as one value; None for its default."""
+        return self._value(shader, name, "", 1.0)
 
     def _normal(self, shader: UsdShade.Shader, name: str) -> None:
         source = source_of(shader, name, self.time)
@@ -258,6 +259,42 @@ class MaterialXReader:
             if name:
                 return str(name)
         return "st"
+
+
+class _Constants:
+    """Inputs that have no slot, as constants; what drives them otherwise is reported."""
+
+    def __init__(self, reader: MaterialXReader, shader: UsdShade.Shader, model: str) -> None:
+        self._reader = reader
+        self._shader = shader
+        self._model = model
+
+    def number(self, name: str, default: float) -> float:
+        return number(self._constant(name), default)
+
+    def colour(self, name: str, default: Colour) -> Colour:
+        return colour(self._constant(name), default)
+
+    def ignored(self, *names: str) -> None:
+        for name in names:
+            given = self._shader.GetInput(name)
+            if given and (given.HasConnectedSource() or given.Get(self._reader.time) is not None):
+                self._missing(f"MaterialX {self._model} input {name} (ignored)")
+
+    def approximated(self, what: str) -> None:
+        self._missing(f"{what}: approximated")
+
+    def _constant(self, name: str) -> Any:
+        source = source_of(self._shader, name, self._reader.time)
+        if source is None or source.is_value:
+            return None if source is None else source.value
+        node = source.shader
+        if node is None or not shader_id(node).startswith("ND_constant"):
+            self._missing(f"MaterialX {self._model} input {name} by a node (one value for all)")
+        return self._reader.constant(self._shader, name)
+
+    def _missing(self, what: str) -> None:
+        self._reader.report.missing(what, self._reader.material.GetPath())
 
 
 def _is_colour_like(value: Any) -> bool:

@@ -105,23 +105,17 @@ class _Tracer:
         glow = self._weight(model.emission_weight)
         if model_name == "open_pbr_surface":
             glow /= 1000.0
-        clear = self._weight(model.transmission) >= 0.5 and self._weight(model.metallic) < 0.5
-        base = model.base_color
-        if clear and model.transmission_color[0]:
-            base, weight = model.transmission_color, 1.0
         specs = [
-            ("base_color", base, weight),
+            ("base_color", model.base_color, weight),
             ("roughness", model.roughness, 1.0),
             ("ior", model.ior, 1.0),
+            ("metallic", model.metallic, 1.0),
+            ("specular_color", model.specular_color, 1.0),
+            ("clearcoat", model.clearcoat, 1.0),
+            ("clearcoat_roughness", model.clearcoat_roughness, 1.0),
+            ("opacity", model.opacity, 1.0),
+            ("emission", model.emission, glow),
         ]
-        if not clear:
-            specs += [
-                ("metallic", model.metallic, 1.0),
-                ("clearcoat", model.clearcoat, 1.0),
-                ("clearcoat_roughness", model.clearcoat_roughness, 1.0),
-                ("opacity", model.opacity, 1.0),
-                ("emission", model.emission, glow),
-            ]
         out: dict[str, Parameter] = {}
         for slot, (name, default), factor in specs:
             if name:

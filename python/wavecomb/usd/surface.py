@@ -25,7 +25,7 @@ class Surface:
 
     Attributes:
         name: For messages.
-        program: diffuse, metal, dielectric, plastic, emissive or principled.
+        program: diffuse, metal, dielectric, plastic, emissive, principled or openpbr.
         parameters: Keyword arguments of ``SceneBuilder.add_material``.
         textures: Slots as ``SceneBuilder.add_material`` takes them.
         uv_names: Primvars that hold texture coordinates, first use first.

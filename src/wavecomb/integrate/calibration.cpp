@@ -65,7 +65,7 @@ std::vector<MaterialTraits> material_traits(const Scene& scene) {
 }
 
 CostSnapshot model_costs(const Scene& scene) {
-  constexpr float kProgramNs[kProgramCount] = {60, 75, 70, 85, 20, 110};
+  constexpr float kProgramNs[kProgramCount] = {60, 75, 70, 85, 20, 110, 300};
   constexpr float kTextureNs = 25;
   CostSnapshot costs;
   costs.texture_ns.assign(scene.textures().size(), kTextureNs);

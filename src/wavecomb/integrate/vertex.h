@@ -205,6 +205,16 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
 }
 
+/// The parameters that program `Bsdf` takes.
+template <typename Bsdf, uint32_t kSlots, typename F>
+WAVECOMB_INLINE auto fetch_for(const MaterialView& materials, const UInt<F>& material,
+                               const Vec2<F>& uv, const F& uv_width, const Mask<F>& active) {
+  if constexpr (Bsdf::kProgram == ProgramId::kOpenPbr)
+    return fetch_openpbr<kSlots, F>(materials, material, uv, uv_width, active);
+  else
+    return fetch_params<kSlots, F>(materials, material, uv, uv_width, active);
+}
+
 /// Shades vertex `depth` (0: the camera's first hit) of the active lanes' paths with program
 /// `Bsdf`. `material` and `geom` (geometry within the instance's group) belong to `hit`; t is the
 /// length of the ray.
@@ -226,8 +236,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   if (wants_lights) aovs->emitter = aovs->lit_by = U(kNoLight);
 
   // Programs that emit read one slot more than their BSDF does.
-  constexpr bool kEmits =
-      Bsdf::kProgram == ProgramId::kEmissive || Bsdf::kProgram == ProgramId::kPrincipled;
+  constexpr bool kEmits = can_emit(Bsdf::kProgram);
   constexpr uint32_t kSlots = Bsdf::kSlots | (kEmits ? slot_bit(Slot::kEmission) : 0u);
 
   // Texture coordinates are worked out only where a texture is read.
@@ -237,17 +246,20 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
                             Mask<U>(active));
   const Mask<F> reads_texture = active & Mask<F>((slots & kSlots) != U(0u));
   const bool textured = any(reads_texture);
-  constexpr bool kOpaque = Bsdf::kProgram != ProgramId::kDielectric;
+  constexpr bool kSolid = Bsdf::kProgram != ProgramId::kDielectric;
+  constexpr bool kOpaque = kSolid && Bsdf::kProgram != ProgramId::kOpenPbr;
   const bool wants_uv = textured || (aovs && aovs->wants_uv);
-  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, wants_uv, kOpaque, active);
+  const Surface<F> s = setup_surface<F>(scene, hit, path.dir, wants_uv, kSolid, active);
   const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
   const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
 
   MaterialView materials = scene.materials;
   materials.schlick_fresnel = settings.schlick_fresnel;
-  const ShadingParams<F> params =
-      fetch_params<kSlots, F>(materials, material, s.uv, uv_width, active);
+  const auto params = fetch_for<Bsdf, kSlots, F>(materials, material, s.uv, uv_width, active);
   const Bsdf bsdf(params, settings.schlick_fresnel);
+  Color<F> throughput = path.throughput;
+  if constexpr (Bsdf::kProgram == ProgramId::kOpenPbr)
+    throughput *= openpbr_transmittance<F>(params, t, F(-dot(path.dir, s.ng)));
 
   if constexpr (kEmits) {
     const Mask<F> emits = active & not_(is_black(params.emission));
@@ -270,8 +282,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
                              F(0.f));
       }
       const F w = bounce_weight<F>(path.pdf, light_pdf);
-      const Color<F> e =
-          clean<F>(path.throughput * params.emission * w, clamp_limit(settings, depth));
+      const Color<F> e = clean<F>(throughput * params.emission * w, clamp_limit(settings, depth));
       out.emitted = select<F>(emits, e, Color<F>(F(0.f)));
     }
   }
@@ -346,7 +357,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
       out.shadow_set = shadow_set<F>(scene.lights, light, lit);
     }
     const Color<F> c =
-        clean<F>(path.throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));
+        clean<F>(throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
     if (wants_lights) aovs->lit_by = light;
@@ -371,7 +382,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   }
   const Vec3<F> d = normalize(frame.to_world(b.wi));
   out.next.dir = d;
-  out.next.throughput = path.throughput * b.weight;
+  out.next.throughput = throughput * b.weight;
   out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
   out.next.eta_scale = path.eta_scale * b.eta * b.eta;
   out.next.receiver = receiver.normal;

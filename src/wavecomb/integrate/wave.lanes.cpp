@@ -13,6 +13,10 @@
 
 namespace wavecomb {
 
+// In shade_openpbr.lanes.cpp.
+extern template void shade_batch<OpenPbrBsdf<Lanes<WAVECOMB_LANES>>, Lanes<WAVECOMB_LANES>>(
+    Wave&, const WaveContext&, const ShadeSettings&, uint32_t, size_t, size_t);
+
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   using F = Lanes<W>;

@@ -9,6 +9,7 @@
 #include "wavecomb/material/programs/diffuse.h"
 #include "wavecomb/material/programs/emissive.h"
 #include "wavecomb/material/programs/metal.h"
+#include "wavecomb/material/programs/openpbr.h"
 #include "wavecomb/material/programs/plastic.h"
 #include "wavecomb/material/programs/principled.h"
 
@@ -26,7 +27,7 @@ struct ProgramList {
 
 template <typename F>
 using Programs = ProgramList<DiffuseBsdf<F>, MetalBsdf<F>, DielectricBsdf<F>, PlasticBsdf<F>,
-                             EmissiveBsdf<F>, PrincipledBsdf<F>>;
+                             EmissiveBsdf<F>, PrincipledBsdf<F>, OpenPbrBsdf<F>>;
 static_assert(Programs<float>::kSize == kProgramCount && Programs<float>::kOrdered);
 
 namespace detail {

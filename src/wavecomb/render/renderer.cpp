@@ -14,6 +14,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/material/energy_tables.h"
 #include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb {
@@ -102,6 +103,12 @@ struct WavefrontRenderer::Impl {
 };
 
 namespace {
+
+bool needs_energy_tables(const Scene& scene) {
+  const auto& all = scene.materials();
+  return std::any_of(all.begin(), all.end(),
+                     [](const Material& m) { return m.program == ProgramId::kOpenPbr; });
+}
 
 /// Says that a render goes on, for as long as it lives.
 template <typename Impl>
@@ -229,6 +236,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const uint32_t wave_size = wave_size_for(settings, pixels);
   SceneView scene_view = scene.view();
   scene_view.lights.by_tree = chooses_by_tree(settings.light_selection, scene_view.lights);
+  if (needs_energy_tables(scene)) scene_view.materials.energy = EnergyTables::shared().data();
   const WaveContext context{
       scene_view,
       impl_->accel.get(),

@@ -8,15 +8,28 @@
 #include <vector>
 
 #include "wavecomb/core/affine.h"
+#include "wavecomb/scene/openpbr_data.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
 
 /// A program is shading code; each material runs one.
-enum class ProgramId : uint8_t { kDiffuse, kMetal, kDielectric, kPlastic, kEmissive, kPrincipled };
-inline constexpr uint32_t kProgramCount = 6;
-inline constexpr const char* kProgramNames[kProgramCount] = {"diffuse", "metal",    "dielectric",
-                                                             "plastic", "emissive", "principled"};
+enum class ProgramId : uint8_t {
+  kDiffuse,
+  kMetal,
+  kDielectric,
+  kPlastic,
+  kEmissive,
+  kPrincipled,
+  kOpenPbr,
+};
+inline constexpr uint32_t kProgramCount = 7;
+inline constexpr const char* kProgramNames[kProgramCount] = {
+    "diffuse", "metal", "dielectric", "plastic", "emissive", "principled", "openpbr"};
+/// Whether a program reads the emission slot.
+inline constexpr bool can_emit(ProgramId p) {
+  return p == ProgramId::kEmissive || p == ProgramId::kPrincipled || p == ProgramId::kOpenPbr;
+}
 
 /// Parameters that a texture can drive. Each has a constant, used where no texture is connected.
 enum class Slot : uint8_t {
@@ -70,12 +83,12 @@ struct Material {
   /// and changes nothing else: it stands for dearer shading networks where cost is measured.
   uint32_t evaluations = 1;
   std::array<TextureUse, kSlotCount> textures;
+  OpenPbr openpbr;  ///< read by the program of that name alone
 
   bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
   /// Whether it can shine: its program reads the emission slot and finds something there.
   bool emits() const {
-    const bool can = program == ProgramId::kEmissive || program == ProgramId::kPrincipled;
-    return can &&
+    return can_emit(program) &&
            (emission.x > 0 || emission.y > 0 || emission.z > 0 || has_texture(Slot::kEmission));
   }
   /// Whether rays must ask how much of the surface is there.
@@ -94,9 +107,13 @@ struct alignas(64) MaterialRecord {
   uint32_t texture_slots;  ///< bit s: slot s reads a texture
   uint32_t flags;          ///< MaterialFlags; upper half: evaluations - 1
   uint32_t program;
-  float pad[4];
+  uint32_t openpbr;  ///< its OpenPbrRecord
+  float pad[3];
 };
 static_assert(sizeof(MaterialRecord) == 128);
+/// A bit of MaterialRecord::texture_slots beside those of slots: the program needs a frame along
+/// the texture, though it may read none.
+inline constexpr uint32_t kNeedsTangent = 1u << 31;
 /// The upper half of MaterialRecord::flags: evaluations beyond the first.
 inline constexpr uint32_t kEvaluationsShift = 16;
 inline constexpr uint32_t kMaxEvaluations = 1u << 16;
@@ -119,6 +136,8 @@ struct MaterialView {
   const MaterialRecord* materials = nullptr;
   const TextureUseRecord* uses = nullptr;
   const TextureView* textures = nullptr;
+  const OpenPbrRecord* openpbr = nullptr;
+  const float* energy = nullptr;  ///< EnergyTables; set where a material needs them
   /// A render setting: Schlick's approximation in place of exact Fresnel.
   bool schlick_fresnel = false;
 };

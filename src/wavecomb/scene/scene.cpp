@@ -48,6 +48,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.materials = materials_->records.data();
   v.materials.uses = materials_->uses.data();
   v.materials.textures = geometry_->texture_views.data();
+  v.materials.openpbr = materials_->openpbr.data();
   v.lights = lights_->set.view(v.materials);
   v.scale = geometry_->radius;
   v.motion = {geometry_->mesh_motions.data(),
@@ -137,7 +138,8 @@ SceneBytes Scene::bytes() const {
       of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
          g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
          g.instance_motions) +
-      of(materials_->materials, materials_->records, materials_->uses, materials_->programs) +
+      of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
+         materials_->openpbr) +
       of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins,
          set.tree.nodes, set.tree.trails, set.shapings, set.ies, set.ies_numbers) +
       g.names.bytes();

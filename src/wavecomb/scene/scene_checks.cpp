@@ -35,12 +35,33 @@ void check_material(const Material& material, size_t texture_count) {
     if (use.channel > 4)
       throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
   }
-  for (const Vec3<float>& v : {material.base_color, material.specular_color, material.emission,
-                               material.conductor_eta, material.conductor_k})
+  const OpenPbr& o = material.openpbr;
+  for (const Vec3<float>& v :
+       {material.base_color, material.specular_color, material.emission, material.conductor_eta,
+        material.conductor_k, o.transmission_color, o.subsurface_color, o.fuzz_color, o.coat_color})
     if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
-  for (float x :
-       {material.roughness, material.metallic, material.clearcoat, material.clearcoat_roughness,
-        material.opacity, material.ior, material.opacity_threshold})
+  for (float x : {material.roughness,
+                  material.metallic,
+                  material.clearcoat,
+                  material.clearcoat_roughness,
+                  material.opacity,
+                  material.ior,
+                  material.opacity_threshold,
+                  o.diffuse_roughness,
+                  o.specular_weight,
+                  o.anisotropy,
+                  o.rotation,
+                  o.transmission_weight,
+                  o.transmission_depth,
+                  o.subsurface_weight,
+                  o.subsurface_anisotropy,
+                  o.fuzz_weight,
+                  o.fuzz_roughness,
+                  o.coat_ior,
+                  o.coat_darkening,
+                  o.film_weight,
+                  o.film_thickness,
+                  o.film_ior})
     if (!std::isfinite(x))
       throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// SceneMaterials: materials as lanes read them.
 #include <algorithm>
+#include <cmath>
 
 #include "wavecomb/scene/scene_parts.h"
 
@@ -35,6 +36,43 @@ MaterialRecord make_material_record(const Material& m) {
   if (m.emits()) r.flags |= kEmits;
   r.flags |= (m.evaluations - 1) << kEvaluationsShift;
   r.program = static_cast<uint32_t>(m.program);
+  if (m.program == ProgramId::kOpenPbr && m.openpbr.anisotropy != 0)
+    r.texture_slots |= kNeedsTangent;
+  return r;
+}
+
+OpenPbrRecord make_openpbr_record(const OpenPbr& m) {
+  OpenPbrRecord r{};
+  const auto unit = [](float x) { return std::clamp(x, 0.f, 1.f); };
+  const auto put = [&unit](float* to, const Vec3<float>& v) {
+    to[0] = unit(v.x);
+    to[1] = unit(v.y);
+    to[2] = unit(v.z);
+  };
+  r.diffuse_roughness = unit(m.diffuse_roughness);
+  r.specular_weight = std::clamp(m.specular_weight, 0.f, 100.f);
+  r.anisotropy = unit(m.anisotropy);
+  r.rotation = m.rotation - std::floor(m.rotation);
+  r.transmission_weight = unit(m.transmission_weight);
+  put(r.transmission_tint, m.transmission_color);
+  if (m.transmission_depth > 0)
+    for (int c = 0; c < 3; ++c) {
+      r.extinction[c] = -std::log(std::max(r.transmission_tint[c], 1e-6f)) / m.transmission_depth;
+      r.transmission_tint[c] = 1;
+    }
+  r.subsurface_weight = unit(m.subsurface_weight);
+  put(r.subsurface_color, m.subsurface_color);
+  r.subsurface_anisotropy = std::clamp(m.subsurface_anisotropy, -1.f, 1.f);
+  r.fuzz_weight = unit(m.fuzz_weight);
+  put(r.fuzz_color, m.fuzz_color);
+  r.fuzz_roughness = unit(m.fuzz_roughness);
+  put(r.coat_color, m.coat_color);
+  r.coat_ior = std::clamp(m.coat_ior, 0.1f, 10.f);
+  r.coat_darkening = unit(m.coat_darkening);
+  r.film_weight = unit(m.film_weight);
+  r.film_thickness = std::clamp(m.film_thickness, 0.f, 1e5f);
+  r.film_ior = std::clamp(m.film_ior, 1.f, 10.f);
+  r.thin_walled = m.thin_walled ? 1.f : 0.f;
   return r;
 }
 
@@ -53,6 +91,10 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 SceneMaterials::SceneMaterials(std::vector<Material> all) : materials(std::move(all)) {
   for (const Material& m : materials) {
     records.push_back(make_material_record(m));
+    if (m.program == ProgramId::kOpenPbr) {
+      records.back().openpbr = static_cast<uint32_t>(openpbr.size());
+      openpbr.push_back(make_openpbr_record(m.openpbr));
+    }
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
     has_presence = has_presence || m.needs_presence();

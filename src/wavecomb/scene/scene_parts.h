@@ -106,6 +106,7 @@ struct SceneMaterials {
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
   std::vector<uint32_t> programs;
+  std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
   bool has_presence = false, has_emission = false;
 };
 

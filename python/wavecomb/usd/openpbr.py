@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What program "openpbr" takes beside its slots, from inputs of MaterialX's surface shaders.
+
+Names on the left are those of ``SceneBuilder.add_material(openpbr=...)``. Standard Surface goes to
+OpenPBR as Autodesk's published graph, ``standard_surface_to_open_pbr_surface``, does it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+Colour = tuple[float, float, float]
+
+WHITE: Colour = (1.0, 1.0, 1.0)
+PALE: Colour = (0.8, 0.8, 0.8)
+
+OPENPBR_COLOURS = ("transmission_color", "subsurface_color", "fuzz_color", "coat_color")
+"""Which of the parameters are colours."""
+
+
+class Inputs(Protocol):
+    """Constants of a shader's inputs."""
+
+    def number(self, name: str, default: float) -> float:
+        """A number; the default where nothing is authored."""
+
+    def colour(self, name: str, default: Colour) -> Colour:
+        """A colour; the default where nothing is authored."""
+
+    def ignored(self, *names: str) -> None:
+        """Says that inputs are authored which have no effect."""
+
+    def approximated(self, what: str) -> None:
+        """Says that something is not drawn as it is meant."""
+
+
+def _open_pbr(i: Inputs) -> dict[str, Any]:
+    i.ignored(
+        "transmission_scatter",
+        "transmission_scatter_anisotropy",
+        "transmission_dispersion_scale",
+        "coat_roughness_anisotropy",
+        "geometry_tangent",
+        "geometry_coat_normal",
+        "geometry_coat_tangent",
+    )
+    return {
+        "diffuse_roughness": i.number("base_diffuse_roughness", 0.0),
+        "specular_weight": i.number("specular_weight", 1.0),
+        "anisotropy": i.number("specular_roughness_anisotropy", 0.0),
+        "transmission_weight": i.number("transmission_weight", 0.0),
+        "transmission_color": i.colour("transmission_color", WHITE),
+        "transmission_depth": i.number("transmission_depth", 0.0),
+        "subsurface_weight": i.number("subsurface_weight", 0.0),
+        "subsurface_color": i.colour("subsurface_color", PALE),
+        "subsurface_anisotropy": i.number("subsurface_scatter_anisotropy", 0.0),
+        "fuzz_weight": i.number("fuzz_weight", 0.0),
+        "fuzz_color": i.colour("fuzz_color", WHITE),
+        "fuzz_roughness": i.number("fuzz_roughness", 0.5),
+        "coat_color": i.colour("coat_color", WHITE),
+        "coat_ior": i.number("coat_ior", 1.6),
+        "coat_darkening": i.number("coat_darkening", 1.0),
+        "film_weight": i.number("thin_film_weight", 0.0),
+        "film_thickness": 1000.0 * i.number("thin_film_thickness", 0.5),
+        "film_ior": i.number("thin_film_ior", 1.4),
+        "thin_walled": i.number("geometry_thin_walled", 0.0) != 0.0,
+    }
+
+
+def _standard_surface(i: Inputs) -> dict[str, Any]:
+    i.ignored(
+        "transmission_scatter",
+        "transmission_scatter_anisotropy",
+        "transmission_dispersion",
+        "transmission_extra_roughness",
+        "coat_anisotropy",
+        "coat_rotation",
+        "coat_affect_roughness",
+        "coat_normal",
+        "tangent",
+    )
+    film = i.number("thin_film_thickness", 0.0)
+    return {
+        "diffuse_roughness": i.number("diffuse_roughness", 0.0),
+        "specular_weight": i.number("specular", 1.0),
+        "anisotropy": i.number("specular_anisotropy", 0.0),
+        "rotation": i.number("specular_rotation", 0.0),
+        "transmission_weight": i.number("transmission", 0.0),
+        "transmission_color": i.colour("transmission_color", WHITE),
+        "transmission_depth": i.number("transmission_depth", 0.0),
+        "subsurface_weight": i.number("subsurface", 0.0),
+        "subsurface_color": i.colour("subsurface_color", WHITE),
+        "subsurface_anisotropy": i.number("subsurface_anisotropy", 0.0),
+        "fuzz_weight": i.number("sheen", 0.0),
+        "fuzz_color": i.colour("sheen_color", WHITE),
+        "fuzz_roughness": i.number("sheen_roughness", 0.3),
+        "coat_color": i.colour("coat_color", WHITE),
+        "coat_ior": i.number("coat_IOR", 1.5),
+        "coat_darkening": i.number("coat_affect_color", 0.0),
+        "film_weight": 1.0 if film > 0 else 0.0,
+        "film_thickness": film,
+        "film_ior": i.number("thin_film_IOR", 1.5),
+        "thin_walled": i.number("thin_walled", 0.0) != 0.0,
+    }
+
+
+def _gltf_pbr(i: Inputs) -> dict[str, Any]:
+    i.ignored("occlusion", "clearcoat_normal", "dispersion", "tangent")
+    sheen = i.colour("sheen_color", (0.0, 0.0, 0.0))
+    fuzz = max(sheen)
+    depth = i.number("attenuation_distance", 0.0)
+    solid = i.number("thickness", 0.0) > 0
+    base = i.colour("base_color", WHITE)
+    if solid and depth > 0:
+        if base != WHITE:
+            i.approximated("base_color of glTF glass that absorbs (no tint at its surface)")
+        base = i.colour("attenuation_color", WHITE)
+    return {
+        "specular_weight": i.number("specular", 1.0),
+        "anisotropy": i.number("anisotropy_strength", 0.0),
+        "rotation": i.number("anisotropy_rotation", 0.0) / 6.283185307179586,
+        "transmission_weight": i.number("transmission", 0.0),
+        "transmission_color": base,
+        "transmission_depth": depth if solid else 0.0,
+        "fuzz_weight": min(fuzz, 1.0),
+        "fuzz_color": (sheen[0] / fuzz, sheen[1] / fuzz, sheen[2] / fuzz) if fuzz > 0 else WHITE,
+        "fuzz_roughness": i.number("sheen_roughness", 0.0),
+        "coat_ior": 1.5,
+        "coat_darkening": 0.0,
+        "film_weight": i.number("iridescence", 0.0),
+        "film_thickness": i.number("iridescence_thickness", 100.0),
+        "film_ior": i.number("iridescence_ior", 1.3),
+        "thin_walled": i.number("transmission", 0.0) > 0 and not solid,
+    }
+
+
+_READERS: dict[str, Callable[[Inputs], dict[str, Any]]] = {
+    "open_pbr_surface": _open_pbr,
+    "standard_surface": _standard_surface,
+    "gltf_pbr": _gltf_pbr,
+}
+
+
+def layers_of(model: str, inputs: Inputs) -> dict[str, Any]:
+    """The parameters of a shading model beside slots."""
+    found = _READERS[model](inputs)
+    if found.get("subsurface_weight", 0.0) > 0:
+        inputs.approximated("subsurface scattering (diffuse in its colour)")
+    return found

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Trowbridge-Reitz ("GGX") with two roughnesses, along x and along y.
+#pragma once
+
+#include "wavecomb/material/lobes/ggx.h"
+
+namespace wavecomb {
+
+/// As Ggx, with alpha_x along x and alpha_y along y; equal ones give its values.
+template <typename F>
+struct AnisotropicGgx {
+  F ax, ay;
+
+  /// D(h) (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 85).
+  F d(const Vec3<F>& h) const {
+    const F q = fma(h.z, h.z, fma(F(h.x / ax), F(h.x / ax), sqr(F(h.y / ay))));
+    return 1.f / F(kPi * ax * ay * q * q);
+  }
+  /// sqrt(z^2 + (ax x)^2 + (ay y)^2) = |z| (1 + 2 Lambda(w)).
+  F s(const Vec3<F>& w) const {
+    return sqrt(fma(w.z, w.z, fma(F(ax * w.x), F(ax * w.x), sqr(F(ay * w.y)))));
+  }
+  /// G2 / (4 |z_o z_i|), height-correlated.
+  F g2_over_4cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    return 0.5f / max(fma(abs(wo.z), s(wi), F(abs(wi.z) * s(wo))), F(1e-20f));
+  }
+  /// A normal that wo (z >= 0) sees, in proportion to its visible area (Dupuy and Benyoub,
+  /// "Sampling Visible GGX Normals with Spherical Caps", HPG 2023).
+  Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {
+    const Vec3<F> k = normalize(Vec3<F>(ax * wo.x, ay * wo.y, max(wo.z, F(1e-7f))));
+    const auto [sin_phi, cos_phi] = sincos_2pi(u);
+    const F cap = 1.f + k.z;
+    const F n_z = F(1.f - v) * cap;
+    const F z = n_z - k.z;
+    const F r = safe_sqrt(F(v * cap * F(1.f + z)));
+    const Vec3<F> h(ax * fma(r, cos_phi, k.x), ay * fma(r, sin_phi, k.y), n_z);
+    const F len2 = length_squared(h);
+    const Mask<F> good = len2 > 1e-30f;
+    const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
+    return select<F>(good, h * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
+  }
+};
+
+}  // namespace wavecomb

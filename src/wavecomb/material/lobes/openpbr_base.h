@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+/// OpenPBR's base interface: one rough surface that is part metal, part dielectric over a diffuse
+/// base and part dielectric that transmits.
+#pragma once
+
+#include "wavecomb/material/energy_tables.h"
+#include "wavecomb/material/lobes/coat.h"
+#include "wavecomb/material/lobes/ggx_anisotropic.h"
+#include "wavecomb/material/lobes/rough_dielectric.h"
+#include "wavecomb/material/lobes/thin_film.h"
+#include "wavecomb/material/openpbr_params.h"
+
+namespace wavecomb {
+
+/// What lobes are chosen by: between luminance and the brightest channel, so that no colour makes
+/// weights large.
+template <typename F>
+inline F importance(const Color<F>& c) {
+  return 0.5f * F(luminance(c) + max_component(c));
+}
+
+/// What a facet does with light: colours of reflection and transmission.
+template <typename F>
+struct OpenPbrFacet {
+  Color<F> reflect, transmit;
+
+  /// Probability with which a facet is sampled for reflection.
+  F reflect_share() const {
+    const F up = importance(reflect), down = importance(transmit);
+    return select(F(up + down) > 0.f, F(up / max(F(up + down), F(1e-20f))), F(1.f));
+  }
+};
+
+/// Sampled by visible normals, then reflection or transmission in proportion to what the facet
+/// does:
+///   reflection    f cos = R(h) D G2 / (4 z_o),                     pdf = p_R D G1 / (4 z_o);
+///   transmission  f cos = T(h) D G2 |wi.h wo.h| / (z_o c^2 eta^2),  pdf = p_T D G1 |wi.h wo.h| /
+///   (z_o c^2), c = wi.h + wo.h / eta (Walter et al. 2007); thin walls: that of reflection,
+///   mirrored.
+/// What single scattering loses is given back by scaling (Turquin 2019): metals by
+/// 1 + F0 (1 - E) / E, transmission by 1 / (E_R + E_T).
+template <typename F>
+struct OpenPbrBase {
+  F metal, opaque, glass;  ///< shares; their sum is 1
+  F roughness;
+  AnisotropicGgx<F> ggx;
+  Mask<F> smooth, thin, present;
+  F ior;        ///< that bends
+  F glass_ior;  ///< that reflects, by specular_weight
+  F gloss_ior;  ///< of the interface over the diffuse base, below a coat; >= 1
+  F glass_f0, specular_weight;
+  Color<F> specular_color, tint;
+  F82Tint<F> metal_fresnel;
+  ThinFilm<F> film;
+
+  explicit OpenPbrBase(const OpenPbrParams<F>& p) {
+    const F coat = p.clearcoat;
+    metal = p.metallic;
+    glass = F(1.f - metal) * p.transmission_weight;
+    opaque = F(1.f - metal) * F(1.f - p.transmission_weight);
+    // Light that crosses a rough coat meets a rougher base ("Coat roughening").
+    const F r4 = sqr(F(p.roughness * p.roughness));
+    const F c4 = sqr(F(p.clearcoat_roughness * p.clearcoat_roughness));
+    const F rougher = sqrt(sqrt(min(fma(c4, F(2.f), r4), F(1.f))));
+    roughness = select(coat > 0.f, fma(coat, F(rougher - p.roughness), p.roughness), p.roughness);
+    const F alpha = roughness * roughness;
+    const F narrow = 1.f - p.anisotropy;
+    const F along = min(F(alpha * sqrt(F(2.f / fma(narrow, narrow, F(1.f))))), F(1.f));
+    ggx.ax = max(along, F(kDeltaAlpha));
+    ggx.ay = max(F(along * narrow), F(kDeltaAlpha));
+    thin = p.thin_walled > 0.5f;
+    ior = p.ior;
+    smooth =
+        (alpha < kDeltaAlpha) | (not_(thin) & (glass > 0.f) & (alpha * abs(F(ior - 1.f)) < 1e-4f));
+    specular_weight = p.specular_weight;
+    specular_color = p.specular_color;
+    tint = p.transmission_tint;
+    glass_ior = scaled_ior(ior);
+    glass_f0 = f0_from_ior(glass_ior);
+    const F under = select(coat > 0.f, F(ior / fma(coat, F(p.coat_ior - 1.f), F(1.f))), ior);
+    gloss_ior = scaled_ior(max(under, F(1.f / under)));
+    metal_fresnel = F82Tint<F>(p.base_color, p.specular_color);
+    film = {p.film_weight, p.film_thickness, p.film_ior};
+    present = (metal > 0.f) | (glass > 0.f) | ((opaque > 0.f) & (specular_weight > 0.f));
+  }
+
+  Color<F> metal_f0() const { return metal_fresnel.f0 * min(specular_weight, F(1.f)); }
+
+  /// What depends on wo alone.
+  struct View {
+    Mask<F> inside;
+    F eta;          ///< relative index across the surface
+    F glass_scale;  ///< compensations
+    F gloss_scale;
+    Color<F> metal_scale;
+    Color<F> gloss;   ///< albedo of the interface over the diffuse base
+    Color<F> albedo;  ///< estimate, of all that this interface reflects and transmits
+  };
+
+  /// `o` is above the surface as the viewer sees it; `below`: the viewer is on the inner side.
+  View view(const Vec3<F>& o, const Mask<F>& below, const float* energy) const {
+    View v;
+    const F z = o.z;
+    v.inside = below & (glass > 0.f) & not_(thin);
+    v.eta = select(v.inside, F(1.f / ior), ior);
+    // The tables know one roughness: brushed surfaces take the mean of theirs.
+    const F alpha = sqrt(F(ggx.ax * ggx.ay));
+    const EnergyLookup<F> look(energy, z, sqrt(alpha));
+    const F white = select(smooth, F(1.f), max(look.white(), F(1e-3f)));
+    const F lost = F(1.f - white) / white;
+    const Color<F> one(F(1.f));
+    v.metal_scale = one + metal_fresnel.f0 * lost;
+    v.gloss_scale = fma(f0_from_ior(gloss_ior), lost, F(1.f));
+    v.glass_scale = F(1.f);
+    if (any(Mask<F>(glass > 0.f))) {
+      const F scattered = select(thin, white, max(look.scattered(v.eta), F(1e-3f)));
+      v.glass_scale = select(smooth, F(1.f), F(1.f / scattered));
+    }
+    const F mirror = fresnel_dielectric(z, gloss_ior).reflectance;
+    const F rough = look.reflected(gloss_ior) * v.gloss_scale;
+    const F gloss = min(select(smooth, mirror, rough), F(1.f));
+    v.gloss = Color<F>(gloss);
+    if (any(Mask<F>(film.weight > 0.f)))
+      v.gloss = lerp(v.gloss, film.over_dielectric(z, gloss_ior), film.weight);
+    const OpenPbrFacet<F> f = facet(v, z);
+    v.albedo = min(Color<F>(f.reflect + f.transmit), one);
+    return v;
+  }
+
+  /// Of a facet seen at the cosine c, with compensations.
+  OpenPbrFacet<F> facet(const View& v, const F& c) const {
+    const Color<F> one(F(1.f));
+    const Mask<F> filmed = film.weight > 0.f;
+    Color<F> m = metal_fresnel(c);
+    Color<F> d(fresnel_dielectric(c, gloss_ior).reflectance);
+    if (any(filmed)) {
+      m = lerp(m, film.over_metal(c, m), film.weight);
+      d = lerp(d, film.over_dielectric(c, gloss_ior), film.weight);
+    }
+    const Color<F> metallic = m * v.metal_scale * F(metal * min(specular_weight, F(1.f)));
+    OpenPbrFacet<F> f{metallic + specular_color * d * F(opaque * v.gloss_scale), Color<F>(F(0.f))};
+    if (any(Mask<F>(glass > 0.f))) {
+      const F bent = refracted_cos(c, v.eta);
+      const F outer = select(v.inside, bent, c);
+      const Mask<F> total = not_(thin) & not_(Mask<F>(bent > 0.f));
+      Color<F> g(fresnel_dielectric(outer, glass_ior).reflectance);
+      if (any(filmed)) g = lerp(g, film.over_dielectric(outer, glass_ior), film.weight);
+      g = select<F>(total, one, g);
+      // Both faces of a wall, and what goes to and fro between them.
+      const Color<F> wall(wall_of(g.x), wall_of(g.y), wall_of(g.z));
+      g = select<F>(thin, wall, g);
+      const F scale = glass * v.glass_scale;
+      f.reflect += specular_color * g * scale;
+      f.transmit = tint * Color<F>(one - g) * scale;
+    }
+    return f;
+  }
+
+  /// Radiance over throughput: 1 / eta^2 where light bends.
+  F radiance_scale(const View& v) const { return select(thin, F(1.f), F(1.f / sqr(v.eta))); }
+
+  BsdfEval<F> eval(const View& v, const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const Mask<F> up = wi.z > 0.f;
+    const Mask<F> bends = not_(up) & not_(thin);
+    const Vec3<F> i(wi.x, wi.y, select(bends, wi.z, abs(wi.z)));
+    const Vec3<F> sum = fma(i, select(bends, v.eta, F(1.f)), wo);
+    const F len2 = length_squared(sum);
+    const Mask<F> nonzero = (len2 > 1e-20f) & (wi.z != 0.f) & (wo.z > 0.f) & (up | (glass > 0.f));
+    const F inv_len = 1.f / sqrt(select(nonzero, len2, F(1.f)));
+    const Vec3<F> h = sum * F(inv_len * copysign(F(1.f), sum.z));
+    const F oh = dot(wo, h), ih = dot(i, h);
+    const Mask<F> valid = nonzero & not_(smooth) & (oh > 0.f) & (h.z > 0.f) &
+                          ((bends & (ih < 0.f)) | (not_(bends) & (ih > 0.f)));
+    const F d = ggx.d(select<F>(valid, h, Vec3<F>(F(0.f), F(0.f), F(1.f))));
+    const F c = ih + F(oh / v.eta);
+    const F jacobian = select(bends, F(F(-4.f * ih * oh) / max(F(c * c), F(1e-20f))), F(1.f));
+    const F base = select(valid, F(d * jacobian), F(0.f));
+    const F g2 = ggx.g2_over_4cos(wo, i) * abs(wi.z);
+    const F g1 = 0.5f / max(F(abs(wo.z) + ggx.s(wo)), F(1e-20f));
+    const OpenPbrFacet<F> f = facet(v, clamp(oh, F(0.f), F(1.f)));
+    const F share = f.reflect_share();
+    const Color<F> color = select<F>(up, f.reflect, f.transmit * radiance_scale(v));
+    return {color * F(base * g2), F(base * g1) * select(up, share, F(1.f - share))};
+  }
+
+  struct Sample {
+    Vec3<F> wi;
+    Mask<F> crosses;
+  };
+  /// wi may be on the wrong side of the surface, where eval is 0.
+  Sample sample(const View& v, const Vec3<F>& wo, const F& choice, const F& u, const F& w) const {
+    Vec3<F> h(F(0.f), F(0.f), F(1.f));
+    if (!all(smooth)) h = select<F>(smooth, h, ggx.sample_visible(wo, u, w));
+    const F c = clamp(dot(wo, h), F(0.f), F(1.f));
+    const Mask<F> crosses = not_(Mask<F>(choice < facet(v, c).reflect_share()));
+    const Vec3<F> mirrored = reflect(wo, h);
+    Vec3<F> wi = mirrored;
+    if (any(crosses)) {
+      const Vec3<F> straight(mirrored.x, mirrored.y, F(-mirrored.z));
+      const Vec3<F> bent = refract(wo, h, c, refracted_cos(c, v.eta), v.eta);
+      wi = select<F>(crosses, select<F>(thin, straight, bent), wi);
+    }
+    // A facet may reflect to below or refract to above: no sample.
+    const Mask<F> right = (wi.z > 0.f) ^ crosses;
+    const F len2 = length_squared(wi);
+    const F inv = 1.f / sqrt(select(len2 > 1e-20f, len2, F(1.f)));
+    return {select<F>(right & (len2 > 1e-20f), wi * inv, Vec3<F>(F(1.f), F(0.f), F(0.f))), crosses};
+  }
+
+ private:
+  /// The index whose F0 is specular_weight times that of `eta`.
+  F scaled_ior(const F& eta) const {
+    const F root = F(eta - 1.f) / F(eta + 1.f);
+    const F e = copysign(sqrt(min(F(specular_weight * root * root), F(0.66f))), root);
+    const F scaled = F(1.f + e) / F(1.f - e);
+    return select(specular_weight == 1.f, eta, scaled);
+  }
+  static F wall_of(const F& r) { return F(2.f * r) / F(1.f + r); }
+};
+
+}  // namespace wavecomb

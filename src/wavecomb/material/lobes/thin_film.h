@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Iridescence: interference in one thin film (Belcour and Barla, "A Practical Extension to
+/// Microfacet Theory for the Modeling of Varying Iridescence", SIGGRAPH 2017).
+#pragma once
+
+#include "wavecomb/material/lobes/fresnel.h"
+
+namespace wavecomb {
+namespace detail {
+
+/// Response of the eye to cos(2 pi opd / lambda), the opd in nanometres: the Fourier transform of
+/// Gaussian fits to the colour matching functions, in linear Rec.709 and 1 for an opd of 0.
+template <typename F>
+inline Color<F> film_sensitivity(const F& opd) {
+  // Amplitude, position (1 / m) and variance of x, y, z and the second lobe of x; the amplitudes
+  // are those of the paper's code times sqrt(2 pi variance), over their sum.
+  const auto lobe = [&opd](float value, float turns_per_nm, float variance) {
+    const F phase = opd * (2.f * kPi * 1e-9f);
+    return F(value * sincos_2pi(F(opd * (turns_per_nm * 1e-9f))).cos *
+             exp(F(-variance * phase * phase)));
+  };
+  const F x = lobe(0.846590f, 1.6810e6f, 4.3278e9f) + lobe(0.153868f, 2.2399e6f, 4.5282e9f);
+  const F y = lobe(1.000222f, 1.7953e6f, 9.3046e9f);
+  const F z = lobe(1.001122f, 2.2084e6f, 6.6121e9f);
+  // XYZ to linear Rec.709, each channel over its value for x = y = z = 1.
+  const Color<F> rgb(fma(F(3.2404542f), x, fma(F(-1.5371385f), y, F(-0.4985314f * z))),
+                     fma(F(-0.9692660f), x, fma(F(1.8760108f), y, F(0.0415560f * z))),
+                     fma(F(0.0556434f), x, fma(F(-0.2040259f), y, F(1.0572252f * z))));
+  return {rgb.x * 0.829601f, rgb.y * 1.054526f, rgb.z * 1.098878f};
+}
+
+}  // namespace detail
+
+/// A film of index `ior` and `thickness` (nm), below vacuum. Reflectances are those of Airy's sum
+/// over orders 0 to 3, per channel of three; phases of a reflection are 0 or pi, so metals are
+/// approximated. Absent where weight is 0.
+template <typename F>
+struct ThinFilm {
+  F weight, thickness, ior;
+
+  /// Index of the film; one of no thickness has none of its own.
+  F index() const {
+    const F grown = clamp(F(thickness * (1.f / 30.f)), F(0.f), F(1.f));
+    return fma(F(ior - 1.f), F(grown * grown * fma(grown, F(-2.f), F(3.f))), F(1.f));
+  }
+
+  /// Reflectance at the cosine c over a base whose amplitudes at the film's lower side are
+  /// base_s and base_p (signed).
+  Color<F> airy(const F& c, const Color<F>& base_s, const Color<F>& base_p) const {
+    const F eta = index(), t = refracted_cos(c, eta);
+    const F opd = 2.f * eta * thickness * t;
+    const Mask<F> total = not_(Mask<F>(t > 0.f));
+    Color<F> sum;
+    const F a = eta * c, b = eta * t;
+    const F top_s = F(c - b) / max(F(c + b), F(1e-12f));
+    const F top_p = F(a - t) / max(F(a + t), F(1e-12f));
+    const Color<F> order[3] = {detail::film_sensitivity<F>(opd),
+                               detail::film_sensitivity<F>(F(2.f * opd)),
+                               detail::film_sensitivity<F>(F(3.f * opd))};
+    const auto channel = [&](const F& r12, const F& r23, const F& s1, const F& s2, const F& s3) {
+      const F top = r12 * r12, bottom = r23 * r23, through = 1.f - top;
+      const F rs = through * through * bottom / max(F(1.f - top * bottom), F(1e-6f));
+      const F turn = -r12 * r23;  // r21 r23, a phase of pi as its sign
+      F term = (rs - through) * turn;
+      F r = top + rs + 2.f * term * s1;
+      term = term * turn;
+      r = r + 2.f * term * s2;
+      term = term * turn;
+      return F(r + 2.f * term * s3);
+    };
+    const auto both = [&](const F& s, const F& p, const F& s1, const F& s2, const F& s3) {
+      return clamp(F(0.5f * F(channel(top_s, s, s1, s2, s3) + channel(top_p, p, s1, s2, s3))),
+                   F(0.f), F(1.f));
+    };
+    sum.x = both(base_s.x, base_p.x, order[0].x, order[1].x, order[2].x);
+    sum.y = both(base_s.y, base_p.y, order[0].y, order[1].y, order[2].y);
+    sum.z = both(base_s.z, base_p.z, order[0].z, order[1].z, order[2].z);
+    return select<F>(total, Color<F>(F(1.f)), sum);
+  }
+
+  /// Over a dielectric of index `base`.
+  Color<F> over_dielectric(const F& c, const F& base) const {
+    const F eta = index(), t = refracted_cos(c, eta), relative = base / eta;
+    const F below = refracted_cos(t, relative);
+    const F s = F(t - relative * below) / max(F(t + relative * below), F(1e-12f));
+    const F p = F(relative * t - below) / max(F(relative * t + below), F(1e-12f));
+    const Mask<F> total = not_(Mask<F>(below > 0.f));
+    return airy(c, Color<F>(select(total, F(1.f), s)), Color<F>(select(total, F(1.f), p)));
+  }
+
+  /// Over a metal that reflects `f` at this angle.
+  Color<F> over_metal(const F& c, const Color<F>& f) const {
+    const Color<F> root(safe_sqrt(f.x), safe_sqrt(f.y), safe_sqrt(f.z));
+    return airy(c, -root, root);
+  }
+};
+
+}  // namespace wavecomb

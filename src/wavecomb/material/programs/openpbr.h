@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program "openpbr": OpenPBR Surface 1.1 (Academy Software Foundation, 2024).
+#pragma once
+
+#include "wavecomb/material/energy_tables.h"
+#include "wavecomb/material/lobes/coat.h"
+#include "wavecomb/material/lobes/eon.h"
+#include "wavecomb/material/lobes/fuzz.h"
+#include "wavecomb/material/lobes/lambert.h"
+#include "wavecomb/material/lobes/microfacet_reflection.h"
+#include "wavecomb/material/lobes/openpbr_base.h"
+#include "wavecomb/material/openpbr_params.h"
+
+namespace wavecomb {
+
+/// fuzz over coat over { metal, glossy diffuse, transmission }. A layer dims what is below by 1 -
+/// E, its albedo towards the viewer (the specification's albedo scaling): energy is kept exactly,
+/// and the whole is not reciprocal. Each lobe is sampled in proportion to its estimated share; eval
+/// and pdf are those of the mixture.
+///
+/// Opaque and thin-walled surfaces are alike from both sides. A solid that transmits is seen from
+/// inside without fuzz and without the coat's reflection. Subsurface scattering is approximated as
+/// diffuse.
+template <typename F>
+class OpenPbrBsdf {
+ public:
+  static constexpr ProgramId kProgram = ProgramId::kOpenPbr;
+  using Params = OpenPbrParams<F>;
+  static constexpr uint32_t kSlots =
+      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) | slot_bit(Slot::kRoughness) |
+      slot_bit(Slot::kMetallic) | slot_bit(Slot::kClearcoat) | slot_bit(Slot::kClearcoatRoughness) |
+      slot_bit(Slot::kNormal) | kNeedsTangent;
+  static constexpr bool kHasNonDelta = true;
+
+  /// Fresnel's formulas are always exact.
+  OpenPbrBsdf(const Params& p, bool /*schlick*/)
+      : base_(p), eon_(p.diffuse_roughness), energy_(p.energy) {
+    fuzz_ = p.fuzz_weight;
+    fuzz_roughness_ = p.fuzz_roughness;
+    fuzz_color_ = p.fuzz_color;
+    coat_ = p.clearcoat;
+    coat_roughness_ = p.clearcoat_roughness;
+    coat_ior_ = coat_ior(p.coat_ior);
+    coat_f0_ = f0_from_ior(coat_ior_);
+    const F coat_alpha = alpha_from_roughness(coat_roughness_);
+    coat_smooth_ = coat_alpha < kDeltaAlpha;
+    coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
+    // Half of the logarithm: light crosses the coat twice.
+    const auto half_log = [](const F& c) { return F(0.5f * log(max(c, F(1e-6f)))); };
+    coat_color_ = p.coat_color;
+    coat_log_ = {half_log(p.coat_color.x), half_log(p.coat_color.y), half_log(p.coat_color.z)};
+    darkening_ = p.coat_darkening;
+    // Thin walls let a part of the diffuse light through.
+    const F sub = p.subsurface_weight, thin = p.thin_walled;
+    const F through = F(0.5f * F(1.f + p.subsurface_anisotropy)) * thin;
+    diffuse_ = lerp(p.base_color, p.subsurface_color * F(1.f - through), sub);
+    back_ = p.subsurface_color * F(sub * through);
+    const F cs = sincos_2pi(p.rotation).cos, sn = sincos_2pi(p.rotation).sin;
+    turn_cos_ = cs;
+    turn_sin_ = sn;
+  }
+
+  Color<F> albedo() const {
+    const Color<F> c = base_.metal_f0() * base_.metal + (diffuse_ + back_) * base_.opaque +
+                       base_.tint * base_.glass +
+                       base_.specular_color * F(F(1.f - base_.metal) * base_.glass_f0);
+    return min(c, Color<F>(F(1.f)));
+  }
+  Mask<F> has_non_delta() const {
+    return ((base_.opaque > 0.f) & not_(is_black(Color<F>(diffuse_ + back_)))) |
+           (not_(base_.smooth) & base_.present) | (not_(coat_smooth_) & (coat_ > 0.f)) |
+           (fuzz_ > 0.f);
+  }
+
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const View v = make_view(wo);
+    return eval_view(v, to_view(v, wi));
+  }
+
+  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi_) const {
+    const View v = make_view(wo);
+    const Vec3<F> wi = to_view(v, wi_);
+    return diffuse_part(v, wi) * v.glossy * below(v, wi);
+  }
+
+  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
+    const View view = make_view(wo);
+    // Which lobe, and what is left of the number that chose it.
+    F from = F(0.f), left = F(0.f);
+    Mask<F> open = Mask<F>(true);
+    const auto choose = [&](const F& p) {
+      const F to = from + p;
+      const Mask<F> here = open & (u_lobe < to) & (p > 0.f);
+      left = select(here, F(F(u_lobe - from) / max(p, F(1e-20f))), left);
+      open = open & not_(here);
+      from = to;
+      return here;
+    };
+    const Mask<F> is_diffuse = choose(view.p_diffuse), is_back = choose(view.p_back),
+                  is_fuzz = choose(view.p_fuzz), is_coat = choose(view.p_coat);
+    const Mask<F> is_base = choose(view.p_base) | (open & (view.p_base > 0.f));
+    left = clamp(left, F(0.f), F(kOneMinusEpsilon));
+
+    const Vec3<F>& o = view.o;
+    Vec3<F> wi(F(0.f), F(0.f), F(1.f));
+    if (any(is_diffuse)) wi = select<F>(is_diffuse, eon_.sample(view.eon, o, left, u, v), wi);
+    if (any(is_back)) {
+      const Vec3<F> c = square_to_cosine_hemisphere(u, v);
+      wi = select<F>(is_back, Vec3<F>(c.x, c.y, F(-c.z)), wi);
+    }
+    if (any(is_fuzz)) wi = select<F>(is_fuzz, view.fuzz.sample(o, u, v), wi);
+    const Vec3<F> mirror(-o.x, -o.y, o.z);
+    if (any(is_coat)) {
+      // A facet of the coat may reflect to below, where only what the base transmits has a density:
+      // no sample.
+      const Vec3<F> c = sample_microfacet(coat_ggx_, o, u, v);
+      const Vec3<F> rough = select<F>(c.z > 0.f, c, Vec3<F>(F(1.f), F(0.f), F(0.f)));
+      wi = select<F>(is_coat, select<F>(coat_smooth_, mirror, rough), wi);
+    }
+    Mask<F> refracted(false);
+    if (any(is_base)) {
+      const auto b = base_.sample(view.base, o, left, u, v);
+      refracted = is_base & b.crosses;
+      wi = select<F>(is_base, b.wi, wi);
+    }
+
+    const BsdfEval<F> e = eval_view(view, wi);
+    const Mask<F> above = o.z > 0.f;
+    const Mask<F> delta_base = is_base & base_.smooth & above;
+    const Mask<F> delta_coat = is_coat & coat_smooth_ & above;
+    // What is smooth is eval'd as nothing; a mirrored direction may still meet other lobes.
+    const Mask<F> delta = delta_base | delta_coat;
+    const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
+    BsdfSample<F> s = empty_sample<F>();
+    s.weight = select<F>(valid, e.f_cos * F(1.f / select(valid, e.pdf, F(1.f))), s.weight);
+    s.pdf = select(valid, e.pdf, F(0.f));
+    if (any(delta)) {
+      const auto facet = base_.facet(view.base, o.z);
+      const F p_up = facet.reflect_share();
+      const F p_way = select(refracted, F(1.f - p_up), p_up);
+      const Color<F> base =
+          select<F>(refracted, facet.transmit * base_.radiance_scale(view.base), facet.reflect) *
+          below(view, wi);
+      const F p = max(select(delta_coat, view.p_coat, F(view.p_base * p_way)), F(1e-20f));
+      const Color<F> f =
+          select<F>(delta_coat, Color<F>(F(view.under_fuzz * coat_reflectance(view, o.z))), base);
+      s.weight = select<F>(delta, f * F(1.f / p), s.weight);
+      s.pdf = select(delta, p, s.pdf);
+      s.is_delta = delta;
+      // A facet that reflects all, or light that is as good as absorbed.
+      const Mask<F> nothing = delta & is_black(s.weight);
+      s.pdf = select(nothing, F(0.f), s.pdf);
+      s.is_delta = s.is_delta & not_(nothing);
+    }
+    const Mask<F> good = s.pdf > 0.f;
+    s.wi = select<F>(good, from_view(view, wi), Vec3<F>(F(0.f), F(0.f), F(1.f)));
+    const Mask<F> bends = refracted & good & not_(base_.thin);
+    s.eta = select(bends, view.base.eta, F(1.f));
+    const F lobe = select(is_coat, coat_roughness_, select(is_base, base_.roughness, F(1.f)));
+    s.roughness = select(s.is_delta, F(0.f), lobe);
+    return s;
+  }
+
+ private:
+  /// What depends on wo alone. `o` is above: the frame is mirrored and turned along the grain.
+  struct View {
+    F side;
+    Vec3<F> o;
+    typename OpenPbrBase<F>::View base;
+    typename EonDiffuse<F>::Sampler eon;
+    FuzzLobe<F> fuzz;
+    Color<F> glossy;        ///< of the diffuse lobe: what the interface lets pass
+    F fuzz_on, coat_on;     ///< weights on this side
+    F under_fuzz;           ///< share below the fuzz
+    F coat_compensation;    ///< for energy that one bounce loses
+    Color<F> bare, coated;  ///< share below: bare + coated coat_color^(1 / 2 mu_i)
+    F p_diffuse, p_back, p_fuzz, p_coat, p_base;
+  };
+
+  Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
+  Vec3<F> turned(const Vec3<F>& w) const {
+    return {fma(turn_cos_, w.x, F(turn_sin_ * w.y)), fma(turn_cos_, w.y, F(-(turn_sin_ * w.x))),
+            w.z};
+  }
+  Vec3<F> from_view(const View& v, const Vec3<F>& w) const {
+    const Vec3<F> t(fma(turn_cos_, w.x, F(-(turn_sin_ * w.y))),
+                    fma(turn_sin_, w.x, F(turn_cos_ * w.y)), w.z);
+    return mirror_z(t, v.side);
+  }
+
+  /// coat_color^(1 / 2 mu), mu the cosine in the coat.
+  Color<F> coat_tint(const F& z) const {
+    const F inv = 1.f / max(refracted_cos(abs(z), coat_ior_), F(0.05f));
+    return {exp(F(coat_log_.x * inv)), exp(F(coat_log_.y * inv)), exp(F(coat_log_.z * inv))};
+  }
+  F coat_reflectance(const View& v, const F& cos_h) const {
+    return v.coat_on *
+           min(F(fresnel_dielectric(cos_h, coat_ior_).reflectance * v.coat_compensation), F(1.f));
+  }
+  /// Share of the base that is seen through what is above it.
+  Color<F> below(const View& v, const Vec3<F>& wi) const {
+    if (none(Mask<F>(coat_ > 0.f))) return v.bare;
+    return fma_color(v.coated, coat_tint(wi.z), v.bare);
+  }
+  static Color<F> fma_color(const Color<F>& a, const Color<F>& b, const Color<F>& c) {
+    return {fma(a.x, b.x, c.x), fma(a.y, b.y, c.y), fma(a.z, b.z, c.z)};
+  }
+
+  View make_view(const Vec3<F>& wo) const {
+    View v;
+    v.side = side_of(wo);
+    v.o = turned(mirror_z(wo, v.side));
+    const F z = v.o.z;
+    v.base = base_.view(v.o, wo.z < 0.f, energy_);
+    v.eon = eon_.sampler(z);
+    v.glossy = (Color<F>(F(1.f)) - v.base.gloss) * base_.opaque;
+    // A solid that transmits has its layers on the outside.
+    const F outside = select(v.base.inside, F(0.f), F(1.f));
+    v.fuzz_on = fuzz_ * outside;
+    v.coat_on = coat_ * outside;
+    v.under_fuzz = F(1.f);
+    v.fuzz.albedo = F(0.f);
+    v.fuzz.inv_a = F(1.f);
+    v.fuzz.inv_b = F(0.f);
+    if (any(Mask<F>(v.fuzz_on > 0.f))) {
+      v.fuzz = FuzzLobe<F>(z, fuzz_roughness_);
+      v.under_fuzz = fnma(v.fuzz_on, v.fuzz.albedo, F(1.f));
+    }
+    v.bare = Color<F>(v.under_fuzz);
+    v.coated = Color<F>(F(0.f));
+    v.coat_compensation = F(1.f);
+    F coat_albedo(0.f);
+    if (any(Mask<F>(coat_ > 0.f))) {
+      const EnergyLookup<F> look(energy_, z, coat_roughness_);
+      const F white = max(look.white(), F(1e-3f));
+      v.coat_compensation =
+          select(coat_smooth_, F(1.f), fma(coat_f0_, F(F(1.f - white) / white), F(1.f)));
+      const F rough = look.reflected(coat_ior_) * v.coat_compensation;
+      const F smooth = fresnel_dielectric(z, coat_ior_).reflectance;
+      coat_albedo = v.coat_on * min(select(coat_smooth_, smooth, rough), F(1.f));
+      v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_)));
+      v.coated = darkened(v, z) * coat_tint(z) * F(v.under_fuzz * F(coat_ - coat_albedo));
+    }
+    choose_shares(v, F(v.under_fuzz * coat_albedo));
+    return v;
+  }
+
+  /// The coat sends light back down to the base, which absorbs again: (1 - K) / (1 - K E_base)
+  /// (OpenPBR 1.1, "Coat darkening").
+  Color<F> darkened(const View& v, const F& z) const {
+    const F smooth = fresnel_dielectric(z, coat_ior_).reflectance;
+    const F rough = 1.f - F(1.f - average_fresnel_dielectric(coat_ior_)) / sqr(coat_ior_);
+    // How diffuse the base is.
+    const F spread = fma(F(1.f - base_.opaque), base_.roughness, base_.opaque);
+    const F k = fma(spread, F(rough - smooth), smooth);
+    const Color<F> e = min(
+        base_.metal_f0() * base_.metal + (diffuse_ + back_) * base_.opaque + Color<F>(base_.glass),
+        Color<F>(F(1.f)));
+    const auto one = [&](const F& albedo) {
+      const F dark = F(1.f - k) / max(fnma(k, albedo, F(1.f)), F(1e-4f));
+      const F on = select(v.base.inside, F(0.f), darkening_);
+      return fma(on, F(dark - 1.f), F(1.f));
+    };
+    return {one(e.x), one(e.y), one(e.z)};
+  }
+
+  void choose_shares(View& v, const F& coat) const {
+    const Color<F> through = fma_color(v.coated, coat_color_, v.bare);
+    const F floor(0.04f);
+    const auto share = [&floor](const Mask<F>& on, const F& estimate) {
+      return select(on, max(estimate, floor), F(0.f));
+    };
+    const Mask<F> opaque = base_.opaque > 0.f;
+    const Color<F> seen = v.glossy * through;
+    const F diffuse = share(opaque & not_(is_black(diffuse_)), importance(seen * diffuse_));
+    const F back = share(opaque & not_(is_black(back_)), importance(seen * back_));
+    const F fuzz = share(v.fuzz_on > 0.f, F(v.fuzz_on * v.fuzz.albedo * importance(fuzz_color_)));
+    const F coated = share(v.coat_on > 0.f, coat);
+    const F base = share(base_.present, importance(v.base.albedo * through));
+    const F sum = F(diffuse + back) + F(fuzz + coated) + base;
+    const F inv = select(sum > 0.f, F(1.f / max(sum, F(1e-20f))), F(0.f));
+    v.p_diffuse = diffuse * inv;
+    v.p_back = back * inv;
+    v.p_fuzz = fuzz * inv;
+    v.p_coat = coated * inv;
+    v.p_base = base * inv;
+  }
+
+  /// Of both sides, below the interface.
+  Color<F> diffuse_part(const View& v, const Vec3<F>& wi) const {
+    Color<F> f = eon_.eval(diffuse_, v.o, wi);
+    if (any(Mask<F>(v.p_back > 0.f))) f += back_ * back_cos(v.o, wi);
+    return f;
+  }
+  static F back_cos(const Vec3<F>& o, const Vec3<F>& wi) {
+    return select(o.z > 0.f, lambert_cos(Vec3<F>(wi.x, wi.y, F(-wi.z))), F(0.f));
+  }
+
+  BsdfEval<F> eval_view(const View& v, const Vec3<F>& wi) const {
+    const Vec3<F>& o = v.o;
+    Color<F> f(F(0.f));
+    F pdf(0.f);
+    if (any(Mask<F>(base_.opaque > 0.f))) {
+      f = diffuse_part(v, wi) * v.glossy;
+      pdf = v.p_diffuse * eon_.pdf(v.eon, o, wi);
+      if (any(Mask<F>(v.p_back > 0.f))) pdf = fma(v.p_back, back_cos(o, wi), pdf);
+    }
+    if (!all(base_.smooth)) {
+      const BsdfEval<F> e = base_.eval(v.base, o, wi);
+      f += e.f_cos;
+      pdf = fma(v.p_base, e.pdf, pdf);
+    }
+    f = f * below(v, wi);
+    const Mask<F> rough_coat = not_(coat_smooth_) & (v.coat_on > 0.f);
+    if (any(rough_coat)) {
+      const MicrofacetEval<F> m = eval_microfacet(coat_ggx_, o, wi);
+      const F on = select(rough_coat, F(1.f), F(0.f));
+      const F glossy = m.f_cos * on * coat_reflectance(v, m.cos_h) * v.under_fuzz;
+      f += Color<F>(glossy);
+      pdf = fma(F(v.p_coat * on), m.pdf, pdf);
+    }
+    if (any(Mask<F>(v.fuzz_on > 0.f))) {
+      const F d = v.fuzz.density(o, wi);
+      f += fuzz_color_ * F(v.fuzz_on * v.fuzz.albedo * d);
+      pdf = fma(v.p_fuzz, d, pdf);
+    }
+    return {f, pdf};
+  }
+
+  OpenPbrBase<F> base_;
+  EonDiffuse<F> eon_;
+  const float* energy_;
+  F fuzz_, fuzz_roughness_, coat_, coat_roughness_, coat_ior_, coat_f0_, darkening_;
+  F turn_cos_, turn_sin_;
+  Color<F> fuzz_color_, coat_color_, coat_log_, diffuse_, back_;
+  Ggx<F> coat_ggx_;
+  Mask<F> coat_smooth_;
+};
+
+}  // namespace wavecomb
