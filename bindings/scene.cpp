@@ -228,10 +228,12 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
                   const std::optional<Array<float>>& normals,
                   const std::optional<Array<float>>& uvs,
                   const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                  const std::string& name, const std::string& light_group, uint32_t asset_length) {
+                  const std::string& name, const std::string& light_group, uint32_t asset_length,
+                  std::optional<uint32_t> mesh_light) {
   Mesh mesh = make_mesh(positions, indices, normals, uvs, face_materials, material, name);
   mesh.light_group = builder.light_group(light_group);
   mesh.asset_length = asset_length;
+  mesh.mesh_light = mesh_light.value_or(kNoLight);
   return builder.add_mesh(std::move(mesh));
 }
 
@@ -394,6 +396,33 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   return builder.add_light(std::move(light));
 }
 
+uint32_t add_mesh_light(SceneBuilder& builder,
+                        const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
+                        const std::string& sync, const std::string& name, const Color3& color,
+                        bool normalize, float focus, const Color3& focus_tint, float cone_angle,
+                        float cone_softness, std::optional<uint32_t> ies, float ies_angle_scale,
+                        bool ies_normalize, float diffuse, float specular, bool visible,
+                        std::optional<uint32_t> light_link, std::optional<uint32_t> shadow_link) {
+  Light light;
+  light.name = name;
+  light.sync = choose<MaterialSync>("material sync mode", sync,
+                                    {{"materialGlowTintsLight", MaterialSync::kGlowTintsLight},
+                                     {"independent", MaterialSync::kIndependent},
+                                     {"noMaterialResponse", MaterialSync::kNoResponse}});
+  light.to_world = affine(transform);
+  light.color = vec3(color);
+  light.normalize = normalize;
+  light.shaping = {focus,         vec3(focus_tint),     cone_angle,
+                   cone_softness, ies.value_or(kNoIes), ies_angle_scale,
+                   ies_normalize};
+  light.diffuse = diffuse;
+  light.specular = specular;
+  light.visible = visible;
+  light.light_link = light_link.value_or(kNoSet);
+  light.shadow_link = shadow_link.value_or(kNoSet);
+  return builder.add_mesh_light(std::move(light));
+}
+
 uint32_t add_geometry_set(SceneBuilder& builder, const std::map<std::string, std::string>& rules) {
   GeometrySet set;
   for (const auto& [path, rule] : rules)
@@ -522,7 +551,7 @@ void bind_scene(nb::module_& m) {
       .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "name"_a = "", "light_group"_a = "",
-           "asset_length"_a = 0)
+           "asset_length"_a = 0, "mesh_light"_a = nb::none())
       .def("replace_mesh", &replace_mesh, "mesh"_a, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial)
@@ -546,6 +575,12 @@ void bind_scene(nb::module_& m) {
            "cone_softness"_a = 0.f, "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f,
            "ies_normalize"_a = false, "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true,
            "light_link"_a = nb::none(), "shadow_link"_a = nb::none())
+      .def("add_mesh_light", &add_mesh_light, "transform"_a, "material_sync"_a, nb::kw_only(),
+           "name"_a = "", "color"_a = white, "normalize"_a = false, "focus"_a = 0.f,
+           "focus_tint"_a = black, "cone_angle"_a = 180.f, "cone_softness"_a = 0.f,
+           "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f, "ies_normalize"_a = false,
+           "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true, "light_link"_a = nb::none(),
+           "shadow_link"_a = nb::none())
       .def("add_geometry_set", &add_geometry_set, "rules"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,

@@ -90,6 +90,10 @@ class RecordingBuilder(Recorded):
         )
         return self._native.add_light(kind, transform, **options)
 
+    def add_mesh_light(self, transform: NDArray[Any], material_sync: str, **options: Any) -> int:
+        """Passes the light of a mesh on; peers get its material alone."""
+        return self._native.add_mesh_light(transform, material_sync, **options)
+
     def set_camera(self, transform: NDArray[Any], **options: Any) -> None:
         """Keeps the camera."""
         self.camera = {"transform": np.asarray(transform, np.float64), **options}

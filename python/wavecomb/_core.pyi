@@ -160,13 +160,14 @@ class SceneBuilder:
         name: str = "",
         light_group: str = "",
         asset_length: int = 0,
+        mesh_light: int | None = None,
     ) -> int:
         """Positions (n, 3), or (s, n, 3) at s equal steps over the shutter, and normals likewise;
         triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
         vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,).
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
         afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
-        names the asset that it is part of; 0: none known."""
+        names the asset that it is part of; 0: none known. mesh_light: what add_mesh_light gave."""
     def replace_mesh(
         self,
         mesh: int,
@@ -288,8 +289,33 @@ class SceneBuilder:
         degrees, a cone_angle of 180 is none) is UsdLuxShapingAPI's. visible: whether rays meet its
         shape. light_link, shadow_link: sets of geometry that it shines on, and that casts shadows
         in its light; None: all."""
+    def add_mesh_light(
+        self,
+        transform: NDArray[Any],
+        material_sync: str,
+        *,
+        name: str = "",
+        color: tuple[float, float, float] = (1, 1, 1),
+        normalize: bool = False,
+        focus: float = 0,
+        focus_tint: tuple[float, float, float] = (0, 0, 0),
+        cone_angle: float = 180,
+        cone_softness: float = 0,
+        ies: int | None = None,
+        ies_angle_scale: float = 0,
+        ies_normalize: bool = False,
+        diffuse: float = 1,
+        specular: float = 1,
+        visible: bool = True,
+        light_link: int | None = None,
+        shadow_link: int | None = None,
+    ) -> int:
+        """A light of the triangles of meshes, for add_mesh. transform: from the light's space, by
+        whose -z it is shaped, to that of the mesh's group. material_sync: materialGlowTintsLight,
+        independent or noMaterialResponse; give the mesh of the last one an emissive material of
+        radiance 1. Others as in add_light; visible: false where rays do not meet the mesh."""
     def add_geometry_set(self, rules: dict[str, str]) -> int:
-        """A set for add_light, by the rules of a UsdCollectionMembershipQuery: prim paths to
+        """A set for lights, by the rules of a UsdCollectionMembershipQuery: prim paths to
         exclude, explicit or expand."""
     def add_ies(
         self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]

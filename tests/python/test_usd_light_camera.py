@@ -110,21 +110,65 @@ def test_hidden_lights_stay_off(tmp_path):
 def test_what_lights_ask_for_and_do_not_get(tmp_path):
     scene, loaded = load(
         tmp_path,
-        f"""def PortalLight "Window" {{}}
-        def Mesh "Glow" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} }}
-        def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {{
-            float inputs:shaping:focus = 2 }}
-        def RectLight "Spot" {{
-            rel light:filters = </Window> }}""",
+        """def PortalLight "Window" {}
+        def BasisCurves "Glow" (prepend apiSchemas = ["LightAPI"]) {
+            uniform token type = "linear"
+            point3f[] points = [(0, 0, 0), (1, 0, 0)]
+            int[] curveVertexCounts = [2]
+            float[] widths = [0.1, 0.1] }
+        def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {
+            float inputs:shaping:focus = 2 }
+        def RectLight "Spot" (prepend apiSchemas = ["ShadowAPI"]) {
+            rel light:filters = </Window>
+            color3f inputs:shadow:color = (1, 0, 0) }""",
     )
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
         "PortalLight",
         "shaping of DistantLights",
         "light filters",
-        "MeshLightAPI (a mesh shines by its material alone)",
+        "colour and distance of shadows",
+        "curves as lights (they shine by their material alone)",
     ]
     assert len(scene.lights) == 2
+
+
+def test_mesh_lights(tmp_path):
+    scene, loaded = load(
+        tmp_path,
+        f"""def Mesh "Glow" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD}
+            float inputs:intensity = 3
+            bool inputs:normalize = true
+            rel collection:lightLink:excludes = </World/Floor>
+            double3 xformOp:translate = (1, 2, 3)
+            uniform token[] xformOpOrder = ["xformOp:translate"] }}
+        def Mesh "Alone" (prepend apiSchemas = ["LightAPI"]) {{ {QUAD} }}
+        def Mesh "Odd" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD}
+            uniform token light:materialSyncMode = "loud" }}
+        def Mesh "Plain" {{ {QUAD} }}""",
+    )
+    glow, alone, odd = scene.mesh_lights
+    assert glow["sync"] == "materialGlowTintsLight" and glow["normalize"]
+    assert glow["color"] == (3, 3, 3) and glow["name"] == "/Glow"
+    assert scene.sets[glow["light_link"]] == {"/": "expand", "/World/Floor": "exclude"}
+    assert np.array_equal(glow["transform"][3], (1, 2, 3, 1))
+    assert alone["sync"] == odd["sync"] == "noMaterialResponse"
+    assert [scene.mesh(name)["mesh_light"] for name in ("Glow", "Alone", "Plain")] == [0, 1, None]
+    assert scene.material_of("Alone")["emission"] == (1, 1, 1)
+    assert "unknown light:materialSyncMode loud" in said(loaded)
+    # They are light enough for a stage without others.
+    assert not scene.lights and loaded.report.counts["mesh lights"] == 3
+
+
+def test_shadows_may_be_off(tmp_path):
+    found, loaded = light(
+        tmp_path,
+        """def RectLight "L" (prepend apiSchemas = ["ShadowAPI"]) {
+            bool inputs:shadow:enable = false }""",
+    )
+    scene, _ = load(tmp_path, 'def RectLight "L" (prepend apiSchemas = ["ShadowAPI"]) {}')
+    assert found["shadow_link"] == 0 and "shadow_link" not in scene.lights[0]
+    assert not loaded.report.unsupported
 
 
 def test_linking(tmp_path):

@@ -17,7 +17,7 @@ class Recorder:
 
     def __init__(self):
         self.textures, self.materials, self.meshes, self.lights = [], [], [], []
-        self.profiles, self.sets = [], []
+        self.profiles, self.sets, self.mesh_lights = [], [], []
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
         self.motions = []  # (name of a group, its transforms over the shutter)
@@ -51,6 +51,7 @@ class Recorder:
         name="",
         light_group="",
         asset_length=0,
+        mesh_light=None,
     ):
         steps = positions.shape[:-2]  # of the shutter, where it changes its shape
         n, m = positions.shape[-2], len(indices)
@@ -67,6 +68,7 @@ class Recorder:
             assert face_materials.shape == (m,) and face_materials.dtype == np.uint32
             assert face_materials.max() < len(self.materials) or face_materials.max() == INHERIT
         assert material == INHERIT or material < len(self.materials)
+        assert mesh_light is None or mesh_light < len(self.mesh_lights)
         self.meshes.append(
             {
                 "positions": positions,
@@ -78,12 +80,14 @@ class Recorder:
                 "name": name,
                 "light_group": light_group,
                 "asset": name[:asset_length],
+                "mesh_light": mesh_light,
             }
         )
         return len(self.meshes) - 1
 
     def replace_mesh(self, mesh, positions, indices, *, material=INHERIT, **arrays):
-        kept = {key: self.meshes[mesh][key] for key in ("name", "light_group", "asset")}
+        names = ("name", "light_group", "asset", "mesh_light")
+        kept = {key: self.meshes[mesh][key] for key in names}
         number = self.add_mesh(positions, indices, material=material, **arrays)
         self.meshes[mesh] = {**self.meshes.pop(number), **kept}
 
@@ -149,6 +153,11 @@ class Recorder:
         assert np.shape(transform) == (4, 4)
         self.lights.append({"kind": kind, "transform": np.asarray(transform), **options})
         return len(self.lights) - 1
+
+    def add_mesh_light(self, transform, material_sync, **options):
+        assert np.shape(transform) == (4, 4)
+        self.mesh_lights.append({"sync": material_sync, "transform": transform, **options})
+        return len(self.mesh_lights) - 1
 
     def add_geometry_set(self, rules):
         self.sets.append(dict(rules))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.isolate import trail
 from wavecomb.usd.assign import Assigner, Draw
@@ -27,6 +27,7 @@ from wavecomb.usd.material import (
     bound_materials,
 )
 from wavecomb.usd.mesh import IDENTITY, UV_NAMES, MeshArrays
+from wavecomb.usd.mesh_light import MeshLights
 from wavecomb.usd.network import colour
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
@@ -65,6 +66,7 @@ class Group:
         lights: With their transforms (4, 4) in the group.
         children: Groups that hold lights placed in it, transforms (k, 4, 4).
         surfaced: The same of groups that hold surfaces to be refined.
+        sampled_lamp: A mesh light in it that cannot move.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Group:
     surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
     lit: bool = False
     has_surfaces: bool = False
+    sampled_lamp: Sdf.Path | None = None
 
     @property
     def empty(self) -> bool:
@@ -145,6 +148,7 @@ class GroupBuilder:
         self.progress = progress
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(materials, self.time, report)
+        self.mesh_lights = MeshLights(builder, traversal.lights, materials, report)
         self.bindings = BindingScan()
         self.assets = Assets()
         self._groups: dict[Hashable, Group] = {}
@@ -221,6 +225,9 @@ class GroupBuilder:
             return self._draw_alone(group, own, draw.matrix, scope)
         if scope.override:
             draw.subsets = ()
+        lamp = self.mesh_lights.of(draw, kind)
+        if lamp is not None and lamp.material is not None:
+            draw = replace(draw, material=None, subsets=(), subset_materials=[])
         names = self.assigner.uv_names(draw)
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
@@ -239,12 +246,16 @@ class GroupBuilder:
             what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
             self.report.note(what, draw.prim.GetPath())
             return
-        if draw.prim.HasAPI(UsdLux.LightAPI):
-            what = "MeshLightAPI (a mesh shines by its material alone)"
-            self.report.missing(what, draw.prim.GetPath())
-        material, faces = self._materials(draw, shape, scope)
+        if lamp is not None and lamp.material is not None:
+            material, faces = lamp.material, None
+        else:
+            material, faces = self._materials(draw, shape, scope)
         name = self.report.place(draw.prim.GetPath())
-        may_shine = material == INHERIT_MATERIAL or self.materials.any_emits(material, faces)
+        may_shine = (
+            lamp is not None
+            or material == INHERIT_MATERIAL
+            or self.materials.any_emits(material, faces)
+        )
         options: dict[str, Any] = {
             "face_materials": faces,
             "material": material,
@@ -252,6 +263,12 @@ class GroupBuilder:
             "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
             "asset_length": self._asset_length(draw.prim, name),
         }
+        if lamp is not None:
+            options["mesh_light"] = lamp.number
+            if lamp.is_sampled_only:
+                group.sampled_lamp = draw.prim.GetPath()
+                if kind == "mesh" and self.gprims.deforms(kind, draw.prim):
+                    self.mesh_lights.say_moving(group.sampled_lamp)
         try:
             number = add_shape(self.builder, shape, options)
         except ValueError as error:
@@ -518,6 +535,10 @@ class GroupBuilder:
                 numbers = numbers[usable]
         if len(transforms) == 0:
             return
+        if child.sampled_lamp is not None:
+            parent.sampled_lamp = child.sampled_lamp
+            if motion is not None:
+                self.mesh_lights.say_moving(child.sampled_lamp)
         if child.lit:
             middle = transforms if motion is None else _middle(motion)
             parent.children.append((child, middle))

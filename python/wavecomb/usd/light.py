@@ -83,12 +83,7 @@ class LightReader:
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
         kind = KINDS[str(prim.GetTypeName())]
-        self._say_unsupported(prim)
-        radiance = self._colour(prim)
-        if not all(0 <= value < 1e30 for value in radiance):
-            self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
-            radiance = (0.0, 0.0, 0.0)
-        options: dict[str, Any] = {"name": self.report.place(prim.GetPath()), "color": radiance}
+        options = self._common(prim, kind)
         if group := self.groups.of(prim):
             options["group"] = group
         normalize = bool(self._get(prim, "normalize", False))
@@ -111,18 +106,36 @@ class LightReader:
             local = self._pole(prim)
             normalize = False
         options["normalize"] = normalize
-        self._shaping(prim, kind, options)
         if self.hidden and kind not in ("distant", "dome"):
             options["visible"] = False
+        return Light(kind, options, local)
+
+    def read_mesh(self, prim: Usd.Prim) -> dict[str, Any]:
+        """The light of a mesh that is one, as ``SceneBuilder.add_mesh_light`` takes it."""
+        options = self._common(prim, "mesh")
+        options["normalize"] = bool(self._get(prim, "normalize", False))
+        return options
+
+    def _common(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
+        """Options that lights of all kinds have."""
+        self._say_unsupported(prim)
+        radiance = self._colour(prim)
+        if not all(0 <= value < 1e30 for value in radiance):
+            self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
+            radiance = (0.0, 0.0, 0.0)
+        options: dict[str, Any] = {"name": self.report.place(prim.GetPath()), "color": radiance}
+        self._shaping(prim, kind, options)
         for name, option in (("lightLink", "light_link"), ("shadowLink", "shadow_link")):
             linked = self.links.set_of(prim, name) if self.links else None
             if linked is not None:
                 options[option] = linked
+        if self.links and not self._get(prim, "shadow:enable", True):
+            options["shadow_link"] = self.links.nothing()
         for name in ("diffuse", "specular"):
             factor = number(self._get(prim, name, 1.0), 1.0)
             if factor != 1.0:
                 options[name] = max(factor, 0.0)
-        return Light(kind, options, local)
+        return options
 
     def _get(self, prim: Usd.Prim, name: str, default: Any) -> Any:
         attribute = prim.GetAttribute(f"inputs:{name}")
@@ -251,6 +264,9 @@ class LightReader:
             relation = prim.GetRelationship(name)
             if relation and relation.HasAuthoredTargets():
                 self.report.missing(name.replace(":", " "), path)
+        tint = colour(self._get(prim, "shadow:color", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
+        if any(tint) or number(self._get(prim, "shadow:distance", -1.0), -1.0) >= 0:
+            self.report.missing("colour and distance of shadows", path)
 
 
 def soft_dome() -> NDArray[np.float32]:

@@ -38,6 +38,13 @@ class LinkTable:
             named.setdefault("/", "expand")
         if all(rule != "exclude" for rule in named.values()) and named.get("/") == "expand":
             return None
+        return self._set(named)
+
+    def nothing(self) -> int:
+        """The set that nothing is in."""
+        return self._set({})
+
+    def _set(self, named: dict[str, str]) -> int:
         key = tuple(sorted(named.items()))
         if key not in self._known:
             self._known[key] = self._builder.add_geometry_set(named)

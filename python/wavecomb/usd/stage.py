@@ -356,10 +356,11 @@ def _read(
         _limit_textures(stage, traversal, seen, choice, textures, report)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
-    world = GroupBuilder(
+    groups_of = GroupBuilder(
         stage, traversal, builder, materials, groups, report, surfaces, meshes, progress
-    ).world()
-    lit = materials.glows or has_lights
+    )
+    world = groups_of.world()
+    lit = materials.glows or has_lights or groups_of.mesh_lights.any
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")

@@ -141,6 +141,24 @@ inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UIn
   return gather<U>(scene.lights.links.classes, first + geom, Mask<U>(active));
 }
 
+/// What a path gets of surfaces that glow with `glow`, before MIS, where there are mesh lights.
+template <typename F>
+[[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
+                                               const UInt<F>& geom, const Color<F>& glow,
+                                               const PathState<F>& path, bool from_camera,
+                                               const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+  const U first =
+      gather<U>(scene.instances,
+                inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+                Mask<U>(active));
+  const U record = select(Mask<U>(active),
+                          gather<U>(scene.mesh_lights, first + geom, Mask<U>(active)), U(kNoLight));
+  return mesh_light_radiance<F>(scene.lights, record, glow, path.dir, path.link,
+                                not_(path.pdf > 0.f), from_camera, active);
+}
+
 /// Radiance of a light's own shape met by a path.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
@@ -262,7 +280,10 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     throughput *= openpbr_transmittance<F>(params, t, F(-dot(path.dir, s.ng)));
 
   if constexpr (kEmits) {
-    const Mask<F> emits = active & not_(is_black(params.emission));
+    Color<F> emission = params.emission;
+    if (scene.mesh_lights) [[unlikely]]
+      emission = mesh_light_emission<F>(scene, hit.inst, geom, emission, path, depth == 0, active);
+    const Mask<F> emits = active & not_(is_black(emission));
     if (any(emits)) {
       F light_pdf(0.f);
       if (scene.has_emissive_meshes) {
@@ -282,7 +303,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
                              F(0.f));
       }
       const F w = bounce_weight<F>(path.pdf, light_pdf);
-      const Color<F> e = clean<F>(throughput * params.emission * w, clamp_limit(settings, depth));
+      const Color<F> e = clean<F>(throughput * emission * w, clamp_limit(settings, depth));
       out.emitted = select<F>(emits, e, Color<F>(F(0.f)));
     }
   }

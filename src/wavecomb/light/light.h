@@ -13,6 +13,7 @@
 #include "wavecomb/light/dome.h"
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/link.h"
+#include "wavecomb/light/mesh_light.h"
 #include "wavecomb/light/rect.h"
 #include "wavecomb/light/shaping.h"
 #include "wavecomb/light/sphere.h"
@@ -167,8 +168,10 @@ inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>
   const Mask<F> triangle = active & Mask<F>(index >= UInt<F>(view.first_triangle));
   if (any(triangle)) {
     const detail::TriangleReader<F> light(view, index, triangle);
-    put(detail::sample_triangle<F>(light, view, p, u, v, triangle), pick.pdf(light.pick_pdf),
-        triangle);
+    detail::KindSample<F> s = detail::sample_triangle<F>(light, view, p, u, v, triangle);
+    if (view.mesh_lights) [[unlikely]]
+      s.radiance = detail::of_mesh_light<F>(view, index, light, s, triangle);
+    put(s, pick.pdf(light.pick_pdf), triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (none(others)) return result;
@@ -242,8 +245,9 @@ struct LightEffect {
   Mask<F> sampled_only;  ///< LightRecord::sampled_only
 
   LightEffect(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
-    const Mask<F> known = active & Mask<F>(light < UInt<F>(view.first_triangle));
-    const detail::LightReader<F> reader(view.lights, light, known);
+    const UInt<F> record = detail::record_of<F>(view, light, active);
+    const Mask<F> known = active & Mask<F>(record != UInt<F>(kNoLight));
+    const detail::LightReader<F> reader(view.lights, record, known);
     diffuse = select(known, reader.real(offsetof(LightRecord, diffuse)), F(1.f));
     specular = select(known, reader.real(offsetof(LightRecord, specular)), F(1.f));
     sampled_only = known & Mask<F>(reader.bits(offsetof(LightRecord, sampled_only)) != UInt<F>(0u));

@@ -18,13 +18,14 @@ inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<
   return not_(asked) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u));
 }
 
-/// Lanes where light `light` shines on surfaces of class `link`; triangles shine on all.
+/// Lanes where light `light` shines on surfaces of class `link`; what merely glows shines on all.
 template <typename F>
 inline Mask<F> shines_on(const LightView& view, const UInt<F>& link, const UInt<F>& light,
                          const Mask<F>& active) {
-  const Mask<F> known = active & Mask<F>(light < UInt<F>(view.first_triangle));
+  const UInt<F> record = detail::record_of<F>(view, light, active);
+  const Mask<F> known = active & Mask<F>(record != UInt<F>(kNoLight));
   if (none(known)) return Mask<F>(true);
-  const detail::LightReader<F> reader(view.lights, light, known);
+  const detail::LightReader<F> reader(view.lights, record, known);
   const UInt<F> set = reader.bits(offsetof(LightRecord, light_link));
   return not_(known) | is_linked<F>(view.links, link, set, known);
 }
@@ -33,9 +34,10 @@ inline Mask<F> shines_on(const LightView& view, const UInt<F>& link, const UInt<
 template <typename F>
 inline UInt<F> shadow_set(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
-  const Mask<F> known = active & Mask<F>(light < U(view.first_triangle));
+  const U record = detail::record_of<F>(view, light, active);
+  const Mask<F> known = active & Mask<F>(record != U(kNoLight));
   if (none(known)) return U(0u);
-  const detail::LightReader<F> reader(view.lights, light, known);
+  const detail::LightReader<F> reader(view.lights, record, known);
   return select(Mask<U>(known), reader.bits(offsetof(LightRecord, shadow_link)) + 1u, U(0u));
 }
 

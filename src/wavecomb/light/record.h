@@ -68,6 +68,20 @@ struct LightReader {
   UInt<F> shaping() const { return bits(offsetof(LightRecord, shaping)); }
 };
 
+/// The record that says what light `light` shines on and how: its own, or that of the mesh light
+/// which a triangle is part of; kNoLight for triangles that merely glow.
+template <typename F>
+inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
+  using U = UInt<F>;
+  const Mask<U> triangle(light >= U(view.first_triangle));
+  U record = select(triangle, U(kNoLight), light);
+  if (view.mesh_lights) [[unlikely]] {
+    const Mask<U> known = Mask<U>(active) & triangle & Mask<U>(light < U(view.count));
+    record = select(known, gather<U>(view.mesh_lights, light - view.first_triangle, known), record);
+  }
+  return record;
+}
+
 /// What one light gives a shading point, before the choice of the light is counted.
 template <typename F>
 struct KindSample {

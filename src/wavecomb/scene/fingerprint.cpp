@@ -120,14 +120,20 @@ uint64_t hash_textures(const Scene& scene) {
   return h.value();
 }
 
+void add_light(Hash& h, const Light& l) {
+  const Shaping& s = l.shaping;
+  h.add(l.kind, l.to_world, l.color, l.width, l.height, l.radius, l.length, l.angle, l.normalize,
+        l.texture, l.group, l.diffuse, l.specular, s.focus, s.focus_tint, s.cone_angle,
+        s.cone_softness, s.ies, s.ies_angle_scale, s.ies_normalize, l.light_link, l.shadow_link,
+        l.visible);
+}
+
 uint64_t hash_lights(const Scene& scene) {
   Hash h;
-  for (const Light& l : scene.lights()) {
-    const Shaping& s = l.shaping;
-    h.add(l.kind, l.to_world, l.color, l.width, l.height, l.radius, l.length, l.angle, l.normalize,
-          l.texture, l.group, l.diffuse, l.specular, s.focus, s.focus_tint, s.cone_angle,
-          s.cone_softness, s.ies, s.ies_angle_scale, s.ies_normalize, l.light_link, l.shadow_link,
-          l.visible);
+  for (const Light& l : scene.lights()) add_light(h, l);
+  for (const Light& l : scene.geometry()->mesh_lights) {
+    add_light(h, l);
+    h.add(l.sync);
   }
   for (const GeometrySet& set : scene.geometry()->sets)
     for (const GeometrySet::Entry& entry : set.entries) {
@@ -139,7 +145,10 @@ uint64_t hash_lights(const Scene& scene) {
     h.add_array(std::span<const float>(p.horizontal));
     h.add_array(std::span<const float>(p.candela));
   }
-  for (const Mesh& m : scene.meshes()) h.add(m.light_group);
+  for (const Mesh& m : scene.meshes()) {
+    h.add(m.light_group);
+    if (m.mesh_light != kNoLight) h.add(m.mesh_light, m.light_group);
+  }
   return h.value();
 }
 

@@ -84,7 +84,7 @@ void check(const Light& light, size_t texture_count, size_t profile_count) {
     throw Error(where + "there is no IES profile " + std::to_string(s.ies));
   }
   if (static_cast<uint32_t>(light.kind) >= static_cast<uint32_t>(LightKind::kTriangle)) {
-    throw Error(where + "is of no kind that a stage can give");
+    throw Error(where + "is of no kind that has a place of its own");
   }
   if (light.texture != kNoTexture && light.texture >= texture_count) {
     throw Error(where + "there is no texture " + std::to_string(light.texture));
@@ -356,8 +356,25 @@ struct MadeTriangle {
   double power = 0;
 };
 
+/// What the triangles of a placed mesh light have in common.
+LightRecord make_mesh_light(LightSet& set, const PlacedMeshLight& placed,
+                            std::span<const IesProfile> profiles) {
+  Light light = *placed.light;
+  light.to_world = placed.to_world * light.to_world;
+  LightRecord record = make_light(set, light, 1, {}, nullptr, profiles).record;
+  const bool there = placed.area >= kLeastArea;
+  put_radiance(record,
+               to_double(light.color) * (!there ? 0 : (light.normalize ? 1 / placed.area : 1)));
+  record.area = static_cast<float>(placed.area);
+  record.sync = static_cast<uint32_t>(light.sync);
+  // Of light that the material does not tell of, paths that meet the mesh get nothing.
+  if (light.sync == MaterialSync::kIndependent) record.sampled_only = 1;
+  if (!placed.is_sampled) record.sampled_only = 0;
+  return record;
+}
+
 /// Index of the texture coordinates left to the caller.
-MadeTriangle make_triangle(const EmissiveTriangle& t) {
+MadeTriangle make_triangle(const LightSet& set, const EmissiveTriangle& t) {
   MadeTriangle made;
   TriangleLight& r = made.light;
   const Double3 p0 = to_double(t.p0);
@@ -369,14 +386,23 @@ MadeTriangle make_triangle(const EmissiveTriangle& t) {
   put(r.v, v);
   put(r.m, m);
   const auto sane = [](float x) { return std::clamp(double{x}, 0.0, kMostRadiance); };
-  put(r.radiance, {sane(t.radiance[0]), sane(t.radiance[1]), sane(t.radiance[2])});
-  if (t.material != kNoLight) {
+  Double3 radiance{sane(t.radiance[0]), sane(t.radiance[1]), sane(t.radiance[2])};
+  bool textured = t.material != kNoLight;
+  if (t.mesh_light != kNoLight) {
+    const LightRecord& mesh = set.records[set.record_count + t.mesh_light];
+    const Double3 tint = to_double(mesh.radiance);
+    const bool independent = mesh.sync == static_cast<uint32_t>(MaterialSync::kIndependent);
+    textured = textured && !independent;
+    radiance =
+        independent ? tint : Double3{radiance.x * tint.x, radiance.y * tint.y, radiance.z * tint.z};
+  }
+  const double mean = luminance(radiance.x, radiance.y, radiance.z) * double{t.mean_scale};
+  put(r.radiance, {std::min(radiance.x, kMostRadiance), std::min(radiance.y, kMostRadiance),
+                   std::min(radiance.z, kMostRadiance)});
+  if (textured) {
     r.radiance[0] = TriangleLight::kTextured;
     r.radiance[1] = std::bit_cast<float>(t.material);
   }
-  const double mean =
-      luminance(double{t.radiance[0]}, double{t.radiance[1]}, double{t.radiance[2]}) *
-      double{t.mean_scale};
   made.power = area < kLeastArea ? 0 : 2 * kPiD * area * mean;
   return made;
 }
@@ -390,13 +416,15 @@ void make_triangles(LightSet& set, size_t count, const TriangleSource& source, d
     for (size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) one(i);
   };
   set.triangles.resize(count);
+  if (set.records.size() > set.record_count) set.mesh_lights.assign(count, kNoLight);
   parallel_for(chunks, [&](size_t chunk) {
     each(chunk, [&](size_t i) {
       const EmissiveTriangle t = source(i);
-      const MadeTriangle made = make_triangle(t);
+      const MadeTriangle made = make_triangle(set, t);
       set.triangles[i] = made.light;
       powers[i] = sane_power(made.power);
-      if (t.material == kNoLight) return;
+      if (t.mesh_light != kNoLight) set.mesh_lights[i] = set.record_count + t.mesh_light;
+      if (made.light.radiance[0] != TriangleLight::kTextured) return;
       uvs[chunk].push_back({{t.uv0[0], t.uv0[1]}, {t.uv1[0], t.uv1[1]}, {t.uv2[0], t.uv2[1]}});
     });
   });
@@ -451,6 +479,7 @@ LightView LightSet::view(const MaterialView& materials) const {
     v.ies = ies.data();
     v.ies_numbers = ies_numbers.data();
   }
+  if (records.size() > record_count) v.mesh_lights = mesh_lights.data();
   for (const LightRecord& record : records) v.has_sampled_only |= record.sampled_only != 0;
   v.materials = materials;
   return v;
@@ -459,7 +488,8 @@ LightView LightSet::view(const MaterialView& materials) const {
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const TexturePtr> textures, const LightSet* before,
-                      std::span<const IesProfile> profiles) {
+                      std::span<const IesProfile> profiles,
+                      std::span<const PlacedMeshLight> mesh_lights) {
   (void)centre;  // directions of infinite lights do not depend on it
   if (lights.size() + triangle_count > kMaxLights) {
     throw Error("the scene has " + std::to_string(lights.size() + triangle_count) +
@@ -468,7 +498,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   const double scene_radius = std::isfinite(radius) && radius > 0 ? double{radius} : 1.0;
   LightSet set;
   std::vector<double> powers;
-  set.records.reserve(lights.size());
+  set.records.reserve(lights.size() + mesh_lights.size());
   powers.reserve(lights.size() + triangle_count);
   set.of_input.resize(lights.size());
   put_profiles(set, profiles);
@@ -483,6 +513,9 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
     }
     if (infinite) set.infinite_count = static_cast<uint32_t>(set.records.size());
   }
+  set.record_count = static_cast<uint32_t>(set.records.size());
+  for (const PlacedMeshLight& placed : mesh_lights)
+    set.records.push_back(make_mesh_light(set, placed, profiles));
   powers.resize(lights.size() + triangle_count);
   make_triangles(set, triangle_count, triangle, powers.data() + lights.size());
 
@@ -490,7 +523,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   std::vector<uint32_t> numbers;
   set.pick = build_pick_table(powers, set.first_triangle(), set.pick_bins, numbers);
   const auto pdf = [&](size_t i) { return static_cast<float>(numbers[i]) * 0x1p-24f; };
-  for (size_t i = 0; i < set.records.size(); ++i) set.records[i].pick_pdf = pdf(i);
+  for (size_t i = 0; i < set.record_count; ++i) set.records[i].pick_pdf = pdf(i);
   for (size_t i = 0; i < triangle_count; ++i)
     set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
   set.tree = build_light_tree(set, powers);

@@ -14,6 +14,14 @@
 
 namespace wavecomb {
 
+/// A mesh light in one of the places where its mesh is.
+struct PlacedMeshLight {
+  const Light* light;
+  Affine to_world;  ///< of the mesh's group
+  double area;      ///< of all its triangles, one side, in world space
+  bool is_sampled;  ///< false: only paths that meet it find it
+};
+
 /// A triangle of a mesh that emits, in world space.
 struct EmissiveTriangle {
   float p0[3], p1[3], p2[3];
@@ -22,6 +30,7 @@ struct EmissiveTriangle {
   uint32_t material = kNoLight;
   /// Emitted radiance, W / (m^2 sr), to both sides; not read by kernels where `material` is set.
   float radiance[3] = {0, 0, 0};
+  uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight
   /// Luminance to expect of the emission is luminance(radiance) * mean_scale. With a texture, put
   /// the texture's mean (times scale, plus bias) into `radiance` and leave this at 1. Only the
   /// choice of lights depends on it.
@@ -31,9 +40,12 @@ struct EmissiveTriangle {
 /// All lights of a scene, ready for kernels. Order: infinite lights, then those with a shape and
 /// points (`records`), then the triangles; each kind of group in the order of the input.
 struct LightSet {
+  /// Those of mesh lights follow; they are no lights that can be chosen.
   std::vector<LightRecord> records;
+  uint32_t record_count = 0;  ///< without them
   std::vector<TriangleLight> triangles;
   std::vector<TriangleUvs> triangle_uvs;  ///< of triangles with textured emission
+  std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
   std::vector<uint32_t> pick_bins;
   PickTable pick;  ///< without its pointer
   LightTree tree;
@@ -45,12 +57,12 @@ struct LightSet {
   std::vector<uint32_t> of_input;  ///< record of each input light
   double total_power = 0;          ///< estimate that the choice of lights rests on, W
 
-  size_t size() const { return records.size() + triangles.size(); }
+  size_t size() const { return record_count + triangles.size(); }
   /// Index of the first triangle among all lights.
-  uint32_t first_triangle() const { return static_cast<uint32_t>(records.size()); }
+  uint32_t first_triangle() const { return record_count; }
   /// Probability of choosing light `i`.
   float pick_pdf(size_t i) const {
-    return i < records.size() ? records[i].pick_pdf : triangles[i - records.size()].pick_pdf;
+    return i < record_count ? records[i].pick_pdf : triangles[i - record_count].pick_pdf;
   }
 
   /// What kernels take. Contract: points into this set, which must stay where it is.
@@ -82,7 +94,8 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const TexturePtr> textures, const LightSet* before = nullptr,
-                      std::span<const IesProfile> profiles = {});
+                      std::span<const IesProfile> profiles = {},
+                      std::span<const PlacedMeshLight> mesh_lights = {});
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,

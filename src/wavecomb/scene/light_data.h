@@ -46,6 +46,14 @@ struct IesProfile {
   bool covers_sphere() const { return vertical.back() - vertical.front() > 95.7f; }
 };
 
+/// How the light of a mesh goes with the glow of its material, which cameras and mirrors see
+/// (UsdLux: light:materialSyncMode).
+enum class MaterialSync : uint32_t {
+  kGlowTintsLight,  ///< its light is the glow times the light's colour
+  kIndependent,     ///< its light is the light's colour alone
+  kNoResponse,      ///< as kGlowTintsLight, and that is what cameras and mirrors see, too
+};
+
 /// A light as the stage gives it, in its own space (UsdLux: rect, disk in the xy plane, shining
 /// along -z; distant shining along -z; dome's pole +y, texture's centre towards +z ... as
 /// UsdLuxDomeLight says).
@@ -71,6 +79,8 @@ struct Light {
   /// SceneBuilder::add_geometry_set: what it shines on, and what casts shadows in its light.
   uint32_t light_link = kNoSet, shadow_link = kNoSet;
   bool visible = true;  ///< whether rays meet its shape
+  /// Of mesh lights (kind kTriangle), whose to_world leads to the space of the mesh's group.
+  MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
 
 /// A light as lanes read it, triangles of meshes apart: 32 words. Vectors are in world space. Use
@@ -82,6 +92,8 @@ struct Light {
 ///   distant   n unit direction the light travels, one_minus_cos of its half angle (0: a direction,
 ///             radiance then is irradiance at normal incidence)
 ///   dome      u, v, n: world axes of the dome's local x, y, z
+///   triangle  a mesh light, placed once: what its triangles have in common. radiance is that of
+///             kIndependent, else what the glow of the material is multiplied by; area
 struct alignas(64) LightRecord {
   float p[3], u[3], v[3], n[3];
   float radiance[3];
@@ -100,6 +112,7 @@ struct alignas(64) LightRecord {
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1: rays do not meet its shape
   uint32_t light_link, shadow_link;
+  uint32_t sync;  ///< MaterialSync of a mesh light
 };
 static_assert(sizeof(LightRecord) == 128);
 
@@ -242,6 +255,8 @@ struct LightView {
   const ShapingRecord* shapings = nullptr;
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
+  /// Of triangle i the record of its mesh light, or kNoLight; null where there are no mesh lights.
+  const uint32_t* mesh_lights = nullptr;
   bool has_sampled_only = false;  ///< some record is that
   LinkView links;
   MaterialView materials;  ///< textures, and emission of textured triangle lights

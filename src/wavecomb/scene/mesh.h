@@ -47,6 +47,7 @@ struct Mesh {
   std::span<const uint32_t> face_materials;  ///< one per primitive, or empty
   uint32_t material = kInheritMaterial;      ///< where face_materials is empty
   uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
+  uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight
   uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
   uint32_t steps = 1;  ///< of its shape, at equal distances over the shutter; 1: it keeps its shape
   std::shared_ptr<const void> owner;

@@ -44,6 +44,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.instances = geometry_->instance_records.data();
   v.geometry_mesh = geometry_->geometry_mesh.data();
   v.emissive_lights = lights_->emissive.data();
+  v.mesh_lights = lights_->mesh_lights.empty() ? nullptr : lights_->mesh_lights.data();
   v.material_program = materials_->programs.data();
   v.materials.materials = materials_->records.data();
   v.materials.uses = materials_->uses.data();
@@ -55,7 +56,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
               geometry_->instance_motions.empty() ? nullptr : geometry_->instance_motions.data(),
               geometry_->steps.data()};
   v.has_motion = geometry_->moves();
-  v.has_emissive_meshes = materials_->has_emission;
+  v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
                              [](const Mesh& mesh) { return mesh.is_curved(); });
   v.has_presence = materials_->has_presence;
@@ -134,15 +135,15 @@ SceneBytes Scene::bytes() const {
   const auto of = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   const SceneGeometry& g = *geometry_;
   const LightSet& set = lights_->set;
-  b.records =
-      of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
-         g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
-         g.instance_motions) +
-      of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
-         materials_->openpbr) +
-      of(lights_->emissive, set.records, set.triangles, set.triangle_uvs, set.pick_bins,
-         set.tree.nodes, set.tree.trails, set.shapings, set.ies, set.ies_numbers) +
-      g.names.bytes();
+  b.records = of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
+                 g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
+                 g.instance_motions) +
+              of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
+                 materials_->openpbr) +
+              of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records,
+                 set.triangles, set.triangle_uvs, set.pick_bins, set.tree.nodes, set.tree.trails,
+                 set.shapings, set.ies, set.ies_numbers) +
+              g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;
 }

@@ -21,6 +21,8 @@ struct SceneView {
   const uint32_t* geometry_mesh = nullptr;  ///< mesh of (instance.geometry + geometry id)
   /// First triangle light of (instance.emissive + geometry id).
   const uint32_t* emissive_lights = nullptr;
+  /// Likewise the record of a mesh light, or kNoLight. Null where there are no mesh lights.
+  const uint32_t* mesh_lights = nullptr;
   const uint32_t* material_program = nullptr;
   MaterialView materials;
   LightView lights;
@@ -164,6 +166,8 @@ class SceneBuilder {
   /// A profile for Shaping::ies.
   uint32_t add_ies(IesProfile profile);
   uint32_t add_light(Light light);
+  /// A light for Mesh::mesh_light, of kind kTriangle; its visible does not count.
+  uint32_t add_mesh_light(Light light);
   /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
   uint32_t light_group(const std::string& name);
   void set_camera(const Camera& camera);
@@ -202,7 +206,7 @@ class SceneBuilder {
   std::vector<TexturePtr> textures_;
   std::vector<IesProfile> profiles_;
   std::vector<GeometrySet> sets_;
-  std::vector<Light> lights_;
+  std::vector<Light> lights_, mesh_lights_;
   std::vector<std::string> light_groups_{kOtherLights};
   NameTable names_;
   Camera camera_;

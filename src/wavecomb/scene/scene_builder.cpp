@@ -194,6 +194,8 @@ void check_mesh(const Mesh& mesh) {
 
 uint32_t SceneBuilder::add_mesh(Mesh mesh) {
   check_mesh(mesh);
+  if (mesh.mesh_light != kNoLight && mesh.mesh_light >= mesh_lights_.size())
+    throw Error(quoted("mesh", mesh.name) + " has a mesh light that was never added");
   meshes_.push_back(std::move(mesh));
   return static_cast<uint32_t>(meshes_.size() - 1);
 }
@@ -203,6 +205,7 @@ void SceneBuilder::replace_mesh(uint32_t id, Mesh mesh) {
   Mesh& old = meshes_[id];
   mesh.name = old.name;
   mesh.light_group = old.light_group;
+  mesh.mesh_light = old.mesh_light;
   mesh.asset_length = old.asset_length;
   check_mesh(mesh);
   old = std::move(mesh);
@@ -271,6 +274,13 @@ uint32_t SceneBuilder::add_light(Light light) {
   check_light(light, textures_.size(), profiles_.size(), sets_.size());
   lights_.push_back(std::move(light));
   return static_cast<uint32_t>(lights_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_mesh_light(Light light) {
+  light.kind = LightKind::kTriangle;
+  check_light(light, textures_.size(), profiles_.size(), sets_.size());
+  mesh_lights_.push_back(std::move(light));
+  return static_cast<uint32_t>(mesh_lights_.size() - 1);
 }
 
 void SceneBuilder::set_camera(const Camera& camera) {
@@ -397,6 +407,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->textures = std::move(textures_);
   geometry->profiles = std::move(profiles_);
   geometry->sets = std::move(sets_);
+  geometry->mesh_lights = std::move(mesh_lights_);
   geometry->light_groups = std::move(light_groups_);
   geometry->names = std::move(names_);
   geometry->warnings = std::move(warnings_);

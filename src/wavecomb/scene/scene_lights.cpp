@@ -19,7 +19,34 @@ struct EmissiveMesh {
   const Mesh* mesh;
   const InstanceRecord* instance;
   const Affine* to_world;
+  uint32_t mesh_light;  ///< index of its PlacedMeshLight, or kNoLight
 };
+
+/// Area of a mesh in the middle of the shutter, one side, as `to_world` places it.
+double world_area(const Mesh& mesh, const Affine& to_world) {
+  const std::span<const float> positions = mesh.positions.subspan(
+      mesh.steps / 2 * (mesh.positions.size() / mesh.steps), mesh.positions.size() / mesh.steps);
+  double sum = 0;
+  for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    double p[3][3];
+    for (size_t k = 0; k < 3; ++k) {
+      const float* const at = &positions[size_t{3} * mesh.indices[i + k]];
+      const Vec3<float> w = to_world.point({at[0], at[1], at[2]});
+      p[k][0] = double{w.x};
+      p[k][1] = double{w.y};
+      p[k][2] = double{w.z};
+    }
+    double square = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t a = (k + 1) % 3, b = (k + 2) % 3;
+      const double c =
+          (p[1][a] - p[0][a]) * (p[2][b] - p[0][b]) - (p[1][b] - p[0][b]) * (p[2][a] - p[0][a]);
+      square += c * c;
+    }
+    sum += 0.5 * std::sqrt(square);
+  }
+  return sum;
+}
 
 /// Face `face` of an emissive mesh as a light; radiance 0 where it does not emit.
 EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMaterials& materials,
@@ -27,6 +54,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
   const Mesh& mesh = *source.mesh;
   const uint32_t material = material_of(mesh, *source.instance, face);
   EmissiveTriangle t{};
+  t.mesh_light = source.mesh_light;
   const Material& m = materials.materials[material];
   Vec3<float> radiance = m.emission;
   if (m.has_texture(Slot::kEmission)) {
@@ -71,7 +99,9 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   size_t triangle_count = 0;
   const auto emits = [&](uint32_t material) { return materials.materials[material].emits(); };
   const Affine identity{};
-  for (size_t i = 0; materials.has_emission && i < geometry.instance_records.size(); ++i) {
+  std::vector<PlacedMeshLight> placed;
+  const bool any = materials.has_emission || !geometry.mesh_lights.empty();
+  for (size_t i = 0; any && i < geometry.instance_records.size(); ++i) {
     const InstanceRecord& record = geometry.instance_records[i];
     const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
     for (uint32_t mesh_id : group.meshes) {
@@ -79,12 +109,19 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
       // What moves is no light to aim at: its triangles are where they are at a path's own time.
       // Paths that meet it see it shine.
       const bool moves = mesh.deforms() || (i > 0 && geometry.instances[i - 1].motion.moves());
-      const bool shines = !moves && mesh.triangle_count() > 0 &&
-                          geometry.any_material(mesh_id, record.material, emits);
+      const Light* const light =
+          mesh.mesh_light == kNoLight ? nullptr : &geometry.mesh_lights[mesh.mesh_light];
+      const bool glows = geometry.any_material(mesh_id, record.material, emits);
+      const bool independent = light && light->sync == MaterialSync::kIndependent;
+      const bool shines = !moves && mesh.triangle_count() > 0 && (glows || independent);
       emissive.push_back(shines ? static_cast<uint32_t>(triangle_count) : kNoLight);
+      const Affine& to_world = i == 0 ? identity : geometry.instances[i - 1].to_world;
+      if (!geometry.mesh_lights.empty())
+        mesh_lights.push_back(light ? static_cast<uint32_t>(placed.size()) : kNoLight);
+      const uint32_t mesh_light = light ? mesh_lights.back() : kNoLight;
+      if (light) placed.push_back({light, to_world, world_area(mesh, to_world), !moves});
       if (!shines) continue;
-      sources.push_back({triangle_count, &mesh, &record,
-                         i == 0 ? &identity : &geometry.instances[i - 1].to_world});
+      sources.push_back({triangle_count, &mesh, &record, &to_world, mesh_light});
       triangle_groups.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
       triangle_count += mesh.triangle_count();
     }
@@ -98,10 +135,11 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   const Bounds& b = geometry.bounds;
   const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
   set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
-                     before ? &before->set : nullptr, geometry.profiles);
-  // Table entries now point at the first triangle; make them light ids.
-  for (uint32_t& entry : emissive)
-    if (entry != kNoLight) entry += set.first_triangle();
+                     before ? &before->set : nullptr, geometry.profiles, placed);
+  // Table entries now count from the first triangle and the first mesh light; make them ids.
+  for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
+    for (uint32_t& entry : *table)
+      if (entry != kNoLight) entry += set.first_triangle();
 }
 
 std::vector<uint32_t> Scene::groups_of_lights() const {

@@ -70,6 +70,7 @@ struct SceneGeometry {
   std::vector<TexturePtr> textures;
   std::vector<IesProfile> profiles;
   std::vector<GeometrySet> sets;
+  std::vector<Light> mesh_lights;  ///< Mesh::mesh_light
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;
@@ -119,7 +120,8 @@ struct SceneLights {
 
   std::vector<Light> lights;
   LightSet set;
-  std::vector<uint32_t> emissive;  ///< SceneView::emissive_lights; empty where nothing emits
+  std::vector<uint32_t> emissive;     ///< SceneView::emissive_lights; empty where nothing emits
+  std::vector<uint32_t> mesh_lights;  ///< SceneView::mesh_lights; empty where there are none
   /// Of the triangle lights from `first` on, up to those of the next entry.
   struct TriangleGroup {
     uint32_t first, group;

@@ -56,14 +56,16 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       hit.time = gather<F>(pool.time, slot, active);
     PathLanes<F> path = load_path<F>(pool, slot, active);
     const F t = r[Q::kT];
-    const PathState<F> state{path.d,
-                             path.throughput,
-                             path.pdf,
-                             path.eta_scale,
-                             fma(path.cone_spread, t, path.cone_width),
-                             path.cone_spread,
-                             path.o,
-                             path.receiver};
+    PathState<F> state{path.d,
+                       path.throughput,
+                       path.pdf,
+                       path.eta_scale,
+                       fma(path.cone_spread, t, path.cone_width),
+                       path.cone_spread,
+                       path.o,
+                       path.receiver};
+    if (pool.link && context.scene.mesh_lights && depth > 0) [[unlikely]]
+      state.link = gather<U>(pool.link, slot, on);
     const VertexResult<F> v =
         shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, id(Q::kGeom), t,
                               material, state, wants_aovs ? &aovs : nullptr, active);

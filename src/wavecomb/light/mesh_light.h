@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Mesh lights: triangles of meshes that UsdLux makes lights of, whose light may be other than what
+/// their material shows.
+#pragma once
+
+#include "wavecomb/light/link.h"
+#include "wavecomb/light/shaping.h"
+#include "wavecomb/light/triangle.h"
+
+namespace wavecomb {
+
+namespace detail {
+
+/// Radiance of samples `s` on triangles `light`, as their mesh lights let it out. What is constant
+/// is tinted when the scene is built.
+template <typename F>
+inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
+                              const TriangleReader<F>& triangle, const KindSample<F>& s,
+                              const Mask<F>& active) {
+  const UInt<F> record = record_of<F>(view, light, active);
+  const Mask<F> known = active & (s.pdf > 0.f) & Mask<F>(record != UInt<F>(kNoLight));
+  if (none(known)) return s.radiance;
+  const LightReader<F> reader(view.lights, record, known);
+  const Mask<F> textured = known & (triangle.radiance.x == TriangleLight::kTextured);
+  const Color<F> radiance = select<F>(textured, s.radiance * reader.radiance(), s.radiance);
+  if (!view.shapings) return radiance;
+  return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
+}
+
+}  // namespace detail
+
+/// What a path along `dir` gets of meshes of mesh lights `record` (kNoLight: of none) that it met,
+/// before MIS: `glow` is the radiance that the material says. `is_seen`: a camera or a mirror looks
+/// at it, else it is a bounce which light sampling could have made.
+template <typename F>
+inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
+                                    const Color<F>& glow, const Vec3<F>& dir, const UInt<F>& link,
+                                    const Mask<F>& is_seen, bool from_camera,
+                                    const Mask<F>& active) {
+  using U = UInt<F>;
+  using R = LightRecord;
+  const Mask<F> known = active & Mask<F>(record != U(kNoLight));
+  if (none(known)) return glow;
+  const detail::LightReader<F> light(view.lights, record, known);
+  const U sync = light.bits(offsetof(R, sync));
+  const Mask<F> shows_glow =
+      is_seen & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
+  const Mask<F> given = known & not_(shows_glow);
+  if (none(given)) return glow;
+  Color<F> radiance = glow * light.radiance();
+  if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -dir, radiance, given);
+  const F mirrored = from_camera ? F(1.f) : light.real(offsetof(R, specular));
+  const Mask<F> sampled_only = Mask<F>(light.bits(offsetof(R, sampled_only)) != U(0u));
+  F factor = select(sampled_only, select(is_seen, mirrored, F(0.f)), F(1.f));
+  if (view.links.members) {
+    const U set = light.bits(offsetof(R, light_link));
+    factor = select(is_linked<F>(view.links, link, set, given), factor, F(0.f));
+  }
+  return select<F>(given, radiance * factor, glow);
+}
+
+}  // namespace wavecomb
