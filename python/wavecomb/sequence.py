@@ -17,7 +17,7 @@ from wavecomb import _core
 from wavecomb.api import check_memory, picture_of, prepare
 from wavecomb.frame_names import parse_frames
 from wavecomb.stats import make_stats
-from wavecomb.usd import LoadReport, load_stage, open_stage
+from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.camera import camera_motion, read_camera
 from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.opening import time_code
@@ -77,6 +77,7 @@ class Frames:
             self._stage: Usd.Stage = open_stage(
                 self._path, variants, mask=tuple(mask), session_layer=layer
             )
+            mtlx.tell(self._stage, opening)
             self._stock = FrameStock(self._stage, opening)
         self._opening_s = time.perf_counter() - started
         self._renderer: _core.Renderer | None = None

@@ -122,14 +122,14 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     Raises:
         WavecombError: It cannot be rendered.
     """
-    from wavecomb.usd import load_stage, open_stage
+    from wavecomb.usd import load_stage, mtlx, open_stage
 
     source = request.source
     usd = request.usd
     if usd is None:
         usd = open_stage(source.path, source.variants)
     elif request.fresh:
-        usd.Reload()
+        mtlx.reload(usd)
     overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()
     options: dict[str, Any] = {} if source.purposes is None else {"purposes": source.purposes}
     loaded = load_stage(

@@ -38,6 +38,10 @@ _FORMS = (
 """Diagnostics that are said in our words: the place is the first group."""
 
 
+_SAID = re.compile(r"Could not (open asset|load sublayer) @[^@]*\.mtlx\]*@", re.IGNORECASE)
+"""What ``usd.mtlx`` says better, where it comes to nothing."""
+
+
 def _tell(report: LoadReport, text: str) -> None:
     """Adds one diagnostic to a report."""
     for form, words in _FORMS:
@@ -96,7 +100,7 @@ def captured(report: LoadReport) -> Iterator[None]:
             yield
         finally:
             texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
-            lines = sorted({plain(text) for text in texts})
+            lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
             # What can be said in our words is grouped there, however often it comes.
             known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
             for line in known:

@@ -13,6 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import patience, trail
+from wavecomb.usd import mtlx
 from wavecomb.usd.diagnostics import commentary
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.population import populate
@@ -166,7 +167,10 @@ def open_stage(
         stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll)
     if not stage:
         raise WavecombError(f"{file}: cannot be read as USD")
+    mtlx.resolve(stage)
     select_variants(stage, variants or {})
+    if variants:
+        mtlx.resolve(stage)
     if mask:
         populate(stage, mask)
     return stage

@@ -15,6 +15,7 @@ from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import trail
+from wavecomb.usd import mtlx
 from wavecomb.usd.camera import camera_motion, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
@@ -295,6 +296,8 @@ def _fill(
 ) -> _Filled:
     """Fills the builder. A stage that was opened here is closed then."""
     stage = choice.opened()
+    if stock is None:
+        mtlx.tell(stage, report)
     time = time_code(stage, choice.frame)
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
