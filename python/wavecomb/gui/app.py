@@ -13,7 +13,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from wavecomb.errors import WavecombError
-from wavecomb.gui import theme
+from wavecomb.gui import collector, theme
 from wavecomb.gui.messages import install_hooks
 from wavecomb.gui.setup import Setup
 
@@ -54,6 +54,7 @@ def make_application() -> QApplication:
     application.setApplicationName("Wavecomb")
     application.setOrganizationName("Wavecomb")
     application.setDesktopFileName("wavecomb")
+    collector.install(application)
     return application
 
 
