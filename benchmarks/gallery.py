@@ -19,6 +19,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -48,9 +49,11 @@ img {{ width: 100%; background: #888 }} .no {{ color: #a40 }} .bad {{ color: #c3
 
 @dataclass
 class Entry:
-    """What came of one stage."""
+    """What came of one stage; ``reference``: a picture to show beside ours."""
 
     name: str
+    about: str = ""
+    reference: str | None = None
     picture: str | None = None
     seconds: float = 0.0
     load: float = 0.0
@@ -62,9 +65,12 @@ class Entry:
     def card(self) -> str:
         """Its part of the page."""
         lines = [f'<article class="{"failed" if self.failure else "done"}">']
-        if self.picture is not None:
-            lines.append(f'<img src="{html.escape(self.picture)}" alt="">')
+        for picture in (self.picture, self.reference):
+            if picture is not None:
+                lines.append(f'<img src="{html.escape(picture)}" alt="">')
         lines.append(f"<h2>{html.escape(self.name)}</h2>")
+        if self.about:
+            lines.append(f"<p>{html.escape(self.about)}</p>")
         if self.failure:
             lines.append(f'<p class="bad">{html.escape(self.failure)}</p>')
         else:
@@ -80,13 +86,16 @@ class Entry:
         return "\n".join([*lines, "</article>"])
 
 
-def render(stage: Path, name: str, stem: Path, options: argparse.Namespace) -> Entry:
-    """Renders a stage in a process of its own."""
+def render(
+    stage: Path, name: str, stem: Path, options: argparse.Namespace, extra: Sequence[str] = ()
+) -> Entry:
+    """Renders a stage in a process of its own; ``extra``: more options of the command."""
     entry = Entry(name)
     files = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in ("exr", "png", "json")}
     command = [sys.executable, "-m", "wavecomb", "render", str(stage), "--quiet"]
     command += ["-o", str(files["exr"]), "--png", str(files["png"]), "--stats", str(files["json"])]
     command += ["--size", str(options.size), str(options.size), "--spp", str(options.spp)]
+    command += extra
     begin = time.monotonic()
     child = subprocess.Popen(
         command,
@@ -117,6 +126,29 @@ def render(stage: Path, name: str, stem: Path, options: argparse.Namespace) -> E
     return entry
 
 
+def write_page(folder: str, entries: Sequence[Entry], options: argparse.Namespace) -> int:
+    """Writes the page; gives the exit code."""
+    failed = [entry for entry in entries if entry.failure]
+    summary = (
+        f"{len(failed)} failed; Wavecomb {version()}, {options.size} x {options.size} pixels, "
+        f"{options.spp} samples each, at most {options.limit:g} s."
+    )
+    page = options.output / "index.html"
+    with replacing(page) as part:
+        part.write_text(
+            PAGE.format(
+                folder=html.escape(folder),
+                count=len(entries),
+                size=options.size,
+                summary=html.escape(summary),
+                cards="\n".join(entry.card() for entry in entries),
+            ),
+            encoding="utf-8",
+        )
+    print(f"{summary} Wrote {page}")
+    return 1 if failed else 0
+
+
 def main() -> int:
     """Renders all and writes the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -139,25 +171,7 @@ def main() -> int:
         entries.append(entry)
         result = entry.failure or f"{entry.seconds:.1f} s, {entry.memory_mb:.0f} MB"
         print(f"{number} of {len(stages)}  {name}: {result}", flush=True)
-    failed = [entry for entry in entries if entry.failure]
-    summary = (
-        f"{len(failed)} failed; Wavecomb {version()}, {options.size} x {options.size} pixels, "
-        f"{options.spp} samples each, at most {options.limit:g} s."
-    )
-    page = options.output / "index.html"
-    with replacing(page) as part:
-        part.write_text(
-            PAGE.format(
-                folder=html.escape(options.folder.name),
-                count=len(entries),
-                size=options.size,
-                summary=html.escape(summary),
-                cards="\n".join(entry.card() for entry in entries),
-            ),
-            encoding="utf-8",
-        )
-    print(f"{summary} Wrote {page}")
-    return 1 if failed else 0
+    return write_page(options.folder.name, entries, options)
 
 
 if __name__ == "__main__":

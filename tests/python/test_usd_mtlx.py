@@ -61,7 +61,7 @@ def value(stage: Usd.Stage, path: str, name: str) -> object:
     shader = UsdShade.Material(stage.GetPrimAtPath(path)).ComputeSurfaceSource("mtlx")[0]
     assert shader, path
     found = UsdShade.Utils.GetValueProducingAttributes(shader.GetInput(name))
-    return found[0].Get()
+    return found[0].Get() if found else None
 
 
 def said(stage: Usd.Stage) -> list[str]:
@@ -253,6 +253,48 @@ def test_graphs_and_includes(tmp_path: Path) -> None:
         "MaterialX connection leads nowhere (left out)",
         "MaterialX value 'much' is no float (left out)",
     ]
+
+
+LOOKS = """
+  <collection name="c_all" includegeom="/a, /b" excludegeom="/b/x" geomprefix="/world"/>
+  <variantset name="vs"><variant name="dull">
+    <input name="specular_roughness" type="float" value="0.875"/></variant></variantset>
+  <look name="plain">
+    <materialassign name="ma" material="Gold" collection="c_all">
+      <variantassign name="va" variantset="vs" variant="dull"/></materialassign>
+    <materialassign name="mb" material="Gold" geom="/c"/>
+    <materialassign name="mc" material="None" geom="/c, /d*"/>
+  </look>
+  <look name="more" inherit="plain"><materialassign name="md" material="Gold"/></look>
+</materialx>"""
+
+
+def test_looks(tmp_path: Path) -> None:
+    file = write(tmp_path, "l.mtlx", GOLD.replace("</materialx>", LOOKS))
+    write(
+        tmp_path,
+        "s.usda",
+        '#usda 1.0\ndef "M" (\n references = @./l.mtlx@</ModelRoot>\n'
+        ' variants = { string LookVariant = "more" }\n) {\n'
+        ' def "world" {\n  def Sphere "a" {\n  }\n }\n}\n',
+    )
+    layer, findings = translate(str(file))
+    stage = Usd.Stage.Open(layer)
+    collection = Usd.CollectionAPI(stage.GetPrimAtPath("/MaterialX/Collections"), "c_all")
+    at = "/MaterialX/Collections/world"
+    assert collection.GetIncludesRel().GetTargets() == [Sdf.Path(f"{at}/a"), Sdf.Path(f"{at}/b")]
+    assert collection.GetExcludesRel().GetTargets() == [Sdf.Path(f"{at}/b/x")]
+    assert value(stage, "/MaterialX/Looks/plain/Materials/ma", "specular_roughness") == 0.875
+    assert value(stage, "/MaterialX/Looks/plain/Materials/mb", "specular_roughness") is None
+    assert sorted(what for what, _ in findings) == [
+        "MaterialX geometry /d* is no path of a prim (left out)",
+        "MaterialX material None is not there (not assigned)",
+    ]
+    stage = open_stage(tmp_path / "s.usda")
+    bound, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/M/world/a")).ComputeBoundMaterial()
+    assert bound.GetPath() == "/M/Materials/ma"
+    bound, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/M")).ComputeBoundMaterial()
+    assert bound.GetPath() == "/M/Materials/md"
 
 
 @pytest.mark.parametrize(

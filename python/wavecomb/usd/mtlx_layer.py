@@ -10,6 +10,7 @@ from pxr import Sdf
 
 from wavecomb.usd.mtlx_files import MtlxError, read_document
 from wavecomb.usd.mtlx_graphs import Graphs
+from wavecomb.usd.mtlx_looks import write_looks
 from wavecomb.usd.mtlx_materials import Materials
 from wavecomb.usd.mtlx_prims import Prims
 
@@ -43,6 +44,7 @@ def translate(file: str) -> tuple[Sdf.Layer, Findings]:
             graphs = Graphs(document, prims)
             Materials(document, prims, graphs).all()
             graphs.all()
+        write_looks(document, layer, tell)
     except Exception as error:  # MaterialX's bindings raise types of their own
         raise MtlxError(" ".join(str(error).split())[:200]) from None
     return layer, findings
