@@ -226,7 +226,7 @@ DEFS = """<?xml version="1.0"?>
 
 def test_graphs_and_includes(tmp_path: Path) -> None:
     write(tmp_path, "lib/defs.mtlx", DEFS)
-    layer, findings = translate(str(write(tmp_path, "g.mtlx", GRAPH)))
+    layer, report = translate(str(write(tmp_path, "g.mtlx", GRAPH)))
     stage = Usd.Stage.Open(layer)
     top = "/MaterialX/Materials/ns__M"
     shader, name, _ = UsdShade.Material(stage.GetPrimAtPath(top)).ComputeSurfaceSource("mtlx")
@@ -249,7 +249,7 @@ def test_graphs_and_includes(tmp_path: Path) -> None:
     assert image.GetShaderId() == "ND_image_color3"
     assert image.GetInput("file").Get().path == f"{tmp_path}/tex/a.png"
     assert image.GetInput("file").GetAttr().GetColorSpace() == "acescg"
-    assert sorted(what for what, _ in findings) == [
+    assert sorted(finding.what for finding in report.warnings) == [
         "MaterialX connection leads nowhere (left out)",
         "MaterialX value 'much' is no float (left out)",
     ]
@@ -278,7 +278,7 @@ def test_looks(tmp_path: Path) -> None:
         ' variants = { string LookVariant = "more" }\n) {\n'
         ' def "world" {\n  def Sphere "a" {\n  }\n }\n}\n',
     )
-    layer, findings = translate(str(file))
+    layer, report = translate(str(file))
     stage = Usd.Stage.Open(layer)
     collection = Usd.CollectionAPI(stage.GetPrimAtPath("/MaterialX/Collections"), "c_all")
     at = "/MaterialX/Collections/world"
@@ -286,7 +286,7 @@ def test_looks(tmp_path: Path) -> None:
     assert collection.GetExcludesRel().GetTargets() == [Sdf.Path(f"{at}/b/x")]
     assert value(stage, "/MaterialX/Looks/plain/Materials/ma", "specular_roughness") == 0.875
     assert value(stage, "/MaterialX/Looks/plain/Materials/mb", "specular_roughness") is None
-    assert sorted(what for what, _ in findings) == [
+    assert sorted(finding.what for finding in report.warnings) == [
         "MaterialX geometry /d* is no path of a prim (left out)",
         "MaterialX material None is not there (not assigned)",
     ]

@@ -20,7 +20,7 @@ from pxr import Ar, Sdf, Tf, Usd
 
 from wavecomb.isolate import trail
 from wavecomb.usd.mtlx_files import MtlxError
-from wavecomb.usd.mtlx_layer import Findings, translate
+from wavecomb.usd.mtlx_layer import translate
 from wavecomb.usd.report import LoadReport
 
 MAX_ROUNDS = 16
@@ -38,13 +38,13 @@ class _Translation:
         stamp: Of the file as it was.
         layer: None where it cannot be read.
         error: Why not.
-        findings: What was left out.
+        report: What was left out or chosen.
     """
 
     stamp: object
     layer: Sdf.Layer | None
     error: str
-    findings: Findings
+    report: LoadReport
 
 
 _translations: dict[str, _Translation] = {}
@@ -91,8 +91,7 @@ def tell(stage: Usd.Stage, report: LoadReport) -> None:
     used = {layer.identifier for layer in stage.GetUsedLayers()}
     for translation in _translations.values():
         if translation.layer is not None and translation.layer.identifier in used:
-            for what, place in translation.findings:
-                report.warn(what, place)
+            report.absorb(translation.report)
 
 
 def _missing(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
@@ -140,14 +139,14 @@ def _translated(file: str) -> _Translation:
         return known
     trail.note("translating", file)
     try:
-        layer, findings = translate(file)
+        layer, report = translate(file)
         error = ""
     except (MtlxError, Tf.ErrorException) as reason:
-        layer, findings, error = None, [], str(reason)
+        layer, report, error = None, LoadReport(), str(reason)
     if layer is not None and known is not None and known.layer is not None:
         known.layer.TransferContent(layer)
         layer = known.layer
-    _translations[file] = _Translation(stamp, layer, error, findings)
+    _translations[file] = _Translation(stamp, layer, error, report)
     return _translations[file]
 
 

@@ -13,15 +13,15 @@ from wavecomb.usd.mtlx_graphs import Graphs
 from wavecomb.usd.mtlx_looks import write_looks
 from wavecomb.usd.mtlx_materials import Materials
 from wavecomb.usd.mtlx_prims import Prims
+from wavecomb.usd.report import LoadReport
 
 ROOT = Sdf.Path("/MaterialX")
 
-Findings = list[tuple[str, str]]
-"""What could not be translated: what, and which element of which file."""
 
+def translate(file: str) -> tuple[Sdf.Layer, LoadReport]:
+    """The layer of a file, and what could not be translated.
 
-def translate(file: str) -> tuple[Sdf.Layer, Findings]:
-    """The layer of a file; names of files in it are absolute, so that it can be anywhere.
+    Names of files in the layer are absolute, so that it can be anywhere.
 
     Args:
         file: As Ar resolved it.
@@ -30,15 +30,15 @@ def translate(file: str) -> tuple[Sdf.Layer, Findings]:
         MtlxError: It cannot be read.
     """
     document = read_document(file)
-    findings: Findings = []
+    report = LoadReport()
 
     def tell(element: Any, what: str) -> None:
-        findings.append((what, f"{file} {element.getNamePath()}"))
+        report.warn(what, f"{file} {element.getNamePath()}")
 
     layer = Sdf.Layer.CreateAnonymous(f"{Path(file.rstrip(']')).name}.usda")
     try:
         with Sdf.ChangeBlock():
-            prims = Prims(layer, file, tell)
+            prims = Prims(layer, file, tell, report)
             prims.define(ROOT)
             layer.defaultPrim = ROOT.name
             graphs = Graphs(document, prims)
@@ -47,4 +47,4 @@ def translate(file: str) -> tuple[Sdf.Layer, Findings]:
         write_looks(document, layer, tell)
     except Exception as error:  # MaterialX's bindings raise types of their own
         raise MtlxError(" ".join(str(error).split())[:200]) from None
-    return layer, findings
+    return layer, report

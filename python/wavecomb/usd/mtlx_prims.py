@@ -10,6 +10,7 @@ from pxr import Sdf, Tf
 
 from wavecomb.usd.mtlx_files import image_file
 from wavecomb.usd.mtlx_values import usd_type, usd_value
+from wavecomb.usd.report import LoadReport
 
 Tell = Callable[[Any, str], None]
 """Takes an element of the document and what there is to say of it."""
@@ -43,9 +44,11 @@ class Prims:
         layer: That is written.
         file: The document's; names of images count from it.
         tell: Is told what cannot be translated.
+        report: Is told what was chosen.
     """
 
-    def __init__(self, layer: Sdf.Layer, file: str, tell: Tell) -> None:
+    def __init__(self, layer: Sdf.Layer, file: str, tell: Tell, report: LoadReport) -> None:
+        self.report = report
         self.layer = layer
         self.file = file
         self.tell = tell
@@ -108,7 +111,7 @@ class Prims:
         if kind == "filename":
             text, is_bare = image_file(element, self.file)
             if is_bare:
-                self.tell(element, "MaterialX fileprefix leads nowhere (left out)")
+                self.report.note("MaterialX fileprefix leads nowhere (left out)", self.file)
             # Linear Rec. 709 of a whole document says nothing of its images, to OpenUSD either.
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:

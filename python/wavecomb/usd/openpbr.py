@@ -81,9 +81,12 @@ def _standard_surface(i: Inputs) -> dict[str, Any]:
         "tangent",
     )
     film = i.number("thin_film_thickness", 0.0)
+    specular = i.number("specular", 1.0)
+    if specular < 1.0 and i.number("metalness", 0.0) >= 1.0:
+        specular = 1.0  # dims the edge of a metal only; OpenPBR's weight would dim all of it
     return {
         "diffuse_roughness": i.number("diffuse_roughness", 0.0),
-        "specular_weight": i.number("specular", 1.0),
+        "specular_weight": specular,
         "anisotropy": i.number("specular_anisotropy", 0.0),
         "rotation": i.number("specular_rotation", 0.0),
         "transmission_weight": i.number("transmission", 0.0),
