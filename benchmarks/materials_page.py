@@ -44,7 +44,11 @@ class Exhibit:
     @property
     def name(self) -> str:
         """Its title: with what is chosen."""
-        chosen = [word.rpartition("{")[2] for word in self.options if not word.startswith("--")]
+        chosen = [
+            word.rpartition("{")[2].replace("}", "")
+            for word in self.options
+            if not word.startswith("--")
+        ]
         return " ".join([self.stage, *chosen])
 
 
@@ -76,14 +80,14 @@ EXHIBITS = (
     *(
         Exhibit(
             f"cornell-box/{folder}/cornell-box.usda",
-            f"{what}: the box of Cornell's data, a light of 17, 12, 4 over walls of white, green "
-            "and red; all forms of the file are one scene.",
+            f"{what}. The box of Cornell's data: a light of 17, 12, 4 over walls of white, red and "
+            "green. (The display colours have red and green the other way round.)",
         )
         for folder, what in (
             ("mtlx-ref", "MaterialX as a file"),
             ("mtlx-usdshade", "MaterialX in the stage"),
             ("usdpreviewsurface", "UsdPreviewSurface"),
-            ("display-color", "Display colours, without a light"),
+            ("display-color", "Display colours; no light is in the file"),
         )
     ),
     *_variants(
@@ -112,6 +116,17 @@ EXHIBITS = (
         "A teapot that refers to two MaterialX files: coated brass with textures, or plastic.",
         ("/Teapot{materialvariants}=BrassTiled",),
         ("/Teapot{materialvariants}=Plastic",),
+    ),
+    Exhibit(
+        "wg_test_assets/MaterialXTest/basic.usda",
+        "A sphere that refers to a MaterialX file with UsdPreviewSurface: blue plastic.",
+    ),
+    *(
+        Exhibit(
+            f"wg_test_assets/MaterialXTest/{name}_flatten.usda",
+            f"{name}.usda as OpenUSD itself reads it, flattened: the same picture.",
+        )
+        for name in ("basic", "basicTextured")
     ),
 )  # fmt: skip
 
@@ -147,7 +162,8 @@ def said_of(stage: Path) -> str:
     for part in (text[after:], text) if after >= 0 else (text,):
         for paragraph in re.split(r"\n\s*\n", part):
             line = " ".join(paragraph.split())
-            if re.match(r"[A-Z*]", line) and not line.startswith("**") and ". " in f"{line} ":
+            is_prose = re.match(r"[A-Z]", line) and ". " in f"{line} "
+            if is_prose and not re.search(r"\bTM\b|©|rights reserved", line):
                 return re.split(r"(?<=\.) ", line)[0]
     return ""
 
@@ -176,7 +192,7 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, default=Path("out/materials"))
     parser.add_argument("--size", type=int, default=256, help="pixels of an edge")
     parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--limit", type=float, default=120.0, help="seconds for each stage")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds for each stage")
     options = parser.parse_args()
     wanted = [
         exhibit

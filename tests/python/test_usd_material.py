@@ -526,6 +526,16 @@ def test_materialx_constants(tmp_path, identifier, inputs, program, expected):
     assert "MaterialX" not in said(loaded)
 
 
+def test_materialx_metal_without_specular(tmp_path):
+    """Standard Surface's specular dims the edge of a metal, not the metal."""
+    text = surface("float inputs:metalness = 1\nfloat inputs:specular = 0")
+    text = text.replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader")
+    scene, _ = load(tmp_path, text)
+    assert scene.material_of("M")["openpbr"]["specular_weight"] == 1.0
+    scene, _ = load(tmp_path, text.replace("metalness = 1", "metalness = 0"))
+    assert scene.material_of("M")["openpbr"]["specular_weight"] == 0.0
+
+
 def test_materialx_layers(tmp_path):
     """Standard Surface as its published translation to OpenPBR has it, and what has no effect."""
     text = surface(

@@ -66,10 +66,11 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     ``PREVIEW``, or a shading model of MaterialX; "" where nothing does.
     """
     shader = material.ComputeSurfaceSource()[0]
-    # Where a material comes in both forms, the preview is the one for who knows no MaterialX.
+    if shader_id(shader) == "UsdPreviewSurface":
+        return PREVIEW, shader
     for candidate in (material.ComputeSurfaceSource("mtlx")[0], shader):
         name = shader_id(candidate)
-        if name.startswith(("ND_UsdPreviewSurface", "UsdPreviewSurface")):
+        if name.startswith("ND_UsdPreviewSurface"):
             return PREVIEW, candidate
         if model := model_of(name):
             return model, candidate

@@ -104,6 +104,8 @@ class _Looks:
 
     def look(self, look: Any, above: tuple[str, ...]) -> Sdf.Path:
         """The prim of a look; ``above``: those that inherit it."""
+        import MaterialX as mx
+
         name = look.getName()
         path = child(LOOKS, name)
         if name in self._looks:
@@ -111,7 +113,7 @@ class _Looks:
         self._looks.add(name)
         prim = self._stage.DefinePrim(path)
         base = look.getInheritsFrom()
-        if base is not None and base.getName() not in (*above, name):
+        if base is not None and base.isA(mx.Look) and base.getName() not in (*above, name):
             prim.GetReferences().AddInternalReference(self.look(base, (*above, name)))
         assigned = [(item, self._assigned(item)) for item in look.getMaterialAssigns()]
         if self._stage.GetPrimAtPath(COLLECTIONS):

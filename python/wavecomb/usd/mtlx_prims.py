@@ -107,6 +107,9 @@ class Prims:
         kind, text = element.getType(), element.getValueString()
         if not text:
             return
+        if port.typeName != (usd_type(kind) or Sdf.ValueTypeNames.Token):
+            self.tell(element, f"MaterialX value of type {kind} for {port.typeName} (left out)")
+            return
         space = element.getActiveColorSpace()
         if kind == "filename":
             text, is_bare = image_file(element, self.file)
