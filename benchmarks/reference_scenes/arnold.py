@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 from reference_scenes.shapes import write_checker, write_magnified
 from reference_scenes.stage import Image, StageWriter
@@ -203,32 +204,26 @@ class _Translator:
         self._note(f"the instances' {name} is displayColor, without standard_surface's reflection")
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> None:
+        """Arnold takes what says no subdivisionScheme for polygons, and smooths their shading."""
         scheme = mesh.GetSubdivisionSchemeAttr()
-        normals = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
-        if not scheme.HasAuthoredValue() and normals and normals.HasValue():
-            scheme.Set(UsdGeom.Tokens.none)
-            if normals.GetElementSize() != 1:
-                self._smooth(mesh)
-            self._note("a mesh with normals whose subdivisionScheme is not authored is polygons")
-
-    def _smooth(self, mesh: UsdGeom.Mesh) -> None:
-        """Normals of corners, averaged over faces by their area, in place of what is no primvar."""
-        points = np.array(mesh.GetPointsAttr().Get(), np.float64)
-        faces = np.array(mesh.GetFaceVertexIndicesAttr().Get())
-        counts = np.array(mesh.GetFaceVertexCountsAttr().Get())
-        if not (counts == 3).all():
+        if scheme.HasAuthoredValue():
             return
-        corners = faces.reshape(-1, 3)
-        a, b, c = (points[corners[:, k]] for k in range(3))
-        normals = np.zeros_like(points)
-        for k in range(3):
-            np.add.at(normals, corners[:, k], np.cross(b - a, c - a))
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for name in ("primvars:normals", "primvars:normals:indices"):
-            mesh.GetPrim().GetAttribute(name).Block()
-        mesh.CreateNormalsAttr([Gf.Vec3f(*(float(v) for v in n)) for n in normals])
+        scheme.Set(UsdGeom.Tokens.none)
+        self._note("a mesh whose subdivisionScheme is not authored is polygons, not catmullClark")
+        normals = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
+        if normals and normals.HasValue() and normals.GetInterpolation() == "vertex":
+            return
+        if normals:
+            self._note("normals of an elementSize that USD cannot read are averaged ones")
+            for name in ("primvars:normals", "primvars:normals:indices"):
+                mesh.GetPrim().GetAttribute(name).Block()
+        found = averaged_normals(
+            np.array(mesh.GetPointsAttr().Get(), np.float64),
+            np.array(mesh.GetFaceVertexCountsAttr().Get()),
+            np.array(mesh.GetFaceVertexIndicesAttr().Get()),
+        )
+        mesh.CreateNormalsAttr([Gf.Vec3f(*(float(v) for v in n)) for n in found])
         mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-        self._note("normals of an elementSize that USD cannot read: averaged ones")
 
     def _dome(self, prim: Usd.Prim) -> None:
         seen = prim.GetAttribute("primvars:arnold:camera")
@@ -252,3 +247,17 @@ def _source(owner: Any, attribute: str) -> UsdShade.Shader:
 
 def _kind(shader: UsdShade.Shader) -> str:
     return str(shader.GetIdAttr().Get()) if shader else ""
+
+
+def averaged_normals(
+    points: NDArray[np.float64], counts: NDArray[Any], indices: NDArray[Any]
+) -> NDArray[np.float64]:
+    """Normals of points: those of their faces, weighted by area."""
+    starts = np.cumsum(counts) - counts
+    following = np.arange(len(indices)) + 1
+    following[starts + counts - 1] = starts
+    edges = np.cross(points[indices], points[indices[following]])
+    faces = np.add.reduceat(edges, starts, axis=0)
+    normals = np.zeros_like(points)
+    np.add.at(normals, indices, faces.repeat(counts, axis=0))
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)

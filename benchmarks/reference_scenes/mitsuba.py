@@ -102,7 +102,7 @@ class Scene:
     def missing_file(self, number: int) -> str:
         """The first file below a node that is not there, else ""."""
         props = self.props(number)
-        if props.has_property("filename") and self.path(str(props["filename"])) is None:
+        if "filename" in props and self.path(str(props["filename"])) is None:
             return str(props["filename"])
         for child in self.children(number).values():
             if missing := self.missing_file(child):
@@ -114,7 +114,7 @@ class Scene:
     ) -> list[float]:
         """A parameter as linear Rec.709, as Mitsuba converts spectra."""
         props = self.props(number)
-        if not props.has_property(key):
+        if key not in props:
             return [default] * 3
         get = props.get_emissive_texture if emits else props.get_unbounded_texture
         if emits and str(props.type(key)).endswith("Color"):
@@ -147,10 +147,10 @@ def referee(scene: Scene, as_ours: bool) -> Any:
             root.remove_property(key)
     for number, node in enumerate(scene.state.nodes):
         props = node.props
-        if props.has_property("filename") and (found := scene.path(str(props["filename"]))):
+        if "filename" in props and (found := scene.path(str(props["filename"]))):
             props["filename"] = str(found)
         if as_ours and scene.category(number) == "BSDF":
-            if props.has_property("distribution") or "rough" in scene.kind(number):
+            if "distribution" in props or "rough" in scene.kind(number):
                 props["distribution"] = "ggx"
             if "plastic" in scene.kind(number):
                 props["nonlinear"] = False
@@ -194,7 +194,7 @@ class _Translator:
                     kind, props = self.scene.kind(number), self.scene.props(number)
                     if kind not in ("path", "direct"):
                         raise Inexpressible(f"the integrator {kind} is none of ours")
-                    most = int(props["max_depth"]) if props.has_property("max_depth") else -1
+                    most = int(props["max_depth"]) if "max_depth" in props else -1
                     return 1 if kind == "direct" else (64 if most < 0 else most - 1)
                 number = inner[0]
         return 64
@@ -211,7 +211,7 @@ class _Translator:
         to_world, half, orthographic = self._view(sensor, film)
         props = self.scene.props(sensor)
         near, far = (
-            float(props[key]) if props.has_property(key) else default
+            float(props[key]) if key in props else default
             for key, default in (("near_clip", 1e-2), ("far_clip", 1e4))
         )
         self.out.camera(to_world @ TURN, half, (near, far), orthographic)
@@ -248,7 +248,7 @@ class _Translator:
 
     def _matrix(self, number: int, key: str = "to_world") -> Matrix:
         props = self.scene.props(number)
-        if not props.has_property(key):
+        if key not in props:
             return np.eye(4)
         return np.array(props[key].matrix, np.float64).reshape(4, 4)
 
@@ -263,7 +263,7 @@ class _Translator:
         if kind == "constant":
             self.out.dome_light(np.eye(4), self.scene.colour(number, "radiance", 1.0, True))
         elif kind == "envmap":
-            scale = float(props["scale"]) if props.has_property("scale") else 1.0
+            scale = float(props["scale"]) if "scale" in props else 1.0
             image = self.out.file.with_name(f"{self.out.file.stem}_dome.exr")
             source = self.scene.path(str(props["filename"]))
             assert source is not None
@@ -272,17 +272,11 @@ class _Translator:
             to_world[:3, 3] = 0.0
             self.out.dome_light(to_world, [scale] * 3, image)
         elif kind == "point":
-            centre = (
-                props["position"] if props.has_property("position") else self._matrix(number)[:3, 3]
-            )
+            centre = props["position"] if "position" in props else self._matrix(number)[:3, 3]
             colour = self.scene.colour(number, "intensity", 1.0, True)
             self.out.sphere_light([float(v) for v in centre], 0.0, colour)
         elif kind == "directional":
-            along = (
-                props["direction"]
-                if props.has_property("direction")
-                else self._matrix(number)[:3, 2]
-            )
+            along = props["direction"] if "direction" in props else self._matrix(number)[:3, 2]
             colour = self.scene.colour(number, "irradiance", 1.0, True)
             self.out.distant_light([float(v) for v in along], colour)
         elif kind == "spot":
@@ -337,7 +331,7 @@ class _Translator:
             raise Inexpressible(f"the shape {kind} is not translated")
         made = {"type": kind, "filename": str(self.scene.path(str(props["filename"])))}
         for key in ("shape_index", "face_normals", "flip_normals"):
-            if props.has_property(key):
+            if key in props:
                 made[key] = props[key]
         mesh = self.mi.load_dict({**made, "to_world": self.mi.ScalarTransform4f(to_world)})
         found = self.mi.traverse(mesh)
@@ -402,10 +396,10 @@ class _Translator:
         inputs: dict[str, Any] = {"roughness": math.sqrt(alpha)}
         if kind.endswith("conductor"):
             eta, k = self._index(number, props)
-            if props.has_property("alpha_u"):
+            if "alpha_u" in props:
                 return self._brushed(eta, k, float(props["alpha_u"]), float(props["alpha_v"]))
             return self.out.material("metal", inputs, {"wavecomb:eta": eta, "wavecomb:k": k})
-        ior = {key: props[key] for key in ("int_ior", "ext_ior") if props.has_property(key)}
+        ior = {key: props[key] for key in ("int_ior", "ext_ior") if key in props}
         default = {} if kind.endswith("dielectric") else {"int_ior": "polypropylene"}
         made = self.mi.load_dict({"type": "dielectric", **default, **ior})
         inputs["ior"] = float(self.mi.traverse(made)["eta"])
@@ -417,7 +411,7 @@ class _Translator:
         return self.out.material("plastic", {**inputs, "diffuseColor": colour})
 
     def _index(self, number: int, props: Any) -> tuple[list[float], list[float]]:
-        if props.has_property("eta"):
+        if "eta" in props:
             return self.scene.colour(number, "eta"), self.scene.colour(number, "k")
         made = self.mi.load_dict(
             {"type": "conductor", "material": str(props.get("material", "Cu"))}
