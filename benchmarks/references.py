@@ -190,7 +190,7 @@ def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace
 
     def judged(as_ours: bool) -> Pixels:
         scene = mitsuba.referee(mitsuba.Scene(mi, file, width), as_ours)
-        return np.asarray(mi.render(scene, spp=2 * spp))[:, :, :3]
+        return np.asarray(mi.render(scene, spp=spp))[:, :, :3]
 
     now = judged(False)
     reference = read(stored) if stored.exists() else now
@@ -238,7 +238,7 @@ def main() -> int:
     )
     parser.add_argument("scenes", nargs="*", help="parts of names; default: all")
     parser.add_argument("-o", "--out", type=Path, default=Path("out/references"))
-    parser.add_argument("--spp", type=int, default=256)
+    parser.add_argument("--spp", type=int, default=128)
     options = parser.parse_args()
     if not (ASSETS / "reference" / "arnold-usd").is_dir():
         parser.error(f"there are no references in {ASSETS}")

@@ -192,7 +192,7 @@ class _Translator:
                 inner = list(self.scene.all_of(number, "Integrator"))
                 if not inner:
                     kind, props = self.scene.kind(number), self.scene.props(number)
-                    if kind not in ("path", "direct"):
+                    if kind not in ("path", "direct", "ptracer"):
                         raise Inexpressible(f"the integrator {kind} is none of ours")
                     most = int(props["max_depth"]) if "max_depth" in props else -1
                     return 1 if kind == "direct" else (64 if most < 0 else most - 1)

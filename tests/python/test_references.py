@@ -110,7 +110,7 @@ def test_a_translated_scene_looks_as_mitsuba_renders_it(mi: Any, tmp_path: Path,
         ('type="cube"', 'type="cylinder"', "shape cylinder"),
         ('<bsdf type="plastic">', '<bsdf type="principled">', "material principled"),
         ('<rfilter type="box"/>', '<rfilter type="mitchell"/>', "filter mitchell"),
-        ('<integrator type="path">', '<integrator type="ptracer">', "integrator ptracer"),
+        ('<integrator type="path">', '<integrator type="volpath">', "integrator volpath"),
     ],
 )
 def test_what_cannot_be_said_is_named(
