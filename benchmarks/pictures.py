@@ -24,14 +24,15 @@ def read(file: Path) -> Pixels:
     image = oiio.ImageBuf(str(file))
     if image.has_error or image.spec().nchannels < 3:
         raise OSError(f"{file}: not a picture of three channels {image.geterror()}".rstrip())
-    return np.asarray(image.get_pixels(oiio.FLOAT)[..., :3], np.float32)
+    return np.asarray(image.get_pixels(oiio.FLOAT), np.float32)[..., :3]
 
 
 def shrunk(image: Pixels, width: int) -> Pixels:
     """An image at a width that divides its own, by means of blocks."""
     n = image.shape[1] // width
     height = image.shape[0] // n
-    return image[: height * n, : width * n].reshape(height, n, width, n, 3).mean((1, 3))
+    blocks = image[: height * n, : width * n].reshape(height, n, width, n, 3)
+    return np.asarray(blocks.mean((1, 3)))
 
 
 def linear(encoded: Pixels) -> Pixels:

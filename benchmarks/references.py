@@ -29,6 +29,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 from pictures import Pixels, linear, read, white_of, write_row
 from reference_scenes import arnold, mitsuba, mitsuba_files
+from reference_scenes.mitsuba_scene import Scene, referee
 from reference_scenes.stage import Inexpressible
 from reference_scenes.why import LISTED, WHY
 
@@ -174,7 +175,7 @@ def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace
     width = 0 if stored.exists() else WIDTH
     name = name_of(file)
     stage = options.out / "stages" / f"{file.stem}.usda"
-    film = mitsuba.to_stage(mitsuba.Scene(mi, file, width), stage)
+    film = mitsuba.to_stage(Scene(mi, file, width), stage)
     kept = ~film.left_out
     if kept.mean() < 0.5:
         raise Inexpressible(film.notes[0].split(":")[0])
@@ -189,7 +190,7 @@ def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace
     )
 
     def judged(as_ours: bool) -> Pixels:
-        scene = mitsuba.referee(mitsuba.Scene(mi, file, width), as_ours)
+        scene = referee(Scene(mi, file, width), as_ours)
         return np.asarray(mi.render(scene, spp=spp))[:, :, :3]
 
     now = judged(False)

@@ -260,4 +260,5 @@ def averaged_normals(
     faces = np.add.reduceat(edges, starts, axis=0)
     normals = np.zeros_like(points)
     np.add.at(normals, indices, faces.repeat(counts, axis=0))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return normals

@@ -77,7 +77,8 @@ def write_checker(file: Path, first: Sequence[float], second: Sequence[float]) -
     """Two by two cells; the first colour is at the uv of 0 and at that of 1."""
     cells = np.indices((2, 2)).sum(axis=0) % 2
     # Rows go down and v goes up: the lowest row has the first colour at its left.
-    image = np.where((cells[::-1] == 0)[:, :, None], np.float32(first), np.float32(second))
+    colours = np.array([first, second], np.float32)
+    image = colours[cells[::-1]]
     write_exr(file, image.repeat(CHECKER_TEXELS, axis=0).repeat(CHECKER_TEXELS, axis=1))
 
 
@@ -86,7 +87,7 @@ def write_dome(source: Path, file: Path) -> None:
 
     There the centres of rows are half a row inwards.
     """
-    image = np.asarray(oiio.ImageBuf(str(source)).get_pixels(oiio.FLOAT)[..., :3], np.float32)
+    image = read(source)
     height = len(image)
     at = (np.arange(height) + 0.5) * ((height - 1) / height)
     low = np.minimum(np.floor(at).astype(int), height - 2)
@@ -128,4 +129,5 @@ def _placed(points: NDArray[Any], to_world: Matrix) -> NDArray[np.float64]:
 
 def _turned(normals: Any, to_world: Matrix) -> NDArray[np.float64]:
     turned: NDArray[np.float64] = np.asarray(normals) @ np.linalg.inv(to_world[:3, :3])
-    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return turned

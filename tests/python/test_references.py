@@ -15,6 +15,7 @@ import wavecomb
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from reference_scenes import arnold, mitsuba, shapes
+from reference_scenes.mitsuba_scene import Scene, referee
 from reference_scenes.stage import Inexpressible
 
 BOX = """<scene version="3.0.0">
@@ -81,10 +82,10 @@ def mi() -> Any:
     return load_mitsuba()
 
 
-def parsed(mi: Any, folder: Path, text: str) -> mitsuba.Scene:
+def parsed(mi: Any, folder: Path, text: str) -> Scene:
     file = folder / "scene.xml"
     file.write_text(text, encoding="utf-8")
-    return mitsuba.Scene(mi, file)
+    return Scene(mi, file)
 
 
 @pytest.mark.parametrize("text", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
@@ -95,8 +96,8 @@ def test_a_translated_scene_looks_as_mitsuba_renders_it(mi: Any, tmp_path: Path,
     ours = wavecomb.render(
         stage, size=film.size, spp=256, max_depth=2, filter="box", filter_width=1.0
     ).beauty
-    referee = mitsuba.referee(parsed(mi, tmp_path, text), as_ours=True)
-    theirs = np.asarray(mi.render(referee, spp=256))[:, :, :3]
+    scene = referee(parsed(mi, tmp_path, text), as_ours=True)
+    theirs = np.asarray(mi.render(scene, spp=256))[:, :, :3]
     # A light, a texture or an object that is elsewhere, or turned, moves much more than noise.
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.01)
     blocks = [image.reshape(6, 4, 8, 4, 3).mean((1, 3)) for image in (ours, theirs)]
