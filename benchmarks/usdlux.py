@@ -24,8 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
-from numpy.typing import NDArray
+from pictures import Pixels, read, shrunk, white_of, write_row
 
 import wavecomb
 from wavecomb.files import replacing
@@ -62,8 +61,6 @@ td, th {{ padding: 2px 10px; text-align: right }} td:first-child {{ text-align: 
 </table></html>
 """
 
-Pixels = NDArray[np.float32]
-
 
 @dataclass
 class Entry:
@@ -89,12 +86,6 @@ class Entry:
         )
 
 
-def read(file: Path) -> Pixels:
-    """The colours of a picture, (height, width, 3)."""
-    image = oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT)
-    return np.asarray(image[..., :3], np.float32)
-
-
 def render(stage: Path, frame: int, camera: str | None, options: argparse.Namespace) -> Pixels:
     """Our picture of a frame."""
     lambert = options.out / "lambert.usda"
@@ -112,24 +103,6 @@ def render(stage: Path, frame: int, camera: str | None, options: argparse.Namesp
     return np.asarray(picture.beauty, np.float32)
 
 
-def shrunk(image: Pixels, width: int) -> Pixels:
-    """An image at a width that divides its own, by means of blocks."""
-    n = image.shape[1] // width
-    height = image.shape[0] // n
-    return image[: height * n, : width * n].reshape(height, n, width, n, 3).mean((1, 3))
-
-
-def write_png(file: Path, ours: Pixels, reference: Pixels) -> None:
-    """Both pictures side by side, as bright as the reference is."""
-    pair = np.concatenate([ours, reference], axis=1)
-    white = max(float(np.percentile(reference, 99.5)), 1e-6)
-    pixels = np.ascontiguousarray(255 * np.clip(pair / white, 0, 1) ** (1 / 2.2), np.uint8)
-    out = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8"))
-    out.set_pixels(oiio.ROI(), pixels)
-    with replacing(file) as part:
-        out.write(str(part), "uint8", "png")
-
-
 def compare(reference_file: Path, options: argparse.Namespace) -> Entry:
     """Renders what a reference shows and compares."""
     found = NAME.fullmatch(reference_file.name)
@@ -143,7 +116,7 @@ def compare(reference_file: Path, options: argparse.Namespace) -> Entry:
     mean = max(float(reference.mean(dtype=np.float64)), 1e-12)
     difference = np.asarray(ours, np.float64) - reference
     image = f"{stage}.{frame:04d}.png"
-    write_png(options.out / image, ours, reference)
+    write_row(options.out / image, [ours, reference], white_of(reference))
     return Entry(
         name, mean, float(difference.mean()) / mean, float(abs(difference).mean()) / mean, image
     )
