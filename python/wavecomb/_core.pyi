@@ -109,6 +109,16 @@ class SceneBuilder:
 
     def share_texture(self, scene: Scene, texture: int) -> int:
         """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
+    def add_graph(
+        self,
+        ops: bytes,
+        constants: Sequence[float],
+        images: Sequence[tuple[int, float]],
+        outputs: Sequence[tuple[int, int]],
+    ) -> int:
+        """A value graph, for ``add_material``: operations of 16 bytes as GraphOp in
+        texture/graph_data.h has them, images as (texture, stretch), outputs as (component of
+        GRAPH_PARAMETERS, operand). Raises Error for one that reads what is not there."""
     def add_material(
         self,
         program: str,
@@ -131,6 +141,9 @@ class SceneBuilder:
         evaluations: int = 1,
         openpbr: dict[str, Any] = {},
         textures: dict[str, dict[str, Any]] = {},
+        graph: int | None = None,
+        opacity_graph: int | None = None,
+        emission_graph: int | None = None,
     ) -> int:
         """Programs: diffuse, metal, dielectric, plastic, emissive, principled, openpbr.
 
@@ -550,6 +563,28 @@ class RayRecording:
 
 AOVS: list[str]
 """Names for Settings.aovs."""
+
+GRAPH_CODES: tuple[str, ...]
+"""Operations of value graphs, by number."""
+GRAPH_INPUTS: tuple[str, ...]
+GRAPH_PARAMETERS: dict[str, tuple[int, int]]
+"""Parameter that a graph may drive -> (number of its first component, how many it has)."""
+GRAPH_REGISTERS: int
+GRAPH_OPS: int
+GRAPH_CONSTANT: int
+"""An operand with this bit is a constant, else a register."""
+
+def run_graph(
+    ops: bytes,
+    constants: Sequence[float],
+    images: Sequence[tuple[int, float]],
+    outputs: Sequence[tuple[int, int]],
+    points: NDArray[np.float32],
+    lanes: int = 1,
+) -> NDArray[np.float32]:
+    """Outputs of a value graph (n, outputs) at points (n, 21): uv, its width, position, local
+    position, normal, local normal, tangent, view. Textures are white. ``lanes``: 1 or 16; the
+    results are alike. Raises Error for a graph that reads what is not there."""
 
 def crypto_id(name: str) -> int:
     """A name's id in a Cryptomatte: MurmurHash3 32 with seed 0, made a usual float."""

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/scene/graph_emission.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -39,7 +40,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     radiance = {value(0), value(1), value(2)};
     t.material = material;
   }
-  if (!m.emits()) radiance = {0, 0, 0};
+  if (!can_aim_at(m, *materials.graphs)) radiance = {0, 0, 0};
   t.radiance[0] = radiance.x;
   t.radiance[1] = radiance.y;
   t.radiance[2] = radiance.z;
@@ -58,6 +59,10 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     uvs[k][0] = uv[0];
     uvs[k][1] = uv[1];
   }
+  if (m.emission_graph != kNoGraph && can_aim_at(m, *materials.graphs)) {
+    t.material = material;
+    mean_graph_emission(geometry, materials, m.emission_graph, t);
+  }
   return t;
 }
 
@@ -69,7 +74,9 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   // Triangles of meshes whose material emits become lights of their own.
   std::vector<EmissiveMesh> sources;
   size_t triangle_count = 0;
-  const auto emits = [&](uint32_t material) { return materials.materials[material].emits(); };
+  const auto emits = [&](uint32_t material) {
+    return can_aim_at(materials.materials[material], *materials.graphs);
+  };
   const Affine identity{};
   for (size_t i = 0; materials.has_emission && i < geometry.instance_records.size(); ++i) {
     const InstanceRecord& record = geometry.instance_records[i];
