@@ -316,7 +316,7 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
     if (m.has_texture(static_cast<Slot>(s)))
       textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
   d["textures"] = textures;
-  if (m.graph != kNoGraph) d["graph"] = driven_names(scene, m.graph);
+  if (m.graph != kNoGraph) d["driven"] = driven_names(scene, m.graph);
   if (m.program == ProgramId::kOpenPbr) {
     nb::dict openpbr;
     put(openpbr, m.openpbr, kOpenPbrColors);
