@@ -55,7 +55,8 @@ class Scene:
         """As set_camera takes it, but for motion; its transform is to_world (4, 4)."""
     def material(self, material: int) -> dict[str, Any]:
         """name, program and parameters of a material as add_material takes them; its textures with
-        their names as well; driven: names of parameters that a graph computes. Raises Error for an id that is not there."""
+        their names as well; driven: names of parameters that a graph computes. Raises Error for an
+        id that is not there."""
     def light(self, light: int) -> dict[str, Any]:
         """name, kind, transform and parameters of a light as add_light takes them, its group by
         name; texture: the name of its texture, or None. Raises Error for an index that is not

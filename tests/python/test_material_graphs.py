@@ -367,3 +367,63 @@ def test_graph_of_a_real_scene_renders_as_its_formula(tmp_path):
     steps = 0.25 + 0.5 * (np.arange(16) + 0.5) / 16
     assert np.allclose(image[..., 0], steps[None, :], atol=0.02)
     assert np.allclose(image[..., 1], steps[::-1][:, None], atol=0.02)
+
+
+MOVED = """matrix4d xformOp:transform = ((0, 2, 0, 0), (-2, 0, 0, 0), (0, 0, 2, 0), (1, 2, 3, 1))
+        uniform token[] xformOpOrder = ["xformOp:transform"]
+        rel material:binding"""
+
+
+def test_object_space_is_that_of_each_mesh(tmp_path):
+    """A mesh outside of instances is brought to the world; its graph goes back."""
+    nodes = node("P", "ND_position_vector3", "", "float3 outputs:out")
+    nodes += node("N", "ND_normal_vector3", "", "float3 outputs:out")
+    text = standard(
+        "color3f inputs:base_color.connect = </Mat/P.outputs:out>\nfloat inputs:base = 1\n"
+        "color3f inputs:specular_color.connect = </Mat/N.outputs:out>",
+        nodes,
+    )
+    scene, _ = load(tmp_path, text.replace("rel material:binding", MOVED))
+    at = grid()
+    got = driven(scene)(at)
+    matrix = np.array([[0, 2, 0, 0], [-2, 0, 0, 0], [0, 0, 2, 0], [1, 2, 3, 1]], float)
+    world = np.concatenate([at[:, 6:9], np.ones((len(at), 1))], axis=1)
+    assert np.allclose(got["base_color"], (world @ np.linalg.inv(matrix))[:, :3], atol=1e-5)
+    normals = at[:, 9:12] = np.random.default_rng(1).normal(size=(len(at), 3))
+    at[:, 12:15] = normals
+    expected = normals @ matrix[:3, :3].T
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert np.allclose(driven(scene)(at)["specular_color"], expected, atol=1e-5)
+    # What stands still in its group shares the surface's own program.
+    still, _ = load(tmp_path, text)
+    assert len(still.graphs) == 1
+
+
+def test_primvars_of_a_mesh_take_their_places(tmp_path):
+    nodes = node("C", "ND_geomcolor_color3", "")
+    nodes += node("Half", "ND_multiply_color3FA", "float inputs:in2 = 0.5\n"
+                  "color3f inputs:in1.connect = </Mat/C.outputs:out>")  # fmt: skip
+    nodes += UV + node("R", "ND_geompropvalue_float", 'string inputs:geomprop = "wear"\n'
+                       "float inputs:default = 0.75", "float outputs:out")  # fmt: skip
+    nodes += node("Ramp", "ND_ramplr_float", "float inputs:valuel.connect = </Mat/R.outputs:out>\n"
+                  "float inputs:valuer = 1", "float outputs:out")  # fmt: skip
+    text = standard(
+        "color3f inputs:base_color.connect = </Mat/Half.outputs:out>\nfloat inputs:base = 1\n"
+        "float inputs:coat_IOR.connect = </Mat/Ramp.outputs:out>\n"
+        "float inputs:specular_roughness.connect = </Mat/R.outputs:out>",
+        nodes,
+    )
+    bare, _ = load(tmp_path, text)
+    got = bare.material_of("M")
+    assert got["roughness"] == 0.75 and got["base_color"] == (0, 0, 0)
+    with_values = text.replace(
+        "rel material:binding",
+        "color3f[] primvars:displayColor = [(0.5, 1, 0.25)]\n"
+        "float primvars:wear = 0.5\nrel material:binding",
+    )
+    scene, loaded = load(tmp_path, with_values)
+    got = scene.material_of("M")
+    assert got["base_color"] == (0.25, 0.5, 0.125) and got["roughness"] == 0.5
+    at = grid()
+    assert np.allclose(driven(scene)(at)["coat_ior"][:, 0], 0.5 + 0.5 * at[:, 0], atol=1e-6)
+    assert "MaterialX" not in said(loaded)

@@ -25,6 +25,9 @@ POINT_SIZE = 21
 """Numbers of a point: uv, its width, then position, local position, normal, local normal, tangent
 and view of three each."""
 
+PRIMVAR = "primvar"
+"""A node that stands for what a mesh gives."""
+
 _WHOLE = {"dot", "cross", "rgbtohsv", "hsvtorgb", "image", "input", "copy"}
 _POINTS = {"noise2": 2, "noise3": 3, "fractal3": 3, "cell2": 2, "cell3": 3, "worley2": 2,
            "worley3": 3}  # fmt: skip
@@ -56,6 +59,11 @@ class Node:
         self.operands = operands
         self.number = number
         self.image = image
+
+    @property
+    def name(self) -> str:
+        """Of an input: which."""
+        return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
 
     @property
     def results(self) -> int:
@@ -124,6 +132,18 @@ class Expressions:
     def image(self, texture: int, uv: Value, stretch: float) -> Value:
         """r, g, b and alpha of a texture."""
         return self._all(self._node("image", 4, (uv,), 0, (texture, stretch)))
+
+    def primvar(self, number: int, otherwise: Value) -> Value:
+        """A value that each mesh gives; ``otherwise`` where it does not. Replaced before use."""
+        return self._all(self._node(PRIMVAR, len(otherwise), (otherwise,), number))
+
+    def again(self, node: Node, operands: tuple[Value, ...]) -> Value:
+        """A node with other operands."""
+        if node.code == "input":
+            return self.input(node.name)
+        if node.code == "image" and node.image is not None:
+            return self.image(node.image[0], operands[0], node.image[1])
+        return self.op(node.code, *operands, number=node.number, width=node.width)
 
     def op(self, code: str, *operands: Value, number: int = 0, width: int = 0) -> Value:
         """An operation on values: component by component but for those on whole vectors.
@@ -270,6 +290,22 @@ def nodes_of(parts: Sequence[Part]) -> list[Node]:
         for value in reversed(node.operands):
             stack += [(p[0], False) for p in reversed(value) if not isinstance(p, float)]
     return order
+
+
+def substituted(make: Expressions, value: Value, replaced: Callable[[Node], Value | None]) -> Value:
+    """A value made anew with other values in the place of some nodes; primvars give way always."""
+    done: dict[Node, Value] = {}
+
+    def part_of(part: Part) -> Part:
+        return part if isinstance(part, float) else done[part[0]][part[1]]
+
+    for node in nodes_of(value):
+        operands = tuple(tuple(part_of(part) for part in one) for one in node.operands)
+        new = replaced(node)
+        if new is None:
+            new = operands[0] if node.code == PRIMVAR else make.again(node, operands)
+        done[node] = fit(new, node.results)
+    return tuple(part_of(part) for part in value)
 
 
 def assemble(outputs: dict[int, Part]) -> Graph:

@@ -72,6 +72,7 @@ class Networks:
         self.make = Expressions()
         self.converts = False
         self.uv_names: list[str] = []
+        self.primvars: list[str] = []
         self._done: dict[tuple[Any, ...], Value | None] = {}
         self._path: list[tuple[Any, ...]] = []
 
@@ -79,6 +80,7 @@ class Networks:
         """The same networks with constant colours of the working space; tells nothing."""
         other = Networks(self.material, self.time, self.textures, LoadReport())
         other.make, other.converts, other.uv_names = self.make, True, self.uv_names
+        other.primvars = self.primvars
         return other
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
@@ -261,9 +263,13 @@ class NodeCall:
             self.networks.uv_names.append(name or "st")
             return self.make.input("uv")
         fallback = "fallback" if self.category == "UsdPrimvarReader" else "default"
-        what = f"MaterialX node {self.identifier} of primvar {name!r} (its default)"
-        report.missing(what, self.shader.GetPath())
-        return self.value(fallback)
+        otherwise = fit(self.value(fallback), self.width or 1)
+        if not name:
+            return otherwise
+        known = self.networks.primvars
+        if name not in known:
+            known.append(name)
+        return self.make.primvar(known.index(name), otherwise)
 
     def _normal_map(self) -> Value | None:
         """A normal in tangent space; of a map that is flat, the surface's own."""

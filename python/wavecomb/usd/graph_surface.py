@@ -13,6 +13,8 @@ from pxr import UsdShade
 from wavecomb.usd.graph_code import (
     PARAMETERS,
     POINT_SIZE,
+    PRIMVAR,
+    Expressions,
     Graph,
     GraphTooLarge,
     Node,
@@ -22,6 +24,8 @@ from wavecomb.usd.graph_code import (
     fit,
     is_constant,
     linear,
+    nodes_of,
+    substituted,
 )
 from wavecomb.usd.graph_images import uv_matrix
 from wavecomb.usd.graph_network import BASE, COLOUR, COLOURS, NORMAL, NUMBER, Networks
@@ -40,12 +44,18 @@ class SurfaceGraph:
         opacity: The part that drives opacity.
         emission: The part that drives emission.
         brightest: Highest emission seen at some points, textures taken for white.
+        primvars: That it reads of each mesh.
+        in_object_space: Whether it reads places in the space of the mesh.
+        outputs: What it was compiled from.
     """
 
     whole: Graph
     opacity: Graph | None = None
     emission: Graph | None = None
     brightest: float = field(default=0.0, compare=False)
+    primvars: tuple[str, ...] = ()
+    in_object_space: bool = False
+    outputs: tuple[tuple[str, Value], ...] = field(default=(), compare=False, repr=False)
 
 
 def sampled(value: Value) -> Any:
@@ -55,7 +65,8 @@ def sampled(value: Value) -> Any:
     points[:, 0], points[:, 1] = (axis.ravel() for axis in np.meshgrid(steps, steps))
     points[:, [3, 4, 6, 7]] = np.tile(points[:, :2], 2)
     points[:, [11, 14, 15, 20]] = 1.0
-    return assemble(dict(enumerate(value))).run(points)
+    ready = substituted(Expressions(), value, lambda node: None)
+    return assemble(dict(enumerate(ready))).run(points)
 
 
 def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
@@ -160,16 +171,35 @@ class Drivers:
         left = dict(self._outputs)
         while left:
             try:
-                whole = _of(left)
-                opacity = _of({"opacity": left["opacity"]}) if "opacity" in left else None
-                emission = _of({"emission": left["emission"]}) if "emission" in left else None
-                seen = float(sampled(left["emission"]).max()) if emission else 0.0
-                return SurfaceGraph(whole, opacity, emission, seen)
+                return graphs_of(left, tuple(self.networks.primvars))
             except GraphTooLarge as error:
                 name, _ = left.popitem()
                 what = f"shading network too large for {name} ({error}): left out"
                 self.networks.report.missing(what, self.networks.material.GetPath())
         return None
+
+
+def graphs_of(outputs: dict[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
+    """The graphs that drive parameters, primvars at their defaults; None for no parameter.
+
+    Raises:
+        GraphTooLarge: There is no room for them.
+    """
+    if not outputs:
+        return None
+    make = Expressions()
+    ready = {name: substituted(make, v, lambda node: None) for name, v in outputs.items()}
+    whole = _of(ready)
+    opacity = _of({"opacity": ready["opacity"]}) if "opacity" in ready else None
+    emission = _of({"emission": ready["emission"]}) if "emission" in ready else None
+    seen = float(sampled(ready["emission"]).max()) if emission else 0.0
+    nodes = nodes_of([part for value in outputs.values() for part in value])
+    wanted = {node.number for node in nodes if node.code == PRIMVAR}
+    local = any(node.name.startswith("local_") for node in nodes)
+    names = primvars if wanted else ()
+    return SurfaceGraph(
+        whole, opacity, emission, seen, names, local, tuple(sorted(outputs.items()))
+    )
 
 
 def kind_of(parameter: str) -> str:
