@@ -3,10 +3,14 @@
 
 #include <nanobind/nanobind.h>
 
+#include <utility>
+#include <vector>
+
 #include "wavecomb/scene/scene.h"
 
 void bind_scene(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
+void bind_graphs(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
 void bind_watching(nanobind::module_& m);
 void bind_render(nanobind::module_& m);
@@ -14,6 +18,12 @@ void bind_renderer(nanobind::module_& m);
 
 /// A texture use as SceneBuilder.add_material takes it.
 wavecomb::TextureUse texture_use(const nanobind::dict& d);
+
+/// A value graph as SceneBuilder.add_graph takes it.
+uint32_t add_graph(wavecomb::SceneBuilder& builder, const nanobind::bytes& ops,
+                   const std::vector<float>& constants,
+                   const std::vector<std::pair<uint32_t, float>>& images,
+                   const std::vector<std::pair<uint32_t, uint32_t>>& outputs);
 
 /// Each description's mesh, or the line that says why there is none.
 nanobind::list make_surfaces(const wavecomb::SceneBuilder& builder,

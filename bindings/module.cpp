@@ -15,6 +15,7 @@ NB_MODULE(_core, m) {
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_scene(m);
   bind_geometry(m);
+  bind_graphs(m);
   bind_recording(m);
   bind_watching(m);
   bind_render(m);

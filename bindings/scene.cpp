@@ -146,7 +146,9 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
                       float metallic, float clearcoat, float clearcoat_roughness, float opacity,
                       float ior, float opacity_threshold, const Color3& conductor_eta,
                       const Color3& conductor_k, bool specular_workflow, bool presence,
-                      uint32_t evaluations, const nb::dict& openpbr, const nb::dict& textures) {
+                      uint32_t evaluations, const nb::dict& openpbr, const nb::dict& textures,
+                      std::optional<uint32_t> graph, std::optional<uint32_t> opacity_graph,
+                      std::optional<uint32_t> emission_graph) {
   Material m;
   m.name = name;
   m.program = program(program_name);
@@ -166,6 +168,9 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   m.presence = presence;
   m.evaluations = evaluations;
   m.openpbr = openpbr_of(name, openpbr);
+  m.graph = graph.value_or(kNoGraph);
+  m.opacity_graph = opacity_graph.value_or(kNoGraph);
+  m.emission_graph = emission_graph.value_or(kNoGraph);
   for (const auto& [key, value] : textures)
     m.textures[static_cast<size_t>(slot(nb::cast<std::string>(key)))] =
         texture_use(nb::cast<nb::dict>(value));
@@ -541,13 +546,15 @@ void bind_scene(nb::module_& m) {
            "wrap_t"_a = "repeat", "name"_a = "")
       .def("share_texture", &share_texture, "scene"_a, "texture"_a)
       .def("add_tiles", &SceneBuilder::add_tiles, "name"_a, "tiles"_a, "missing"_a)
+      .def("add_graph", &add_graph, "ops"_a, "constants"_a, "images"_a, "outputs"_a)
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
            "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
            "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,
            "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f, "ior"_a = 1.5f,
            "opacity_threshold"_a = 0.f, "conductor_eta"_a = black, "conductor_k"_a = black,
            "specular_workflow"_a = false, "presence"_a = false, "evaluations"_a = 1,
-           "openpbr"_a = nb::dict(), "textures"_a = nb::dict())
+           "openpbr"_a = nb::dict(), "textures"_a = nb::dict(), "graph"_a = nb::none(),
+           "opacity_graph"_a = nb::none(), "emission_graph"_a = nb::none())
       .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "name"_a = "", "light_group"_a = "",

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/graph_parameters.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -239,6 +240,18 @@ void check_index(const char* kind, uint32_t i, size_t count) {
                 std::to_string(count));
 }
 
+/// Names of the parameters that a graph drives.
+nb::list driven_names(const Scene& scene, uint32_t graph) {
+  nb::list names;
+  const GraphSet& graphs = *scene.material_part()->graphs;
+  const GraphProgram& program = graphs.programs[graph];
+  for (const GraphParameter& p : kGraphParameters)
+    for (uint32_t i = 0; i < program.output_count; ++i)
+      if (graphs.outputs[program.first_output + i].parameter == graph_parameter(p.name))
+        names.append(p.name);
+  return names;
+}
+
 nb::dict texture_use_dict(const Scene& scene, const TextureUse& use) {
   constexpr const char* kChannels[] = {"r", "g", "b", "a", "rgb"};
   const auto list = [](const auto& values) {
@@ -303,6 +316,7 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
     if (m.has_texture(static_cast<Slot>(s)))
       textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
   d["textures"] = textures;
+  if (m.graph != kNoGraph) d["driven"] = driven_names(scene, m.graph);
   if (m.program == ProgramId::kOpenPbr) {
     nb::dict openpbr;
     put(openpbr, m.openpbr, kOpenPbrColors);

@@ -55,7 +55,8 @@ class Scene:
         """As set_camera takes it, but for motion; its transform is to_world (4, 4)."""
     def material(self, material: int) -> dict[str, Any]:
         """name, program and parameters of a material as add_material takes them; its textures with
-        their names as well. Raises Error for an id that is not there."""
+        their names as well; driven: names of parameters that a graph computes. Raises Error for an
+        id that is not there."""
     def light(self, light: int) -> dict[str, Any]:
         """name, kind, transform and parameters of a light as add_light takes them, its group by
         name; texture: the name of its texture, or None. Raises Error for an index that is not
@@ -109,6 +110,16 @@ class SceneBuilder:
 
     def share_texture(self, scene: Scene, texture: int) -> int:
         """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
+    def add_graph(
+        self,
+        ops: bytes,
+        constants: Sequence[float],
+        images: Sequence[tuple[int, float]],
+        outputs: Sequence[tuple[int, int]],
+    ) -> int:
+        """A value graph, for ``add_material``: operations of 16 bytes as GraphOp in
+        texture/graph_data.h has them, images as (texture, stretch), outputs as (component of
+        GRAPH_PARAMETERS, operand). Raises Error for one that reads what is not there."""
     def add_material(
         self,
         program: str,
@@ -131,6 +142,9 @@ class SceneBuilder:
         evaluations: int = 1,
         openpbr: dict[str, Any] = {},
         textures: dict[str, dict[str, Any]] = {},
+        graph: int | None = None,
+        opacity_graph: int | None = None,
+        emission_graph: int | None = None,
     ) -> int:
         """Programs: diffuse, metal, dielectric, plastic, emissive, principled, openpbr.
 
@@ -576,6 +590,28 @@ class RayRecording:
 
 AOVS: list[str]
 """Names for Settings.aovs."""
+
+GRAPH_CODES: tuple[str, ...]
+"""Operations of value graphs, by number."""
+GRAPH_INPUTS: tuple[str, ...]
+GRAPH_PARAMETERS: dict[str, tuple[int, int]]
+"""Parameter that a graph may drive -> (number of its first component, how many it has)."""
+GRAPH_REGISTERS: int
+GRAPH_OPS: int
+GRAPH_CONSTANT: int
+"""An operand with this bit is a constant, else a register."""
+
+def run_graph(
+    ops: bytes,
+    constants: Sequence[float],
+    images: Sequence[tuple[int, float]],
+    outputs: Sequence[tuple[int, int]],
+    points: NDArray[np.float32],
+    lanes: int = 1,
+) -> NDArray[np.float32]:
+    """Outputs of a value graph (n, outputs) at points (n, 21): uv, its width, position, local
+    position, normal, local normal, tangent, view. Textures are white. ``lanes``: 1 or 16; the
+    results are alike. Raises Error for a graph that reads what is not there."""
 
 def crypto_id(name: str) -> int:
     """A name's id in a Cryptomatte: MurmurHash3 32 with seed 0, made a usual float."""

@@ -154,6 +154,61 @@ def openpbr_scene() -> Any:
     return builder.build()
 
 
+def graph_scene() -> Any:
+    """Tiles whose parameters graphs drive, the same one or others side by side; one shines."""
+    from wavecomb.usd.graph_code import PARAMETERS, Expressions, assemble, numbers
+
+    builder = wavecomb.SceneBuilder()
+    texels = np.random.default_rng(2).integers(0, 256, (64, 64, 3), np.uint8)
+    texture = builder.add_texture(texels, srgb=True, name="noise")
+
+    def graph(**driven: Any) -> int:
+        parts: dict[int, Any] = {}
+        for name, value in driven.items():
+            first, width = PARAMETERS[name]
+            assert len(value) == width
+            parts |= {first + i: part for i, part in enumerate(value)}
+        made = assemble(parts)
+        return int(builder.add_graph(made.ops, made.constants, made.images, made.outputs))
+
+    e = Expressions()
+    place, uv = e.input("local_position"), e.input("uv")
+    noise = e.op("noise3", e.op("multiply", place, numbers(3.0)), width=3)
+    bright = e.op("add", e.op("multiply", noise, numbers(0.5)), numbers(0.5))
+    texel = e.image(texture, e.op("multiply", uv, numbers(3.0)), 3.0)
+    facing = e.op("abs", e.op("dot", e.input("view"), e.input("normal")))
+    glow = e.op("multiply", e.op("worley2", uv, numbers(1.0), width=1), numbers(2.0))
+    tilted = (*e.op("multiply", noise[:2], numbers(0.3)), 1.0)
+    fractal = e.op("fractal3", place, numbers(2.0), numbers(0.5), number=3, width=1)
+    holes = graph(opacity=e.op("less", fractal, numbers(0.1)))
+    kinds: list[dict[str, Any]] = [
+        {"graph": graph(base_color=bright, roughness=bright[:1], fuzz_weight=bright[1:2])},
+        {"graph": graph(base_color=texel[:3], metallic=facing, normal=tilted)},
+        {"graph": holes, "opacity_graph": holes, "presence": True},
+        {"graph": graph(film_thickness=e.op("multiply", bright[:1], numbers(900.0)),
+                        film_weight=numbers(1.0), coat_ior=bright[1:2], anisotropy=bright[2:])},
+        {"base_color": (0.2, 0.6, 0.3)},
+    ]  # fmt: skip
+    shining = graph(emission=glow * 3)
+    kinds.append({"graph": shining, "emission_graph": shining})
+    kinds[0]["evaluations"] = 2
+    materials = [
+        builder.add_material("openpbr" if i % 2 == 0 else "principled", name=f"G{i}", **kind)
+        for i, kind in enumerate([*kinds, *kinds])
+    ]
+    quad = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    for i in range(48):
+        place_of = np.array([i % 8 - 4.0, i // 8 - 3.0, -6.0 - 0.3 * (i % 5)], np.float32)
+        mesh = builder.add_mesh(
+            quad + place_of, faces, uvs=quad[:, :2].copy(), material=materials[(5 * i) % 12]
+        )
+        builder.add_to_group(0, mesh)
+    builder.add_light("dome", np.eye(4), color=(0.4, 0.5, 0.6), name="Sky")
+    builder.set_camera(np.eye(4), window=(-0.6, 0.6, -0.4, 0.4))
+    return builder.build()
+
+
 @pytest.fixture(scope="session")
 def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Scenes by name, each made once."""
@@ -164,6 +219,8 @@ def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
                 _loaded[name] = texture_scene()
             elif name == "openpbr":
                 _loaded[name] = openpbr_scene()
+            elif name == "graphs":
+                _loaded[name] = graph_scene()
             else:
                 from wavecomb.scenes import write_scene
 
@@ -345,6 +402,22 @@ def test_all_lobes_of_openpbr_are_one_picture(scene_of: Any) -> None:
         assert same, (lanes, policy, threads)
     used = {material["name"] for material in picture.stats["materials"] if material["records"]}
     assert used >= set(OPENPBR_LOBES)
+
+
+def test_value_graphs_are_one_picture(scene_of: Any) -> None:
+    scene, size = scene_of("graphs"), (48, 32)
+    expected = render(scene, size, 8, integrator="reference", threads=1)
+    assert np.isfinite(expected.beauty).all() and expected.beauty.std() > 0.05
+    widths, policies = _core.lane_widths(), ("none", "material", "texture", "random-runs")
+    for i, (lanes, policy) in enumerate(itertools.product(widths, policies)):
+        picture = render(
+            scene, size, 8, lanes=lanes, policy=policy, threads=1 + i % 2,
+            wave_size=(256, 4096)[i // 2 % 2], materialize=("on", "off")[i // 3 % 2],
+        )  # fmt: skip
+        same = picture.beauty.tobytes() == expected.beauty.tobytes()
+        assert same, (lanes, policy)
+    used = {material["name"] for material in picture.stats["materials"] if material["records"]}
+    assert used >= {f"G{i}" for i in range(12)}
 
 
 def test_roulettes_are_different_estimates(scene_of: Any) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from wavecomb import _core
 from wavecomb.usd import LoadedStage, load_stage
+from wavecomb.usd.graph_code import Graph
 
 INHERIT = 0xFFFFFFFF
 ASSETS = Path(__file__).resolve().parents[3] / "shared" / "assets"
@@ -17,7 +18,7 @@ class Recorder:
 
     def __init__(self):
         self.textures, self.materials, self.meshes, self.lights = [], [], [], []
-        self.profiles, self.sets, self.mesh_lights = [], [], []
+        self.profiles, self.sets, self.mesh_lights, self.graphs = [], [], [], []
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
         self.motions = []  # (name of a group, its transforms over the shutter)
@@ -32,6 +33,11 @@ class Recorder:
         assert tiles and all(1001 <= n <= 1100 and t < len(self.textures) for n, t in tiles)
         self.textures.append({"tiles": dict(tiles), "missing": missing, "name": name})
         return len(self.textures) - 1
+
+    def add_graph(self, ops, constants, images, outputs):
+        assert len(ops) % 16 == 0 and outputs
+        self.graphs.append(Graph(ops, tuple(constants), tuple(images), tuple(outputs)))
+        return len(self.graphs) - 1
 
     def add_material(self, program, *, name="", textures=None, **parameters):
         self.materials.append(

@@ -13,6 +13,8 @@ from pxr import Gf, Usd, UsdShade
 
 from wavecomb.usd.colour import face_values, quantise
 from wavecomb.usd.curves import CurveArrays
+from wavecomb.usd.graph_bind import asks_for, bound
+from wavecomb.usd.graph_code import GraphTooLarge
 from wavecomb.usd.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.mesh import MeshArrays, find_primvar
 from wavecomb.usd.network import colour, number
@@ -56,6 +58,7 @@ class Assigner:
         self.table = table
         self.time = time
         self.report = report
+        self._bound_graphs: dict[tuple[Any, ...], tuple[Surface, Surface]] = {}
 
     def uv_names(self, draw: Draw) -> tuple[str, ...]:
         """Texture coordinates that the bound materials read, first use first."""
@@ -120,6 +123,8 @@ class Assigner:
         self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface
     ) -> tuple[int, FaceIds | None]:
         """Ids of a surface; one that reads primvars is made anew with this mesh's values."""
+        if asks_for(surface.graph):
+            surface = self._with_graph(draw, mesh, surface)
         by_face: tuple[str, NDArray[Any]] | None = None
         # One may vary by face: the base colour where it does, for that shows most.
         slots = sorted(surface.primvars.items(), key=lambda item: item[0] != "base_color")
@@ -148,6 +153,45 @@ class Assigner:
             self.table.add(surface.with_value(slot, _plain(c[: values.shape[1]]))) for c in palette
         ]
         return ids[0], np.array(ids, np.uint32)[index]
+
+    def _with_graph(self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface) -> Surface:
+        """A surface whose graph reads the mesh's own space or its primvars, as it is there."""
+        graph = surface.graph
+        values: dict[str, tuple[float, ...]] = {}
+        for name in graph.primvars if graph is not None else ():
+            found = None
+            for width in (4, 3, 2, 1):
+                found = self._primvar_of(draw, name, mesh.topology, width)
+                if found is not None:
+                    break
+            if found is None or len(found) == 0:
+                continue
+            if len(found) > 1 and float(np.ptp(found, axis=0).max()) > 0:
+                what = f"varying primvar {name} in a shading network (its mean is used)"
+                self.report.missing(what, draw.prim.GetPath())
+            values[name] = tuple(float(x) for x in found.mean(axis=0))
+        matrix = np.array(draw.matrix, np.float64)
+        key = (id(surface), matrix.tobytes(), tuple(values.items()))
+        if key not in self._bound_graphs:
+            try:
+                made = bound(surface, matrix, values)
+            except GraphTooLarge:
+                made = surface
+            # Holding the surface keeps its address from being used again.
+            self._bound_graphs[key] = (surface, made)
+        return self._bound_graphs[key][1]
+
+    def _primvar_of(
+        self, draw: Draw, name: str, topology: Topology | Strands | None, width: int
+    ) -> NDArray[Any] | None:
+        """A primvar on each triangle where it has so many components; else None."""
+        try:
+            primvar = find_primvar(draw.prim, name, draw.inherited, self.time)
+        except PrimvarError:
+            return None
+        if primvar is None or len(primvar.values) == 0 or primvar.values.shape[1] != width:
+            return None
+        return self._values(draw, name, topology, width)
 
     def _display(
         self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None

@@ -22,6 +22,7 @@ from wavecomb.working_space import from_rec709
 
 if TYPE_CHECKING:
     from wavecomb import _core
+    from wavecomb.usd.graph_code import Graph
 
 INHERIT_MATERIAL = 0xFFFFFFFF
 """Same as ``_core.INHERIT_MATERIAL``: what the instance says."""
@@ -122,6 +123,7 @@ class MaterialTable:
         self._report = report
         self._surfaces: dict[Sdf.Path, Surface] = {}
         self._ids: dict[str, int] = {}
+        self._graph_ids: dict[Graph, int] = {}
         self._surface_ids: dict[int, tuple[Surface, int]] = {}
         self._plain: dict[tuple[float, ...], int] = {}
         self.glows = False
@@ -165,6 +167,7 @@ class MaterialTable:
                 name=surface.name,
                 **parameters,
                 textures=surface.textures,
+                **self._graphs_of(surface),
             )
             self._ids[key] = number
             self._names.append(surface.name)
@@ -173,6 +176,22 @@ class MaterialTable:
         # Holding the surface keeps its address from being used again.
         self._surface_ids[id(surface)] = (surface, number)
         return number
+
+    def _graphs_of(self, surface: Surface) -> dict[str, int]:
+        """Ids of a surface's graphs, equal ones once."""
+        if surface.graph is None:
+            return {}
+        graphs = {
+            "graph": surface.graph.whole,
+            "opacity_graph": surface.graph.opacity,
+            "emission_graph": surface.graph.emission,
+        }
+        for graph in graphs.values():
+            if graph is not None and graph not in self._graph_ids:
+                self._graph_ids[graph] = self._builder.add_graph(
+                    graph.ops, graph.constants, graph.images, graph.outputs
+                )
+        return {name: self._graph_ids[g] for name, g in graphs.items() if g is not None}
 
     def _in_working_space(self, parameters: dict[str, Any]) -> dict[str, Any]:
         """Parameters whose colours are those of the working space."""

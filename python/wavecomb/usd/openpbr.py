@@ -8,7 +8,12 @@ OpenPBR as Autodesk's published graph, ``standard_surface_to_open_pbr_surface``,
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+from wavecomb.usd.graph_code import Value, fit, numbers
+
+if TYPE_CHECKING:
+    from wavecomb.usd.graph_surface import Drivers
 
 Colour = tuple[float, float, float]
 
@@ -151,3 +156,82 @@ def layers_of(model: str, inputs: Inputs) -> dict[str, Any]:
     if found.get("subsurface_weight", 0.0) > 0:
         inputs.approximated("subsurface scattering (diffuse in its colour)")
     return found
+
+
+_DRIVEN: dict[str, dict[str, tuple[str, float]]] = {
+    "open_pbr_surface": {
+        "diffuse_roughness": ("base_diffuse_roughness", 1.0),
+        "specular_weight": ("specular_weight", 1.0),
+        "anisotropy": ("specular_roughness_anisotropy", 1.0),
+        "transmission_weight": ("transmission_weight", 1.0),
+        "subsurface_weight": ("subsurface_weight", 1.0),
+        "subsurface_color": ("subsurface_color", 1.0),
+        "subsurface_anisotropy": ("subsurface_scatter_anisotropy", 1.0),
+        "fuzz_weight": ("fuzz_weight", 1.0),
+        "fuzz_color": ("fuzz_color", 1.0),
+        "fuzz_roughness": ("fuzz_roughness", 1.0),
+        "coat_color": ("coat_color", 1.0),
+        "coat_ior": ("coat_ior", 1.0),
+        "coat_darkening": ("coat_darkening", 1.0),
+        "film_weight": ("thin_film_weight", 1.0),
+        "film_thickness": ("thin_film_thickness", 1000.0),
+        "film_ior": ("thin_film_ior", 1.0),
+    },
+    "standard_surface": {
+        "diffuse_roughness": ("diffuse_roughness", 1.0),
+        "specular_weight": ("specular", 1.0),
+        "anisotropy": ("specular_anisotropy", 1.0),
+        "rotation": ("specular_rotation", 1.0),
+        "transmission_weight": ("transmission", 1.0),
+        "subsurface_weight": ("subsurface", 1.0),
+        "subsurface_color": ("subsurface_color", 1.0),
+        "subsurface_anisotropy": ("subsurface_anisotropy", 1.0),
+        "fuzz_weight": ("sheen", 1.0),
+        "fuzz_color": ("sheen_color", 1.0),
+        "fuzz_roughness": ("sheen_roughness", 1.0),
+        "coat_color": ("coat_color", 1.0),
+        "coat_ior": ("coat_IOR", 1.0),
+        "coat_darkening": ("coat_affect_color", 1.0),
+        "film_thickness": ("thin_film_thickness", 1.0),
+        "film_ior": ("thin_film_IOR", 1.0),
+    },
+    "gltf_pbr": {
+        "specular_weight": ("specular", 1.0),
+        "anisotropy": ("anisotropy_strength", 1.0),
+        "rotation": ("anisotropy_rotation", 1.0 / 6.283185307179586),
+        "transmission_weight": ("transmission", 1.0),
+        "fuzz_roughness": ("sheen_roughness", 1.0),
+        "film_weight": ("iridescence", 1.0),
+        "film_thickness": ("iridescence_thickness", 1.0),
+        "film_ior": ("iridescence_ior", 1.0),
+    },
+}
+"""Parameter -> the input that gives it, times a number."""
+
+
+def drive_layers(
+    model: str, layers: dict[str, Any], driven: dict[str, Value], drivers: Drivers
+) -> None:
+    """Lets driven inputs drive their parameters, and takes them out of ``driven``."""
+    m = drivers.networks.make
+    for parameter, (name, factor) in _DRIVEN[model].items():
+        if name not in driven:
+            continue
+        value = m.op("multiply", driven.pop(name), numbers(factor))
+        if parameter == "rotation":
+            value = m.op("subtract", value, m.op("floor", value))
+        drivers.put(parameter, value)
+    tint = "base_color" if model == "gltf_pbr" else "transmission_color"
+    if tint in driven:
+        value, depth = fit(driven.pop(tint), 3), layers["transmission_depth"]
+        if depth > 0 and model != "gltf_pbr":
+            layers["transmission_color"] = WHITE
+            grey = m.op("clamp", value, numbers(1e-6), numbers(1.0))
+            drivers.put("extinction", m.op("multiply", m.op("log", grey), numbers(-1.0 / depth)))
+        elif depth <= 0:
+            drivers.put("transmission_tint", value)
+    if model == "gltf_pbr" and "sheen_color" in driven:
+        sheen = fit(driven.pop("sheen_color"), 3)
+        strongest = m.op("max", m.op("max", sheen[:1], sheen[1:2]), sheen[2:])
+        drivers.put("fuzz_weight", strongest)
+        drivers.put("fuzz_color", m.op("divide", sheen, strongest))

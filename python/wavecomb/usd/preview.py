@@ -10,6 +10,9 @@ import numpy as np
 from pxr import Usd, UsdShade
 
 from wavecomb.usd.colour_space import SRGB, canonical, linear_colour, space_of
+from wavecomb.usd.graph_code import PARAMETERS
+from wavecomb.usd.graph_network import Networks
+from wavecomb.usd.graph_surface import Drivers
 from wavecomb.usd.network import (
     MAX_DEPTH,
     Source,
@@ -119,7 +122,8 @@ class PreviewReader:
         self.textures = textures
         self.report = report
         self.uv_names: list[str] = []
-        self.slots: dict[str, dict[str, Any]] = {}
+        self.drivers = Drivers(Networks(material, time, textures, report))
+        self.slots = self.drivers.slots
         self.primvars: dict[str, str] = {}
 
     def read(self, shader: UsdShade.Shader) -> Surface:
@@ -160,9 +164,10 @@ class PreviewReader:
             program,
             parameters,
             self.slots,
-            tuple(dict.fromkeys(self.uv_names)),
+            tuple(dict.fromkeys((*self.uv_names, *self.drivers.uv_names))),
             self.primvars,
             displacement,
+            self.drivers.graph(),
         )
 
     def _flat_normal(self, value: Any) -> None:
@@ -219,9 +224,19 @@ class PreviewReader:
             elif name:
                 self.primvars[slot] = str(name)
             return constant(slot, fallback, default)
+        if shader is not None and identifier.startswith("ND_") and slot in PARAMETERS:
+            return self._network(slot, shader, source.output, default)
         what = identifier or "a shader without info:id"
         self.report.missing(f"shading node {what}", self.material.GetPath())
         return default
+
+    def _network(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
+        """A network of MaterialX's nodes: a constant, or None for what it drives."""
+        value = self.drivers.output(shader, output, slot)
+        if value is None:
+            return default
+        found = self.drivers.put(slot, value)
+        return None if found is None else constant(slot, found, default)
 
     def _linear(self, value: Any, source: Source) -> Any:
         """A colour in linear Rec.709, whatever its attribute holds."""

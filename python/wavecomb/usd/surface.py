@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wavecomb.usd.graph_surface import SurfaceGraph
 
 COLOUR_SLOTS = ("base_color", "specular_color", "emission")
 SLOTS = (
@@ -32,6 +35,7 @@ class Surface:
         primvars: Slots read from a primvar of the mesh: slot -> (primvar, scale).
         displacement: How far points move along their normals: a length, or a texture use; None: not
             at all. Part of the mesh's shape, not of the material's look.
+        graph: Computes parameters that neither constants nor plain textures give.
     """
 
     name: str
@@ -41,13 +45,23 @@ class Surface:
     uv_names: tuple[str, ...] = ()
     primvars: dict[str, str] = field(default_factory=dict)
     displacement: float | dict[str, Any] | None = None
+    graph: SurfaceGraph | None = None
 
     def key(self) -> str:
         """Equal for surfaces that look alike."""
-        return repr((self.program, sorted(self.parameters.items()), sorted(self.textures.items())))
+        parameters, textures = sorted(self.parameters.items()), sorted(self.textures.items())
+        return repr((self.program, parameters, textures, self.graph))
+
+    def texture_uses(self) -> list[dict[str, Any]]:
+        """All that reads a texture; of graphs about how."""
+        images = self.graph.whole.images if self.graph is not None else ()
+        within = [{"texture": texture, "uv": (k, 0, 0, 0, k, 0)} for texture, k in images]
+        return [*self.textures.values(), *within]
 
     def brightest(self) -> float:
         """Highest emission that it can reach, textures taken for white."""
+        if self.graph is not None and self.graph.emission is not None:
+            return self.graph.brightest
         use = self.textures.get("emission")
         if use is not None:
             return float(max(s + b for s, b in zip(use["scale"][:3], use["bias"][:3], strict=True)))

@@ -190,7 +190,7 @@ def _note_materials(
         if material is None:
             continue
         surface = materials.surface(material)
-        uses = list(surface.textures.values())
+        uses = surface.texture_uses()
         if isinstance(surface.displacement, dict):
             uses.append(surface.displacement)
         if not uses:

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "wavecomb/core/hash.h"
+#include "wavecomb/scene/graph_value.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb {
@@ -35,9 +36,45 @@ Vec2<float> hit_uv(const MeshRecord& mesh, uint32_t prim, float u, float v) {
   return uv;
 }
 
+/// What a graph is given of a hit on a triangle: places at rest, and no view.
+GraphPoint<float> presence_point(const SceneView& scene, uint32_t instance, const MeshRecord& mesh,
+                                 uint32_t prim, float u, float v, const Vec2<float>& uv) {
+  GraphPoint<float> at;
+  at.uv = uv;
+  if (mesh.indices == 0 || (mesh.flags & kIsCurved) != 0) return at;
+  const auto* indices = reinterpret_cast<const uint32_t*>(mesh.indices) + 3 * size_t{prim};
+  const auto* positions = reinterpret_cast<const float*>(mesh.positions);
+  const auto corner = [&](size_t k) {
+    const float* p = positions + 3 * size_t{indices[k]};
+    return Vec3<float>(p[0], p[1], p[2]);
+  };
+  const Vec3<float> p0 = corner(0), e1 = corner(1) - p0, e2 = corner(2) - p0;
+  at.local_position = fma(e2, v, fma(e1, u, p0));
+  const Vec3<float> n = cross(e1, e2);
+  const float length_n = length(n);
+  if (length_n > 0) at.local_normal = n * (1.f / length_n);
+  const float* m = scene.instances[instance].to_world;
+  const auto place = [&](const Vec3<float>& p, float w) {
+    const auto row = [&](size_t i) {
+      return m[4 * i] * p.x + m[4 * i + 1] * p.y + m[4 * i + 2] * p.z + m[4 * i + 3] * w;
+    };
+    return Vec3<float>(row(0), row(1), row(2));
+  };
+  at.position = place(at.local_position, 1.f);
+  const Vec3<float> world = cross(place(e1, 0.f), place(e2, 0.f));
+  const float length_w = length(world);
+  if (length_w > 0) at.normal = world * (scene.instances[instance].side / length_w);
+  at.view = at.normal;
+  return at;
+}
+
 float opacity_at(const SceneView& scene, const MaterialRecord& material, uint32_t material_id,
-                 const Vec2<float>& uv) {
+                 const Vec2<float>& uv, const GraphPoint<float>* point) {
   float opacity = material.opacity;
+  if (point)
+    opacity = graph_value<float>(scene.materials, material.opacity_graph, kOpacityOutput, *point,
+                                 true, Vec3<float>(opacity))
+                  .x;
   if (material.texture_slots & slot_bit(Slot::kOpacity)) {
     const TextureUseRecord& use =
         scene.materials.uses[material_id * kSlotCount + static_cast<uint32_t>(Slot::kOpacity)];
@@ -74,7 +111,11 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
   const MaterialRecord& m = scene.materials.materials[material];
   if ((m.flags & kPresence) == 0) return true;
 
-  const float opacity = opacity_at(scene, m, material, hit_uv(record, prim, u, v));
+  const Vec2<float> uv = hit_uv(record, prim, u, v);
+  GraphPoint<float> point;
+  if (m.opacity_graph != kNoGraph) point = presence_point(scene, instance, record, prim, u, v, uv);
+  const float opacity =
+      opacity_at(scene, m, material, uv, m.opacity_graph != kNoGraph ? &point : nullptr);
   if (opacity >= 1.f) return true;
   if (!(opacity > 0.f)) return false;
   const uint32_t path =

@@ -15,6 +15,7 @@
 
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
+#include "wavecomb/integrate/graph_point.h"
 #include "wavecomb/integrate/surface.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/material/params.h"
@@ -224,13 +225,14 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
 }
 
 /// The parameters that program `Bsdf` takes.
-template <typename Bsdf, uint32_t kSlots, typename F>
+template <typename Bsdf, uint32_t kSlots, typename F, typename MakePoint>
 WAVECOMB_INLINE auto fetch_for(const MaterialView& materials, const UInt<F>& material,
-                               const Vec2<F>& uv, const F& uv_width, const Mask<F>& active) {
+                               const Vec2<F>& uv, const F& uv_width, const MakePoint& make_point,
+                               const Mask<F>& active) {
   if constexpr (Bsdf::kProgram == ProgramId::kOpenPbr)
-    return fetch_openpbr<kSlots, F>(materials, material, uv, uv_width, active);
+    return fetch_openpbr<kSlots, F>(materials, material, uv, uv_width, make_point, active);
   else
-    return fetch_params<kSlots, F>(materials, material, uv, uv_width, active);
+    return fetch_params<kSlots, F>(materials, material, uv, uv_width, make_point, active);
 }
 
 /// Shades vertex `depth` (0: the camera's first hit) of the active lanes' paths with program
@@ -262,7 +264,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
                             material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
                                 static_cast<uint32_t>(offsetof(MaterialRecord, texture_slots) / 4),
                             Mask<U>(active));
-  const Mask<F> reads_texture = active & Mask<F>((slots & kSlots) != U(0u));
+  const Mask<F> reads_texture = active & Mask<F>((slots & (kSlots | kReadsGraph)) != U(0u));
   const bool textured = any(reads_texture);
   constexpr bool kSolid = Bsdf::kProgram != ProgramId::kDielectric;
   constexpr bool kOpaque = kSolid && Bsdf::kProgram != ProgramId::kOpenPbr;
@@ -273,7 +275,16 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
 
   MaterialView materials = scene.materials;
   materials.schlick_fresnel = settings.schlick_fresnel;
-  const auto params = fetch_for<Bsdf, kSlots, F>(materials, material, s.uv, uv_width, active);
+  const auto make_point = [&](const Mask<F>& lanes) {
+    // Copies, as everything is that only graphs are given.
+    const MeshHit<F> at = hit;
+    const Surface<F> surface = s;
+    const Vec3<F> dir = path.dir;
+    const F width = uv_width;
+    return graph_point<F>(scene, at, surface, dir, width, lanes);
+  };
+  const auto params =
+      fetch_for<Bsdf, kSlots, F>(materials, material, s.uv, uv_width, make_point, active);
   const Bsdf bsdf(params, settings.schlick_fresnel);
   Color<F> throughput = path.throughput;
   if constexpr (Bsdf::kProgram == ProgramId::kOpenPbr)
@@ -314,7 +325,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   Vec3<F> tangent(F(0.f));
   if (textured) {
     tangent = select<F>(reads_texture, s.dpdu, tangent);
-    const Mask<F> mapped = active & Mask<F>((slots & slot_bit(Slot::kNormal)) != U(0u));
+    const Mask<F> mapped =
+        active & Mask<F>((slots & (slot_bit(Slot::kNormal) | kGraphNormal)) != U(0u));
     if (any(mapped)) {
       Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
       const F towards = select(dot(path.dir, s.ng) < 0.f, F(1.f), F(-1.f));

@@ -4,9 +4,21 @@
 
 #include "wavecomb/core/rows.h"
 #include "wavecomb/light/record.h"
+#include "wavecomb/scene/graph_value.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb::detail {
+
+/// Radiance that the graphs of each lane's material give at a point of a triangle.
+template <typename F>
+[[gnu::noinline, gnu::cold]] Color<F> graph_emission(const MaterialView& view, const UInt<F>& graph,
+                                                     const Vec3<F>& p, const Vec2<F>& uv,
+                                                     const Mask<F>& active) {
+  GraphPoint<F> at;
+  at.uv = uv;
+  at.position = p;
+  return graph_value<F>(view, graph, kEmissionOutput, at, active, Color<F>(F(0.f)));
+}
 
 /// Radiance that the emission slot of each lane's material gives at `uv`: texel * scale + bias,
 /// read at the finest level, in [0, 1e18] as material/ keeps it.
@@ -79,8 +91,25 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
     const auto uvs = load_rows<8, F>(view.triangle_uvs, index * 8u, textured);
     const Vec2<F> uv{fma(F(uvs[2] - uvs[0]), b.x, fma(F(uvs[4] - uvs[0]), b.y, uvs[0])),
                      fma(F(uvs[3] - uvs[1]), b.x, fma(F(uvs[5] - uvs[1]), b.y, uvs[1]))};
-    radiance =
-        select<F>(textured, textured_emission<F>(view.materials, material, uv, textured), radiance);
+    Mask<F> plain = textured;
+    if (view.materials.graphs.programs) [[unlikely]] {
+      using U = UInt<F>;
+      const U graph =
+          gather<U>(view.materials.materials,
+                    material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
+                        static_cast<uint32_t>(offsetof(MaterialRecord, emission_graph) / 4),
+                    Mask<U>(textured));
+      const Mask<F> driven = textured & Mask<F>(graph != U(kNoGraph));
+      plain = textured & not_(driven);
+      if (any(driven)) {
+        const Vec3<F> at = q;
+        radiance =
+            select<F>(driven, graph_emission<F>(view.materials, graph, at, uv, driven), radiance);
+      }
+    }
+    if (any(plain))
+      radiance =
+          select<F>(plain, textured_emission<F>(view.materials, material, uv, plain), radiance);
   }
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }

@@ -2,6 +2,9 @@
 /// The parameters of program "openpbr" at hits.
 #pragma once
 
+#include <algorithm>
+#include <array>
+
 #include "wavecomb/material/params.h"
 #include "wavecomb/scene/openpbr_data.h"
 
@@ -26,13 +29,53 @@ struct OpenPbrParams : ShadingParams<F> {
   const float* energy;  ///< EnergyTables
 };
 
+/// Where the components of GraphParameter are in `p`, in their order.
+template <typename F>
+inline std::array<F*, kGraphOutputCount> parameter_places(OpenPbrParams<F>& p) {
+  const std::array<F*, kGraphOutputCount - kFirstOpenPbrOutput> own{&p.diffuse_roughness,
+                                                                    &p.specular_weight,
+                                                                    &p.anisotropy,
+                                                                    &p.rotation,
+                                                                    &p.transmission_weight,
+                                                                    &p.transmission_tint.x,
+                                                                    &p.transmission_tint.y,
+                                                                    &p.transmission_tint.z,
+                                                                    &p.extinction.x,
+                                                                    &p.extinction.y,
+                                                                    &p.extinction.z,
+                                                                    &p.subsurface_weight,
+                                                                    &p.subsurface_color.x,
+                                                                    &p.subsurface_color.y,
+                                                                    &p.subsurface_color.z,
+                                                                    &p.subsurface_anisotropy,
+                                                                    &p.fuzz_weight,
+                                                                    &p.fuzz_color.x,
+                                                                    &p.fuzz_color.y,
+                                                                    &p.fuzz_color.z,
+                                                                    &p.fuzz_roughness,
+                                                                    &p.coat_color.x,
+                                                                    &p.coat_color.y,
+                                                                    &p.coat_color.z,
+                                                                    &p.coat_ior,
+                                                                    &p.coat_darkening,
+                                                                    &p.film_weight,
+                                                                    &p.film_thickness,
+                                                                    &p.film_ior};
+  std::array<F*, kGraphOutputCount> all;
+  const auto slots = parameter_places(static_cast<ShadingParams<F>&>(p));
+  std::copy(own.begin(), own.end(), std::copy(slots.begin(), slots.end(), all.begin()));
+  return all;
+}
+
 /// fetch_params for this program.
-template <uint32_t kSlots, typename F>
+template <uint32_t kSlots, typename F, typename MakePoint>
 inline OpenPbrParams<F> fetch_openpbr(const MaterialView& view, const UInt<F>& material,
-                                      const Vec2<F>& uv, const F& uv_width, const Mask<F>& active) {
+                                      const Vec2<F>& uv, const F& uv_width,
+                                      const MakePoint& make_point, const Mask<F>& active) {
   using R = OpenPbrRecord;
   OpenPbrParams<F> p;
-  static_cast<ShadingParams<F>&>(p) = fetch_params<kSlots, F>(view, material, uv, uv_width, active);
+  static_cast<ShadingParams<F>&>(p) =
+      detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
   const bool uniform = any(active) && is_uniform<F>(material, active);
   const UInt<F> record =
       detail::make_reader<MaterialRecord, F>(view.materials, material, uniform, active)
@@ -59,6 +102,7 @@ inline OpenPbrParams<F> fetch_openpbr(const MaterialView& view, const UInt<F>& m
   p.film_ior = r.real(offsetof(R, film_ior));
   p.thin_walled = r.real(offsetof(R, thin_walled));
   p.energy = view.energy;
+  complete_params<kSlots, F>(view, material, make_point, active, p);
   return p;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads the parameters of materials at hits: constants from records, or textures.
+/// Reads the parameters of materials at hits: constants from records, textures, or value graphs.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,7 @@
 
 #include "wavecomb/core/math.h"
 #include "wavecomb/material/bsdf.h"
+#include "wavecomb/material/graph.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb {
@@ -137,16 +138,6 @@ inline Color<F> sane_emission(const Color<F>& c) {
           min(max(c.z, F(0.f)), F(kMaxEmission))};
 }
 
-/// A unit normal of the upper half; (0, 0, 1) where `n` is no direction.
-template <typename F>
-inline Vec3<F> sane_normal(const Vec3<F>& n) {
-  const Vec3<F> up(n.x, n.y, max(n.z, F(0.01f)));
-  const F len2 = length_squared(up);
-  const Mask<F> good = is_finite(len2) & (max(max(abs(n.x), abs(n.y)), n.z) > 1e-6f);
-  const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
-  return select<F>(good, up * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
-}
-
 /// Lanes whose opacity is presence: it says how much of the surface is there, not how it transmits.
 template <typename F>
 inline Mask<F> opacity_is_presence(const SlotReader<F>& slots, const F& threshold) {
@@ -188,43 +179,81 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
   return p;
 }
 
-/// Evaluates the parameters of dear materials as often as they say: a packet as often as its
-/// dearest lane. The values are those of one evaluation; the compiler is kept from seeing that.
-template <uint32_t kSlots, typename F>
-[[gnu::noinline]] void evaluate_again(const MaterialView& view, const UInt<F>& material,
-                                      const Vec2<F>& uv, const F& uv_width, const Mask<F>& active,
-                                      const UInt<F>& more) {
+/// What graphs are given where there is nothing but texture coordinates.
+template <typename F>
+struct UvOnly {
+  const Vec2<F>& uv;
+  const F& uv_width;
+  GraphPoint<F> operator()(const Mask<F>& /*active*/) const {
+    GraphPoint<F> at;
+    at.uv = uv;
+    at.uv_width = uv_width;
+    return at;
+  }
+};
+
+/// Puts what graphs drive in the place of the parameters in `p`, and evaluates dear materials as
+/// often as they say: a packet as often as its dearest lane, with the values of one evaluation; the
+/// compiler is kept from seeing that.
+template <uint32_t kSlots, typename F, typename Params>
+[[gnu::noinline]] void evaluate_more(const MaterialView& view, const UInt<F>& material,
+                                     const GraphPoint<F>& point, const Mask<F>& active, Params& p) {
+  const UInt<F> more = p.flags >> kEvaluationsShift;
+  const Mask<F> driven = active & Mask<F>((p.flags & UInt<F>(uint32_t{kHasGraph})) != UInt<F>(0u));
   const Mask<UInt<F>> on(active);
-  Vec2<F> at = uv;
+  GraphPoint<F> at = point;
   for (uint32_t done = 0; any(Mask<F>(on & (more > UInt<F>(done)))); ++done) {
     asm volatile("" : : "r"(&at) : "memory");
-    const ShadingParams<F> p = evaluate_params<kSlots, F>(view, material, at, uv_width, active);
-    asm volatile("" : : "r"(&p) : "memory");
+    Params again = p;
+    static_cast<ShadingParams<F>&>(again) =
+        evaluate_params<kSlots, F>(view, material, at.uv, at.uv_width, active);
+    if (any(driven)) drive_parameters<F>(view, material, at, driven, again);
+    asm volatile("" : : "r"(&again) : "memory");
   }
+  if (any(driven)) drive_parameters<F>(view, material, at, driven, p);
 }
 
 }  // namespace detail
 
+/// Parameters `p` of material `material` with what graphs drive in its place: what
+/// evaluate_params leaves to do. `make_point(active)` gives the GraphPoint and is called only where
+/// there is a graph.
+template <uint32_t kSlots, typename F, typename Params, typename MakePoint>
+WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& material,
+                                     const MakePoint& make_point, const Mask<F>& active,
+                                     Params& p) {
+  const UInt<F> more = p.flags & UInt<F>(kMoreToEvaluate);
+  if (any(active & Mask<F>(more != UInt<F>(0u)))) [[unlikely]] {
+    // Copies, so that what all other materials use may stay in registers.
+    const MaterialView v = view;
+    const UInt<F> m = material;
+    const Mask<F> on = active;
+    const GraphPoint<F> at = make_point(on);
+    Params copy = p;
+    detail::evaluate_more<kSlots, F>(v, m, at, on, copy);
+    p = copy;
+  }
+}
+
 /// The parameters of material `material` at `uv`, in sane ranges. Only slots in `kSlots` read
 /// textures; the others give their constants. `uv_width` is the ray's footprint in uv units.
 /// `opacity` is 1 where it is presence, which fetch_opacity gives. Inactive lanes hold anything
-/// finite.
+/// finite. Graphs are given what `make_point` says.
+template <uint32_t kSlots, typename F, typename MakePoint>
+WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
+                                              const Vec2<F>& uv, const F& uv_width,
+                                              const MakePoint& make_point, const Mask<F>& active) {
+  auto p = detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
+  complete_params<kSlots, F>(view, material, make_point, active, p);
+  return p;
+}
+/// The same where graphs have nothing but uv.
 template <uint32_t kSlots, typename F>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const F& uv_width,
                                               const Mask<F>& active) {
-  const auto p = detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
-  const UInt<F> more = p.flags >> kEvaluationsShift;
-  if (any(active & Mask<F>(more != UInt<F>(0u)))) [[unlikely]] {
-    // Copies, so that what all other materials use may stay in registers.
-    const MaterialView v = view;
-    const UInt<F> m = material, n = more;
-    const Vec2<F> at = uv;
-    const F width = uv_width;
-    const Mask<F> on = active;
-    detail::evaluate_again<kSlots, F>(v, m, at, width, on, n);
-  }
-  return p;
+  return fetch_params<kSlots, F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width},
+                                 active);
 }
 
 /// Radiance that the surface emits at `uv`.
@@ -233,7 +262,11 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
                                const F& uv_width, const Mask<F>& active) {
   const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
   const Vec3<F> constant = slots.record.vec3(offsetof(MaterialRecord, emission));
-  return detail::sane_emission(slots.value(Slot::kEmission, constant));
+  const Color<F> plain = detail::sane_emission(slots.value(Slot::kEmission, constant));
+  const UInt<F> graph = slots.record.bits(offsetof(MaterialRecord, emission_graph));
+  if (none(active & Mask<F>(graph != UInt<F>(kNoGraph)))) return plain;
+  const GraphPoint<F> at = detail::UvOnly<F>{uv, uv_width}(active);
+  return graph_value<F>(view, graph, kEmissionOutput, at, active, plain);
 }
 
 /// How much of the surface is there at `uv`: the probability that a ray meets it. It is 0 or 1 with
@@ -244,8 +277,13 @@ inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const 
                        const F& uv_width, const Mask<F>& active) {
   using R = MaterialRecord;
   const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
-  const F opacity =
+  F opacity =
       detail::saturate(slots.value(Slot::kOpacity, slots.record.real(offsetof(R, opacity))));
+  const UInt<F> graph = slots.record.bits(offsetof(R, opacity_graph));
+  if (any(active & Mask<F>(graph != UInt<F>(kNoGraph)))) {
+    const GraphPoint<F> at = detail::UvOnly<F>{uv, uv_width}(active);
+    opacity = graph_value<F>(view, graph, kOpacityOutput, at, active, Vec3<F>(opacity)).x;
+  }
   const F threshold = slots.record.real(offsetof(R, opacity_threshold));
   const F cut = select(opacity < threshold, F(0.f), F(1.f));
   const F present = select(threshold > 0.f, cut, opacity);

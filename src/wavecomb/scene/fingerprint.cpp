@@ -101,7 +101,18 @@ uint64_t hash_materials(const Scene& scene) {
       h.add_array(std::span<const float>(use.bias));
       h.add_array(std::span<const float>(use.uv));
     }
+    if (m.graph != kNoGraph) h.add(m.graph, m.opacity_graph, m.emission_graph);
   }
+  const GraphSet& graphs = *scene.material_part()->graphs;
+  if (graphs.programs.empty()) return h.value();
+  const auto add = [&](const auto& array) {
+    h.add_bytes(array.data(), array.size() * sizeof(array[0]));
+  };
+  add(graphs.programs);
+  add(graphs.ops);
+  add(graphs.constants);
+  add(graphs.images);
+  add(graphs.outputs);
   return h.value();
 }
 

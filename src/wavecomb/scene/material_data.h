@@ -9,6 +9,7 @@
 
 #include "wavecomb/core/affine.h"
 #include "wavecomb/scene/openpbr_data.h"
+#include "wavecomb/texture/graph_data.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
@@ -84,16 +85,21 @@ struct Material {
   uint32_t evaluations = 1;
   std::array<TextureUse, kSlotCount> textures;
   OpenPbr openpbr;  ///< read by the program of that name alone
+  /// What computes parameters at hits, in place of constants and textures: ids of
+  /// SceneBuilder::add_graph or kNoGraph. The parts that drive opacity and emission alone stand
+  /// beside the whole, for rays and lights that ask for nothing else.
+  uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
   bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
   /// Whether it can shine: its program reads the emission slot and finds something there.
   bool emits() const {
-    return can_emit(program) &&
-           (emission.x > 0 || emission.y > 0 || emission.z > 0 || has_texture(Slot::kEmission));
+    return can_emit(program) && (emission.x > 0 || emission.y > 0 || emission.z > 0 ||
+                                 has_texture(Slot::kEmission) || emission_graph != kNoGraph);
   }
   /// Whether rays must ask how much of the surface is there.
   bool needs_presence() const {
-    return (presence || opacity_threshold > 0) && (opacity < 1 || has_texture(Slot::kOpacity));
+    return (presence || opacity_threshold > 0) &&
+           (opacity < 1 || has_texture(Slot::kOpacity) || opacity_graph != kNoGraph);
   }
 };
 
@@ -108,12 +114,14 @@ struct alignas(64) MaterialRecord {
   uint32_t flags;          ///< MaterialFlags; upper half: evaluations - 1
   uint32_t program;
   uint32_t openpbr;  ///< its OpenPbrRecord
-  float pad[3];
+  uint32_t graph, opacity_graph, emission_graph;
 };
 static_assert(sizeof(MaterialRecord) == 128);
 /// A bit of MaterialRecord::texture_slots beside those of slots: the program needs a frame along
 /// the texture, though it may read none.
 inline constexpr uint32_t kNeedsTangent = 1u << 31;
+/// Likewise: a graph drives parameters; one drives the normal.
+inline constexpr uint32_t kReadsGraph = 1u << 30, kGraphNormal = 1u << 29;
 /// The upper half of MaterialRecord::flags: evaluations beyond the first.
 inline constexpr uint32_t kEvaluationsShift = 16;
 inline constexpr uint32_t kMaxEvaluations = 1u << 16;
@@ -122,7 +130,10 @@ enum MaterialFlags : uint32_t {
   kPresence = 2,
   kConductorIndex = 4,
   kEmits = 8,
+  kHasGraph = 16,
 };
+/// Flags of materials whose parameters take more than their constants and textures.
+inline constexpr uint32_t kMoreToEvaluate = kHasGraph | ~((1u << kEvaluationsShift) - 1u);
 
 /// A TextureUse as lanes read it: 16 words.
 struct alignas(64) TextureUseRecord {
@@ -138,6 +149,7 @@ struct MaterialView {
   const TextureView* textures = nullptr;
   const OpenPbrRecord* openpbr = nullptr;
   const float* energy = nullptr;  ///< EnergyTables; set where a material needs them
+  GraphView graphs{};
   /// A render setting: Schlick's approximation in place of exact Fresnel.
   bool schlick_fresnel = false;
 };

@@ -20,7 +20,8 @@ bool same_emission(const Material& a, const Material& b) {
   const TextureUse& ta = a.textures[static_cast<size_t>(Slot::kEmission)];
   const TextureUse& tb = b.textures[static_cast<size_t>(Slot::kEmission)];
   return a.emits() == b.emits() && same(a.emission, b.emission) && ta.texture == tb.texture &&
-         ta.channel == tb.channel && ta.scale == tb.scale && ta.bias == tb.bias && ta.uv == tb.uv;
+         ta.channel == tb.channel && ta.scale == tb.scale && ta.bias == tb.bias && ta.uv == tb.uv &&
+         a.emission_graph == b.emission_graph;
 }
 
 [[noreturn]] void throw_unknown(const char* kind, uint32_t id, size_t count) {
@@ -50,6 +51,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.uses = materials_->uses.data();
   v.materials.textures = geometry_->texture_views.data();
   v.materials.openpbr = materials_->openpbr.data();
+  v.materials.graphs = materials_->graphs->view();
   v.lights = lights_->set.view(v.materials);
   v.scale = geometry_->radius;
   v.motion = {geometry_->mesh_motions.data(),
@@ -73,7 +75,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   if (edit.camera) check_camera(*edit.camera);
   for (const auto& [id, material] : edit.materials) {
     if (id >= materials().size()) throw_unknown("material", id, materials().size());
-    check_material(material, textures().size());
+    check_material(material, textures().size(), materials_->graphs->programs.size());
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());
@@ -90,7 +92,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
       shines_otherwise = shines_otherwise || !same_emission(all[id], material);
       all[id] = material;
     }
-    new_materials = std::make_shared<const SceneMaterials>(std::move(all));
+    new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs);
   }
   std::shared_ptr<const SceneLights> new_lights = lights_;
   if (shines_otherwise) {
@@ -135,15 +137,17 @@ SceneBytes Scene::bytes() const {
   const auto of = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   const SceneGeometry& g = *geometry_;
   const LightSet& set = lights_->set;
-  b.records = of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
-                 g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
-                 g.instance_motions) +
-              of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
-                 materials_->openpbr) +
-              of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records,
-                 set.triangles, set.triangle_uvs, set.pick_bins, set.tree.nodes, set.tree.trails,
-                 set.shapings, set.ies, set.ies_numbers) +
-              g.names.bytes();
+  b.records =
+      of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
+         g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
+         g.instance_motions) +
+      of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
+         materials_->openpbr, materials_->graphs->programs, materials_->graphs->ops,
+         materials_->graphs->constants, materials_->graphs->images, materials_->graphs->outputs) +
+      of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
+         set.triangle_uvs, set.pick_bins, set.tree.nodes, set.tree.trails, set.shapings, set.ies,
+         set.ies_numbers) +
+      g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;
 }

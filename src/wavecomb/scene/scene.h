@@ -137,7 +137,10 @@ class SceneBuilder {
                      const std::array<float, 4>& missing);
   /// A texture that was added; valid until the builder is gone or build() is called.
   const Texture& texture(uint32_t id) const;
-  /// Texture ids in the material must exist.
+  /// A program for Material::graph and its parts; outputs are numbered as in graph_parameters.h.
+  /// Texture ids in it must exist.
+  uint32_t add_graph(const Graph& graph);
+  /// Texture and graph ids in the material must exist.
   uint32_t add_material(Material material);
   /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name;
   /// faces without area stay (they are never hit).
@@ -203,6 +206,7 @@ class SceneBuilder {
   std::vector<std::vector<Node>> children_;
   std::vector<Affine> node_steps_;
   std::vector<Material> materials_;
+  GraphSet graphs_;
   std::vector<TexturePtr> textures_;
   std::vector<IesProfile> profiles_;
   std::vector<GeometrySet> sets_;

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/check_curves.h"
+#include "wavecomb/scene/graph_parameters.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
@@ -146,8 +148,15 @@ const Texture& SceneBuilder::texture(uint32_t id) const {
   return *textures_[id];
 }
 
+uint32_t SceneBuilder::add_graph(const Graph& graph) {
+  check_graph(graph, "graph " + std::to_string(graphs_.programs.size()), textures_.size(),
+              kGraphOutputCount);
+  graphs_.add(graph);
+  return static_cast<uint32_t>(graphs_.programs.size() - 1);
+}
+
 uint32_t SceneBuilder::add_material(Material material) {
-  check_material(material, textures_.size());
+  check_material(material, textures_.size(), graphs_.programs.size());
   const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
                      material.emission.z > 0 || material.has_texture(Slot::kEmission);
   if (glows && !material.emits())
@@ -415,7 +424,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   std::shared_ptr<const SceneLights> lights;
   with_threads(threads_, [&] {
     make_records(*geometry, grey);
-    materials = std::make_shared<const SceneMaterials>(std::move(materials_));
+    materials = std::make_shared<const SceneMaterials>(
+        std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})));
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
   });

@@ -16,7 +16,7 @@ std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
 }
 
-void check_material(const Material& material, size_t texture_count) {
+void check_material(const Material& material, size_t texture_count, size_t graph_count) {
   const auto name = quoted("material", material.name);
   for (uint32_t s = 0; s < kSlotCount; ++s) {
     const TextureUse& use = material.textures[s];
@@ -35,6 +35,9 @@ void check_material(const Material& material, size_t texture_count) {
     if (use.channel > 4)
       throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
   }
+  for (const uint32_t graph : {material.graph, material.opacity_graph, material.emission_graph})
+    if (graph != kNoGraph && graph >= graph_count)
+      throw Error(name + " has a graph that was never added; add graphs before materials");
   const OpenPbr& o = material.openpbr;
   for (const Vec3<float>& v :
        {material.base_color, material.specular_color, material.emission, material.conductor_eta,

@@ -22,8 +22,8 @@ inline bool finite(const Affine& m) {
 /// "mesh '/World/Box'", or "mesh" where it has no name.
 std::string quoted(const std::string& kind, const std::string& name);
 
-/// `texture_count`: textures that there are.
-void check_material(const Material& material, size_t texture_count);
+/// `texture_count`, `graph_count`: textures and graphs that there are.
+void check_material(const Material& material, size_t texture_count, size_t graph_count);
 void check_light(const Light& light, size_t texture_count, size_t profile_count, size_t set_count);
 void check_profile(const IesProfile& profile);
 void check_camera(const Camera& camera);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/scene/graph_emission.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -67,7 +68,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     radiance = {value(0), value(1), value(2)};
     t.material = material;
   }
-  if (!m.emits()) radiance = {0, 0, 0};
+  if (!can_aim_at(m, *materials.graphs)) radiance = {0, 0, 0};
   t.radiance[0] = radiance.x;
   t.radiance[1] = radiance.y;
   t.radiance[2] = radiance.z;
@@ -86,6 +87,10 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     uvs[k][0] = uv[0];
     uvs[k][1] = uv[1];
   }
+  if (m.emission_graph != kNoGraph && can_aim_at(m, *materials.graphs)) {
+    t.material = material;
+    mean_graph_emission(geometry, materials, m.emission_graph, t);
+  }
   return t;
 }
 
@@ -97,7 +102,9 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   // Triangles of meshes whose material emits become lights of their own.
   std::vector<EmissiveMesh> sources;
   size_t triangle_count = 0;
-  const auto emits = [&](uint32_t material) { return materials.materials[material].emits(); };
+  const auto emits = [&](uint32_t material) {
+    return can_aim_at(materials.materials[material], *materials.graphs);
+  };
   const Affine identity{};
   std::vector<PlacedMeshLight> placed;
   const bool any = materials.has_emission || !geometry.mesh_lights.empty();

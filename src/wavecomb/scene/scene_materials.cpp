@@ -3,12 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/scene/graph_parameters.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
 namespace {
 
-MaterialRecord make_material_record(const Material& m) {
+/// Whether program `graph` drives parameter component `output`.
+bool drives(const GraphSet& graphs, uint32_t graph, uint32_t output) {
+  const GraphProgram& p = graphs.programs[graph];
+  const auto first = graphs.outputs.begin() + p.first_output;
+  return std::any_of(first, first + p.output_count,
+                     [&](const GraphOutput& o) { return o.parameter == output; });
+}
+
+MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   MaterialRecord r{};
   const auto put = [](float* to, const Vec3<float>& v) {
     to[0] = v.x;
@@ -38,6 +47,14 @@ MaterialRecord make_material_record(const Material& m) {
   r.program = static_cast<uint32_t>(m.program);
   if (m.program == ProgramId::kOpenPbr && m.openpbr.anisotropy != 0)
     r.texture_slots |= kNeedsTangent;
+  r.graph = m.graph;
+  r.opacity_graph = m.opacity_graph;
+  r.emission_graph = m.emission_graph;
+  if (m.graph != kNoGraph) {
+    r.flags |= kHasGraph;
+    r.texture_slots |= kReadsGraph;
+    if (drives(graphs, m.graph, kNormalOutput)) r.texture_slots |= kGraphNormal;
+  }
   return r;
 }
 
@@ -88,9 +105,10 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 
 }  // namespace
 
-SceneMaterials::SceneMaterials(std::vector<Material> all) : materials(std::move(all)) {
+SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_)
+    : materials(std::move(all)), graphs(std::move(programs_)) {
   for (const Material& m : materials) {
-    records.push_back(make_material_record(m));
+    records.push_back(make_material_record(m, *graphs));
     if (m.program == ProgramId::kOpenPbr) {
       records.back().openpbr = static_cast<uint32_t>(openpbr.size());
       openpbr.push_back(make_openpbr_record(m.openpbr));

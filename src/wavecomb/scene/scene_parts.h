@@ -101,9 +101,10 @@ struct SceneGeometry {
 
 /// Materials, and as lanes read them.
 struct SceneMaterials {
-  explicit SceneMaterials(std::vector<Material> materials);
+  SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs);
 
   std::vector<Material> materials;
+  std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
   std::vector<uint32_t> programs;

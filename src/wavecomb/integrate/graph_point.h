@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What value graphs may ask of a hit.
+#pragma once
+
+#include "wavecomb/integrate/surface.h"
+#include "wavecomb/texture/graph.h"
+
+namespace wavecomb {
+
+/// The GraphPoint of a hit on surface `s`, seen along `dir`. Not inline: kernels without graphs
+/// keep their size.
+template <typename F>
+[[gnu::noinline, gnu::cold]] GraphPoint<F> graph_point(const SceneView& scene,
+                                                       const MeshHit<F>& hit, const Surface<F>& s,
+                                                       const Vec3<F>& dir, const F& uv_width,
+                                                       const Mask<F>& active) {
+  GraphPoint<F> at;
+  at.uv = s.uv;
+  at.uv_width = uv_width;
+  at.position = s.p;
+  at.normal = s.ns;
+  at.view = -dir;
+  const uint32_t wanted = scene.materials.graphs.inputs;
+  const auto unit = [](const Vec3<F>& v, const Vec3<F>& otherwise) {
+    const F len2 = length_squared(v);
+    const Mask<F> good = (len2 > 0.f) & is_finite(len2);
+    return select<F>(good, v * F(1.f / sqrt(select(good, len2, F(1.f)))), otherwise);
+  };
+  if ((wanted &
+       (graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent))) != 0)
+    at.tangent = unit(s.dpdu - s.ns * dot(s.ns, s.dpdu), make_frame<F>(s.ns).s);
+  if ((wanted & (graph_input_bit(GraphInput::kLocalPosition) |
+                 graph_input_bit(GraphInput::kLocalNormal))) == 0)
+    return at;
+  detail::InstanceMaps<F> maps(scene, hit.inst, active);
+  if (scene.has_motion)
+    maps.place(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
+  // The inverse of the transform, by its cofactors.
+  const Vec3<F>* m = maps.row;
+  const Vec3<F> c[3] = {cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
+  const F det = dot(m[0], c[0]), inv = 1.f / select(det == 0.f, F(1.f), det);
+  const Vec3<F> p = s.p - maps.t;
+  at.local_position = (c[0] * p.x + c[1] * p.y + c[2] * p.z) * inv;
+  at.local_normal = unit(m[0] * s.ns.x + m[1] * s.ns.y + m[2] * s.ns.z, s.ns);
+  return at;
+}
+
+}  // namespace wavecomb

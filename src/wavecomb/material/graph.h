@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Puts what value graphs compute in the place of a material's parameters.
+#pragma once
+
+#include <array>
+
+#include "wavecomb/material/bsdf.h"
+#include "wavecomb/scene/graph_value.h"
+
+namespace wavecomb {
+
+/// Where the components of GraphParameter are in `p`, in their order.
+template <typename F>
+inline std::array<F*, kFirstOpenPbrOutput> parameter_places(ShadingParams<F>& p) {
+  return {&p.base_color.x,
+          &p.base_color.y,
+          &p.base_color.z,
+          &p.specular_color.x,
+          &p.specular_color.y,
+          &p.specular_color.z,
+          &p.emission.x,
+          &p.emission.y,
+          &p.emission.z,
+          &p.roughness,
+          &p.metallic,
+          &p.clearcoat,
+          &p.clearcoat_roughness,
+          &p.opacity,
+          &p.normal.x,
+          &p.normal.y,
+          &p.normal.z,
+          &p.ior};
+}
+
+namespace detail {
+
+/// A unit normal of the upper half; (0, 0, 1) where `n` is no direction.
+template <typename F>
+inline Vec3<F> sane_normal(const Vec3<F>& n) {
+  const Vec3<F> up(n.x, n.y, max(n.z, F(0.01f)));
+  const F len2 = length_squared(up);
+  const Mask<F> good = is_finite(len2) & (max(max(abs(n.x), abs(n.y)), n.z) > 1e-6f);
+  const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
+  return select<F>(good, up * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
+}
+
+/// Runs the graphs of the active lanes, which all have one, and puts what they drive into `p`. A
+/// program beside "openpbr" has no place for what that one alone reads.
+template <typename F, typename Params>
+inline void drive_parameters(const MaterialView& view, const UInt<F>& material,
+                             const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
+  using U = UInt<F>;
+  constexpr auto kWords = static_cast<uint32_t>(sizeof(MaterialRecord) / 4);
+  const U graph =
+      gather<U>(view.materials,
+                material * kWords + static_cast<uint32_t>(offsetof(MaterialRecord, graph) / 4),
+                Mask<U>(active));
+  const auto places = parameter_places(p);
+  const F opacity = p.opacity;
+  F registers[kMaxGraphRegisters];
+  for_each_graph<F>(graph, active, [&](uint32_t id, const Mask<F>& same) {
+    const GraphProgram& program = view.graphs.programs[id];
+    run_graph<F>(view.graphs, program, view.textures, at, same, registers);
+    bool tilts = false;
+    for (uint32_t i = 0; i < program.output_count; ++i) {
+      const GraphOutput& output = view.graphs.outputs[program.first_output + i];
+      if (output.parameter >= places.size()) continue;
+      tilts = tilts || output.parameter == kNormalOutput;
+      F& to = *places[output.parameter];
+      const F value = graph_output<F>(view.graphs, program, output, registers);
+      to = select(same, sane_output<F>(output.parameter, value), to);
+    }
+    if (tilts) p.normal = select<F>(same, sane_normal(p.normal), p.normal);
+  });
+  // Presence is what rays ask for; those who met the surface see all of it.
+  const Mask<F> presence = Mask<F>((p.flags & U(uint32_t{kPresence})) != U(0u));
+  p.opacity = select(presence, opacity, p.opacity);
+}
+
+}  // namespace detail
+
+}  // namespace wavecomb
