@@ -15,9 +15,11 @@
 
 #include "bind.h"
 #include "scene_values.h"
+#include "statistics.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/fingerprint.h"
 #include "wavecomb/scene/scene.h"
+#include "wavecomb/texture/tile_store.h"
 
 namespace nb = nanobind;
 using namespace wavecomb;
@@ -477,6 +479,13 @@ void bind_scene(nb::module_& m) {
   using namespace nb::literals;
   m.attr("INHERIT_MATERIAL") = kInheritMaterial;
 
+  nb::class_<TileStore>(m, "TextureStore")
+      .def(nb::init<uint64_t, std::string>(), "limit_bytes"_a, "folder"_a)
+      .def_static("obstacle", &UserFaults::obstacle)
+      .def_prop_ro("limit_bytes", &TileStore::limit_bytes)
+      .def_prop_ro("statistics",
+                   [](const TileStore& store) { return texture_store_dict(store.statistics()); });
+
   nb::class_<Scene>(m, "Scene")
       .def_prop_ro("triangles", &Scene::unique_triangles)
       .def_prop_ro("instanced_triangles", &Scene::instanced_triangles)
@@ -541,7 +550,8 @@ void bind_scene(nb::module_& m) {
 
   const Color3 grey{0.18f, 0.18f, 0.18f}, black{0.f, 0.f, 0.f}, white{1.f, 1.f, 1.f};
   nb::class_<SceneBuilder>(m, "SceneBuilder")
-      .def(nb::init<uint32_t>(), "threads"_a = 0)
+      .def(nb::init<uint32_t, std::shared_ptr<TileStore>>(), "threads"_a = 0,
+           "store"_a.none() = nb::none())
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
       .def("share_texture", &share_texture, "scene"_a, "texture"_a)

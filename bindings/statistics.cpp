@@ -66,6 +66,19 @@ nb::dict programs_dict(const RenderStatistics& s) {
 
 }  // namespace
 
+nb::dict texture_store_dict(const StoreStatistics& s) {
+  nb::dict d;
+  d["limit_bytes"] = s.limit_bytes;
+  d["texture_bytes"] = s.texture_bytes;
+  d["file_bytes"] = s.file_bytes;
+  d["resident_bytes"] = s.resident_bytes;
+  d["peak_bytes"] = s.peak_bytes;
+  d["loads"] = s.loads;
+  d["releases"] = s.releases;
+  d["load_s"] = s.load_s;
+  return d;
+}
+
 nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
                          size_t picture_bytes) {
   nb::dict d, seconds, phases, counts, memory;
@@ -118,6 +131,8 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   memory["textures"] = s.scene_bytes.textures;
   memory["records"] = s.scene_bytes.records;
   d["memory_bytes"] = memory;
+  d["texture_store"] = nb::none();
+  if (s.texture_store) d["texture_store"] = texture_store_dict(*s.texture_store);
   d["peak_rss_bytes"] = s.peak_rss_bytes;
   d["passes"] = s.passes;
   d["resumed_samples"] = s.resumed_samples;

@@ -6,6 +6,9 @@
 
 #include "wavecomb/render/render_statistics.h"
 
+/// What `texture_store` of docs/statistics.md holds.
+nanobind::dict texture_store_dict(const wavecomb::StoreStatistics& statistics);
+
 /// The keys of docs/statistics.md that the core knows of. `picture_bytes`: 0 where there is no
 /// picture yet.
 nanobind::dict statistics_dict(const wavecomb::RenderStatistics& statistics,

@@ -75,6 +75,20 @@ class Scene:
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
 
+class TextureStore:
+    """Keeps the textures of scenes within a limit of memory, and the rest in a temporary file."""
+
+    def __init__(self, limit_bytes: int, folder: str) -> None:
+        """``folder``: for the file, made when textures do not fit. Raises Error."""
+    @staticmethod
+    def obstacle() -> str:
+        """Why this system can have none; "" where it can."""
+    @property
+    def limit_bytes(self) -> int: ...
+    @property
+    def statistics(self) -> dict[str, float]:
+        """``texture_store`` of docs/statistics.md, as it is now."""
+
 class SceneBuilder:
     """Collects a scene; ids are handed out from 0 in order.
 
@@ -82,7 +96,8 @@ class SceneBuilder:
     float64 or float32, shape (4, 4).
     """
 
-    def __init__(self, threads: int = 0) -> None: ...
+    def __init__(self, threads: int = 0, store: TextureStore | None = None) -> None:
+        """``store``: keeps the textures that are added; None: they are in memory."""
     def add_texture(
         self,
         pixels: NDArray[Any],

@@ -121,7 +121,7 @@ class Frames:
             return None
         if not self._stock.varying.is_view_only and before.frame != _number(when):
             return None
-        if self._options.get("texture_limit") is not None:
+        if before.leaves_out_levels:
             return None  # another view shows other textures near
         told = LoadReport()
         seen = self._view(options).on(self._stage, told)

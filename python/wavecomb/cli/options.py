@@ -110,7 +110,7 @@ def stage_options(command: F) -> F:
             "--texture-limit",
             type=Real(0),
             metavar="MB",
-            help="Memory of all textures; finest levels are left out where it is too little.  "
+            help="Memory of all textures; what does not fit waits in a temporary file.  "
             "[default: any]",
         ),
         click.option(

@@ -205,9 +205,14 @@ class ReadAhead:
     is bounded; whatever is asked for and not under way is read at once.
     """
 
-    def __init__(self, threads: int = 0) -> None:
-        """``threads`` read, 0: one for each core; with 1 nothing is read ahead."""
+    def __init__(self, threads: int = 0, limit_bytes: int | None = None) -> None:
+        """``threads`` read, 0: one for each core; with 1 nothing is read ahead.
+
+        ``limit_bytes``: of the pixels that lie ready or are under way; None: any.
+        """
         self._threads = threads or usable_cores()
+        self._limit_bytes = limit_bytes
+        self._sizes: dict[str, int] = {}
         self._pool: ThreadPoolExecutor | None = None
         self._seen: set[str] = set()
         self._waiting: deque[str] = deque()
@@ -246,8 +251,23 @@ class ReadAhead:
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
 
+    def _fits(self, path: str) -> bool:
+        """Whether an image may be read now, beside those that are ready."""
+        if self._limit_bytes is None:
+            return True
+        if path not in self._sizes:
+            try:
+                header = read_header(path)
+                bytes_ = header.size[0] * header.size[1] * header.channels * header.dtype.itemsize
+            except (TextureError, OSError, ValueError):
+                bytes_ = 0  # reading it says what is wrong
+            self._sizes[path] = bytes_
+        return sum(self._sizes[ready] for ready in (path, *self._ready)) <= self._limit_bytes
+
     def _start(self) -> None:
         while self._waiting and len(self._ready) <= self._threads:
+            if not self._fits(self._waiting[0]):
+                return
             if self._pool is None:
                 from concurrent.futures import ThreadPoolExecutor
 

@@ -31,6 +31,7 @@ from wavecomb.usd.shutter import find_motion
 from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
+from wavecomb.usd.texture_store import MEGABYTE, texture_store
 from wavecomb.usd.traverse import Traversal
 from wavecomb.usd.view_options import Seen, ViewOptions
 from wavecomb.usd.view_size import ViewSize
@@ -66,6 +67,7 @@ class LoadedStage:
         render: What the stage's render settings ask for.
         working_space: What its colours are in: of ``WORKING_SPACES``.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
+        leaves_out_levels: Whether textures have only the mip levels that its view needs.
     """
 
     scene: _core.Scene
@@ -82,6 +84,7 @@ class LoadedStage:
     shutter: tuple[float, float] | None = None
     render: RenderChoice = field(default_factory=RenderChoice)
     working_space: str = "rec709"
+    leaves_out_levels: bool = False
 
 
 @dataclass(frozen=True)
@@ -175,8 +178,8 @@ def load_stage(
         render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
             else the only ones under /Render.
         product: Path or name of one of their products; None: the first.
-        texture_limit: MB (10^6 bytes) that all textures together may take; None: any. Where it is
-            too little, finest mip levels are left out, those first that the picture shows least.
+        texture_limit: MB (10^6 bytes) of memory that all textures together may take; None: any.
+            Where it is too little, they wait in a temporary file (docs/textures.md).
         working_space: What the picture is computed in: "rec709", or "acescg".
         lights: Whether rays meet the shapes of lights: "visible" or "hidden"
             (docs/decisions/light-shapes.md).
@@ -211,8 +214,10 @@ def load_stage(
         reuse = stock.textures
     opened = _opener(source, variants or {}, mask, session_layer)
     with captured(report):
-        builder = _native_builder(threads) if builder_factory is None else builder_factory()
-        textures = TextureTable(builder, report, threads, reuse, working_space)
+        # A builder of the caller's own has no store, so that levels are left out.
+        store = None if builder_factory else texture_store(texture_limit, reuse, report)
+        builder = _native_builder(threads, store) if builder_factory is None else builder_factory()
+        textures = TextureTable(builder, report, threads, reuse, working_space, store)
 
         def surfaces_of(materials: MaterialTable) -> Surfaces:
             return Surfaces(
@@ -254,6 +259,7 @@ def load_stage(
         filled.shutter,
         filled.render,
         working_space,
+        texture_limit is not None and store is None,
     )
 
 
@@ -320,10 +326,10 @@ def _fill(
     return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice)
 
 
-def _native_builder(threads: int) -> _core.SceneBuilder:
+def _native_builder(threads: int, store: _core.TextureStore | None) -> _core.SceneBuilder:
     from wavecomb import _core
 
-    return _core.SceneBuilder(threads)
+    return _core.SceneBuilder(threads, store)
 
 
 def _give_back_memory() -> None:
@@ -355,7 +361,7 @@ def _read(
     lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, seen.blur, report)
     traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
-    if choice.texture_limit is not None:
+    if choice.texture_limit is not None and textures.store is None:
         _limit_textures(stage, traversal, seen, choice, textures, report)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
@@ -395,7 +401,7 @@ def _limit_textures(
     report: LoadReport,
 ) -> None:
     """Says which mip levels the textures leave out."""
-    from wavecomb.usd.texture_limit import MEGABYTE, plan_levels
+    from wavecomb.usd.texture_limit import plan_levels
 
     view = None
     if seen.camera is not None:

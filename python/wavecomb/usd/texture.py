@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdShade
 
+from wavecomb.errors import WavecombError
 from wavecomb.usd.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.halve import halve
 from wavecomb.usd.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
@@ -126,11 +127,13 @@ class TextureStock:
         scene: That holds them.
         images: What they were made of, by file; without pixels.
         ids: Texture ids by file and options.
+        store: What keeps them within a limit.
     """
 
     scene: _core.Scene
     images: dict[str, Image]
     ids: dict[tuple[Any, ...], int]
+    store: _core.TextureStore | None = None
 
 
 def _converts(space: str) -> bool:
@@ -155,18 +158,22 @@ class TextureTable:
         threads: int = 0,
         reuse: TextureStock | None = None,
         working: str = "rec709",
+        store: _core.TextureStore | None = None,
     ) -> None:
         """``reuse``: textures to share where their files are what they were.
 
-        ``working``: the space that colours are converted to, of ``WORKING_SPACES``. ``drops`` may
-        be set to say how many of its finest levels a texture leaves out.
+        ``working``: the space that colours are converted to, of ``WORKING_SPACES``. ``store``: that
+        of the builder. ``drops`` may be set to say how many of its finest levels a texture leaves
+        out.
         """
+        self.store = store
         self.working = working
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
         self._builder = builder
         self._report = report
-        self._ahead = ReadAhead(threads)
+        # What lies ready is memory of textures too.
+        self._ahead = ReadAhead(threads, None if store is None else store.limit_bytes // 4)
         self._images: dict[str, Image | TextureError] = {}
         self._ids: dict[tuple[Any, ...], int] = {}
         self._taken: dict[str, Image] = {}
@@ -330,7 +337,12 @@ class TextureTable:
             pixels = np.ascontiguousarray(linear, image.dtype)
         for _ in range(self.drops.get((path, space, wrap_s, wrap_t), 0)):
             pixels = halve(pixels, srgb)
-        return self._builder.add_texture(pixels, srgb=srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path)
+        try:
+            return self._builder.add_texture(
+                pixels, srgb=srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path
+            )
+        except ValueError as error:  # no room for it
+            raise WavecombError(str(error)) from None
 
     def missing(self) -> int:
         """Texture id of the checker that stands for a texture that cannot be read."""
@@ -349,7 +361,7 @@ class TextureTable:
 
     def stock(self, scene: _core.Scene) -> TextureStock:
         """What later scenes can share; scene: that was built of these textures."""
-        return TextureStock(scene, self._taken, self._ids)
+        return TextureStock(scene, self._taken, self._ids, self.store)
 
     def release(self) -> None:
         """Forgets the pixels that were read."""

@@ -26,11 +26,11 @@ from wavecomb.usd.mesh import UV_NAMES
 from wavecomb.usd.pixels import Image, TextureError, read_header
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import Key, TextureTable, stored_type
+from wavecomb.usd.texture_store import MEGABYTE
 
 if TYPE_CHECKING:
     from wavecomb.usd.view_size import ViewSize
 
-MEGABYTE = 1_000_000
 MAX_PRIMS = 100_000
 """Prims whose size in the picture is looked at; what only later ones use is kept fine."""
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
 #include "wavecomb/scene/scene.h"
+#include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {
 
@@ -45,6 +47,7 @@ struct RenderStatistics {
   uint64_t cost_materials = 0;              ///< how many materials that compares; 0: no prediction
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
+  std::optional<StoreStatistics> texture_store;  ///< where textures have a limit
 };
 
 /// Adds up what the workers counted, by phase, depth, policy and material, into `statistics`.

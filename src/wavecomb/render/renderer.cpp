@@ -281,6 +281,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.accelerator_bytes = impl_->accel->bytes();
     s.film_bytes = film.bytes();
     s.peak_rss_bytes = peak_rss_bytes();
+    if (const TileStore* store = scene.texture_store()) s.texture_store = store->statistics();
     return s;
   };
   const auto snapshot = [&](bool finished) {
@@ -293,6 +294,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   watch.run([&] { tbb::task_arena(static_cast<int>(threads)).execute(work); },
             [&] { return options.progress ? options.progress(loop.status()) : Request::kGoOn; },
             [&] { snapshot(false); });
+  if (const TileStore* store = scene.texture_store()) store->check();
   if (options.progress && !watch.stopped()) options.progress(loop.status());
   snapshot(true);
 

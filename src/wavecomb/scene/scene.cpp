@@ -7,6 +7,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_checks.h"
+#include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {
 namespace {
@@ -128,12 +129,20 @@ uint64_t Scene::points() const {
   return n;
 }
 
+const TileStore* Scene::texture_store() const {
+  for (const auto& texture : textures())
+    if (texture->store()) return texture->store().get();
+  return nullptr;
+}
+
 SceneBytes Scene::bytes() const {
   SceneBytes b;
   for (const Mesh& m : meshes())
     b.meshes += m.positions.size_bytes() + m.indices.size_bytes() + m.normals.size_bytes() +
                 m.uvs.size_bytes() + m.face_materials.size_bytes() + m.radii.size_bytes();
-  for (const auto& texture : textures()) b.textures += texture->bytes();
+  for (const auto& texture : textures())
+    if (!texture->store()) b.textures += texture->bytes();
+  if (const TileStore* store = texture_store()) b.textures += store->statistics().resident_bytes;
   const auto of = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   const SceneGeometry& g = *geometry_;
   const LightSet& set = lights_->set;

@@ -38,7 +38,7 @@ struct SceneView {
 struct SceneBytes {
   uint64_t meshes =
       0;  ///< points, indices, radii, normals, texture coordinates, materials of faces
-  uint64_t textures = 0;  ///< all mip levels
+  uint64_t textures = 0;  ///< all mip levels, or what of them a store has in memory
   uint64_t records = 0;   ///< instances, materials, lights
 };
 
@@ -66,6 +66,8 @@ class Scene {
   const std::vector<Instance>& instances() const { return geometry_->instances; }
   const std::vector<Material>& materials() const { return materials_->materials; }
   const std::vector<TexturePtr>& textures() const { return geometry_->textures; }
+  /// What keeps the textures within a limit: of the first that has a store; null: none has.
+  const TileStore* texture_store() const;
   const std::vector<Light>& lights() const { return lights_->lights; }
   /// Names of light groups; the first is kOtherLights.
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
@@ -122,8 +124,9 @@ class Scene {
 /// Scene (Mesh::owner sees to it). Every function throws Error with one line that names the object.
 class SceneBuilder {
  public:
-  /// `threads`: for textures and for build(); 0: all.
-  explicit SceneBuilder(uint32_t threads = 0);
+  /// `threads`: for textures and for build(); 0: all. `store`: keeps the textures that are added
+  /// here, with those of other scenes; null: they are in memory.
+  explicit SceneBuilder(uint32_t threads = 0, std::shared_ptr<TileStore> store = nullptr);
   SceneBuilder(SceneBuilder&&) = default;
   SceneBuilder& operator=(SceneBuilder&&) = default;
 
@@ -201,6 +204,7 @@ class SceneBuilder {
   void make_records(SceneGeometry& geometry, uint32_t grey) const;
 
   uint32_t threads_;
+  std::shared_ptr<TileStore> store_;
   std::vector<Mesh> meshes_;
   std::vector<Group> groups_;
   std::vector<std::vector<Node>> children_;

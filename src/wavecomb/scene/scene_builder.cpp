@@ -117,13 +117,15 @@ InstanceRecord make_instance_record(const Affine& m, uint32_t material) {
 
 }  // namespace
 
-SceneBuilder::SceneBuilder(uint32_t threads) : threads_(threads), groups_(1), children_(1) {
+SceneBuilder::SceneBuilder(uint32_t threads, std::shared_ptr<TileStore> store)
+    : threads_(threads), store_(std::move(store)), groups_(1), children_(1) {
   groups_[0].name = "world";
 }
 
 uint32_t SceneBuilder::add_texture(const TextureDesc& desc) {
-  with_threads(threads_,
-               [&] { textures_.push_back(std::make_shared<const Texture>(desc, parallel_for)); });
+  with_threads(threads_, [&] {
+    textures_.push_back(std::make_shared<const Texture>(desc, parallel_for, store_));
+  });
   return static_cast<uint32_t>(textures_.size() - 1);
 }
 
@@ -432,7 +434,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   std::shared_ptr<Scene> scene(
       new Scene(std::move(geometry), std::move(materials), std::move(lights), nullptr, camera_));
   scene->link();
-  *this = SceneBuilder(threads_);
+  *this = SceneBuilder(threads_, store_);
   return scene;
 }
 

@@ -7,6 +7,7 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/texture/pyramid.h"
+#include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {
 
@@ -35,11 +36,15 @@ void check(const TextureDesc& desc) {
 
 }  // namespace
 
-void Texture::Free::operator()(std::byte* p) const {
-  ::operator delete[](p, kAlignment);
+void Texture::Free::operator()(const std::byte* p) const {
+  if (store)
+    store->remove(p);
+  else
+    ::operator delete[](const_cast<std::byte*>(p), kAlignment);
 }
 
-Texture::Texture(const TextureDesc& desc, const ForEach& for_each) : name_(desc.name) {
+Texture::Texture(const TextureDesc& desc, const ForEach& for_each, std::shared_ptr<TileStore> store)
+    : name_(desc.name), storage_(nullptr, Free{}) {
   check(desc);
   view_.format = desc.format;
   view_.channels = desc.channels == 1 ? 1 : 4;
@@ -65,10 +70,15 @@ Texture::Texture(const TextureDesc& desc, const ForEach& for_each) : name_(desc.
                 " GiB; 8 GiB is the most; make it smaller");
   }
   bytes_ = static_cast<size_t>(total);
-  storage_.reset(static_cast<std::byte*>(::operator new[](bytes_, kAlignment)));
+  if (store) {
+    const uint64_t pixels = uint64_t{desc.width} * desc.height;
+    store->expect(total, pixels * desc.channels * value_bytes(desc.format));
+  }
+  auto* levels = static_cast<std::byte*>(::operator new[](bytes_, kAlignment));
+  storage_ = Storage(levels, Free{});
+  const PyramidTotals totals = build_pyramid(desc, view_, levels, for_each);
+  if (store) storage_ = Storage(store->add(levels, bytes_), Free{store});
   view_.texels = storage_.get();
-
-  const PyramidTotals totals = build_pyramid(desc, view_, storage_.get(), for_each);
   nonfinite_count_ = totals.nonfinite;
   const double count = double(desc.width) * double(desc.height);
   for (uint32_t c = 0; c < view_.channels; ++c)

@@ -43,6 +43,7 @@ struct TextureLevel {
 static_assert(sizeof(TextureLevel) == 24);
 
 struct TileSet;
+class TileStore;
 
 /// What kernels need of a texture, without ownership. Texels are stored in square tiles of
 /// kTile x kTile, row by row; one-channel textures as one value a texel, all others as four.
@@ -91,8 +92,10 @@ class Texture {
 
   /// Builds the pyramid. Values that are not finite become 0 and are counted. Throws Error naming
   /// desc.name for sizes of 0 or above kMaxSize, bad channels, no data, or more than 8 GiB.
-  /// `for_each` may share the rows among threads; it changes no bit.
-  explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order);
+  /// `for_each` may share the rows among threads; it changes no bit. `store` keeps the levels where
+  /// it is given, with others of its; else they are in memory.
+  explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order,
+                   std::shared_ptr<TileStore> store = nullptr);
   /// A UDIM texture of others, which it shares: `tiles` are pairs of tile number (1001 to 1100) and
   /// texture. `missing`: linear r, g, b, alpha wherever there is none. Throws Error naming `name`
   /// for a number out of range or given twice, no tiles, and tiles that are made of tiles.
@@ -114,15 +117,19 @@ class Texture {
   const float* mean() const { return mean_; }
   /// Values of the finest level that were infinite or NaN and read as 0.
   uint64_t nonfinite_count() const { return nonfinite_count_; }
+  /// That keeps the levels; null: they are in memory.
+  const std::shared_ptr<TileStore>& store() const { return storage_.get_deleter().store; }
 
  private:
   struct Free {
-    void operator()(std::byte* p) const;
+    std::shared_ptr<TileStore> store{};
+    void operator()(const std::byte* p) const;
   };
+  using Storage = std::unique_ptr<const std::byte[], Free>;
 
   std::string name_;
   TextureView view_;
-  std::unique_ptr<std::byte[], Free> storage_;
+  Storage storage_;
   std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>> tiles_;
   std::unique_ptr<TileSet> tile_set_;
   size_t bytes_ = 0;

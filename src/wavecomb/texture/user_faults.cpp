@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/texture/user_faults.h"
+
+#include "wavecomb/core/error.h"
+
+#if defined(__linux__)
+#include <fcntl.h>
+#include <linux/userfaultfd.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+#endif
+
+namespace wavecomb {
+
+#if defined(__linux__) && defined(UFFD_USER_MODE_ONLY)
+
+namespace {
+
+/// Descriptor of the kernel's part; -1 and errno.
+int open_faults() {
+  // Faults of the kernel's own stay errors: that is what unprivileged users may have.
+  const auto fd =
+      static_cast<int>(::syscall(SYS_userfaultfd, O_CLOEXEC | O_NONBLOCK | UFFD_USER_MODE_ONLY));
+  if (fd < 0) return -1;
+  uffdio_api api{};
+  api.api = UFFD_API;
+  if (::ioctl(fd, UFFDIO_API, &api) == 0) return fd;
+  const int reason = errno;
+  ::close(fd);
+  errno = reason;
+  return -1;
+}
+
+uint64_t number(const std::byte* at) {
+  return reinterpret_cast<uintptr_t>(at);
+}
+
+std::string reason_of(int error) {
+  return std::string("the system allows no userfaultfd (") + std::strerror(error) + ")";
+}
+
+}  // namespace
+
+std::string UserFaults::obstacle() {
+  const int fd = open_faults();
+  if (fd < 0) return reason_of(errno);
+  ::close(fd);
+  return "";
+}
+
+UserFaults::UserFaults() : faults_(open_faults()) {
+  if (faults_ < 0) throw Error(reason_of(errno));
+  stop_ = ::eventfd(0, EFD_CLOEXEC);
+  if (stop_ < 0) {
+    const int reason = errno;
+    ::close(faults_);
+    throw Error(reason_of(reason));
+  }
+}
+
+UserFaults::~UserFaults() {
+  for (const auto& [at, bytes] : maps_) ::munmap(at, bytes);
+  ::close(stop_);
+  ::close(faults_);
+}
+
+const std::byte* UserFaults::map(size_t bytes) {
+  void* at = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (at == MAP_FAILED)
+    throw Error(std::string("no address space for textures (") + std::strerror(errno) + ")");
+  maps_.emplace_back(static_cast<std::byte*>(at), bytes);
+  // A child would find the holes full of zeros.
+  ::madvise(at, bytes, MADV_DONTFORK);
+  ::madvise(at, bytes, MADV_NOHUGEPAGE);
+  uffdio_register range{};
+  range.range = {number(maps_.back().first), bytes};
+  range.mode = UFFDIO_REGISTER_MODE_MISSING;
+  if (::ioctl(faults_, UFFDIO_REGISTER, &range) != 0) throw Error(reason_of(errno));
+  return maps_.back().first;
+}
+
+void UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) {
+  size_t done = 0;
+  while (done < bytes) {
+    uffdio_copy copy{};
+    copy.dst = number(at) + done;
+    copy.src = number(from) + done;
+    copy.len = bytes - done;
+    if (::ioctl(faults_, UFFDIO_COPY, &copy) == 0) return;
+    if (errno != EAGAIN)
+      throw Error(std::string("no memory for textures (") + std::strerror(errno) + ")");
+    // Mappings changed meanwhile; what was copied before that counts.
+    if (copy.copy > 0) done += static_cast<size_t>(copy.copy);
+  }
+}
+
+void UserFaults::release(const std::byte* at, size_t bytes) {
+  ::madvise(const_cast<std::byte*>(at), bytes, MADV_DONTNEED);
+}
+
+void UserFaults::wake(const std::byte* at, size_t bytes) {
+  uffdio_range range{number(at), bytes};
+  ::ioctl(faults_, UFFDIO_WAKE, &range);
+}
+
+bool UserFaults::wait(std::vector<const std::byte*>& places) {
+  constexpr size_t kMost = 16;
+  places.clear();
+  for (;;) {
+    pollfd files[2] = {{faults_, POLLIN, 0}, {stop_, POLLIN, 0}};
+    if (::poll(files, 2, -1) < 0 && errno != EINTR) return false;
+    if (files[1].revents != 0) return false;
+    uffd_msg messages[kMost];
+    const ssize_t size = ::read(faults_, messages, sizeof(messages));
+    if (size <= 0) continue;  // another thread took them
+    for (size_t i = 0; i < static_cast<size_t>(size) / sizeof(uffd_msg); ++i)
+      if (messages[i].event == UFFD_EVENT_PAGEFAULT)
+        places.push_back(
+            reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address}));
+    return true;
+  }
+}
+
+void UserFaults::stop() {
+  const uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(stop_, &one, sizeof(one));
+}
+
+size_t page_bytes() {
+  static const auto bytes = static_cast<size_t>(::sysconf(_SC_PAGESIZE));
+  return bytes;
+}
+
+#else
+
+std::string UserFaults::obstacle() {
+  return "the system has no userfaultfd; it needs Linux 5.11 or later";
+}
+UserFaults::UserFaults() {
+  throw Error(obstacle());
+}
+UserFaults::~UserFaults() = default;
+const std::byte* UserFaults::map(size_t) {
+  return nullptr;
+}
+void UserFaults::fill(const std::byte*, const std::byte*, size_t) {}
+void UserFaults::release(const std::byte*, size_t) {}
+void UserFaults::wake(const std::byte*, size_t) {}
+bool UserFaults::wait(std::vector<const std::byte*>&) {
+  return false;
+}
+void UserFaults::stop() {}
+size_t page_bytes() {
+  return 4096;
+}
+
+#endif
+
+}  // namespace wavecomb
