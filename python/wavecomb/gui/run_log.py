@@ -28,6 +28,7 @@ FIELDS = (
     "cost_weight",
     "roulette",
     "roulette_depth",
+    "light_selection",
     "adaptive",
     "noise",
     "min_spp",
@@ -35,7 +36,9 @@ FIELDS = (
 )
 """Settings by which series are told apart; all but those of ``WORK`` leave the picture as it is."""
 
-WORK = ("roulette", "roulette_depth", "adaptive", "noise", "min_spp", "time_limit")
+WORK = (
+    "roulette", "roulette_depth", "light_selection", "adaptive", "noise", "min_spp", "time_limit",
+)  # fmt: skip
 """Settings that change how much is done, and with it the noise."""
 
 MAX_LOOKS = 240
@@ -288,6 +291,7 @@ _WORDS = {
     "integrator": "",
     "cost_weight": "cost weight",
     "roulette_depth": "roulette from",
+    "light_selection": "lights",
     "adaptive": "pixel error",
     "min_spp": "min spp",
     "time_limit": "seconds",

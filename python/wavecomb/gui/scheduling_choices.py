@@ -128,6 +128,12 @@ ROULETTE = Choice(
 ROULETTE_DEPTH = Number(
     "roulette_depth", "From depth", "The first vertex at which a path may end early.", 64
 )
+LIGHT_SELECTION = Choice(
+    "light_selection", "Lights", "How a light is chosen to sample.",
+    {"auto": "By tree where there are several to choose among, else by power. The default.",
+     "tree": "For the place that it lights, by a tree of lights.",
+     "power": "By its power, wherever it is."},
+)  # fmt: skip
 ADAPTIVE_MODES = {
     "off": "Every pixel gets as many samples.",
     "pixel": "Pixels stop when their own error is small enough.",
@@ -153,7 +159,10 @@ TIME_LIMIT = Number(
 )
 
 ORDER_FIELDS = (*(choice.field for choice in ORDER_CHOICES), THREADS.field, COST_WEIGHT.field)
-WORK_FIELDS = ("roulette", "roulette_depth", "adaptive", "noise", "min_spp", "spp", "time_limit")
+WORK_FIELDS = (
+    "roulette", "roulette_depth", "light_selection", "adaptive", "noise", "min_spp", "spp",
+    "time_limit",
+)  # fmt: skip
 
 
 def scheduling_of(setup: Setup) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The amount of work: roulette and adaptive sampling."""
+"""The amount of work: roulette, choice of lights and adaptive sampling."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class WorkGroup(QGroupBox):
         note.setWordWrap(True)
         form.addRow(note)
         self._roulette = ChoiceBox(choices.ROULETTE, self._choose)
+        self._lights = ChoiceBox(choices.LIGHT_SELECTION, self._choose)
         self._mode = ChoiceBox(_MODE, self._choose_mode)
         self._numbers = {number.field: number_box(number, self._choose) for number in NUMBERS}
         labels = {number.field: number.label for number in NUMBERS}
@@ -50,6 +51,7 @@ class WorkGroup(QGroupBox):
 
         add("Roulette", self._roulette)
         add(labels["roulette_depth"], self._numbers["roulette_depth"])
+        add("Lights", self._lights)
         add("Adaptive", self._mode)
         for field in ("adaptive", "noise", "min_spp", "spp", "time_limit"):
             add(labels[field], self._numbers[field])
@@ -73,6 +75,7 @@ class WorkGroup(QGroupBox):
 
     def _show(self, setup: Setup) -> None:
         self._roulette.show_value(setup.roulette)
+        self._lights.show_value(setup.light_selection)
         self._mode.show_value(mode_of(setup))
         for field in _FIRST:
             if getattr(setup, field):

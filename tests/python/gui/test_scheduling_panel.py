@@ -186,8 +186,12 @@ def test_presets_and_reset(panel: SchedulingPanel, session: Any, qtbot: Any) -> 
     choose(panel, "policy", "material")
     assert box.currentIndex() == -1, "an own choice"
     choose(panel, "roulette", "off")
+    choose(panel, "light_selection", "power")
+    assert session.setup.light_selection == "power"
     click(panel, "reset")
-    assert (session.setup.policy, session.setup.roulette) == ("program", "throughput")
+    setup = session.setup
+    assert (setup.policy, setup.roulette) == ("program", "throughput")
+    assert setup.light_selection == "auto"
     assert box.currentText() == "Default" and session.setup.width == 96
 
 
