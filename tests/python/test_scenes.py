@@ -341,6 +341,39 @@ def test_bad_spreads_say_why(tmp_path: Path, options: dict[str, Any], says: str)
     assert not (tmp_path / "spread.usdc").exists()
 
 
+# Heavy
+
+
+def test_heavy_has_materials_of_all_weights(tmp_path: Path) -> None:
+    path = tmp_path / "heavy.usdc"
+    write_scene("heavy", path, materials=24, texture_mb=4.0, triangles=10_000, texture_size=64)
+    stage, scene = Usd.Stage.Open(str(path)), wavecomb.load(path).scene
+    stones = [kind for name, kind in scene.materials if "Stone_" in name]
+    assert (len(stones), stones.count("openpbr"), stones.count("diffuse")) == (24, 21, 3)
+    own = [size for name, size in scene.textures if "stone_" in name]
+    # Diffuse ones read one of their three maps.
+    assert sum(own) == pytest.approx(4e6 * (21 + 3 * 4 / 9) / 24, rel=0.2)
+    ids = [
+        [UsdShade.Shader(node).GetIdAttr().Get() for node in look.GetChildren()]
+        for look in stage.GetPrimAtPath("/World/Looks").GetChildren()
+    ]
+    weights = [nodes.count("ND_fractal3d_float") for nodes in ids]
+    assert max(weights) == 8 and len(set(weights)) == 9
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"materials": 2000}, "materials must be from 1 to 1024"),
+        ({"texture_mb": 0.0}, "texture_mb must be from 0.1"),
+        ({"triangles": 100}, "triangles must be from 4608"),
+    ],
+)
+def test_bad_heavy_fields_say_why(tmp_path: Path, options: dict[str, Any], says: str) -> None:
+    with pytest.raises(SceneError, match=says):
+        write_scene("heavy", tmp_path / "heavy.usdc", **options)
+
+
 # Textures
 
 

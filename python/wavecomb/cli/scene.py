@@ -18,6 +18,7 @@ from wavecomb.cli.options import Real, examples
         "wavecomb scene mixed -o mixed.usdc",
         "wavecomb scene cornell-dragon -o box.usda --dragon dragon.obj",
         "wavecomb scene spread -o spread.usdc --materials 256 --texture-mb 64 --shader-cost 10",
+        "wavecomb scene heavy -o heavy.usdc --materials 64 --texture-mb 2000",
         "wavecomb scene lights -o street.usdc --lights 10000",
     ),
 )
@@ -26,18 +27,23 @@ from wavecomb.cli.options import Real, examples
 @click.option("--list", "list_", is_flag=True, help="List the scenes.")
 @click.option("--dragon", type=click.Path(), metavar="FILE", help="OBJ, PLY or USD mesh to use.")
 @click.option(
-    "--triangles", type=click.IntRange(min=1), metavar="N", help="Of our own dragon, or of spread."
+    "--triangles",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Of our own dragon, or of the field.",
 )
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of layout and patterns.")
 @click.option("--texture-size", type=click.IntRange(min=16), metavar="N", help="Largest, texels.")
 @click.option("--aspect", type=Real(0, above=True), metavar="X", help="Width / height.")
 @click.option("--material", metavar="NAME", help="cornell-dragon: gold, copper, glass, jade.")
-@click.option("--materials", type=click.IntRange(min=1), metavar="N", help="spread: how many.")
+@click.option(
+    "--materials", type=click.IntRange(min=1), metavar="N", help="spread, heavy: how many."
+)
 @click.option(
     "--programs", type=click.IntRange(1, 5), metavar="N", help="spread: kinds of materials, 1 to 5."
 )
 @click.option("--lights", type=click.IntRange(min=1), metavar="N", help="lights: how many.")
-@click.option("--texture-mb", type=Real(0), metavar="X", help="spread: memory of its textures.")
+@click.option("--texture-mb", type=Real(0), metavar="X", help="spread, heavy: memory of textures.")
 @click.option(
     "--shader-cost",
     type=Real(1),

@@ -14,6 +14,7 @@ from typing import Any
 
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.heavy import build_heavy
 from wavecomb.scenes.lights import build_lights
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
@@ -44,6 +45,7 @@ SCENES: dict[str, SceneInfo] = {
     "mixed": SceneInfo("45 teapots, 45 dragons and a mirror", 0.1, build_mixed),
     "dragon": SceneInfo("90 dragons and a mirror", 0.1, build_dragon),
     "spread": SceneInfo("a field of stones, for scaling: see --materials", 0.1, build_spread),
+    "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""

@@ -17,15 +17,15 @@ class SceneOptions:
 
     Attributes:
         dragon: OBJ, PLY or USD file to stand in for our dragon, or None.
-        triangles: Triangles of our dragon; of all stones of ``spread`` together.
+        triangles: Triangles of our dragon; of all stones of ``spread`` and ``heavy`` together.
         teapot_level: Cells along each edge of the teapot's 32 patches.
         seed: Of the layout and of the texture patterns.
         texture_size: Edge of the largest textures, texels; the others shrink in proportion.
         aspect: Width / height of the picture that the camera frames.
         material: Of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
-        materials: How many ``spread`` has.
+        materials: How many ``spread`` and ``heavy`` have.
         programs: How many kinds of material ``spread`` uses, 1 to 5.
-        texture_mb: Memory of all textures of ``spread``, 1e6 bytes; 0 is none.
+        texture_mb: Memory of all textures of ``spread`` and ``heavy``, 1e6 bytes; 0 is none.
         shader_cost: How often the dearest material of ``spread`` evaluates its parameters for a
             hit; the others from once up, geometrically.
         lights: How many ``lights`` has.

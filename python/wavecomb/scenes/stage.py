@@ -179,6 +179,11 @@ class StageWriter:
         self._materials[name] = material
         return name
 
+    def own_material(self, name: str, material: UsdShade.Material) -> str:
+        """Lets ``bind`` know a material that was made by other means; returns the name."""
+        self._materials[name] = material
+        return name
+
     def define_texture(self, name: str, info: TextureInfo) -> None:
         """Lets materials name a texture of the scene's own; ``info.size`` is its edge as it is."""
         self._own[name] = info
@@ -198,7 +203,7 @@ class StageWriter:
             texture_info = self._own.get(name) or TEXTURES[name]
             texture = UsdShade.Shader.Define(self.stage, f"{path}/{key[0].upper()}{key[1:]}Map")
             texture.CreateIdAttr("UsdUVTexture")
-            texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._texture_file(name))
+            texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self.texture_file(name))
             texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(result)
             space = "sRGB" if texture_info.colour else "raw"
             texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
@@ -219,7 +224,8 @@ class StageWriter:
         folder.mkdir(parents=True, exist_ok=True)
         return folder / file_name, Sdf.AssetPath(f"./{folder.name}/{file_name}")
 
-    def _texture_file(self, name: str) -> Sdf.AssetPath:
+    def texture_file(self, name: str) -> Sdf.AssetPath:
+        """Writes a texture, once, and returns the path that a stage has for it."""
         file, asset = self._texture_path(f"{name}.png")
         if name not in self._written:
             if name in self._own:

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an order is worth where it should be worth most: 64 heavy materials, 2 GB of textures.
+
+    .venv/bin/python benchmarks/heavy.py              # 2 GB: minutes to write the stage, once
+    .venv/bin/python benchmarks/heavy.py --quick      # does it run?
+
+The stage of `wavecomb scene heavy`. Every policy renders it at one lane and at the widest, in
+rounds of shuffled order, in one process; a second field, whose textures fit into the caches, tells
+what textures have to do with it. Prints a Markdown table for each and how far materials are apart
+in cost, and writes all figures to a JSON file. All pictures must be one picture, bit for bit.
+
+Figures are medians over rounds with 95 % intervals, of a policy's over arrival order's in the same
+round: shade + order time (what shading takes with what its order costs), and the time of the
+render.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sitting import RESULTS, ROOT, head, log, phase_times, ratio, row, show, write_result
+
+import wavecomb
+from wavecomb.scenes import write_scene
+from wavecomb.scheduling import POLICIES
+
+SMALL_MB = 2.0
+SEEN = 1000
+"""Materials with fewer records are left out of the spread of costs."""
+
+
+def main() -> None:
+    """Renders, prints the tables, writes the JSON."""
+    args = _arguments()
+    found: dict[str, Any] = {}
+    for texture_mb in (args.texture_mb, SMALL_MB):
+        found[f"{texture_mb:g}"] = measure(texture_mb, args)
+        content = {
+            "materials": args.materials, "size": args.size, "spp": args.spp,
+            "rounds": args.rounds, "texture_mb": found,
+        }  # fmt: skip
+        write_result(args.output, "wavecomb-heavy/1", content)
+    for line in report(found):
+        print(line)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--materials", type=int, default=64)
+    parser.add_argument("--texture-mb", type=float, default=2000.0)
+    parser.add_argument("--triangles", type=int, default=2_000_000)
+    parser.add_argument("--size", type=int, default=400)
+    parser.add_argument("--spp", type=int, default=8)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "heavy", help="of stages")
+    parser.add_argument("--output", type=Path, default=RESULTS / "heavy.json")
+    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    args = parser.parse_args()
+    if args.quick:
+        args.materials, args.texture_mb, args.triangles = 16, 8.0, 50_000
+        args.size, args.spp, args.rounds = 96, 4, 2
+        args.output = args.folder / "quick.json"
+    return args
+
+
+def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
+    """All figures of one field."""
+    path = args.folder / f"heavy-{args.materials}-{args.triangles}-{texture_mb:g}.usdc"
+    if not path.exists():
+        log(f"writing {path}")
+        write_scene(
+            "heavy", path, materials=args.materials, texture_mb=texture_mb,
+            triangles=args.triangles,
+        )  # fmt: skip
+    stage = wavecomb.load(path)
+    textures = sum(size for _, size in stage.scene.textures)
+    lanes = sorted({1, 0})
+    shuffle = random.Random(1)
+    times: dict[str, list[dict[str, float]]] = {}
+    picture: np.ndarray | None = None
+    spread = 0.0
+    render(stage, args, lanes=0, policy="program")  # fills caches and the allocator
+    for turn in range(args.rounds):
+        cases = [(width, policy) for width in lanes for policy in POLICIES]
+        for width, policy in shuffle.sample(cases, len(cases)):
+            done = render(stage, args, lanes=width, policy=policy)
+            if picture is None:
+                picture = done.beauty
+            elif not np.array_equal(picture, done.beauty):
+                raise SystemExit(f"{policy} at {width} lanes gives another picture")
+            times.setdefault(f"{width}/{policy}", []).append(phase_times(done.stats))
+            if (width, policy) == (0, "material"):
+                spread = cost_spread(done.stats)
+        log(f"{texture_mb:g} MB: round {turn + 1} of {args.rounds}")
+    return {
+        "texture_bytes": textures,
+        "cost_spread": spread,
+        "shade_and_order": _ratios(times, lambda t: t["shade_s"] + t["order_s"]),
+        "render": _ratios(times, lambda t: t["render_s"]),
+        "times": times,
+    }
+
+
+def render(stage: Any, args: argparse.Namespace, **settings: Any) -> Any:
+    """One render. The costs of materials are fixed, so that the picture is the same."""
+    return wavecomb.render(
+        stage, size=(args.size, args.size), spp=args.spp, threads=args.threads, **settings
+    )
+
+
+def cost_spread(stats: dict[str, Any]) -> float:
+    """Nanoseconds a record of the dearest material to those of the cheapest, among those seen."""
+    costs = [m["ns_per_record"] for m in stats["materials"] if m["records"] >= SEEN]
+    return max(costs) / min(costs)
+
+
+def _ratios(times: dict[str, list[dict[str, float]]], of: Any) -> dict[str, Any]:
+    """Each case to arrival order at as many lanes."""
+    return {
+        case: ratio([of(t) for t in runs], [of(t) for t in times[f"{case.split('/')[0]}/none"]])
+        for case, runs in times.items()
+    }
+
+
+def report(found: dict[str, Any]) -> list[str]:
+    """The tables, as Markdown."""
+    lines = []
+    for texture_mb, figures in found.items():
+        lines += [
+            f"{figures['texture_bytes'] / 1e6:.0f} MB of textures (asked for: {texture_mb}), the "
+            f"dearest material {figures['cost_spread']:.0f} times the cheapest:",
+            "",
+            *head("policy", "one lane: shade + order", "render", "widest: shade + order", "render"),
+        ]
+        for policy in POLICIES:
+            cells = [
+                show(figures[what][f"{width}/{policy}"], 2)
+                for width in (1, 0)
+                for what in ("shade_and_order", "render")
+            ]
+            lines.append(row(policy, *cells))
+        lines.append("")
+    return lines
+
+
+if __name__ == "__main__":
+    main()

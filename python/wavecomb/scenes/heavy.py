@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A field of stones with materials as heavy and as different as those of a production.
+
+Each material is a network of MaterialX nodes: images of its own, mixed by fractals in space and
+graded, in front of a surface of eight kinds, from plain paint to all lobes at once. The first reads
+one image and is done; the last mixes eight layers. So materials differ in program, lobes, textures
+and time, and none of it is made up by repeating work.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from pxr import UsdShade
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.network import Network
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.stage import StageWriter
+from wavecomb.scenes.stones import MAX_TRIANGLES, MIN_TRIANGLES, build_field, stones_for
+from wavecomb.scenes.textures import Image, TextureInfo, marble, weave, wood
+
+MAX_MATERIALS = 1024
+MAX_TEXTURE_MB = 8192.0
+LAYERS = 8
+"""Of the heaviest material."""
+_BYTES_PER_TEXEL = (4.0 + 4.0 + 1.0) * 4.0 / 3.0
+"""Of a material: two colour maps and one of roughness, 8 bits each, with mip levels."""
+_TILE = 8
+_PATTERNS = (marble, wood, weave)
+_SURFACE = "ND_open_pbr_surface_surfaceshader"
+
+Inputs = dict[str, Any]
+
+
+def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
+    """Fills the stage; ``SceneOptions`` says with how many materials and how large textures."""
+    stones = stones_for(options.materials)
+    for name, value, low, high in (
+        ("materials", options.materials, 1, MAX_MATERIALS),
+        ("texture_mb", options.texture_mb, 0.1, MAX_TEXTURE_MB),
+        ("triangles", options.triangles, stones * MIN_TRIANGLES, MAX_TRIANGLES),
+    ):
+        if not low <= value <= high:
+            raise SceneError(f"heavy: {name} must be from {low:g} to {high:g}, not {value:g}")
+    rng = np.random.default_rng([options.seed, 2000])
+    edge = texture_edge(options)
+    names = [_material(writer, options, k, edge, rng) for k in range(options.materials)]
+    build_field(writer, names, options.triangles, edge, options.aspect or 1.0, rng)
+
+
+def texture_edge(options: SceneOptions) -> int:
+    """Edge of each texture in texels."""
+    texels = options.texture_mb * 1e6 / options.materials / _BYTES_PER_TEXEL
+    return max(2 * _TILE, round(math.sqrt(texels) / _TILE) * _TILE)
+
+
+def layers(options: SceneOptions, index: int) -> int:
+    """Of material ``index``: none for the first ninth of them, ``LAYERS`` for the last."""
+    share = index / max(options.materials - 1, 1)
+    return min(int((LAYERS + 1) * share), LAYERS)
+
+
+def _paint(rng: np.random.Generator) -> Inputs:
+    return {"specular_weight": ("float", 0.5)}
+
+
+def _metal(rng: np.random.Generator) -> Inputs:
+    return {
+        "base_metalness": ("float", 1.0),
+        "specular_roughness_anisotropy": ("float", 0.5),
+    }
+
+
+def _lacquer(rng: np.random.Generator) -> Inputs:
+    return {
+        "coat_weight": ("float", 1.0),
+        "coat_color": ("color3", tuple(float(v) for v in rng.uniform(0.7, 1.0, 3))),
+        "coat_roughness": ("float", 0.05),
+    }
+
+
+def _cloth(rng: np.random.Generator) -> Inputs:
+    return {
+        "base_diffuse_roughness": ("float", 0.8),
+        "fuzz_weight": ("float", 0.8),
+        "fuzz_roughness": ("float", 0.4),
+    }
+
+
+def _film(rng: np.random.Generator) -> Inputs:
+    return {
+        "base_metalness": ("float", 1.0),
+        "thin_film_weight": ("float", 1.0),
+        "thin_film_thickness": ("float", float(rng.uniform(0.25, 0.7))),
+    }
+
+
+def _glass(rng: np.random.Generator) -> Inputs:
+    return {
+        "transmission_weight": ("float", 0.7),
+        "specular_ior": ("float", 1.45),
+    }
+
+
+def _everything(rng: np.random.Generator) -> Inputs:
+    return {
+        "base_metalness": ("float", 0.3),
+        "transmission_weight": ("float", 0.2),
+        "thin_film_weight": ("float", 0.5),
+        "thin_film_thickness": ("float", 0.4),
+        "coat_weight": ("float", 0.6),
+        "fuzz_weight": ("float", 0.3),
+    }
+
+
+_KINDS = (_paint, _metal, _lacquer, _cloth, _film, _glass, _everything)
+"""Inputs of OpenPBR surfaces, in turn after a UsdPreviewSurface that is diffuse alone."""
+
+
+def _material(
+    writer: StageWriter, options: SceneOptions, index: int, edge: int, rng: np.random.Generator
+) -> str:
+    name = f"Stone_{index:04d}"
+    colours = rng.uniform(0.1, 0.9, (2, 3))
+    pattern = _PATTERNS[index % len(_PATTERNS)]
+    maps = {}
+    for which, colour in zip("ab", colours, strict=True):
+        maps[which] = _define(writer, f"{name.lower()}_{which}", edge, pattern, colour)
+    if index % (len(_KINDS) + 1) == 0:
+        return writer.material(name, looks.diffuse((0.5, 0.5, 0.5), maps["a"]))
+    kind = _KINDS[index % (len(_KINDS) + 1) - 1]
+    maps["r"] = _define(writer, f"{name.lower()}_r", edge, pattern, None)
+    net = Network(writer.stage, f"/World/Looks/{name}")
+    colour = _layered(net, writer, maps, layers(options, index), rng)
+    rough = net.node("image", "float", file=("filename", writer.texture_file(maps["r"])))
+    inputs = {"base_color": colour, "specular_roughness": rough, **kind(rng)}
+    net.surface(_SURFACE, **inputs)
+    return writer.own_material(name, net.material)
+
+
+def _define(
+    writer: StageWriter, name: str, edge: int, pattern: Any, colour: np.ndarray | None
+) -> str:
+    """A texture's name: a pattern in a colour, or one of roughness."""
+
+    def made(size: int, source: np.random.Generator) -> Image:
+        grey = pattern(max(size, 16), source)[:size, :size].mean(axis=2, keepdims=True)
+        tinted = 0.1 + 0.6 * grey if colour is None else 0.2 + grey * colour
+        return np.clip(tinted, 0, 1).astype(np.float32)
+
+    channels = "r" if colour is None else "rgb"
+    writer.define_texture(name, TextureInfo(made, edge, colour is not None, channels))
+    return name
+
+
+def _layered(
+    net: Network,
+    writer: StageWriter,
+    maps: dict[str, str],
+    count: int,
+    rng: np.random.Generator,
+) -> UsdShade.Output:
+    """Colour of so many layers, each laid over those below where a fractal in space says so."""
+
+    def image(which: str) -> UsdShade.Output:
+        return net.node("image", "color3", file=("filename", writer.texture_file(maps[which])))
+
+    colour = image("a")
+    if count == 0:
+        return colour
+    other = image("b")
+    place = net.node("position", "vector3", space=("string", "object"))
+    for layer in range(count):
+        scale = float(1.5 * 1.6**layer)
+        scaled = net.node("multiply", "vector3FA", in1=place, in2=("float", scale))
+        cloud = net.node("fractal3d", "float", position=scaled, octaves=("integer", 2 + layer))
+        mask = net.node("smoothstep", "float", in_=cloud, low=("float", -0.2), high=("float", 0.4))
+        if layer % 2 == 0:
+            turn = tuple(float(v) for v in rng.uniform((-0.1, 0.6, 0.8), (0.1, 1.4, 1.2)))
+            top = net.node("hsvadjust", "color3", in_=other, amount=("vector3", turn))
+        else:
+            tint = tuple(float(v) for v in rng.uniform(0.4, 1.0, 3))
+            top = net.node("multiply", "color3", in1=colour, in2=("color3", tint))
+        colour = net.node("mix", "color3", fg=top, bg=colour, mix=mask)
+    return colour

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A field of stones, each a closed mesh of its own, for stages that are about their materials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import UsdGeom, Vt
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.mesh import Mesh, grid_faces, smooth_normals, without_flat_faces
+from wavecomb.scenes.stage import StageWriter
+
+STONES = 144
+"""At least so many stones lie in a field."""
+MIN_TRIANGLES = 32
+"""Of a stone: a sphere of 4 x 4 cells."""
+MAX_TRIANGLES = 60_000_000
+_PITCH = 2.3
+_CHART_TEXELS = 4
+
+
+def stones_for(materials: int) -> int:
+    """How many stones show so many materials."""
+    return max(STONES, materials)
+
+
+def build_field(
+    writer: StageWriter,
+    names: Sequence[str],
+    triangles: int,
+    edge: int,
+    aspect: float,
+    rng: np.random.Generator,
+) -> None:
+    """Adds stones with the materials dealt at random among them, ground, lights and camera.
+
+    Args:
+        writer: Of the stage.
+        names: Materials that it has.
+        triangles: Of all stones together.
+        edge: Of the textures, in texels: a stone's triangles lie all over them, as the charts of
+            an atlas do; 0 without texture coordinates.
+        aspect: Width / height of the picture.
+        rng: Of shapes and places.
+    """
+    count = stones_for(len(names))
+    hands = [names[k] for _ in range(-(-count // len(names))) for k in rng.permutation(len(names))]
+    side = math.ceil(math.sqrt(count))
+    cells = _cells(triangles // count)
+    for index in range(count):
+        row, column = divmod(index, side)
+        place = np.array([column - 0.5 * (side - 1), 0.0, row - 0.5 * (side - 1)]) * _PITCH
+        place += [rng.uniform(-0.25, 0.25), 0.0, rng.uniform(-0.25, 0.25)]
+        mesh = _stone(cells, rng)
+        atlas = _atlas(len(mesh.faces), edge, rng) if edge else None
+        prim = _add(writer, f"/World/Objects/Stone_{index:04d}", mesh, atlas)
+        UsdGeom.XformCommonAPI(prim).SetTranslate(tuple(float(v) for v in place))
+        writer.bind(prim.GetPrim(), hands[index])
+    _set(writer, side * _PITCH, aspect)
+
+
+def _cells(triangles: int) -> tuple[int, int]:
+    """Rows and columns of a sphere's grid, for about so many triangles."""
+    rows = max(4, round(math.sqrt(triangles / 4.0)))
+    return rows, max(4, round(triangles / (2.0 * (rows - 1))))
+
+
+def _stone(cells: tuple[int, int], rng: np.random.Generator) -> Mesh:
+    """A closed, bumpy ball of radius about 1 that stands on y = 0.
+
+    The relief is a sum of waves in space, so it is closed at seam and poles.
+    """
+    rows, columns = cells
+    theta = np.linspace(0.0, np.pi, rows + 1)[:, None]
+    phi = np.linspace(0.0, 2.0 * np.pi, columns + 1)[None, :]
+    unit = np.empty((rows + 1, columns + 1, 3))
+    unit[:, :, 0] = np.sin(theta) * np.cos(phi)
+    unit[:, :, 1] = np.cos(theta)
+    unit[:, :, 2] = np.sin(theta) * np.sin(phi)
+    unit[0], unit[-1], unit[:, -1] = (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), unit[:, 0]
+    radius = np.ones((rows + 1, columns + 1))
+    for octave in range(5):
+        waves = rng.normal(0.0, 1.7 * 1.8**octave, (3, 3))
+        phase = rng.uniform(0.0, 2.0 * np.pi, 3)
+        radius += 0.10 / 1.8**octave * np.sin(unit @ waves.T + phase).mean(axis=2)
+    points = (unit * radius[:, :, None] * [1.0, 0.8, 1.0]).reshape(-1, 3)
+    points[:, 1] -= points[:, 1].min()
+    positions = points.astype(np.float32)
+    faces = np.ascontiguousarray(grid_faces(rows + 1, columns + 1)[:, ::-1])
+    normals = smooth_normals(positions, faces)
+    uv = np.zeros((len(positions), 2), np.float32)
+    return without_flat_faces(Mesh(positions, faces, normals, uv))
+
+
+def _atlas(triangles: int, edge: int, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Texture coordinates of each corner, (triangles, 3, 2): every triangle in a chart of its own.
+
+    Charts are squares of 4 x 4 texels in random order; where there are more triangles than charts,
+    they share.
+    """
+    charts = edge // _CHART_TEXELS
+    order = rng.permutation(charts * charts)
+    chart = order[np.arange(triangles) % len(order)]
+    origin = np.stack([chart % charts, chart // charts], axis=1)
+    corners = np.array([[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])
+    return ((origin[:, None, :] + corners) / charts).astype(np.float32)
+
+
+def _add(
+    writer: StageWriter, path: str, mesh: Mesh, atlas: NDArray[np.float32] | None
+) -> UsdGeom.Mesh:
+    prim = writer.mesh(path, mesh)
+    if atlas is not None:
+        primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("st")
+        primvar.SetInterpolation(UsdGeom.Tokens.faceVarying)
+        primvar.Set(Vt.Vec2fArray.FromNumpy(atlas.reshape(-1, 2)))
+    return prim
+
+
+def _set(writer: StageWriter, width: float, aspect: float) -> None:
+    """Ground, lights and camera for a field of stones so wide."""
+    writer.material("Ground", looks.CHALK)
+    half = 30.0 * width
+    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
+    writer.polygons("/World/Set/Ground", corners, [[0, 1, 2, 3]], "Ground")
+    writer.rect_light("Lamp", (0.0, 0.8 * width, 0.2 * width), 0.5 * width, 0.3 * width, (3, 3, 3))
+    writer.dome_light("Sky", 0.0)
+    writer.camera((0.0, 0.75 * width, 0.95 * width), (0.0, 0.0, 0.06 * width), 46.0, aspect)
