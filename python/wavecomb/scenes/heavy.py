@@ -173,7 +173,7 @@ def _layered(
     if count == 0:
         return colour
     other = image("b")
-    place = net.node("position", "vector3", space=("string", "object"))
+    place = net.node("position", "vector3", space=("string", "world"))
     for layer in range(count):
         scale = float(1.5 * 1.6**layer)
         scaled = net.node("multiply", "vector3FA", in1=place, in2=("float", scale))
