@@ -20,9 +20,9 @@ from wavecomb.stats import make_stats
 from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.camera import camera_motion, read_camera
 from wavecomb.usd.diagnostics import captured
-from wavecomb.usd.opening import time_code
 from wavecomb.usd.shutter import find_motion
 from wavecomb.usd.stock import FrameStock
+from wavecomb.usd.times import frame_number, time_code
 from wavecomb.usd.view_options import ViewOptions
 
 if TYPE_CHECKING:
@@ -111,7 +111,9 @@ class Frames:
             )
         seconds = time.perf_counter() - started + self._opening_s
         self._opening_s = 0.0
-        self._loaded = replace(loaded, seconds=seconds, stage_path=self._path, frame=_number(when))
+        self._loaded = replace(
+            loaded, seconds=seconds, stage_path=self._path, frame=frame_number(when)
+        )
         return self._loaded
 
     def _seen_anew(self, when: Usd.TimeCode, options: Mapping[str, Any]) -> LoadedStage | None:
@@ -119,7 +121,7 @@ class Frames:
         before, renderer = self._loaded, self._renderer
         if before is None or renderer is None:
             return None
-        if not self._stock.varying.is_view_only and before.frame != _number(when):
+        if not self._stock.varying.is_view_only and before.frame != frame_number(when):
             return None
         if before.leaves_out_levels:
             return None  # another view shows other textures near
@@ -170,11 +172,6 @@ class Frames:
         if not self._is_built:
             stats["seconds"]["build"] = 0.0
         return stats
-
-
-def _number(when: Usd.TimeCode) -> float | None:
-    """A time code; None: default values."""
-    return None if when.IsDefault() else float(when.GetValue())
 
 
 def render_frames(

@@ -328,7 +328,7 @@ def test_material_networks_with_endless_ways(tmp_path):
         def Mesh "M" {BIND} {{ {QUAD}
             rel material:binding = </Mat> }}""",
     )
-    assert scene.material_of("M")["program"] == "principled"
+    assert scene.material_of("M")["program"] == "openpbr"
 
 
 def test_composition_errors_are_lines_and_not_spilt(tmp_path):

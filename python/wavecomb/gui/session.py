@@ -303,8 +303,8 @@ class Session(QObject):
         from pxr import Sdf, UsdGeom
 
         from wavecomb.usd.camera import read_camera
-        from wavecomb.usd.opening import time_code
         from wavecomb.usd.report import LoadReport
+        from wavecomb.usd.times import time_code
 
         if self.usd is None or self._request is None or not Sdf.Path.IsValidPathString(path):
             return None
@@ -474,7 +474,7 @@ def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.flo
     """
     from pxr import Sdf, UsdGeom
 
-    from wavecomb.usd.opening import time_code
+    from wavecomb.usd.times import time_code
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):

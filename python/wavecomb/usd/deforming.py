@@ -13,6 +13,7 @@ from wavecomb.usd.primvar import as_array
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shutter import Motion
 from wavecomb.usd.skeleton import Skin, skinned_points
+from wavecomb.usd.times import frame_number
 
 if TYPE_CHECKING:
     from wavecomb.usd.shutter import Track
@@ -35,7 +36,7 @@ def _has_velocities(prim: Usd.Prim) -> bool:
 
 def points_now(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
     """Points at one time, as USD has them: velocities carry those of the sample before."""
-    if not time.IsDefault() and _has_velocities(prim):
+    if frame_number(time) is not None and _has_velocities(prim):
         found = UsdGeom.PointBased(prim).ComputePointsAtTime(time, time)
         if found:
             return found

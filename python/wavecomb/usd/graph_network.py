@@ -14,6 +14,7 @@ from wavecomb.usd.graph_images import IMAGES
 from wavecomb.usd.graph_nodes import HANDLERS
 from wavecomb.usd.network import shader_id, source_of, value_of, word
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.times import frame_number
 from wavecomb.working_space import from_rec709
 
 if TYPE_CHECKING:
@@ -246,7 +247,7 @@ class NodeCall:
         if self.category == "UsdTransform2d":
             return self._transform_2d()
         if self.category in ("time", "frame"):
-            frame = 0.0 if time.IsDefault() else float(time.GetValue())
+            frame = frame_number(time) or 0.0
             if self.category == "frame":
                 return numbers(frame)
             stage = self.shader.GetPrim().GetStage()

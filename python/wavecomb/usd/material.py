@@ -177,7 +177,7 @@ class MaterialTable:
         self._surface_ids[id(surface)] = (surface, number)
         return number
 
-    def _graphs_of(self, surface: Surface) -> dict[str, int]:
+    def _graphs_of(self, surface: Surface) -> dict[str, Any]:
         """Ids of a surface's graphs, equal ones once."""
         if surface.graph is None:
             return {}

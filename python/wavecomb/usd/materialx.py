@@ -135,7 +135,10 @@ class MaterialXReader:
             self.drivers.put("normal", normal)
         inputs = _Layers(self, shader, model_name)
         parameters["openpbr"] = layers_of(model_name, inputs)
-        drive_layers(model_name, parameters["openpbr"], inputs.driven, self.drivers)
+        layers = parameters["openpbr"]
+        if layers["anisotropy"] or any("anisotropy" in name for name in inputs.driven):
+            self.drivers.networks.uv_names.append("st")  # which way it is brushed
+        drive_layers(model_name, layers, inputs.driven, self.drivers)
         inputs.tell_rest()
         return Surface(
             str(self.material.GetPath()),

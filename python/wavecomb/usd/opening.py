@@ -221,12 +221,3 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
             known = ", ".join(variant_set.GetVariantNames()) or "none"
             raise WavecombError(f"variant {key}={choice}: there are {known}")
         variant_set.SetVariantSelection(choice)
-
-
-def time_code(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
-    """A frame, else the stage's start, else default values."""
-    if frame is not None:
-        return Usd.TimeCode(frame)
-    if stage.HasAuthoredTimeCodeRange():
-        return Usd.TimeCode(stage.GetStartTimeCode())
-    return Usd.TimeCode.Default()

@@ -15,6 +15,7 @@ from pxr import Gf, Usd, UsdGeom
 from wavecomb.errors import WavecombError
 from wavecomb.usd.network import number
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.times import frame_number
 
 Matrices = NDArray[np.float64]
 
@@ -209,9 +210,9 @@ def find_motion(
         return None
     if not closes > opens:
         return None
-    if time.IsDefault():
+    frame = frame_number(time)
+    if frame is None:
         if shutter is not None:
             report.note("no motion blur: the stage has no time codes; choose a frame")
         return None
-    frame = float(time.GetValue())
     return Motion(frame, (frame + opens, frame + closes), blur.steps)

@@ -24,7 +24,7 @@ from wavecomb.usd.ies import IesTable
 from wavecomb.usd.light import LIGHT_SHAPES, LightReader, soft_dome, up_rotation
 from wavecomb.usd.links import LinkTable
 from wavecomb.usd.material import MaterialTable
-from wavecomb.usd.opening import Survey, open_stage, select_variants, survey, time_code
+from wavecomb.usd.opening import Survey, open_stage, select_variants, survey
 from wavecomb.usd.render_settings import RenderChoice
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shutter import find_motion
@@ -32,6 +32,7 @@ from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
 from wavecomb.usd.texture_store import MEGABYTE, texture_store
+from wavecomb.usd.times import frame_number, time_code
 from wavecomb.usd.traverse import Traversal
 from wavecomb.usd.view_options import Seen, ViewOptions
 from wavecomb.usd.view_size import ViewSize
@@ -322,7 +323,7 @@ def _fill(
         stock,
         progress,
     )
-    used = None if time.IsDefault() else float(time.GetValue())
+    used = frame_number(time)
     return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice)
 
 
