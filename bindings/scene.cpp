@@ -372,7 +372,8 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
                    const Color3& focus_tint, float cone_angle, float cone_softness,
                    std::optional<uint32_t> ies, float ies_angle_scale, bool ies_normalize,
                    float diffuse, float specular, bool visible, std::optional<uint32_t> light_link,
-                   std::optional<uint32_t> shadow_link) {
+                   std::optional<uint32_t> shadow_link,
+                   const std::optional<Array<double>>& portals) {
   Light light;
   light.group = builder.light_group(group);
   light.name = name;
@@ -400,6 +401,12 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind,
   light.visible = visible;
   light.light_link = light_link.value_or(kNoSet);
   light.shadow_link = shadow_link.value_or(kNoSet);
+  if (portals) {
+    if (portals->ndim() != 3 || portals->shape(1) != 4 || portals->shape(2) != 4)
+      throw Error("portals of lights must have the shape (k, 4, 4)");
+    for (size_t i = 0; i < portals->shape(0); ++i)
+      light.portals.push_back(affine(portals->data() + 16 * i));
+  }
   return builder.add_light(std::move(light));
 }
 
@@ -591,7 +598,7 @@ void bind_scene(nb::module_& m) {
            "group"_a = "", "focus"_a = 0.f, "focus_tint"_a = black, "cone_angle"_a = 180.f,
            "cone_softness"_a = 0.f, "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f,
            "ies_normalize"_a = false, "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true,
-           "light_link"_a = nb::none(), "shadow_link"_a = nb::none())
+           "light_link"_a = nb::none(), "shadow_link"_a = nb::none(), "portals"_a = nb::none())
       .def("add_mesh_light", &add_mesh_light, "transform"_a, "material_sync"_a, nb::kw_only(),
            "name"_a = "", "color"_a = white, "normalize"_a = false, "focus"_a = 0.f,
            "focus_tint"_a = black, "cone_angle"_a = 180.f, "cone_softness"_a = 0.f,

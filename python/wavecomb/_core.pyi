@@ -312,12 +312,14 @@ class SceneBuilder:
         visible: bool = True,
         light_link: int | None = None,
         shadow_link: int | None = None,
+        portals: NDArray[np.float64] | None = None,
     ) -> int:
         """Kinds: rect, disk, sphere, cylinder, distant, dome, as UsdLux. color = colour *
         intensity * 2^exposure * colour temperature. The shaping (focus to ies_normalize, angles in
         degrees, a cone_angle of 180 is none) is UsdLuxShapingAPI's. visible: whether rays meet its
         shape. light_link, shadow_link: sets of geometry that it shines on, and that casts shadows
-        in its light; None: all."""
+        in its light; None: all. portals: (k, 4, 4), of a dome: maps of the unit square in the xy
+        plane to rectangles that guide its sampling of what is on their -z side."""
     def add_mesh_light(
         self,
         transform: NDArray[Any],

@@ -375,6 +375,21 @@ TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
     }
 }
 
+TEST(DomeDistribution, SolidAngleOfTheLight) {
+  const auto of = [](float (*value)(uint32_t)) {
+    Lights lights;
+    std::vector<float> rgb;
+    for (uint32_t y = 0; y < 64; ++y)
+      for (uint32_t x = 0; x < 128 * 3; ++x) rgb.push_back(value(y));
+    Light dome = make_light(LightKind::kDome);
+    dome.texture = lights.add_texture(128, 64, rgb);
+    lights.build({dome});
+    return image_solid_angle(lights.set.distributions.at(0)) / kPiD;
+  };
+  EXPECT_NEAR(of([](uint32_t) { return 3.f; }), 4, 4e-3);
+  EXPECT_NEAR(of([](uint32_t y) { return y < 32 ? 5.f : 0.f; }), 2, 0.06);
+}
+
 TEST(DomeDistribution, MeanAndBlack) {
   Lights lights;
   const uint32_t grey = lights.add_texture(5, 7, std::vector<float>(5 * 7 * 3, 0.25f));

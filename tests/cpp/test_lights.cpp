@@ -29,7 +29,7 @@ float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& 
     case LightKind::kDistant:
       return detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf * r.pick_pdf;
     case LightKind::kDome:
-      return detail::hit_dome<float>(view, r, dir, true).pdf * r.pick_pdf;
+      return detail::hit_dome_from<float>(view, r, from, dir, true).pdf * r.pick_pdf;
     default: {
       const auto t = trace(view, from, dir);
       return t ? light_hit<float>(view, 0u, from, dir, *t, true).pdf : 0.f;
@@ -72,15 +72,22 @@ std::vector<Case> sampling_cases() {
   distant.angle = 250;
   add("distant, wide", distant);
   add("dome", make_light(LightKind::kDome));
-  for (const uint32_t width : {16u, 5u}) {
+  const std::vector<Affine> portals = {translate(0.2f, 0.1f, 1) * scale(1.5f, 2, 1),
+                                       rotate(20, 90) * translate(0, 0, 0.9f) * scale(1, 2, 1)};
+  Light lit_room = make_light(LightKind::kDome);
+  lit_room.portals = portals;
+  add("dome with portals", lit_room);
+  for (const auto& [width, has_portals] : {std::pair(16u, false), {5u, false}, {16u, true}}) {
     Case c;
     c.name = "dome with an image " + std::to_string(width) + " wide";
+    if (has_portals) c.name += " and portals";
     std::mt19937 rng(9);
     std::vector<float> rgb(size_t{width} * 8 * 3);
     for (size_t i = 0; i < rgb.size(); ++i)
       rgb[i] = i / 3 % 5 == 0 ? 8.f : static_cast<float>(rng() % 100) / 100.f;
     Light dome = make_light(LightKind::kDome, rotate(0, 35));
     dome.texture = c.lights.add_texture(width, 8, rgb, width == 5 ? Wrap::kRepeat : Wrap::kClamp);
+    if (has_portals) dome.portals = portals;
     c.lights.build({dome});
     cases.push_back(std::move(c));
   }
@@ -134,7 +141,7 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
       if (!is_dome_image) {
         ASSERT_NEAR(s.weight.y * s.pdf, 3, 1e-5);
       }
-      const Color<float> escaped = escaped_radiance<float>(view, s.wi, 0.f, true, true);
+      const Color<float> escaped = escaped_radiance<float>(view, c.from, s.wi, 0.f, true, true);
       if (view.infinite_count) {
         ASSERT_NEAR(escaped.y, s.weight.y * s.pdf, 1e-3 * escaped.y + 1e-5) << c.name;
       }
@@ -164,8 +171,8 @@ TEST(LightSampling, BothHalvesOfMisSumTo1) {
       const float light_half = balance_weight<float>(s.pdf, bsdf_pdf);
       float bsdf_half = 0;
       if (view.infinite_count) {
-        const float all = escaped_radiance<float>(view, s.wi, bsdf_pdf, true, true).y;
-        bsdf_half = escaped_radiance<float>(view, s.wi, bsdf_pdf, false, true).y / all;
+        const float all = escaped_radiance<float>(view, c.from, s.wi, bsdf_pdf, true, true).y;
+        bsdf_half = escaped_radiance<float>(view, c.from, s.wi, bsdf_pdf, false, true).y / all;
       } else {
         bsdf_half = balance_weight<float>(bsdf_pdf, density(c.lights, c.from, s.wi));
       }
@@ -294,8 +301,8 @@ TEST(Irradiance, Domes) {
   for (int j = 0; j < kN; ++j)
     for (int i = 0; i < kN; ++i) {
       const double z = (j + 0.5) / kN, phi = 2 * kPiD * (i + 0.5) / kN;
-      const auto radiance =
-          escaped_radiance<float>(lights.view(), bsdf_testing::direction(z, phi), 0.f, true, true);
+      const auto radiance = escaped_radiance<float>(
+          lights.view(), kOrigin, bsdf_testing::direction(z, phi), 0.f, true, true);
       exact += static_cast<double>(radiance.y) * z * 2 * kPiD / kN / kN;
     }
   EXPECT_NEAR(irradiance(lights, kOrigin, kUp) / exact, 1, 3e-3);
@@ -382,7 +389,7 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
   light.texture = lights.add_texture(kW, kH, rgb);
   lights.build({light});
   const auto seen = [&](float x, float y, float z) {
-    return escaped_radiance<float>(lights.view(), {x, y, z}, 0.f, true, true);
+    return escaped_radiance<float>(lights.view(), kOrigin, {x, y, z}, 0.f, true, true);
   };
   EXPECT_NEAR(seen(1, 0, 0).x, 1, 1e-5);
   EXPECT_NEAR(seen(0, 0, 1).y, 1, 1e-5);
@@ -443,6 +450,8 @@ Lights all_kinds() {
       if (i == 2) all.back().shaping = {1.5f, {0.2f, 0, 1}, 70, 0.5f};
       if (i == 3) all.back().shaping = {0, {}, 100, 0, i % 2u, -0.7f, true};
       if (i == 2) all.back().specular = 0.5f;
+      if (i > 0 && kind == LightKind::kDome)
+        all.back().portals = {translate(1, 0, 2) * scale(3, 2, 1), rotate(90, 10) * scale(2, 2, 1)};
       if (kind == LightKind::kDome) all.back().color = {0.001f, 0.002f, 0.003f};
     }
   std::vector<EmissiveTriangle> triangles = {make_triangle({0, 0, 3}, {2, 0, 3}, {0, 2, 3}),
@@ -488,7 +497,8 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
       const auto hit = light_hit<F>(view, id, p, dir, at(7), active);
       for (const F& x : {hit.radiance.x, hit.radiance.z, hit.pdf}) put(x);
       put(triangle_light_pdf<F>(view, id, p, dir, at(7), active));
-      const auto escaped = escaped_radiance<F>(view, dir, at(7), at(6) < 0.3f, active);
+      const auto escaped =
+          escaped_radiance<F>(view, Vec3<F>(F(0.f)), dir, at(7), at(6) < 0.3f, active);
       for (const F& x : {escaped.x, escaped.y, escaped.z}) put(x);
     }
   };
@@ -505,7 +515,7 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
 TEST(LightEdges, NoLightsAndDarkLights) {
   const Lights none(std::vector<Light>{});
   EXPECT_FALSE(sample_light<float>(none.view(), kOrigin, 0.5f, 0.5f, 0.5f, true).valid);
-  EXPECT_EQ(escaped_radiance<float>(none.view(), kUp, 1.f, true, true).x, 0);
+  EXPECT_EQ(escaped_radiance<float>(none.view(), kOrigin, kUp, 1.f, true, true).x, 0);
   Light black = make_light(LightKind::kDome);
   black.color = {0, 0, 0};
   const Lights dark({black});

@@ -85,7 +85,7 @@ def test_oriented_dome_is_where_usd_puts_it(tmp_path):
         uniform token[] xformOpOrder = ["xformOp:rotateX:orientToStageUpAxis"] }""",
         'upAxis = "Z"',
     )
-    from wavecomb.usd.light import Y_TO_Z
+    from wavecomb.usd.dome import Y_TO_Z
 
     assert found["transform"] == pytest.approx(Y_TO_Z)
 
@@ -116,21 +116,41 @@ def test_what_lights_ask_for_and_do_not_get(tmp_path):
             point3f[] points = [(0, 0, 0), (1, 0, 0)]
             int[] curveVertexCounts = [2]
             float[] widths = [0.1, 0.1] }
-        def DistantLight "Sun" (prepend apiSchemas = ["ShapingAPI"]) {
-            float inputs:shaping:focus = 2 }
+        def DomeLight "Sky" (prepend apiSchemas = ["ShapingAPI"]) {
+            float inputs:shaping:focus = 2
+            rel portals = [</Window>, </Glow>] }
         def RectLight "Spot" (prepend apiSchemas = ["ShadowAPI"]) {
             rel light:filters = </Window>
             color3f inputs:shadow:color = (1, 0, 0) }""",
     )
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
-        "PortalLight",
-        "shaping of DistantLights",
+        "shaping of DomeLights",
         "light filters",
         "colour and distance of shadows",
         "curves as lights (they shine by their material alone)",
     ]
-    assert len(scene.lights) == 2
+    assert len(scene.lights) == 2 and "/Glow is no PortalLight" in said(loaded)
+    assert scene.lights[0]["portals"].shape == (1, 4, 4)
+
+
+def test_portals_are_placed_by_their_own_transforms(tmp_path):
+    scene, _ = load(
+        tmp_path,
+        """#usda 1.0
+        (upAxis = "Z")
+        def Xform "Room" {
+            double3 xformOp:translate = (1, 2, 3)
+            uniform token[] xformOpOrder = ["xformOp:translate"]
+            def PortalLight "Window" { float inputs:width = 4
+                float inputs:height = 5 } }
+        def DomeLight_1 "Sky" { rel portals = </Room/Window>
+            float xformOp:rotateX = 40
+            uniform token[] xformOpOrder = ["xformOp:rotateX"] }""",
+    )
+    expected = np.diag((4.0, 5, 1, 1))
+    expected[3, :3] = (1, 2, 3)
+    assert np.allclose(scene.lights[0]["portals"], expected[None])
 
 
 def test_mesh_lights(tmp_path):

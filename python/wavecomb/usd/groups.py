@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +16,9 @@ from wavecomb.usd.assign import Assigner, Draw
 from wavecomb.usd.colour import quantise
 from wavecomb.usd.curves import CurveArrays, uniform_scale
 from wavecomb.usd.gprims import GprimReader, add_shape
+from wavecomb.usd.group import Group, Matrices, Scope, middle_of
 from wavecomb.usd.identity import Assets, LightGroups
 from wavecomb.usd.instancing import moved_instances, read_instances, sound
-from wavecomb.usd.light import Light
 from wavecomb.usd.material import (
     DEFAULT_COLOUR,
     INHERIT_MATERIAL,
@@ -39,7 +39,6 @@ from wavecomb.usd.triangulate import MeshError
 if TYPE_CHECKING:
     from wavecomb import _core
 
-Matrices = NDArray[np.float64]
 LoadProgress = Callable[[int, int], None]
 """Called as progress(prims drawn, prims found so far), now and then."""
 STEP = 512
@@ -53,64 +52,6 @@ _WORDS = {"mesh": "mesh", "shape": "mesh", "curves": "curves", "points": "points
 _COUNTS = {"mesh": "meshes", "shape": "shapes", "curves": "curves", "points": "points"}
 DRAWN_COUNTS = tuple(_COUNTS.values())
 """Counts of ``LoadReport`` for what is drawn."""
-
-
-@dataclass
-class Group:
-    """Meshes, lights and instances that are placed together.
-
-    Attributes:
-        number: In the scene, once something is in it.
-        bounds: (2, 3) in its own space.
-        root: Prim path that the names of what is in it begin with.
-        lights: With their transforms (4, 4) in the group.
-        children: Groups that hold lights placed in it, transforms (k, 4, 4).
-        surfaced: The same of groups that hold surfaces to be refined.
-        sampled_lamp: A mesh light in it that cannot move.
-    """
-
-    name: str
-    root: str = ""
-    number: int | None = None
-    bounds: NDArray[Any] | None = None
-    lights: list[tuple[Light, Matrices]] = field(default_factory=list)
-    children: list[tuple[Group, Matrices]] = field(default_factory=list)
-    surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
-    lit: bool = False
-    has_surfaces: bool = False
-    sampled_lamp: Sdf.Path | None = None
-
-    @property
-    def empty(self) -> bool:
-        """Whether nothing is in it that is drawn."""
-        return self.number is None
-
-    def grow(self, bounds: NDArray[Any]) -> None:
-        """Makes the bounds hold others (2, 3) too."""
-        if self.bounds is None:
-            self.bounds = np.array(bounds, np.float64)
-        else:
-            np.minimum(self.bounds[0], bounds[0], out=self.bounds[0])
-            np.maximum(self.bounds[1], bounds[1], out=self.bounds[1])
-
-
-@dataclass(frozen=True)
-class Scope:
-    """What acts on a group from outside.
-
-    Attributes:
-        inside: It is placed by instances, so a mesh may leave its material to them.
-        bound: The instance brings a bound material, which goes before display colours.
-        override: A binding above is stronger than all in the group.
-        alias: (prototype, instance): bindings are looked up on the instance's proxies.
-        root: Path of the native prototype that the group comes from.
-    """
-
-    inside: bool = False
-    bound: bool = False
-    override: bool = False
-    alias: tuple[Sdf.Path, Sdf.Path] | None = None
-    root: Sdf.Path = Sdf.Path.absoluteRootPath
 
 
 MAX_NESTING = 100
@@ -540,7 +481,7 @@ class GroupBuilder:
             if motion is not None:
                 self.mesh_lights.say_moving(child.sampled_lamp)
         if child.lit:
-            middle = transforms if motion is None else _middle(motion)
+            middle = transforms if motion is None else middle_of(motion)
             parent.children.append((child, middle))
             parent.lit = True
         if child.has_surfaces:
@@ -569,22 +510,3 @@ class GroupBuilder:
             middle = centre @ linear + transforms[:, 3, :3]
             reach = half @ np.abs(linear)
             parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
-
-
-def _middle(motion: Matrices) -> Matrices:
-    """(k, 4, 4) in the middle of steps (k, s, 4, 4)."""
-    last = motion.shape[1] - 1
-    middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
-    return middle
-
-
-def placed_lights(group: Group, limit: int) -> list[tuple[Light, Matrices]]:
-    """All lights of a group and of what is placed in it, at most ``limit``."""
-    out = list(group.lights[:limit])
-    for child, transforms in group.children:
-        inner = placed_lights(child, limit)
-        for transform in transforms:
-            if len(out) >= limit:
-                return out
-            out += [(light, local @ transform) for light, local in inner]
-    return out[:limit]

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdLux
 
 from wavecomb.usd.colour_space import linear_colour, space_of
+from wavecomb.usd.dome import DomeReader
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.ies import IesTable
 from wavecomb.usd.links import LinkTable
 from wavecomb.usd.network import colour, number
+from wavecomb.usd.pixels import Image
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.texture import UDIM, TextureTable, asset_file, tile_files
 from wavecomb.working_space import from_rec709
@@ -33,9 +35,6 @@ KINDS = {
 
 LIGHT_SHAPES = ("visible", "hidden")
 """Whether rays meet the shapes of lights."""
-
-Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
-"""Turns +Y to +Z, row vectors: what UsdLux does to a dome on a Z-up stage."""
 
 
 @dataclass(frozen=True)
@@ -72,13 +71,13 @@ class LightReader:
         ``hidden``: no ray meets their shapes.
         """
         self.time = time
-        self.up_axis = up_axis
         self.textures = textures
         self.groups = groups
         self.report = report
         self.profiles = profiles
         self.hidden = hidden
         self.links = links
+        self.domes = DomeReader(time, up_axis, textures, report)
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
@@ -103,7 +102,10 @@ class LightReader:
             options["angle"] = min(max(number(self._get(prim, "angle", 0.53), 0.53), 0.0), 360.0)
         else:
             options["texture"] = self._texture(prim)
-            local = self._pole(prim)
+            local = self.domes.pole(prim)
+            portals = self.domes.portals(prim, local)
+            if portals is not None:
+                options["portals"] = portals
             normalize = False
         options["normalize"] = normalize
         if self.hidden and kind not in ("distant", "dome"):
@@ -218,7 +220,7 @@ class LightReader:
                 shaping["ies"] = profile
                 shaping["ies_angle_scale"] = read("ies:angleScale", 0.0)
                 shaping["ies_normalize"] = bool(self._get(prim, "shaping:ies:normalize", False))
-        if kind not in ("distant", "dome"):
+        if kind != "dome":
             options.update(shaping)
         elif "focus" in shaping or "ies" in shaping or angle < 90:
             self.report.missing(f"shaping of {prim.GetTypeName()}s", prim.GetPath())
@@ -237,48 +239,24 @@ class LightReader:
             path = next((file for _, file in tile_files(path)), path)
         if not path or self.textures is None:
             return None
-        form = prim.GetAttribute("inputs:texture:format")
-        layout = form.Get(self.time) if form else None
-        if layout not in (None, "automatic", "latlong"):
-            self.report.missing(f"dome texture format {layout} (read as latlong)", prim.GetPath())
         image = self.textures.image(path, prim.GetPath())
         if image is None:
             return None
         tag = space_of(attribute) or "auto"
         rect = prim.GetTypeName() == "RectLight"
+        if not rect and isinstance(image, Image):
+            made = self.domes.resampled(prim, path, image, tag)
+            if made is not None:
+                return made
         wraps = ("clamp", "clamp") if rect else ("repeat", "clamp")
         return self.textures.add(path, image, tag, *wraps, is_colour=True)
-
-    def _pole(self, prim: Usd.Prim) -> NDArray[np.float64]:
-        """Where the dome's pole starts: +Y for DomeLight, by poleAxis for DomeLight_1."""
-        attribute = prim.GetAttribute("poleAxis")
-        axis = attribute.Get(self.time) if attribute else "Y"
-        if axis == "scene":
-            axis = self.up_axis
-        return Y_TO_Z if axis == "Z" else np.eye(4)
 
     def _say_unsupported(self, prim: Usd.Prim) -> None:
         path = prim.GetPath()
 
-        for name in ("light:filters", "portals"):
-            relation = prim.GetRelationship(name)
-            if relation and relation.HasAuthoredTargets():
-                self.report.missing(name.replace(":", " "), path)
+        filters = prim.GetRelationship("light:filters")
+        if filters and filters.HasAuthoredTargets():
+            self.report.missing("light filters", path)
         tint = colour(self._get(prim, "shadow:color", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
         if any(tint) or number(self._get(prim, "shadow:distance", -1.0), -1.0) >= 0:
             self.report.missing("colour and distance of shadows", path)
-
-
-def soft_dome() -> NDArray[np.float32]:
-    """The environment of a stage without lights, (64, 128, 3): bright above, warm grey below."""
-    rows = (np.arange(64, dtype=np.float32) + 0.5) / 64
-    height = np.cos(np.pi * rows)[:, None]
-    blend = 1.0 / (1.0 + np.exp(-6.0 * height))
-    sky, ground = np.array([1.0, 1.03, 1.08]), np.array([0.42, 0.40, 0.38])
-    image = ground + blend * (sky - ground)
-    return np.ascontiguousarray(np.repeat(image[:, None], 128, axis=1), np.float32)
-
-
-def up_rotation(up_axis: str) -> NDArray[np.float64]:
-    """Turns +Y to the stage's up axis, row vectors."""
-    return Y_TO_Z if up_axis == "Z" else np.eye(4)

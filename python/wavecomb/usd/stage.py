@@ -18,10 +18,12 @@ from wavecomb.isolate import trail
 from wavecomb.usd import mtlx
 from wavecomb.usd.camera import camera_motion, frame_bounds, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
-from wavecomb.usd.groups import DRAWN_COUNTS, Group, GroupBuilder, LoadProgress, placed_lights
+from wavecomb.usd.dome import soft_dome, up_rotation
+from wavecomb.usd.group import Group, placed_lights
+from wavecomb.usd.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.ies import IesTable
-from wavecomb.usd.light import LIGHT_SHAPES, LightReader, soft_dome, up_rotation
+from wavecomb.usd.light import LIGHT_SHAPES, LightReader
 from wavecomb.usd.links import LinkTable
 from wavecomb.usd.material import MaterialTable
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey
@@ -433,7 +435,10 @@ def _add_lights(
         report.warn(f"more than {MAX_LIGHTS} lights: the rest is left out")
         lights = lights[:MAX_LIGHTS]
     for light, transform in lights:
-        builder.add_light(light.kind, transform, **light.options)
+        options = light.options
+        if "portals" in options:
+            options = {**options, "portals": options["portals"] @ transform}
+        builder.add_light(light.kind, transform, **options)
     if lights:
         return tuple(light.options["name"] for light, _ in lights)
     if lit:

@@ -26,7 +26,7 @@ from wavecomb.usd.view_size import ViewSize, placements
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.groups import Group
+    from wavecomb.usd.group import Group
     from wavecomb.usd.material import MaterialTable
     from wavecomb.usd.stock import RefinedStock
 

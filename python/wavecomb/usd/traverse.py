@@ -95,6 +95,8 @@ class Traversal:
                 kind = "light"
             elif prim.IsA(UsdGeom.PointInstancer):
                 kind = "instancer"
+            elif name == "PortalLight":
+                kind = "xform"  # the dome that names it reads it
             elif prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
                 kind = "unsupported light"
             elif prim.IsA(UsdGeom.Gprim) or name in _UNSUPPORTED:

@@ -13,7 +13,7 @@ from wavecomb.usd.cage import Cage
 from wavecomb.usd.camera import View
 
 if TYPE_CHECKING:
-    from wavecomb.usd.groups import Group
+    from wavecomb.usd.group import Group
 
 Matrices = NDArray[np.float64]
 

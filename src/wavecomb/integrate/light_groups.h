@@ -23,8 +23,9 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
                               const uint32_t* kept, const PathState<F>& path, const Mask<F>& active,
                               const Add& add) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
-  const Color<F> all = path.throughput * escaped_radiance<F>(scene.lights, path.dir, path.pdf,
-                                                             delta, active, depth == 0, path.link);
+  const Color<F> all =
+      path.throughput * escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
+                                            depth == 0, path.link);
   const Mask<F> ok = active & is_finite(all.x) & is_finite(all.y) & is_finite(all.z);
   const float limit = clamp_limit(settings, depth);
   const F y = luminance(all);
@@ -32,8 +33,8 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
   for (uint32_t i = 0; i < scene.lights.infinite_count; ++i) {
     const uint32_t group = kept[i];
     if (group == kNoGroup) continue;
-    const Color<F> le = infinite_light_radiance<F>(scene.lights, i, path.dir, path.pdf, delta,
-                                                   active, depth == 0, path.link);
+    const Color<F> le = infinite_light_radiance<F>(scene.lights, i, path.o, path.dir, path.pdf,
+                                                   delta, active, depth == 0, path.link);
     add(group, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
   }
 }

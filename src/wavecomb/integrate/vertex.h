@@ -181,8 +181,8 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      uint32_t depth, const PathState<F>& path,
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
-  const Color<F> le =
-      escaped_radiance<F>(scene.lights, path.dir, path.pdf, delta, active, depth == 0, path.link);
+  const Color<F> le = escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
+                                          depth == 0, path.link);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "wavecomb/light/portal.h"
 #include "wavecomb/light/record.h"
 #include "wavecomb/texture/lookup.h"
 
@@ -145,8 +146,8 @@ inline KindSample<F> sample_dome_constant(const LightReader<F>& light, const F& 
 
 /// One kind of dome light after the other among the active lanes: each image once.
 template <typename F>
-inline KindSample<F> sample_dome(const LightView& view, const LightReader<F>& light, const F& u,
-                                 const F& v, const Mask<F>& active) {
+inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<F>& light,
+                                       const F& u, const F& v, const Mask<F>& active) {
   KindSample<F> result = sample_dome_constant<F>(light, u, v);
   const UInt<F> texture = light.texture(), index = light.bits(offsetof(LightRecord, distribution));
   Mask<F> pending = active & Mask<F>(texture != UInt<F>(kNoTexture));
@@ -186,6 +187,64 @@ inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, con
   return {
       dome_radiance<F>(light, view.materials.textures[record.texture], s, F(1.f - down), active),
       dome_pdf<F>(d, row.count, column.count, sin_theta)};
+}
+
+/// hit_dome, with the density as seen from `from`.
+template <typename F>
+inline KindHit<F> hit_dome_from(const LightView& view, const LightRecord& record,
+                                const Vec3<F>& from, const Vec3<F>& dir, const Mask<F>& active) {
+  KindHit<F> hit = hit_dome<F>(view, record, dir, active);
+  if (record.portals != kNoPortals) [[unlikely]]
+    hit.pdf = Portals<F>(view, record.portals, from, active).pdf(dir, hit.pdf, Mask<F>(false));
+  return hit;
+}
+
+/// Samples domes `lights`, some of which have portals, as seen from `from`.
+template <typename F>
+[[gnu::noinline]] KindSample<F> sample_portal_dome(const LightView& view, const UInt<F>& lights,
+                                                   const Vec3<F>& from, const F& u, const F& v,
+                                                   const Mask<F>& active) {
+  KindSample<F> result{Vec3<F>(F(0.f), F(0.f), F(1.f)), F(kFarAway), Color<F>(F(0.f)), F(0.f),
+                       Mask<F>(false)};
+  Mask<F> pending = active;
+  while (any(pending)) {
+    const uint32_t one = lane(lights, static_cast<size_t>(std::countr_zero(lane_bits<F>(pending))));
+    const LightRecord& record = view.lights[one];
+    const Mask<F> same = pending & Mask<F>(lights == UInt<F>(one));
+    pending = pending & not_(same);
+    const LightReader<F> light(record, same);
+    KindSample<F> s;
+    if (record.portals == kNoPortals) {
+      s = sample_dome_light<F>(view, light, u, v, same);
+    } else {
+      const Portals<F> portals(view, record.portals, from, same);
+      const F share = portals.share();
+      const Mask<F> through = u < share;
+      const F inside = select(through, share, F(1.f - share));
+      const F part = select(through, u, F(u - share)) / inside;
+      const F rest = clamp(part, F(0.f), F(kOneMinusEpsilon));
+      s = sample_dome_light<F>(view, light, rest, v, same);
+      const Vec3<F> wi = portals.sample(rest, v);
+      const KindHit<F> hit = hit_dome<F>(view, record, wi, same & through);
+      s.wi = select<F>(through, wi, s.wi);
+      s.radiance = select<F>(through, hit.radiance, s.radiance);
+      s.pdf = portals.pdf(s.wi, select(through, hit.pdf, s.pdf), through);
+    }
+    result = {select<F>(same, s.wi, result.wi), result.distance,
+              select<F>(same, s.radiance, result.radiance), select(same, s.pdf, result.pdf),
+              result.is_delta};
+  }
+  return result;
+}
+
+/// A direction to domes `lights`, whose records `light` reads, from `from`.
+template <typename F>
+inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
+                                 const LightReader<F>& light, const Vec3<F>& from, const F& u,
+                                 const F& v, const Mask<F>& active) {
+  if (view.portals) [[unlikely]]
+    return sample_portal_dome<F>(view, lights, from, u, v, active);
+  return sample_dome_light<F>(view, light, u, v, active);
 }
 
 }  // namespace wavecomb::detail

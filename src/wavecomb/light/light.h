@@ -105,8 +105,9 @@ inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Func
 }
 
 template <typename F>
-inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const LightReader<F>& light,
-                                 const Vec3<F>& p, const F& u, const F& v, const Mask<F>& lanes) {
+inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const UInt<F>& index,
+                                 const LightReader<F>& light, const Vec3<F>& p, const F& u,
+                                 const F& v, const Mask<F>& lanes) {
   switch (kind) {
     case LightKind::kRect:
       return sample_rect<F>(light, view.materials.textures, p, u, v, lanes);
@@ -119,7 +120,7 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const Li
     case LightKind::kDistant:
       return sample_distant<F>(light, u, v);
     case LightKind::kDome:
-      return sample_dome<F>(view, light, u, v, lanes);
+      return sample_dome<F>(view, index, light, p, u, v, lanes);
     case LightKind::kTriangle:
       break;  // has no record
   }
@@ -182,7 +183,7 @@ inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>
                              // its lanes.
                              const detail::LightReader<F> light(view.lights, index, lanes);
                              detail::KindSample<F> s =
-                                 detail::sample_kind<F>(kind, view, light, p, u, v, lanes);
+                                 detail::sample_kind<F>(kind, view, index, light, p, u, v, lanes);
                              if (view.shapings)
                                s.radiance = detail::shaped<F>(view, light.shaping(), -s.wi,
                                                               s.radiance, lanes & (s.pdf > 0.f));
@@ -260,18 +261,22 @@ struct LightEffect {
   }
 };
 
-/// Radiance * MIS weight of infinite light `light` for a ray that left the scene along dir, as
+/// Radiance * MIS weight of infinite light `light` for a ray that left `from` and the scene along
+/// dir, as
 /// escaped_radiance sums them up.
 template <typename F>
-inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& dir,
-                                        const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
-                                        const Mask<F>& active, bool from_camera = false,
+inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& from,
+                                        const Vec3<F>& dir, const F& bsdf_pdf,
+                                        const Mask<F>& bsdf_is_delta, const Mask<F>& active,
+                                        bool from_camera = false,
                                         const UInt<F>& link = UInt<F>(0u)) {
   const LightRecord& record = view.lights[light];
   const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
-  const detail::KindHit<F> hit =
-      is_dome ? detail::hit_dome<F>(view, record, dir, active)
+  detail::KindHit<F> hit =
+      is_dome ? detail::hit_dome_from<F>(view, record, from, dir, active)
               : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
+  if (record.shaping != kNoShaping) [[unlikely]]
+    hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -dir, hit.radiance, active);
   const float pick_pdf = view.by_tree ? view.tree.infinite_pdf[light] : record.pick_pdf;
   F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * pick_pdf)));
   if (view.has_sampled_only)
@@ -281,17 +286,19 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
   return hit.radiance * weight;
 }
 
-/// Sum over all infinite lights of radiance * MIS weight for a ray that left the scene along dir;
+/// Sum over all infinite lights of radiance * MIS weight for a ray that left `from` and the scene
+/// along dir;
 /// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
 /// too).
 template <typename F>
-inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& dir, const F& bsdf_pdf,
-                                 const Mask<F>& bsdf_is_delta, const Mask<F>& active,
-                                 bool from_camera = false, const UInt<F>& link = UInt<F>(0u)) {
+inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
+                                 const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
+                                 const Mask<F>& active, bool from_camera = false,
+                                 const UInt<F>& link = UInt<F>(0u)) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
-    sum += infinite_light_radiance<F>(view, i, dir, bsdf_pdf, bsdf_is_delta, active, from_camera,
-                                      link);
+    sum += infinite_light_radiance<F>(view, i, from, dir, bsdf_pdf, bsdf_is_delta, active,
+                                      from_camera, link);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

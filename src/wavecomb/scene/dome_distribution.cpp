@@ -155,4 +155,27 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
   return d;
 }
 
+double image_solid_angle(const Distribution2D& d) {
+  const auto value = [&](size_t row, uint32_t i) {
+    const size_t line = row * d.row_lines + i / Distribution2D::kLine;
+    return static_cast<double>(d.cumulative[line].value[i % Distribution2D::kLine]);
+  };
+  const auto count = [&](size_t row, uint32_t n, uint32_t i) {
+    return (i + 1 == n ? static_cast<double>(Distribution2D::kCounts) : value(row, i + 1)) -
+           value(row, i);
+  };
+  double sum = 0;
+  for (uint32_t y = 0; y < d.height; ++y) {
+    const double row = count(d.height, d.height, y) / Distribution2D::kCounts;
+    // Cells of a row have the same solid angle.
+    const double size =
+        2 * kPiD / d.width * (std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height));
+    for (uint32_t x = 0; x < d.width; ++x) {
+      const double share = row * count(y, d.width, x) / Distribution2D::kCounts;
+      sum += share * share / size;
+    }
+  }
+  return sum > 0 ? 1 / sum : 4 * kPiD;
+}
+
 }  // namespace wavecomb

@@ -137,6 +137,7 @@ void add_light(Hash& h, const Light& l) {
         l.texture, l.group, l.diffuse, l.specular, s.focus, s.focus_tint, s.cone_angle,
         s.cone_softness, s.ies, s.ies_angle_scale, s.ies_normalize, l.light_link, l.shadow_link,
         l.visible);
+  for (const Affine& portal : l.portals) h.add(portal);
 }
 
 uint64_t hash_lights(const Scene& scene) {

@@ -86,6 +86,9 @@ void check(const Light& light, size_t texture_count, size_t profile_count) {
   if (static_cast<uint32_t>(light.kind) >= static_cast<uint32_t>(LightKind::kTriangle)) {
     throw Error(where + "is of no kind that has a place of its own");
   }
+  for (const Affine& p : light.portals)
+    if (!finite(p.row[0]) || !finite(p.row[1]) || !finite(p.row[2]) || !finite(p.t))
+      throw Error(where + "a portal's transform is not finite");
   if (light.texture != kNoTexture && light.texture >= texture_count) {
     throw Error(where + "there is no texture " + std::to_string(light.texture));
   }
@@ -164,11 +167,12 @@ void make_cylinder(Made& made, const Light& light, const Double3& color, double 
   made.power = kPiD * area * scale * mean;
 }
 
-/// The shaping of a light with a shape or of a point, and what share of its power it lets out: each
+/// The shaping of any light but a dome, and what share of its power it lets out: each
 /// part by its mean over all directions, as if they had nothing to do with one another.
 void make_shaping(Made& made, LightSet& set, const Light& light,
                   std::span<const IesProfile> profiles) {
   const Shaping& s = light.shaping;
+  const double power = made.power;
   const Double3 minus_z = unit(to_double(light.to_world.axis(2)) * -1.0);
   ShapingRecord r{};
   put(r.axis, minus_z);
@@ -207,6 +211,7 @@ void make_shaping(Made& made, LightSet& set, const Light& light,
     r.ies_scale = s.ies_normalize && mean > 0 ? static_cast<float>(1 / mean) : 1.f;
     made.power *= mean * double{r.ies_scale} * (profile.covers_sphere() ? 1 : 0.5);
   }
+  if (light.kind == LightKind::kDistant) made.power = power;  // all goes along the axis
   made.record.shaping = static_cast<uint32_t>(set.shapings.size());
   set.shapings.push_back(r);
 }
@@ -287,6 +292,24 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
     }
   }
   made.power = 4 * kPiD * mean_radiance * kPiD * scene_radius * scene_radius;
+  if (light.portals.empty()) return;
+  made.record.portals = static_cast<uint32_t>(set.portal_groups.size());
+  const auto first = static_cast<uint32_t>(set.portals.size());
+  for (const Affine& square : light.portals) {
+    Light portal;
+    portal.to_world = square;
+    Made rect;
+    put(rect.record.p, to_double(square.point({0.5f, -0.5f, 0})));
+    finish_flat(rect, portal, to_double(square.axis(0)) * -1, to_double(square.axis(1)), 1,
+                {1, 1, 1}, 1);
+    rect.record.texture = kNoTexture;
+    set.portals.push_back(rect.record);
+  }
+  const double spread = made.record.texture == kNoTexture
+                            ? 4 * kPiD
+                            : image_solid_angle(set.distributions[made.record.distribution]);
+  set.portal_groups.push_back(
+      {first, static_cast<uint32_t>(light.portals.size()), static_cast<float>(spread)});
 }
 
 Made make_light(LightSet& set, const Light& light, double scene_radius,
@@ -297,6 +320,7 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
   r.kind = static_cast<uint32_t>(light.kind);
   r.texture = kNoTexture;
   r.shaping = kNoShaping;
+  r.portals = kNoPortals;
   r.diffuse = std::max(0.f, light.diffuse);
   r.specular = std::max(0.f, light.specular);
   r.hidden = !light.visible && !is_infinite(light.kind);
@@ -346,7 +370,7 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
     case LightKind::kTriangle:
       break;
   }
-  if (!light.shaping.is_plain() && !is_infinite(light.kind))
+  if (!light.shaping.is_plain() && light.kind != LightKind::kDome)
     make_shaping(made, set, light, profiles);
   return made;
 }
@@ -474,6 +498,10 @@ LightView LightSet::view(const MaterialView& materials) const {
   v.first_triangle = first_triangle();
   v.infinite_count = infinite_count;
   v.distributions = distributions.data();
+  if (!portals.empty()) {
+    v.portals = portals.data();
+    v.portal_groups = portal_groups.data();
+  }
   if (!shapings.empty()) {
     v.shapings = shapings.data();
     v.ies = ies.data();

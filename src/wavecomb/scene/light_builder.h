@@ -50,6 +50,8 @@ struct LightSet {
   PickTable pick;  ///< without its pointer
   LightTree tree;
   std::vector<Distribution2D> distributions;
+  std::vector<LightRecord> portals;
+  std::vector<PortalGroup> portal_groups;
   std::vector<ShapingRecord> shapings;
   std::vector<IesRecord> ies;
   std::vector<float> ies_numbers;
@@ -102,6 +104,9 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
 /// times the sine of the polar angle. Row 0 is the top (the pole +y). Positive wherever the
 /// bilinear texture is. An all-black texture gives width 0.
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color);
+
+/// 1 / (integral of the squared density of a dome's image over directions): 4 pi of an even one.
+double image_solid_angle(const Distribution2D& d);
 
 /// The table that chooses among lights of the given weights (>= 0), of which those before
 /// `first_triangle` are one group, and how many of the 2^24 numbers choose each light. Lights of

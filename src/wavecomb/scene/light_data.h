@@ -17,6 +17,7 @@ inline constexpr uint32_t kLightKindCount = 7;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
+inline constexpr uint32_t kNoPortals = 0xffffffffu;
 /// All geometry: no GeometrySet. kNoSet + 1 is 0.
 inline constexpr uint32_t kNoSet = 0xffffffffu;
 
@@ -79,6 +80,9 @@ struct Light {
   /// SceneBuilder::add_geometry_set: what it shines on, and what casts shadows in its light.
   uint32_t light_link = kNoSet, shadow_link = kNoSet;
   bool visible = true;  ///< whether rays meet its shape
+  /// Dome: maps of the unit square in the xy plane, whose -z side is lit, to the portals that guide
+  /// its sampling.
+  std::vector<Affine> portals;
   /// Of mesh lights (kind kTriangle), whose to_world leads to the space of the mesh's group.
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
@@ -112,7 +116,8 @@ struct alignas(64) LightRecord {
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1: rays do not meet its shape
   uint32_t light_link, shadow_link;
-  uint32_t sync;  ///< MaterialSync of a mesh light
+  uint32_t sync;     ///< MaterialSync of a mesh light
+  uint32_t portals;  ///< of a dome: index into LightView::portal_groups, or kNoPortals
 };
 static_assert(sizeof(LightRecord) == 128);
 
@@ -238,6 +243,14 @@ struct LinkView {
   uint32_t words = 0;
 };
 
+/// The portals of a dome, in LightView::portals.
+struct PortalGroup {
+  uint32_t first, count;
+  /// That an even image of as much power and as much power squared would take up: 4 pi where it is
+  /// even, little where a sun gives the light.
+  float image_solid_angle;
+};
+
 /// What kernels need of all lights. Light i is record i for i < first_triangle, else triangle
 /// i - first_triangle. Infinite lights (distant, dome) come first.
 struct LightView {
@@ -251,6 +264,9 @@ struct LightView {
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
   const Distribution2D* distributions = nullptr;
+  // Null where no dome has portals. Portals are as rects.
+  const LightRecord* portals = nullptr;
+  const PortalGroup* portal_groups = nullptr;
   // Null where no light is shaped.
   const ShapingRecord* shapings = nullptr;
   const IesRecord* ies = nullptr;

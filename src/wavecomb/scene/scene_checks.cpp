@@ -81,6 +81,8 @@ void check_light(const Light& light, size_t texture_count, size_t profile_count,
   for (float x : {light.width, light.height, light.radius, light.length, light.angle})
     if (!std::isfinite(x) || x < 0)
       throw Error(name + " has a size that is negative or not finite; give one of 0 or more");
+  for (const Affine& portal : light.portals)
+    if (!finite(portal)) throw Error(name + " has a portal whose transform is not finite; mend it");
   if (light.texture != kNoTexture && light.texture >= texture_count)
     throw Error(name + " reads a texture that was never added; add textures before lights");
   const Shaping& s = light.shaping;
