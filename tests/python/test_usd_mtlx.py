@@ -109,6 +109,15 @@ def test_variants_and_opinions_above(folder: Path) -> None:
     assert value(stage, "/V/M/Gold", "specular_roughness") == 0.75
 
 
+def test_variants_that_are_not_selected(folder: Path) -> None:
+    """The window changes variants on a stage whose layers nobody may change any more."""
+    stage = open_stage(folder / "stage.usda")
+    mtlx.resolve(stage, everywhere=True)
+    stage.SetEditTarget(stage.GetSessionLayer())
+    stage.GetPrimAtPath("/V").GetVariantSet("look").SetVariantSelection("gold")
+    assert value(stage, "/V/M/Gold", "base_color") == pytest.approx((1, 0, 0))
+
+
 def test_files_stay_as_they_are(folder: Path) -> None:
     stage = open_stage(folder / "stage.usda")
     root = stage.GetRootLayer()
