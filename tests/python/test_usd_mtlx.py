@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdShade
+from usd_recorder import ASSETS
 
 from wavecomb.image import write_png
 from wavecomb.usd import LoadReport, mtlx, open_stage
@@ -107,6 +108,15 @@ def test_variants_and_opinions_above(folder: Path) -> None:
     stage = open_stage(folder / "stage.usda", {"/V{look}": "gold"}, overrides)
     assert value(stage, "/V/M/Gold", "base_color") == pytest.approx((1, 0, 0))
     assert value(stage, "/V/M/Gold", "specular_roughness") == 0.75
+
+
+def test_variants_that_are_not_selected(folder: Path) -> None:
+    """The window changes variants on a stage whose layers nobody may change any more."""
+    stage = open_stage(folder / "stage.usda")
+    mtlx.resolve(stage, everywhere=True)
+    stage.SetEditTarget(stage.GetSessionLayer())
+    stage.GetPrimAtPath("/V").GetVariantSet("look").SetVariantSelection("gold")
+    assert value(stage, "/V/M/Gold", "base_color") == pytest.approx((1, 0, 0))
 
 
 def test_files_stay_as_they_are(folder: Path) -> None:
@@ -337,3 +347,29 @@ def test_damaged_files_never_crash(tmp_path: Path) -> None:
             except MtlxError:
                 pass
     assert read > 10
+
+
+@pytest.mark.parametrize("name", ["basic", "basicTextured"])
+def test_as_openusd_reads_it(name: str) -> None:
+    """Interfaces and graphs of materials, and what they come to, against OpenUSD's own reading."""
+    folder = ASSETS / "usd" / "wg_test_assets" / "MaterialXTest"
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not there")
+    ours = open_stage(folder / f"{name}.usda")
+    theirs = Usd.Stage.Open(str(folder / f"{name}_flatten.usda"))
+    compared = 0
+    for scope in ("Materials", "NodeGraphs"):
+        top = theirs.GetPrimAtPath(f"/MaterialX/{scope}")
+        for prim in Usd.PrimRange(top) if top else ():
+            if prim.GetName().startswith("ND_"):
+                continue  # named by its definition then, and by its node since
+            for attribute in prim.GetAttributes():
+                other = ours.GetAttributeAtPath(attribute.GetPath())
+                assert other and other.GetTypeName() == attribute.GetTypeName(), attribute
+                assert other.GetColorSpace() == attribute.GetColorSpace()
+                mine, wanted = other.Get(), attribute.Get()
+                if isinstance(wanted, Sdf.AssetPath):
+                    mine, wanted = Path(mine.path).name, Path(wanted.path).name
+                assert mine == wanted, attribute
+                compared += 1
+    assert compared > 10

@@ -128,6 +128,8 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     usd = request.usd
     if usd is None:
         usd = open_stage(source.path, source.variants)
+        # The window selects variants while this thread opens the layers that it looks at.
+        mtlx.resolve(usd, everywhere=True)
     elif request.fresh:
         mtlx.reload(usd)
     overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()

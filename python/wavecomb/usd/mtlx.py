@@ -53,15 +53,20 @@ _translations: dict[str, _Translation] = {}
 _lock = threading.Lock()
 
 
-def resolve(stage: Usd.Stage) -> None:
+def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage see the MaterialX files that its layers name.
 
     Those layers are changed in memory, and cannot be saved from then on. What cannot be read stays
     missing; ``tell`` says so. Costs next to nothing where no such file is missing.
+
+    Args:
+        stage: The stage.
+        everywhere: Also where variants are not selected, so that selecting them later, on whatever
+            thread, changes no layer. Looks through all layers.
     """
     tried: set[tuple[str, str]] = set()
-    for _ in range(MAX_ROUNDS):
-        if not any(True for _ in _missing(stage)):
+    for turn in range(MAX_ROUNDS):
+        if not (everywhere and turn == 0) and not any(True for _ in _missing(stage)):
             return
         with _lock, Ar.ResolverContextBinder(stage.GetPathResolverContext()):
             changes = _changes(stage, tried)
@@ -76,7 +81,7 @@ def resolve(stage: Usd.Stage) -> None:
 def reload(stage: Usd.Stage) -> None:
     """Reads the files of a stage again that changed, MaterialX files among them."""
     stage.Reload()
-    resolve(stage)
+    resolve(stage, everywhere=True)
 
 
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
