@@ -126,7 +126,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
       if (!geometry.mesh_lights.empty())
         mesh_lights.push_back(light ? static_cast<uint32_t>(placed.size()) : kNoLight);
       const uint32_t mesh_light = light ? mesh_lights.back() : kNoLight;
-      if (light) placed.push_back({light, to_world, world_area(mesh, to_world), !moves});
+      if (light) placed.push_back({light, to_world, world_area(mesh, to_world), shines});
       if (!shines) continue;
       sources.push_back({triangle_count, &mesh, &record, &to_world, mesh_light});
       triangle_groups.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
