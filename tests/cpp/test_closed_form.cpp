@@ -303,8 +303,9 @@ DirectLight direct_light(const std::shared_ptr<const Scene>& scene, uint32_t blo
   std::vector<double> by_bsdf, by_light;
   visit_program<float>(
       static_cast<ProgramId>(view.material_program[material]), [&]<typename Bsdf>() {
-        const auto params =
-            fetch_for<Bsdf, Bsdf::kSlots, float>(view.materials, material, s.uv, 0.f, true);
+        const auto anywhere = [](const auto&) { return GraphPoint<float>{}; };
+        const auto params = fetch_for<Bsdf, Bsdf::kSlots, float>(view.materials, material, s.uv,
+                                                                 0.f, anywhere, true);
         const Bsdf bsdf(params, false);
         for (uint32_t block = 0; block < blocks; ++block) {
           double bsdf_sum = 0, light_sum = 0;
