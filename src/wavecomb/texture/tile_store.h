@@ -41,7 +41,8 @@ struct StoreStatistics {
 /// call.
 class TileStore {
  public:
-  /// What moves between memory and the file: 64 x 64 texels of 8 bits.
+  /// What moves between memory and the file: 64 of the squares that a TextureView is made of, where
+  /// texels are four values of 8 bits.
   static constexpr size_t kTileBytes = 16384;
   /// The least limit: some tiles for each reader.
   static constexpr uint64_t kLeastBytes = 1'000'000;
