@@ -490,6 +490,7 @@ void bind_scene(nb::module_& m) {
       .def(nb::init<uint64_t, std::string>(), "limit_bytes"_a, "folder"_a)
       .def_static("obstacle", &UserFaults::obstacle)
       .def_prop_ro("limit_bytes", &TileStore::limit_bytes)
+      .def("set_waiting", &TileStore::set_waiting, "bytes"_a)
       .def_prop_ro("statistics",
                    [](const TileStore& store) { return texture_store_dict(store.statistics()); });
 

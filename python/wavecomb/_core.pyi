@@ -85,6 +85,8 @@ class TextureStore:
         """Why this system can have none; "" where it can."""
     @property
     def limit_bytes(self) -> int: ...
+    def set_waiting(self, bytes: int) -> None:
+        """Says that images of so many bytes lie ready to become textures: they count."""
     @property
     def statistics(self) -> dict[str, float]:
         """``texture_store`` of docs/statistics.md, as it is now."""

@@ -229,7 +229,11 @@ TEST_F(TileStoreTest, ATextureThatIsExpectedFindsRoom) {
   add(1);
   store->expect(kSize, 0);
   EXPECT_EQ(store->statistics().file_bytes, 0u);
-  store->expect(kSize, kLimit);
+  store->set_waiting(kLimit - 2 * kSize - 100'000);
+  store->expect(kSize, 0);
+  EXPECT_EQ(store->statistics().file_bytes, 0u);
+  // What is decoded and what lies ready count too.
+  store->expect(kSize, 100'000);
   EXPECT_GT(store->statistics().file_bytes, 0u);
   EXPECT_EQ(all_resident(), 0u);
   EXPECT_TRUE(is_intact(0));

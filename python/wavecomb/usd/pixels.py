@@ -251,6 +251,11 @@ class ReadAhead:
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
 
+    @property
+    def bytes(self) -> int:
+        """Of the pixels that are ready or under way; 0 where no limit was set."""
+        return sum(self._sizes[path] for path in self._ready) if self._sizes else 0
+
     def _fits(self, path: str) -> bool:
         """Whether an image may be read now, beside those that are ready."""
         if self._limit_bytes is None:
@@ -262,7 +267,7 @@ class ReadAhead:
             except (TextureError, OSError, ValueError):
                 bytes_ = 0  # reading it says what is wrong
             self._sizes[path] = bytes_
-        return sum(self._sizes[ready] for ready in (path, *self._ready)) <= self._limit_bytes
+        return self._sizes[path] + self.bytes <= self._limit_bytes
 
     def _start(self) -> None:
         while self._waiting and len(self._ready) <= self._threads:

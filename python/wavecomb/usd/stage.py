@@ -33,7 +33,7 @@ from wavecomb.usd.shutter import find_motion
 from wavecomb.usd.stock import FrameStock
 from wavecomb.usd.surfaces import Surfaces, parse_level
 from wavecomb.usd.texture import TextureStock, TextureTable
-from wavecomb.usd.texture_store import MEGABYTE, texture_store
+from wavecomb.usd.texture_store import MEGABYTE, give_back_memory, texture_store
 from wavecomb.usd.times import frame_number, time_code
 from wavecomb.usd.traverse import Traversal
 from wavecomb.usd.view_options import Seen, ViewOptions
@@ -246,7 +246,7 @@ def load_stage(
         stock.end_frame()
         report.absorb(stock.opening)
     if builder_factory is None:
-        _give_back_memory()
+        give_back_memory()
     return LoadedStage(
         scene,
         report,
@@ -333,12 +333,6 @@ def _native_builder(threads: int, store: _core.TextureStore | None) -> _core.Sce
     from wavecomb import _core
 
     return _core.SceneBuilder(threads, store)
-
-
-def _give_back_memory() -> None:
-    from wavecomb import _core
-
-    _core.give_back_memory()
 
 
 def _read(

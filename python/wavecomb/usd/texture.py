@@ -18,6 +18,7 @@ from wavecomb.usd.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, 
 from wavecomb.usd.halve import halve
 from wavecomb.usd.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.report import LoadReport
+from wavecomb.usd.texture_store import give_back_memory
 from wavecomb.working_space import from_rec709
 
 if TYPE_CHECKING:
@@ -337,12 +338,19 @@ class TextureTable:
             pixels = np.ascontiguousarray(linear, image.dtype)
         for _ in range(self.drops.get((path, space, wrap_s, wrap_t), 0)):
             pixels = halve(pixels, srgb)
+        if self.store is not None:
+            self.store.set_waiting(self._ahead.bytes)
         try:
             return self._builder.add_texture(
                 pixels, srgb=srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
         except ValueError as error:  # no room for it
             raise WavecombError(str(error)) from None
+        finally:
+            if self.store is not None:
+                # Else the allocator keeps what images took.
+                del pixels
+                give_back_memory()
 
     def missing(self) -> int:
         """Texture id of the checker that stands for a texture that cannot be read."""

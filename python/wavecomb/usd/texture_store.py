@@ -17,6 +17,13 @@ if TYPE_CHECKING:
 MEGABYTE = 1_000_000
 
 
+def give_back_memory() -> None:
+    """Hands memory that was freed to the system."""
+    from wavecomb import _core
+
+    _core.give_back_memory()
+
+
 def texture_folder() -> str:
     """Where the temporary file goes: ``TMPDIR``, else /var/tmp, which is on a disk, else /tmp."""
     chosen = os.environ.get("TMPDIR")

@@ -64,10 +64,15 @@ size_t TileStore::room() const {
   return std::max<size_t>(kLeast, (limit_bytes_ - own) / tile_bytes_);
 }
 
+void TileStore::set_waiting(uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  waiting_bytes_ = bytes;
+}
+
 void TileStore::expect(uint64_t bytes, uint64_t scratch_bytes) {
   const std::lock_guard lock(mutex_);
-  if (!file_ && resident_bytes() + round_up(bytes, page_bytes()) + scratch_bytes > limit_bytes_)
-    spill();
+  const uint64_t outside = round_up(bytes, page_bytes()) + scratch_bytes + waiting_bytes_;
+  if (!file_ && resident_bytes() + outside > limit_bytes_) spill();
 }
 
 const std::byte* TileStore::add(const std::byte* data, size_t bytes) {

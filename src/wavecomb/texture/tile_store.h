@@ -41,7 +41,8 @@ struct StoreStatistics {
 /// call.
 class TileStore {
  public:
-  /// What moves between memory and the file: 64 x 64 texels of 8 bits.
+  /// What moves between memory and the file: 64 of the squares that a TextureView is made of, where
+  /// texels are four values of 8 bits.
   static constexpr size_t kTileBytes = 16384;
   /// The least limit: some tiles for each reader.
   static constexpr uint64_t kLeastBytes = 1'000'000;
@@ -53,8 +54,11 @@ class TileStore {
   TileStore(const TileStore&) = delete;
   TileStore& operator=(const TileStore&) = delete;
 
+  /// Says that `bytes` of images that textures will be made of lie ready outside of the store.
+  void set_waiting(uint64_t bytes);
   /// Says that a texture is being made: from here on `bytes` and `scratch_bytes` beside them are
-  /// used outside of the store. Throws Error where all must go to the file and cannot.
+  /// used outside of the store, and count with what waits. Throws Error where all must go to the
+  /// file and cannot.
   void expect(uint64_t bytes, uint64_t scratch_bytes);
   /// Keeps a copy; it stays where it is until it is removed. Throws Error where there is no room.
   const std::byte* add(const std::byte* data, size_t bytes);
@@ -101,6 +105,7 @@ class TileStore {
   std::map<uint32_t, uint32_t> free_;          ///< first tile and count
   TileQueue queue_;
   uint64_t held_bytes_ = 0;  ///< in memory, while there is no file
+  uint64_t waiting_bytes_ = 0;
   StoreStatistics counts_;
   uint64_t load_ns_ = 0;
   std::string failure_;
