@@ -18,6 +18,7 @@ from wavecomb.usd.graph_code import (
     GraphTooLarge,
     assemble,
     is_constant,
+    linear,
     numbers,
 )
 
@@ -181,6 +182,22 @@ def test_what_needs_no_operation_has_none():
     assert value[1] == 0.0 and value[2] == p[2]
     assert is_constant(make.op("add", numbers(1.0, 2.0), numbers(3.0)))
     assert make.op("add", numbers(1.0, 2.0), numbers(3.0)) == (4.0, 5.0)
+
+
+def test_sums_that_fork_and_meet_are_short():
+    """A sum of a sum of itself, 60 times: 2^60 ways through it, and one answer."""
+    make = Expressions()
+    uv = make.input("uv")
+    value = uv
+    for _ in range(60):
+        value = make.op("add", value, value)
+    terms, constant = linear(value[0], lambda node: node.code == "input")
+    assert terms == {uv[0]: 2.0**60} and constant == 0.0
+    deep = uv
+    for _ in range(3000):
+        deep = make.op("add", deep, numbers(0.5))
+    assert linear(deep[1], lambda node: node.code == "input") == ({uv[1]: 1.0}, 1500.0)
+    assert linear(make.op("sin", uv)[0], lambda node: node.code == "input") is None
 
 
 def test_equal_operations_are_one_and_dead_ones_none():

@@ -237,24 +237,32 @@ Linear = tuple[dict[tuple[Node, int], float], float]
 
 def linear(part: Part, is_leaf: Callable[[Node], bool]) -> Linear | None:
     """A part as a sum of components of leaves times numbers, and a number; None where it is not."""
-    if isinstance(part, float):
-        return {}, part
-    node, component = part
-    if is_leaf(node):
-        return {part: 1.0}, 0.0
-    if node.code not in _LINEAR:
+    known: dict[tuple[Node, int], Linear | None] = {}
+
+    def of(one: Part) -> Linear | None:
+        return ({}, one) if isinstance(one, float) else known[one]
+
+    for node in nodes_of([part]):
+        for i in range(node.results):
+            if is_leaf(node):
+                known[node, i] = {(node, i): 1.0}, 0.0
+            elif node.code in _LINEAR:
+                known[node, i] = _combined(node.code, *(of(value[i]) for value in node.operands))
+            else:
+                known[node, i] = None
+    return of(part)
+
+
+def _combined(code: str, a: Linear | None, b: Linear | None) -> Linear | None:
+    if a is None or b is None:
         return None
-    found = [linear(value[component], is_leaf) for value in node.operands]
-    if any(one is None for one in found):
-        return None
-    a, b = (one for one in found[:2] if one is not None)
-    if node.code == "multiply" and not a[0]:
+    if code == "multiply" and not a[0]:
         return _scaled(b, a[1])
-    if node.code == "multiply":
+    if code == "multiply":
         return None if b[0] else _scaled(a, b[1])
-    if node.code == "divide":
+    if code == "divide":
         return None if b[0] or b[1] == 0.0 else _scaled(a, 1.0 / b[1])
-    return _sum(a, b, 1.0 if node.code == "add" else -1.0)
+    return _sum(a, b, 1.0 if code == "add" else -1.0)
 
 
 _LINEAR = ("add", "subtract", "multiply", "divide")
