@@ -64,10 +64,12 @@ EXHIBITS = (
     *_variants(
         "StandardShaderBall/standard_shader_ball_scene.usda",
         "A modified sphere and a rim of the material over neutral 18 % grey, in a box of neutral "
-        "textures. Examples come as MaterialX files of two models, and as UsdPreviewSurface.",
+        "textures. Examples come as MaterialX files of two models, and as UsdPreviewSurface. (With "
+        "OpenPBR the file gives the neutral part no colour, so that it is OpenPBR's 80 % grey.)",
         *(
             (
                 f"{BALL}{{example_material}}=mtlx_{name}",
+                f"{BALL}/materials{{material_model}}={model}",
                 f"{BALL}/materials/examples{{material_model}}={model}",
             )
             for name in ("plastic", "gold", "glass", "bubblegum")

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdShade
-from usd_recorder import ASSETS
+from usd_recorder import ASSETS, Recorder
 
 from wavecomb.image import write_png
-from wavecomb.usd import LoadReport, mtlx, open_stage
+from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.diagnostics import captured
 from wavecomb.usd.mtlx_files import MAX_DEPTH, MtlxError
 from wavecomb.usd.mtlx_layer import translate
@@ -373,3 +373,32 @@ def test_as_openusd_reads_it(name: str) -> None:
                 assert mine == wanted, attribute
                 compared += 1
     assert compared > 10
+
+
+def test_materialx_counts_before_the_preview(tmp_path: Path) -> None:
+    """A material in both forms, and no word of inputs that an interface connects to nothing."""
+    write(tmp_path, "gold.mtlx", GOLD)
+    file = write(
+        tmp_path,
+        "s.usda",
+        """#usda 1.0
+def Material "M" (
+    references = @./gold.mtlx@</MaterialX/Materials/Gold>
+) {
+    token outputs:surface.connect = </M/P.outputs:surface>
+    def Shader "P" {
+        uniform token info:id = "UsdPreviewSurface"
+        token outputs:surface
+    }
+}
+def Sphere "S" (
+    prepend apiSchemas = ["MaterialBindingAPI"]
+) {
+    rel material:binding = </M>
+}
+""",
+    )
+    recorder = Recorder()
+    loaded = load_stage(file, builder_factory=lambda: recorder)
+    assert [material["program"] for material in recorder.materials] == ["openpbr"]
+    assert not loaded.report.unsupported

@@ -67,11 +67,10 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     ``PREVIEW``, or a shading model of MaterialX; "" where nothing does.
     """
     shader = material.ComputeSurfaceSource()[0]
-    if shader_id(shader) == "UsdPreviewSurface":
-        return PREVIEW, shader
+    # Where a material comes in both forms, the preview is the one for who knows no MaterialX.
     for candidate in (material.ComputeSurfaceSource("mtlx")[0], shader):
         name = shader_id(candidate)
-        if name.startswith("ND_UsdPreviewSurface"):
+        if name.startswith(("ND_UsdPreviewSurface", "UsdPreviewSurface")):
             return PREVIEW, candidate
         if model := model_of(name):
             return model, candidate

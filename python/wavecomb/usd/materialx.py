@@ -192,8 +192,8 @@ class _Layers:
 
     def ignored(self, *names: str) -> None:
         for name in names:
-            given = self._shader.GetInput(name)
-            if given and (given.HasConnectedSource() or given.Get(self._reader.time) is not None):
+            # Interfaces of materials connect all inputs, also to what nobody gives a value.
+            if source_of(self._shader, name, self._reader.time) is not None:
                 self._missing(f"MaterialX {self._model} input {name} (ignored)")
 
     def approximated(self, what: str) -> None:
