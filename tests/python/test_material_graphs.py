@@ -333,7 +333,8 @@ def test_networks_too_large_are_said_and_leave_parameters_out(tmp_path):
         tmp_path, standard("color3f inputs:base_color.connect = </Mat/S69.outputs:out>", nodes)
     )
     told = said(loaded)
-    assert ("too large" in told) or scene.graphs
+    assert "too large for base_color" in told and "/Mat" in told
+    assert not scene.graphs and "base_color" not in scene.material_of("M")
 
 
 def test_graph_of_a_real_scene_renders_as_its_formula(tmp_path):
