@@ -114,7 +114,7 @@ struct alignas(64) MaterialRecord {
   uint32_t flags;          ///< MaterialFlags; upper half: evaluations - 1
   uint32_t program;
   uint32_t openpbr;  ///< its OpenPbrRecord
-  uint32_t graph, opacity_graph, emission_graph;
+  uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 };
 static_assert(sizeof(MaterialRecord) == 128);
 /// A bit of MaterialRecord::texture_slots beside those of slots: the program needs a frame along
