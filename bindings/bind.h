@@ -23,7 +23,8 @@ wavecomb::TextureUse texture_use(const nanobind::dict& d);
 uint32_t add_graph(wavecomb::SceneBuilder& builder, const nanobind::bytes& ops,
                    const std::vector<float>& constants,
                    const std::vector<std::pair<uint32_t, float>>& images,
-                   const std::vector<std::pair<uint32_t, uint32_t>>& outputs);
+                   const std::vector<std::pair<uint32_t, uint32_t>>& outputs,
+                   const std::vector<std::string>& attributes);
 
 /// Each description's mesh, or the line that says why there is none.
 nanobind::list make_surfaces(const wavecomb::SceneBuilder& builder,

@@ -160,8 +160,11 @@ nb::list make_surfaces(const SceneBuilder& builder, const nb::list& descriptions
     d["triangles"] = array_of(std::move(mesh.triangles), 3);
     d["faces"] = array_of(std::move(mesh.faces), 0);
     nb::list primvars;
-    for (size_t p = 0; p < mesh.primvars.size(); ++p)
-      primvars.append(array_of(std::move(mesh.primvars[p]), descs[i].primvars[p].width));
+    for (size_t p = 0; p < mesh.primvars.size(); ++p) {
+      SurfaceValues& made = mesh.primvars[p];
+      primvars.append(nb::make_tuple(made.per_corner ? "corner" : "vertex",
+                                     array_of(std::move(made.values), descs[i].primvars[p].width)));
+    }
     d["primvars"] = primvars;
     d["manifold"] = mesh.is_manifold;
     out.append(d);

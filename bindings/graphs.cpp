@@ -22,19 +22,21 @@ namespace {
 
 using Pairs = std::vector<std::pair<uint32_t, uint32_t>>;
 using Images = std::vector<std::pair<uint32_t, float>>;
+using Names = std::vector<std::string>;
 
 constexpr std::array<const char*, kGraphCodeCount> kCodes{
     "copy",   "input",      "image", "add",   "subtract", "multiply", "divide",   "modulo",
     "power",  "min",        "max",   "atan2", "less",     "equal",    "mix",      "clamp",
     "select", "smoothstep", "abs",   "floor", "sign",     "sqrt",     "exp",      "log",
     "sin",    "cos",        "acos",  "dot",   "cross",    "rgbtohsv", "hsvtorgb", "noise2",
-    "noise3", "fractal3",   "cell2", "cell3", "worley2",  "worley3"};
+    "noise3", "fractal3",   "cell2", "cell3", "worley2",  "worley3",  "attribute"};
 constexpr std::array<const char*, kGraphInputCount> kInputs{
     "uv", "position", "local_position", "normal", "local_normal", "tangent", "bitangent", "view"};
 
 Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, const Images& images,
-                 const Pairs& outputs) {
+                 const Pairs& outputs, const Names& attributes) {
   Graph graph;
+  graph.attributes = attributes;
   if (ops.size() % sizeof(GraphOp) != 0) throw Error("a graph has a part of an operation");
   graph.ops.resize(ops.size() / sizeof(GraphOp));
   if (ops.size() > 0) std::memcpy(graph.ops.data(), ops.c_str(), ops.size());
@@ -62,8 +64,15 @@ void run(const GraphSet& set, const TextureView* textures, const Points& points,
       return wavecomb::load<F>(lanes);
     };
     const auto vec3 = [&](size_t c) { return Vec3<F>(column(c), column(c + 1), column(c + 2)); };
-    const GraphPoint<F> at{
-        {column(0), column(1)}, column(2), vec3(3), vec3(6), vec3(9), vec3(12), vec3(15), vec3(18)};
+    const GraphPoint<F> at{{column(0), column(1)},
+                           column(2),
+                           vec3(3),
+                           vec3(6),
+                           vec3(9),
+                           vec3(12),
+                           vec3(15),
+                           vec3(18),
+                           {}};
     run_graph<F>(view, program, textures, at, first_lanes<F>(count - i), registers);
     for (size_t o = 0; o < program.output_count; ++o) {
       alignas(64) float lanes[kWidth<F>];
@@ -77,8 +86,9 @@ void run(const GraphSet& set, const TextureView* textures, const Points& points,
 nb::ndarray<nb::numpy, float, nb::ndim<2>> run_points(const nb::bytes& ops,
                                                       const std::vector<float>& constants,
                                                       const Images& images, const Pairs& outputs,
-                                                      const Points& points, uint32_t lanes) {
-  Graph graph = make_graph(ops, constants, images, outputs);
+                                                      const Names& attributes, const Points& points,
+                                                      uint32_t lanes) {
+  Graph graph = make_graph(ops, constants, images, outputs, attributes);
   // A texture of one white texel stands for all.
   for (GraphImage& image : graph.images) image.texture = 0;
   check_graph(graph, "a graph to run", 1, ~uint32_t{0});
@@ -119,11 +129,11 @@ void bind_graphs(nb::module_& m) {
   m.attr("GRAPH_REGISTERS") = kMaxGraphRegisters;
   m.attr("GRAPH_OPS") = kMaxGraphOps;
   m.attr("GRAPH_CONSTANT") = uint32_t{kGraphConstant};
-  m.def("run_graph", &run_points, "ops"_a, "constants"_a, "images"_a, "outputs"_a, "points"_a,
-        "lanes"_a = 1);
+  m.def("run_graph", &run_points, "ops"_a, "constants"_a, "images"_a, "outputs"_a, "attributes"_a,
+        "points"_a, "lanes"_a = 1);
 }
 
 uint32_t add_graph(SceneBuilder& builder, const nb::bytes& ops, const std::vector<float>& constants,
-                   const Images& images, const Pairs& outputs) {
-  return builder.add_graph(make_graph(ops, constants, images, outputs));
+                   const Images& images, const Pairs& outputs, const Names& attributes) {
+  return builder.add_graph(make_graph(ops, constants, images, outputs, attributes));
 }

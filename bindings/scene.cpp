@@ -190,12 +190,35 @@ Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, cons
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
 
+/// Attributes by name, each a rate and an array (values, components). `owners` collects the arrays.
+std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& attributes,
+                                         nb::list& owners) {
+  std::vector<MeshAttribute> out;
+  for (const auto& [key, value] : attributes) {
+    const auto name = nb::cast<std::string>(key);
+    const auto [rate, values] = nb::cast<std::pair<std::string, Array<float>>>(value);
+    if (values.ndim() != 2)
+      throw Error("attribute '" + name + "' must have the shape (values, components)");
+    out.push_back({builder.attribute(name),
+                   choose<AttributeRate>("rate of attribute '" + name + "'", rate,
+                                         {{"constant", AttributeRate::kConstant},
+                                          {"primitive", AttributeRate::kPrimitive},
+                                          {"vertex", AttributeRate::kVertex},
+                                          {"corner", AttributeRate::kCorner},
+                                          {"end", AttributeRate::kEnd}}),
+                   static_cast<uint32_t>(std::min<size_t>(values.shape(1), 5)),
+                   {values.data(), values.size()}});
+    owners.append(nb::cast(values));
+  }
+  return out;
+}
+
 /// Arrays as a mesh; they are kept alive, not copied.
-Mesh make_mesh(const Array<float>& positions,
+Mesh make_mesh(SceneBuilder& builder, const Array<float>& positions,
                const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
                const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
                const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-               const std::string& name) {
+               const nb::dict& attributes, const std::string& name) {
   Mesh mesh;
   mesh.name = name;
   const bool deforms = positions.ndim() == 3;
@@ -225,6 +248,7 @@ Mesh make_mesh(const Array<float>& positions,
     mesh.face_materials = {face_materials->data(), face_materials->size()};
     owners.append(nb::cast(*face_materials));
   }
+  mesh.attributes = attributes_of(builder, attributes, owners);
   mesh.material = material;
   mesh.owner = hold(std::move(owners));
   return mesh;
@@ -235,9 +259,11 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
                   const std::optional<Array<float>>& normals,
                   const std::optional<Array<float>>& uvs,
                   const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                  const std::string& name, const std::string& light_group, uint32_t asset_length,
+                  const nb::dict& attributes, const std::string& name,
+                  const std::string& light_group, uint32_t asset_length,
                   std::optional<uint32_t> mesh_light) {
-  Mesh mesh = make_mesh(positions, indices, normals, uvs, face_materials, material, name);
+  Mesh mesh = make_mesh(builder, positions, indices, normals, uvs, face_materials, material,
+                        attributes, name);
   mesh.light_group = builder.light_group(light_group);
   mesh.asset_length = asset_length;
   mesh.mesh_light = mesh_light.value_or(kNoLight);
@@ -248,9 +274,10 @@ void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positi
                   const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
                   const std::optional<Array<float>>& normals,
                   const std::optional<Array<float>>& uvs,
-                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material) {
-  builder.replace_mesh(id,
-                       make_mesh(positions, indices, normals, uvs, face_materials, material, ""));
+                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                  const nb::dict& attributes) {
+  builder.replace_mesh(id, make_mesh(builder, positions, indices, normals, uvs, face_materials,
+                                     material, attributes, ""));
 }
 
 /// What curves and points have in common, ready but for primitive, segments and normals. `owners`
@@ -258,8 +285,8 @@ void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positi
 Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
                  const std::optional<Array<float>>& uvs,
                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                 const std::string& name, const std::string& light_group, uint32_t asset_length,
-                 nb::list& owners) {
+                 const nb::dict& attributes, const std::string& name,
+                 const std::string& light_group, uint32_t asset_length, nb::list& owners) {
   Mesh mesh;
   mesh.name = name;
   mesh.light_group = builder.light_group(light_group);
@@ -282,6 +309,7 @@ Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Arr
     mesh.face_materials = {face_materials->data(), face_materials->size()};
     owners.append(nb::cast(*face_materials));
   }
+  mesh.attributes = attributes_of(builder, attributes, owners);
   return mesh;
 }
 
@@ -290,11 +318,11 @@ uint32_t add_curves(SceneBuilder& builder, const std::string& kind, const Array<
                     const std::optional<Array<float>>& normals,
                     const std::optional<Array<float>>& uvs,
                     const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                    const std::string& name, const std::string& light_group,
-                    uint32_t asset_length) {
+                    const nb::dict& attributes, const std::string& name,
+                    const std::string& light_group, uint32_t asset_length) {
   nb::list owners;
-  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, name,
-                          light_group, asset_length, owners);
+  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, attributes,
+                          name, light_group, asset_length, owners);
   mesh.primitive = choose<Primitive>("kind of curves", kind,
                                      {{"linear-tube", Primitive::kLinearTube},
                                       {"cubic-tube", Primitive::kCubicTube},
@@ -313,11 +341,11 @@ uint32_t add_curves(SceneBuilder& builder, const std::string& kind, const Array<
 uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
                     const std::optional<Array<float>>& uvs,
                     const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
-                    const std::string& name, const std::string& light_group,
-                    uint32_t asset_length) {
+                    const nb::dict& attributes, const std::string& name,
+                    const std::string& light_group, uint32_t asset_length) {
   nb::list owners;
-  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, name,
-                          light_group, asset_length, owners);
+  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, attributes,
+                          name, light_group, asset_length, owners);
   mesh.primitive = Primitive::kSphere;
   mesh.owner = hold(std::move(owners));
   return builder.add_mesh(std::move(mesh));
@@ -564,7 +592,8 @@ void bind_scene(nb::module_& m) {
            "wrap_t"_a = "repeat", "name"_a = "")
       .def("share_texture", &share_texture, "scene"_a, "texture"_a)
       .def("add_tiles", &SceneBuilder::add_tiles, "name"_a, "tiles"_a, "missing"_a)
-      .def("add_graph", &add_graph, "ops"_a, "constants"_a, "images"_a, "outputs"_a)
+      .def("add_graph", &add_graph, "ops"_a, "constants"_a, "images"_a, "outputs"_a,
+           "attributes"_a = std::vector<std::string>())
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
            "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
            "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,
@@ -575,19 +604,19 @@ void bind_scene(nb::module_& m) {
            "opacity_graph"_a = nb::none(), "emission_graph"_a = nb::none())
       .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
-           "material"_a = kInheritMaterial, "name"_a = "", "light_group"_a = "",
-           "asset_length"_a = 0, "mesh_light"_a = nb::none())
+           "material"_a = kInheritMaterial, "attributes"_a = nb::dict(), "name"_a = "",
+           "light_group"_a = "", "asset_length"_a = 0, "mesh_light"_a = nb::none())
       .def("replace_mesh", &replace_mesh, "mesh"_a, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
-           "material"_a = kInheritMaterial)
+           "material"_a = kInheritMaterial, "attributes"_a = nb::dict())
       .def("make_surfaces", &make_surfaces, "descriptions"_a, "threads"_a = 0)
       .def("add_curves", &add_curves, "kind"_a, "positions"_a, "segments"_a, "radii"_a,
            nb::kw_only(), "normals"_a = nb::none(), "uvs"_a = nb::none(),
-           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial, "name"_a = "",
-           "light_group"_a = "", "asset_length"_a = 0)
+           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
+           "attributes"_a = nb::dict(), "name"_a = "", "light_group"_a = "", "asset_length"_a = 0)
       .def("add_points", &add_points, "positions"_a, "radii"_a, nb::kw_only(), "uvs"_a = nb::none(),
-           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial, "name"_a = "",
-           "light_group"_a = "", "asset_length"_a = 0)
+           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
+           "attributes"_a = nb::dict(), "name"_a = "", "light_group"_a = "", "asset_length"_a = 0)
       .def("add_group", &SceneBuilder::add_group, "name"_a = "", "root"_a = "")
       .def("add_to_group", &SceneBuilder::add_to_group, "group"_a, "mesh"_a)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,

@@ -4,7 +4,7 @@
 Arrays are NumPy arrays and are not copied where said so.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -133,10 +133,12 @@ class SceneBuilder:
         constants: Sequence[float],
         images: Sequence[tuple[int, float]],
         outputs: Sequence[tuple[int, int]],
+        attributes: Sequence[str] = (),
     ) -> int:
         """A value graph, for ``add_material``: operations of 16 bytes as GraphOp in
         texture/graph_data.h has them, images as (texture, stretch), outputs as (component of
-        GRAPH_PARAMETERS, operand). Raises Error for one that reads what is not there."""
+        GRAPH_PARAMETERS, operand), names of attributes of meshes. Raises Error for one that reads
+        what is not there."""
     def add_material(
         self,
         program: str,
@@ -188,6 +190,7 @@ class SceneBuilder:
         uvs: NDArray[np.float32] | None = None,
         face_materials: NDArray[np.uint32] | None = None,
         material: int = ...,
+        attributes: Mapping[str, tuple[str, NDArray[np.float32]]] = ...,
         name: str = "",
         light_group: str = "",
         asset_length: int = 0,
@@ -195,7 +198,9 @@ class SceneBuilder:
     ) -> int:
         """Positions (n, 3), or (s, n, 3) at s equal steps over the shutter, and normals likewise;
         triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
-        vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,).
+        vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,). attributes:
+        name -> (rate, values (k, c) of 1 to 4 components): "constant" (k = 1), "primitive" (m),
+        "vertex" (n) or "corner" (3 m); of curves "end" (2 m) in place of the last two.
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
         afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
         names the asset that it is part of; 0: none known. mesh_light: what add_mesh_light gave."""
@@ -209,6 +214,7 @@ class SceneBuilder:
         uvs: NDArray[np.float32] | None = None,
         face_materials: NDArray[np.uint32] | None = None,
         material: int = ...,
+        attributes: Mapping[str, tuple[str, NDArray[np.float32]]] = ...,
     ) -> None:
         """Gives a mesh other arrays, as add_mesh takes them; its name and its groups stay."""
     def make_surfaces(
@@ -225,11 +231,13 @@ class SceneBuilder:
         {"interpolation": "vertex", "varying" or "faceVarying", "values": (k, width) float32,
         "width", "indices": (corners,) int32 where it is face-varying}; displacements, a list of
         lengths and of texture uses as add_material takes them, and face_displacement (faces,)
-        int32: which of them, -1 for none.
+        int32: which of them, -1 for none. At level 0 values of face-varying primvars are those of
+        the triangles' corners (3 m, width), without indices.
 
         Returns for each either a line that says why there is no mesh, or positions, normals, uvs
-        (or None), triangles, faces (m,): face of the cage of each triangle, primvars: mean of each
-        on each triangle, and manifold: false where edges or points had to be kept sharp.
+        (or None), triangles, faces (m,): face of the cage of each triangle, primvars: attributes
+        as add_mesh takes them, "vertex" or "corner", and manifold: false where edges or points had
+        to be kept sharp.
         """
     def add_curves(
         self,
@@ -242,6 +250,7 @@ class SceneBuilder:
         uvs: NDArray[np.float32] | None = None,
         face_materials: NDArray[np.uint32] | None = None,
         material: int = ...,
+        attributes: Mapping[str, tuple[str, NDArray[np.float32]]] = ...,
         name: str = "",
         light_group: str = "",
         asset_length: int = 0,
@@ -260,6 +269,7 @@ class SceneBuilder:
         uvs: NDArray[np.float32] | None = None,
         face_materials: NDArray[np.uint32] | None = None,
         material: int = ...,
+        attributes: Mapping[str, tuple[str, NDArray[np.float32]]] = ...,
         name: str = "",
         light_group: str = "",
         asset_length: int = 0,
@@ -625,12 +635,14 @@ def run_graph(
     constants: Sequence[float],
     images: Sequence[tuple[int, float]],
     outputs: Sequence[tuple[int, int]],
+    attributes: Sequence[str],
     points: NDArray[np.float32],
     lanes: int = 1,
 ) -> NDArray[np.float32]:
     """Outputs of a value graph (n, outputs) at points (n, 21): uv, its width, position, local
-    position, normal, local normal, tangent, view. Textures are white. ``lanes``: 1 or 16; the
-    results are alike. Raises Error for a graph that reads what is not there."""
+    position, normal, local normal, tangent, view. Textures are white, attributes are not there.
+    ``lanes``: 1 or 16; the results are alike. Raises Error for a graph that reads what
+    is not there."""
 
 def crypto_id(name: str) -> int:
     """A name's id in a Cryptomatte: MurmurHash3 32 with seed 0, made a usual float."""

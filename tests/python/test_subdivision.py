@@ -394,14 +394,33 @@ def test_colours_follow_the_refined_faces(tmp_path):
     colours = 'color3f[] primvars:displayColor = [(1,0,0), (0,0,1)] (interpolation = "uniform")'
     recorder, _ = load(tmp_path, mesh(points, faces, colours), subdivision=2)
     made = recorder.mesh("/M")
-    assert len(made["face_materials"]) == len(made["indices"]) == 2 * 2 * 16
+    rate, values = made["attributes"]["displayColor"]
+    assert rate == "primitive" and len(values) == len(made["indices"]) == 2 * 2 * 16
     x = made["positions"][made["indices"]].mean(axis=1)[:, 0]
-    blue = [recorder.materials[i]["base_color"][2] == 1 for i in made["face_materials"]]
-    assert (np.array(blue) == (x > 1)).all()
-    smooth = "color3f[] primvars:displayColor = [(0,0,0), (1,1,1), (0,0,0), (1,1,1), (0,0,0), "
-    smooth += '(1,1,1)] (interpolation = "varying")'
-    recorder, _ = load(tmp_path, mesh(*grid(2, 1), smooth), subdivision=3)
-    assert len(set(recorder.mesh("/M")["face_materials"].tolist())) > 4
+    assert ((values[:, 2] == 1) == (x > 1)).all()
+
+
+@pytest.mark.parametrize("kind", ["vertex", "varying", "faceVarying"])
+def test_primvars_are_refined_as_texture_coordinates_are(tmp_path, kind):
+    """A primvar with the values of texture coordinates: the same numbers at every corner."""
+    points, faces = grid(2, 2)
+    values = BENT[np.concatenate(faces)] if kind == "faceVarying" else BENT
+    if kind == "faceVarying":
+        values[:4] += 0.25  # a seam
+    rest = f"{BIND}; texCoord2f[] primvars:st = {pairs(values)} (interpolation = "
+    rest += f'"{kind}"); color3f[] primvars:tint = ['
+    rest += ", ".join(f"({u}, {v}, 0.5)" for u, v in values) + f'] (interpolation = "{kind}")'
+    reader = """
+        color3f inputs:diffuseColor.connect = </Mat/S/Tint.outputs:result>
+        def Shader "Tint" { uniform token info:id = "UsdPrimvarReader_float3"
+            string inputs:varname = "tint"
+            float3 outputs:result }"""
+    text = preview(TEXTURED + reader, ramp(tmp_path, np.zeros((2, 2, 3))))
+    recorder, _ = load(tmp_path, mesh(points, faces, rest) + text, subdivision=2)
+    made = recorder.mesh("/M")
+    rate, tint = made["attributes"]["tint"]
+    assert rate == "vertex" and tint[:, :2] == pytest.approx(made["uvs"], abs=1e-6)
+    assert tint[:, 2] == pytest.approx(0.5) and np.ptp(tint[:, 0]) > 0.5
 
 
 def test_subsets_name_refined_faces(tmp_path):

@@ -182,8 +182,8 @@ def test_colours_per_curve_and_per_point(tmp_path):
         ' interpolation = "uniform"\n)\n'  # fmt: skip
     scene, _ = load(tmp_path, curves(points, [4, 5], colours + widths([1], "constant")))
     (mesh,) = scene.meshes
-    found = [scene.materials[i]["base_color"] for i in mesh["face_materials"]]
-    assert found == [(1, 0, 0), (0, 1, 0), (0, 1, 0)]
+    rate, found = mesh["attributes"]["displayColor"]
+    assert rate == "primitive" and found.tolist() == [[1, 0, 0], [0, 1, 0], [0, 1, 0]]
     scene, _ = load(
         tmp_path,
         f"""def Points "P" {{
@@ -195,8 +195,8 @@ def test_colours_per_curve_and_per_point(tmp_path):
     )
     (mesh,) = scene.meshes
     assert mesh["kind"] == "sphere" and mesh["radii"].tolist() == [0.5, 1.0, 1.5]
-    found = [scene.materials[i]["base_color"] for i in mesh["face_materials"]]
-    assert found == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    rate, found = mesh["attributes"]["displayColor"]
+    assert rate == "primitive" and found.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
 def test_texture_coordinates(tmp_path):

@@ -438,10 +438,9 @@ def test_display_colours(tmp_path):
     assert scene.material_of("Veil")["opacity"] == 0.5
     assert scene.material_of("Below")["base_color"] == (0, 1, 0)
     assert scene.material_of("None")["base_color"] == (0.5, 0.5, 0.5)
-    faces = scene.mesh("Points")["face_materials"]
-    colours = [scene.materials[i]["base_color"] for i in faces]
-    assert colours[0] == pytest.approx((1, 0, 0)) or colours[1] == pytest.approx((1, 0, 0))
-    assert len(set(colours)) == 2 and "one colour for each face: /Points" in said(loaded)
+    rate, colours = scene.mesh("Points")["attributes"]["displayColor"]
+    assert rate == "vertex" and colours.tolist() == [[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 1]]
+    assert scene.mesh("Plain")["attributes"] == {} and "displayColor" not in said(loaded)
 
 
 def test_many_colours_become_few_materials(tmp_path):
@@ -705,28 +704,6 @@ def test_auto_asks_the_file(tmp_path):
     tagged = one("uint16", "srgb_rec709_scene", "a.tif")  # writes Exif:ColorSpace
     assert tagged["srgb"] and tagged["pixels"][0, 0, 0] == pytest.approx(0.2140, abs=1e-3)
     assert not one("uint8", "lin_rec709_scene", "a.png")["srgb"]
-
-
-def test_varying_primvars_of_other_slots_are_per_face(tmp_path):
-    reader = """def Shader "P" { uniform token info:id = "UsdPrimvarReader_float"
-        string inputs:varname = "rough"
-        float outputs:result }"""
-    text = surface("float inputs:roughness.connect = </Mat/P.outputs:result>", reader)
-    strip = """int[] faceVertexCounts = [4, 4]
-        int[] faceVertexIndices = [0, 1, 2, 3, 1, 4, 5, 2]
-        point3f[] points = [(0,0,0), (1,0,0), (1,1,0), (0,1,0), (2,0,0), (2,1,0)]"""
-    scene, loaded = load(
-        tmp_path,
-        text
-        + f"""def Mesh "Own" {BIND} {{ {strip}
-            rel material:binding = </Mat>
-            uniform token subdivisionScheme = "none"
-            float[] primvars:rough = [0.25, 0.75] (interpolation = "uniform") }}""",
-    )
-    faces = scene.mesh("Own")["face_materials"]
-    values = [scene.materials[i]["roughness"] for i in faces]
-    assert values == pytest.approx([0.25, 0.25, 0.75, 0.75], abs=1e-3)
-    assert "one value for each face" in said(loaded)
 
 
 def test_files_with_the_same_bytes_are_one_texture(tmp_path):

@@ -34,9 +34,10 @@ class Recorder:
         self.textures.append({"tiles": dict(tiles), "missing": missing, "name": name})
         return len(self.textures) - 1
 
-    def add_graph(self, ops, constants, images, outputs):
+    def add_graph(self, ops, constants, images, outputs, attributes=()):
         assert len(ops) % 16 == 0 and outputs
-        self.graphs.append(Graph(ops, tuple(constants), tuple(images), tuple(outputs)))
+        names = tuple((name, 0) for name in attributes)
+        self.graphs.append(Graph(ops, tuple(constants), tuple(images), tuple(outputs), names))
         return len(self.graphs) - 1
 
     def add_material(self, program, *, name="", textures=None, **parameters):
@@ -54,6 +55,7 @@ class Recorder:
         uvs=None,
         face_materials=None,
         material=INHERIT,
+        attributes=(),
         name="",
         light_group="",
         asset_length=0,
@@ -75,6 +77,11 @@ class Recorder:
             assert face_materials.max() < len(self.materials) or face_materials.max() == INHERIT
         assert material == INHERIT or material < len(self.materials)
         assert mesh_light is None or mesh_light < len(self.mesh_lights)
+        counts = {"constant": 1, "primitive": m, "vertex": n, "corner": 3 * m}
+        for rate, values in dict(attributes).values():
+            assert values.dtype == np.float32 and values.flags.c_contiguous
+            assert len(values) == counts[rate] and 1 <= values.shape[1] <= 4
+            assert np.isfinite(values).all()
         self.meshes.append(
             {
                 "positions": positions,
@@ -83,6 +90,7 @@ class Recorder:
                 "uvs": uvs,
                 "face_materials": face_materials,
                 "material": material,
+                "attributes": dict(attributes),
                 "name": name,
                 "light_group": light_group,
                 "asset": name[:asset_length],

@@ -1,27 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Material ids of a mesh: bound, of its subsets, or of its display colour."""
+"""Materials of a mesh, bound, of its subsets or of its display colour, and what they read of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd, UsdShade
+from pxr import Gf, Sdf, Usd, UsdShade
 
-from wavecomb.usd.colour import face_values, quantise
+from wavecomb.usd.attributes import MAX_WIDTH, Wanted, check_fit
 from wavecomb.usd.curves import CurveArrays
 from wavecomb.usd.graph_bind import asks_for, bound
-from wavecomb.usd.graph_code import GraphTooLarge
+from wavecomb.usd.graph_code import PARAMETERS, GraphTooLarge
 from wavecomb.usd.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.mesh import MeshArrays, find_primvar
 from wavecomb.usd.network import colour, number
-from wavecomb.usd.primvar import Primvar, PrimvarError, as_integers
+from wavecomb.usd.primvar import PrimvarError, as_integers
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.shutter import Track
-from wavecomb.usd.strands import Strands
 from wavecomb.usd.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.triangulate import Topology
 
@@ -51,6 +50,21 @@ class Draw:
     track: Track | None = None
 
 
+@dataclass
+class Worn:
+    """What a gprim wears.
+
+    Attributes:
+        material: Of all that has none of its own.
+        by_face: One for each face of the prim where they differ.
+        reads: Primvars that its materials read, by name.
+    """
+
+    material: int
+    by_face: FaceIds | None = None
+    reads: dict[str, Wanted] = field(default_factory=dict)
+
+
 class Assigner:
     """Gives meshes their materials."""
 
@@ -72,35 +86,30 @@ class Assigner:
             self.report.missing(what, draw.prim.GetPath())
         return unique
 
-    def assign(
-        self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None
-    ) -> tuple[int, FaceIds | None]:
-        """The material of a mesh, and one for each triangle where they differ.
+    def assign(self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None) -> Worn:
+        """The materials of a mesh.
 
         Args:
             draw: The gprim with its bindings.
             mesh: Its arrays.
             otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
         """
+        primvars = _Primvars(draw, mesh, self.time, self.report)
         if draw.material is None:
-            base, faces = self._display(draw, mesh, otherwise)
+            worn = Worn(self._display(primvars, otherwise))
         else:
-            base, faces = self._bound(draw, mesh, self.table.surface(draw.material))
+            worn = Worn(self._bound(primvars, self.table.surface(draw.material)))
         if draw.subsets and isinstance(mesh, MeshArrays) and mesh.topology is not None:
-            faces = self._subsets(draw, mesh, base, faces)
-        return base, faces
+            worn.by_face = self._subsets(draw, mesh.topology, worn.material, primvars)
+        worn.reads = primvars.read
+        return worn
 
     def _subsets(
-        self, draw: Draw, mesh: MeshArrays, base: int, faces: FaceIds | None
+        self, draw: Draw, topology: Topology, base: int, primvars: _Primvars
     ) -> FaceIds | None:
-        topology = mesh.topology
-        if topology is None:
-            return faces
-        per_face = np.full(topology.face_count, 0xFFFFFFFF, np.int64)
-        own: dict[int, FaceIds] = {}
-        for k, (subset, material) in enumerate(
-            zip(draw.subsets, draw.subset_materials, strict=True)
-        ):
+        per_face = np.full(topology.face_count, base, np.uint32)
+        bound = False
+        for subset, material in zip(draw.subsets, draw.subset_materials, strict=True):
             if material is None:
                 continue
             index = as_integers(subset.GetAttribute("indices").Get(self.time), np.int64)
@@ -108,135 +117,140 @@ class Assigner:
             if not inside.all():
                 self.report.warn("subset names faces that are not there", subset.GetPath())
                 index = index[inside]
-            number_, varying = self._bound(draw, mesh, self.table.surface(material))
-            per_face[index] = k
-            own[k] = np.full(topology.count, number_, np.uint32) if varying is None else varying
-        if not own:
-            return faces
-        result = np.full(topology.count, base, np.uint32) if faces is None else faces.copy()
-        which = per_face[topology.face_ids()]
-        for k, ids in own.items():
-            result[which == k] = ids[which == k]
-        return result
+            per_face[index] = self._bound(primvars, self.table.surface(material))
+            bound = True
+        return per_face if bound else None
 
-    def _bound(
-        self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface
-    ) -> tuple[int, FaceIds | None]:
-        """Ids of a surface; one that reads primvars is made anew with this mesh's values."""
+    def _bound(self, primvars: _Primvars, surface: Surface) -> int:
+        """The id of a surface, with this gprim's values where it reads constant primvars."""
         if asks_for(surface.graph):
-            surface = self._with_graph(draw, mesh, surface)
-        by_face: tuple[str, NDArray[Any]] | None = None
-        # One may vary by face: the base colour where it does, for that shows most.
-        slots = sorted(surface.primvars.items(), key=lambda item: item[0] != "base_color")
-        for slot, name in slots:
-            width = 3 if slot in COLOUR_SLOTS else 1
-            values = self._values(draw, name, mesh.topology, width)
-            if values is None or len(values) == 0:
+            surface = self._with_graph(primvars, surface)
+        varying: list[str] = []
+        brightest = primvars.highest(surface.emission_attributes())
+        for slot, name in surface.primvars.items():
+            found = primvars.find(name, 3 if slot in COLOUR_SLOTS else 1)
+            if found is None:
                 continue
-            if len(values) == 1:
-                surface = surface.with_value(slot, _plain(values[0]))
-            elif by_face is None:
-                self.report.note(
-                    "varying primvar in a material: one value for each face", draw.prim.GetPath()
-                )
-                by_face = slot, values
-                surface = surface.with_value(slot, _plain(values.mean(axis=0)))
-            else:
+            if found.is_constant:
+                surface = surface.with_value(slot, _plain(found.first))
+                continue
+            if slot not in PARAMETERS:
                 what = f"varying primvar for {slot} (its mean is used)"
-                self.report.missing(what, draw.prim.GetPath())
-                surface = surface.with_value(slot, _plain(values.mean(axis=0)))
-        if by_face is None:
-            return self.table.add(surface), None
-        slot, values = by_face
-        palette, index = quantise(np.repeat(values, 3, axis=1) if values.shape[1] == 1 else values)
-        ids = [
-            self.table.add(surface.with_value(slot, _plain(c[: values.shape[1]]))) for c in palette
-        ]
-        return ids[0], np.array(ids, np.uint32)[index]
+                self.report.missing(what, primvars.path)
+                surface = surface.with_value(slot, _plain(found.mean))
+                continue
+            varying.append(slot)
+            primvars.keep(found)
+            if slot == "emission":
+                brightest = max(brightest, found.highest)
+        return self.table.add(self.table.varied(surface, tuple(varying)), brightest)
 
-    def _with_graph(self, draw: Draw, mesh: MeshArrays | CurveArrays, surface: Surface) -> Surface:
+    def _with_graph(self, primvars: _Primvars, surface: Surface) -> Surface:
         """A surface whose graph reads the mesh's own space or its primvars, as it is there."""
         graph = surface.graph
         values: dict[str, tuple[float, ...]] = {}
+        varying: dict[str, int] = {}
         for name in graph.primvars if graph is not None else ():
-            found = None
-            for width in (4, 3, 2, 1):
-                found = self._primvar_of(draw, name, mesh.topology, width)
-                if found is not None:
-                    break
-            if found is None or len(found) == 0:
+            found = primvars.find(name, 0)
+            if found is None:
                 continue
-            if len(found) > 1 and float(np.ptp(found, axis=0).max()) > 0:
-                what = f"varying primvar {name} in a shading network (its mean is used)"
-                self.report.missing(what, draw.prim.GetPath())
-            values[name] = tuple(float(x) for x in found.mean(axis=0))
-        matrix = np.array(draw.matrix, np.float64)
-        key = (id(surface), matrix.tobytes(), tuple(values.items()))
+            if found.is_constant:
+                values[name] = tuple(float(x) for x in found.first)
+            else:
+                varying[name] = found.width
+                primvars.keep(found)
+        matrix = primvars.matrix
+        key = (id(surface), matrix.tobytes(), tuple(values.items()), tuple(varying.items()))
         if key not in self._bound_graphs:
             try:
-                made = bound(surface, matrix, values)
+                made = bound(surface, matrix, values, varying)
             except GraphTooLarge:
                 made = surface
             # Holding the surface keeps its address from being used again.
             self._bound_graphs[key] = (surface, made)
         return self._bound_graphs[key][1]
 
-    def _primvar_of(
-        self, draw: Draw, name: str, topology: Topology | Strands | None, width: int
-    ) -> NDArray[Any] | None:
-        """A primvar on each triangle where it has so many components; else None."""
-        try:
-            primvar = find_primvar(draw.prim, name, draw.inherited, self.time)
-        except PrimvarError:
+    def _display(self, primvars: _Primvars, otherwise: int | None) -> int:
+        """The id for displayColor and displayOpacity."""
+        colours = primvars.find("displayColor", 3)
+        if colours is None:
+            return self.table.plain() if otherwise is None else otherwise
+        opacities = primvars.find("displayOpacity", 1)
+        opacity = 1.0
+        if opacities is not None and opacities.is_constant:
+            opacity = min(max(number(float(opacities.first[0]), 1.0), 0.0), 1.0)
+        varying = []
+        for slot, found in (("base_color", colours), ("opacity", opacities)):
+            if found is not None and not found.is_constant:
+                varying.append(slot)
+                primvars.keep(found)
+        shown = colour(colours.first, DEFAULT_COLOUR) if colours.is_constant else DEFAULT_COLOUR
+        return self.table.plain(shown, opacity, tuple(varying))
+
+
+class _Primvars:
+    """Finds primvars of a gprim, each once, and tells what is wrong with them."""
+
+    def __init__(
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
+    ) -> None:
+        self.read: dict[str, Wanted] = {}
+        self._draw = draw
+        self._mesh = mesh
+        self._time = time
+        self._report = report
+        self._found: dict[tuple[str, int], Wanted | None] = {}
+
+    @property
+    def path(self) -> Sdf.Path:
+        """Of the gprim."""
+        return self._draw.prim.GetPath()
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(4, 4) From the gprim to its group."""
+        return np.array(self._draw.matrix, np.float64)
+
+    def find(self, name: str, width: int) -> Wanted | None:
+        """A primvar of at least so many components; None where there is none that fits.
+
+        ``width``: 0: as many as it has, at most ``MAX_WIDTH``.
+        """
+        key = name, width
+        if key not in self._found:
+            try:
+                self._found[key] = self._look(name, width)
+            except PrimvarError as error:
+                self._report.warn(f"{error}: ignored", self.path)
+                self._found[key] = None
+        return self._found[key]
+
+    def highest(self, names: Iterable[str]) -> float:
+        """The largest component of some that are read at hits; 0 of none."""
+        return max((self.read[name].highest for name in names if name in self.read), default=0.0)
+
+    def keep(self, wanted: Wanted) -> None:
+        """Notes that a material reads it at hits."""
+        name = wanted.primvar.name
+        known = self.read.get(name)
+        if known is None or known.width < wanted.width:
+            self.read[name] = wanted
+
+    def _look(self, name: str, width: int) -> Wanted | None:
+        primvar = find_primvar(self._draw.prim, name, self._draw.inherited, self._time)
+        if primvar is None or len(primvar.values) == 0:
             return None
-        if primvar is None or len(primvar.values) == 0 or primvar.values.shape[1] != width:
-            return None
-        return self._values(draw, name, topology, width)
-
-    def _display(
-        self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None
-    ) -> tuple[int, FaceIds | None]:
-        """Ids for displayColor and displayOpacity."""
-        colours = self._values(draw, "displayColor", mesh.topology, 3)
-        if colours is None or len(colours) == 0:
-            return self.table.plain() if otherwise is None else otherwise, None
-        opacity = self._opacity(draw, mesh.topology)
-        if len(colours) == 1:
-            return self.table.plain(colour(colours[0], DEFAULT_COLOUR), opacity), None
-        palette, index = quantise(colours)
-        if len(palette) > 1:
-            what = "varying displayColor: one colour for each face"
-            self.report.note(what, draw.prim.GetPath())
-        ids = np.array([self.table.plain(entry, opacity) for entry in palette], np.uint32)
-        return int(ids[0]), ids[index] if len(ids) > 1 else None
-
-    def _opacity(self, draw: Draw, topology: Topology | Strands | None) -> float:
-        values = self._values(draw, "displayOpacity", topology, 1)
-        if values is None or len(values) == 0:
-            return 1.0
-        if len(values) > 1 and float(np.ptp(values)) > 0:
-            what = "varying displayOpacity (its mean is used)"
-            self.report.missing(what, draw.prim.GetPath())
-        return min(max(number(float(values.mean()), 1.0), 0.0), 1.0)
-
-    def _values(
-        self, draw: Draw, name: str, topology: Topology | Strands | None, width: int
-    ) -> NDArray[Any] | None:
-        """A primvar on each triangle, (m, width) or (1, width); None where there is none."""
-        try:
-            primvar: Primvar | None = find_primvar(draw.prim, name, draw.inherited, self.time)
-            if primvar is None or len(primvar.values) == 0:
-                return None
-            if topology is not None and (len(primvar.values) > 1 or topology.point_count == 1):
-                return face_values(primvar, topology, width)
-            if primvar.values.shape[1] < width:
-                raise PrimvarError(f"primvar {name!r} has too few components")
-            return np.asarray(primvar.values[:1, :width], np.float64)
-        except PrimvarError as error:
-            self.report.warn(f"{error}: ignored", draw.prim.GetPath())
-            return None
+        if self._mesh.topology is None:  # an implicit shape
+            primvar = replace(primvar, values=primvar.values[:1], interpolation="constant")
+        check_fit(primvar, self._mesh, width)
+        values = np.asarray(primvar.values[:, :MAX_WIDTH], np.float32)
+        if not np.isfinite(values).all():
+            what = f"primvar {name!r} with values that are not finite: set to 0"
+            self._report.warn(what, self.path)
+            values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        return Wanted(replace(primvar, values=values), width or values.shape[1])
 
 
-def _plain(values: Any) -> Any:
+def _plain(values: Iterable[Any]) -> Any:
     numbers = tuple(float(v) for v in values)
     return numbers if len(numbers) > 1 else numbers[0]

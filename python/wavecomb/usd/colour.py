@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colours that vary over a mesh or over instances, as few materials."""
+"""Colours that vary over instances, as few materials."""
 
 from __future__ import annotations
 
@@ -8,24 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.primvar import Primvar, spread
-from wavecomb.usd.strands import Strands
-from wavecomb.usd.triangulate import RefinedTopology, Topology
-
 MAX_COLOURS = 256
 """Materials that one varying colour may turn into."""
-
-
-def face_values(primvar: Primvar, topology: Topology | Strands, width: int) -> NDArray[np.float32]:
-    """Mean of a primvar on each triangle (segment): (m, width); (1, width) where constant."""
-    if isinstance(topology, Strands):
-        return topology.means(primvar, width)
-    if isinstance(topology, RefinedTopology) and primvar.name in topology.means:
-        return np.ascontiguousarray(topology.means[primvar.name][:, :width])
-    values, at = spread(primvar, topology, width)
-    if at == "vertex":
-        return values[topology.triangles].mean(axis=1)
-    return values.mean(axis=1) if at == "corner" else values
 
 
 def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,7 @@ def bound(
     surface: Surface,
     matrix: NDArray[np.float64],
     primvars: Mapping[str, Sequence[float]],
-    make: Expressions | None = None,
+    attributes: Mapping[str, int] = MappingProxyType({}),
 ) -> Surface:
     """The surface as a mesh wears it.
 
@@ -40,19 +41,23 @@ def bound(
         surface: With a graph that asks for the object's space, or for primvars.
         matrix: From the mesh to its group, 4 x 4, for row vectors.
         primvars: Values of primvars that are one for the whole mesh.
-        make: Makes operations.
+        attributes: Primvars that vary over it, with how many components.
     """
     graph = surface.graph
     if graph is None:
         return surface
-    make = make or Expressions()
+    make = Expressions()
     turned: dict[str, Value] = {}
     if not np.array_equal(matrix, np.eye(4)):
         turned = _in_object_space(make, matrix)
 
-    def replaced(node: Node) -> Value | None:
+    def replaced(node: Node, operands: tuple[Value, ...]) -> Value | None:
         if node.code == PRIMVAR:
-            value = primvars.get(graph.primvars[node.number])
+            name = graph.primvars[node.number]
+            if name in attributes:
+                width = attributes[name]
+                return make.attribute(name, width, operands[0])[: node.width]
+            value = primvars.get(name)
             return None if value is None else numbers(*value)[: node.width]
         return turned.get(node.name) if node.code == "input" else None
 

@@ -44,7 +44,7 @@ class GraphTooLarge(Exception):
 class Node:
     """One operation; equal ones are one node."""
 
-    __slots__ = ("code", "image", "number", "operands", "width")
+    __slots__ = ("attribute", "code", "image", "number", "operands", "width")
 
     def __init__(
         self,
@@ -53,7 +53,9 @@ class Node:
         operands: tuple[Value, ...],
         number: int,
         image: tuple[int, float] | None,
+        attribute: str = "",
     ) -> None:
+        self.attribute = attribute
         self.code = code
         self.width = width
         self.operands = operands
@@ -77,12 +79,21 @@ Value = tuple[Part, ...]
 
 @dataclass(frozen=True)
 class Graph:
-    """A flat program, as ``SceneBuilder.add_graph`` takes it."""
+    """A flat program, as ``SceneBuilder.add_graph`` takes it.
+
+    ``attributes``: primvars that it reads, with how many components.
+    """
 
     ops: bytes
     constants: tuple[float, ...]
     images: tuple[tuple[int, float], ...]
     outputs: tuple[tuple[int, int], ...]
+    attributes: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its attributes."""
+        return tuple(name for name, _ in self.attributes)
 
     @property
     def count(self) -> int:
@@ -90,10 +101,10 @@ class Graph:
         return len(self.ops) // _OP.itemsize
 
     def run(self, points: Any, lanes: int = 1) -> Any:
-        """Its outputs at points (n, ``POINT_SIZE``), textures taken for white."""
+        """Its outputs at points (n, ``POINT_SIZE``), textures taken for white, without a mesh."""
         array = np.ascontiguousarray(points, np.float32)
         return _core.run_graph(
-            self.ops, self.constants, self.images, self.outputs, array, lanes=lanes
+            self.ops, self.constants, self.images, self.outputs, self.names, array, lanes=lanes
         )
 
 
@@ -143,7 +154,13 @@ class Expressions:
             return self.input(node.name)
         if node.code == "image" and node.image is not None:
             return self.image(node.image[0], operands[0], node.image[1])
+        if node.attribute:
+            return self.attribute(node.attribute, node.width, operands[0])
         return self.op(node.code, *operands, number=node.number, width=node.width)
+
+    def attribute(self, name: str, width: int, fallback: Value) -> Value:
+        """A primvar of the mesh at hits; ``fallback`` where it has none of so many components."""
+        return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 
     def op(self, code: str, *operands: Value, number: int = 0, width: int = 0) -> Value:
         """An operation on values: component by component but for those on whole vectors.
@@ -200,11 +217,12 @@ class Expressions:
         operands: tuple[Value, ...],
         number: int = 0,
         image: tuple[int, float] | None = None,
+        attribute: str = "",
     ) -> Node:
-        key = (code, width, operands, number, image)
+        key = (code, width, operands, number, image, attribute)
         node = self._nodes.get(key)
         if node is None:
-            node = self._nodes[key] = Node(code, width, operands, number, image)
+            node = self._nodes[key] = Node(code, width, operands, number, image, attribute)
         return node
 
 
@@ -300,7 +318,11 @@ def nodes_of(parts: Sequence[Part]) -> list[Node]:
     return order
 
 
-def substituted(make: Expressions, value: Value, replaced: Callable[[Node], Value | None]) -> Value:
+Replaced = Callable[[Node, tuple[Value, ...]], Value | None]
+"""Called as replaced(node, its operands made anew); None: the node stays."""
+
+
+def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
     """A value made anew with other values in the place of some nodes; primvars give way always."""
     done: dict[Node, Value] = {}
 
@@ -309,7 +331,7 @@ def substituted(make: Expressions, value: Value, replaced: Callable[[Node], Valu
 
     for node in nodes_of(value):
         operands = tuple(tuple(part_of(part) for part in one) for one in node.operands)
-        new = replaced(node)
+        new = replaced(node, operands)
         if new is None:
             new = operands[0] if node.code == PRIMVAR else make.again(node, operands)
         done[node] = fit(new, node.results)
@@ -335,6 +357,7 @@ class _Assembler:
         self._place: dict[Node, int] = {}
         self._constants: list[float] = []
         self._images: list[tuple[int, float]] = []
+        self._attributes: dict[str, int] = {}
         self._ops: list[tuple[Any, ...]] = []
 
     def graph(self) -> Graph:
@@ -358,7 +381,10 @@ class _Assembler:
         if len(self._ops) > _core.GRAPH_OPS or len(self._constants) >= _core.GRAPH_CONSTANT:
             raise GraphTooLarge(f"{len(self._ops)} operations")
         ops = np.array(self._ops, _OP).tobytes() if self._ops else b""
-        return Graph(ops, tuple(self._constants), tuple(self._images), outputs)
+        return Graph(
+            ops, tuple(self._constants), tuple(self._images), outputs,
+            tuple(self._attributes.items()),
+        )  # fmt: skip
 
     def _write(self, node: Node) -> None:
         operands, steps, copies = [0] * 4, 0, []
@@ -372,6 +398,10 @@ class _Assembler:
         number = node.number
         if node.image is not None:
             number = self._image(node.image)
+        if node.attribute:
+            known = self._attributes
+            known[node.attribute] = max(known.get(node.attribute, 0), node.width)
+            number = list(known).index(node.attribute)
         self._emit(node.code, node.width, steps, to, operands, number)
         for place, width in copies:
             self._release(place, width)

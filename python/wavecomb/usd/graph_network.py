@@ -10,6 +10,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 from wavecomb.usd.graph_code import Expressions, Value, fit, numbers
+from wavecomb.usd.graph_colour import in_working_space
 from wavecomb.usd.graph_images import IMAGES
 from wavecomb.usd.graph_nodes import HANDLERS
 from wavecomb.usd.network import shader_id, source_of, value_of, word
@@ -109,6 +110,12 @@ class Networks:
             self._path.pop()
         self._done[key] = value
         return value
+
+    def primvar(self, name: str, otherwise: Value) -> Value:
+        """What each mesh gives for a primvar."""
+        if name not in self.primvars:
+            self.primvars.append(name)
+        return self.make.primvar(self.primvars.index(name), otherwise)
 
     def _compiled(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
         identifier = shader_id(shader)
@@ -241,7 +248,7 @@ class NodeCall:
 
     def of_surface(self) -> Value | None:
         """Nodes that only say where on the surface something is, or how it is tilted."""
-        time, report = self.networks.time, self.networks.report
+        time = self.networks.time
         if self.category in ("normalmap", "gltf_normalmap"):
             return self._normal_map()
         if self.category == "UsdTransform2d":
@@ -253,24 +260,39 @@ class NodeCall:
             stage = self.shader.GetPrim().GetStage()
             return numbers(frame / (stage.GetFramesPerSecond() or 24.0))
         if self.category == "texcoord":
-            if self.number("index", 0.0) != 0.0:
-                what = "MaterialX texture coordinates of an index above 0 (the first)"
-                report.missing(what, self.shader.GetPath())
-            self.networks.uv_names.append("st")
-            return self.make.input("uv")
+            index = int(self.number("index", 0.0))
+            return self._texture_coordinates(f"st{index}" if index else "st")
         named = "varname" if self.category == "UsdPrimvarReader" else "geomprop"
         name = self.text(named, "displayColor" if self.category == "geomcolor" else "")
         if self.width == 2:
-            self.networks.uv_names.append(name or "st")
-            return self.make.input("uv")
+            return self._texture_coordinates(name or "st")
         fallback = "fallback" if self.category == "UsdPrimvarReader" else "default"
-        otherwise = fit(self.value(fallback), self.width or 1)
-        if not name:
-            return otherwise
-        known = self.networks.primvars
-        if name not in known:
-            known.append(name)
-        return self.make.primvar(known.index(name), otherwise)
+        if not name or self.width == 0:
+            return self.value(fallback)
+        return self._primvar(name, fallback)
+
+    def _texture_coordinates(self, name: str) -> Value:
+        """The first set that a material reads is the mesh's; others are read as primvars."""
+        names = self.networks.uv_names
+        if names and names[0] != name:
+            return self.networks.primvar(name, numbers(0.0, 0.0))
+        names.append(name)
+        return self.make.input("uv")
+
+    def _primvar(self, name: str, fallback: str) -> Value:
+        """A primvar of the mesh; alpha of its colours is displayOpacity."""
+        networks = self.networks
+        converts, networks.converts = networks.converts, False
+        otherwise = self.value(fallback, width=self.width)
+        networks.converts = converts
+        if self.category == "geomcolor" and self.width == 4:
+            opacity = networks.primvar("displayOpacity", numbers(1.0))
+            value = networks.primvar(name, otherwise[:3]) + opacity
+        else:
+            value = networks.primvar(name, otherwise)
+        if converts and self.kind in COLOURS and self.width >= 3:
+            return in_working_space(self.make, value, networks.textures.working)
+        return value
 
     def _normal_map(self) -> Value | None:
         """A normal in tangent space; of a map that is flat, the surface's own."""

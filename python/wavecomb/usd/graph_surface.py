@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,7 +65,7 @@ def sampled(value: Value) -> Any:
     points[:, 0], points[:, 1] = (axis.ravel() for axis in np.meshgrid(steps, steps))
     points[:, [3, 4, 6, 7]] = np.tile(points[:, :2], 2)
     points[:, [11, 14, 15, 20]] = 1.0
-    ready = substituted(Expressions(), value, lambda node: None)
+    ready = substituted(Expressions(), value, _as_it_is)
     return assemble(dict(enumerate(ready))).run(points)
 
 
@@ -179,7 +179,7 @@ class Drivers:
         return None
 
 
-def graphs_of(outputs: dict[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
+def graphs_of(outputs: Mapping[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
     """The graphs that drive parameters, primvars at their defaults; None for no parameter.
 
     Raises:
@@ -188,7 +188,7 @@ def graphs_of(outputs: dict[str, Value], primvars: tuple[str, ...]) -> SurfaceGr
     if not outputs:
         return None
     make = Expressions()
-    ready = {name: substituted(make, v, lambda node: None) for name, v in outputs.items()}
+    ready = {name: substituted(make, v, _as_it_is) for name, v in outputs.items()}
     whole = _of(ready)
     opacity = _of({"opacity": ready["opacity"]}) if "opacity" in ready else None
     emission = _of({"emission": ready["emission"]}) if "emission" in ready else None
@@ -202,6 +202,10 @@ def graphs_of(outputs: dict[str, Value], primvars: tuple[str, ...]) -> SurfaceGr
     )
 
 
+def _as_it_is(_node: Node, _operands: tuple[Value, ...]) -> Value | None:
+    return None
+
+
 def kind_of(parameter: str) -> str:
     """What values of a parameter are."""
     if parameter == "base_color":
@@ -211,7 +215,7 @@ def kind_of(parameter: str) -> str:
     return COLOUR if parameter in COLOUR_SLOTS or parameter.endswith("_color") else NUMBER
 
 
-def _of(outputs: dict[str, Value]) -> Graph:
+def _of(outputs: Mapping[str, Value]) -> Graph:
     parts: dict[int, Part] = {}
     for parameter, value in outputs.items():
         first, _ = PARAMETERS[parameter]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.isolate import trail
-from wavecomb.usd.assign import Assigner, Draw
+from wavecomb.usd.assign import Assigner, Draw, Worn
+from wavecomb.usd.attributes import on_shape
 from wavecomb.usd.colour import quantise
 from wavecomb.usd.curves import CurveArrays, uniform_scale
 from wavecomb.usd.gprims import GprimReader, add_shape
@@ -32,7 +33,7 @@ from wavecomb.usd.network import colour
 from wavecomb.usd.primvar import PrimvarError, from_attribute
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.stock import MeshStock
-from wavecomb.usd.surfaces import Repaint, Surfaces
+from wavecomb.usd.surfaces import Surfaces
 from wavecomb.usd.traverse import STRANDS, Gathered, Placed, Traversal
 from wavecomb.usd.triangulate import MeshError
 
@@ -188,9 +189,12 @@ class GroupBuilder:
             self.report.note(what, draw.prim.GetPath())
             return
         if lamp is not None and lamp.material is not None:
-            material, faces = lamp.material, None
+            worn = Worn(lamp.material)
         else:
-            material, faces = self._materials(draw, shape, scope)
+            worn = self._materials(draw, shape, scope)
+        material, faces = worn.material, None
+        if worn.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
+            faces = worn.by_face[shape.topology.face_ids()]
         name = self.report.place(draw.prim.GetPath())
         may_shine = (
             lamp is not None
@@ -200,6 +204,7 @@ class GroupBuilder:
         options: dict[str, Any] = {
             "face_materials": faces,
             "material": material,
+            "attributes": on_shape(worn.reads, shape, draw.matrix.GetDeterminant3() < 0),
             "name": name,
             "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
             "asset_length": self._asset_length(draw.prim, name),
@@ -218,14 +223,8 @@ class GroupBuilder:
         self.builder.add_to_group(self._number(group), number)
         group.grow(shape.bounds)
         if isinstance(shape, MeshArrays) and shape.cage is not None:
-            repaint = self._repainter(draw, scope) if faces is not None else None
-            self.surfaces.add(group, number, draw, shape, material, repaint)
+            self.surfaces.add(group, number, draw, shape, worn)
         self.report.tally(_COUNTS[kind])
-
-    def _repainter(self, draw: Draw, scope: Scope) -> Repaint:
-        """Materials of the same mesh once its triangles are others; says nothing twice."""
-        quiet = Assigner(self.materials, self.time, LoadReport())
-        return lambda mesh: self._materials(draw, mesh, scope, quiet)
 
     def _draw_alone(
         self,
@@ -249,19 +248,11 @@ class GroupBuilder:
         motion = None if steps is None else steps[None]
         self._add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
 
-    def _materials(
-        self,
-        draw: Draw,
-        mesh: MeshArrays | CurveArrays,
-        scope: Scope,
-        assigner: Assigner | None = None,
-    ) -> tuple[int, Any]:
-        if scope.override:
-            return INHERIT_MATERIAL, None
-        otherwise = INHERIT_MATERIAL if scope.inside else None
-        if draw.material is None and scope.bound and not any(draw.subset_materials):
-            return INHERIT_MATERIAL, None
-        return (assigner or self.assigner).assign(draw, mesh, otherwise)
+    def _materials(self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope) -> Worn:
+        inherits = draw.material is None and scope.bound and not any(draw.subset_materials)
+        if scope.override or inherits:
+            return Worn(INHERIT_MATERIAL)
+        return self.assigner.assign(draw, mesh, INHERIT_MATERIAL if scope.inside else None)
 
     def _asset_length(self, prim: Usd.Prim, name: str) -> int:
         """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdShade
 
+from wavecomb.usd.graph_attributes import with_attributes
+from wavecomb.usd.graph_code import GraphTooLarge
 from wavecomb.usd.materialx import MaterialXReader, model_of
 from wavecomb.usd.network import shader_id
 from wavecomb.usd.openpbr import OPENPBR_COLOURS
@@ -124,7 +126,8 @@ class MaterialTable:
         self._ids: dict[str, int] = {}
         self._graph_ids: dict[Graph, int] = {}
         self._surface_ids: dict[int, tuple[Surface, int]] = {}
-        self._plain: dict[tuple[float, ...], int] = {}
+        self._varied: dict[tuple[int, tuple[str, ...]], tuple[Surface, Surface]] = {}
+        self._plain: dict[tuple[Any, ...], int] = {}
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
         self._emitting: set[int] = set()
@@ -150,8 +153,35 @@ class MaterialTable:
             self._report.tally("materials")
         return surface
 
-    def add(self, surface: Surface) -> int:
-        """Material id of a surface."""
+    def add(self, surface: Surface, brightest: float = 0.0) -> int:
+        """Material id of a surface.
+
+        ``brightest``: highest emission that primvars give it.
+        """
+        number = self._add(surface)
+        if brightest > 0:
+            self._emitting.add(number)
+            self.glows = self.glows or brightest >= LAMP
+        return number
+
+    def varied(self, surface: Surface, slots: tuple[str, ...]) -> Surface:
+        """A surface whose slots read their primvars at hits."""
+        if not slots:
+            return surface
+        known = self._varied.get((id(surface), slots))
+        if known is not None:
+            return known[1]
+        try:
+            varied = with_attributes(surface, slots, self._textures.working)
+        except GraphTooLarge as error:
+            what = f"shading network too large for primvars ({error}): left out"
+            self._report.missing(what, surface.name)
+            varied = surface
+        # Holding the surface keeps its address from being used again.
+        self._varied[id(surface), slots] = surface, varied
+        return varied
+
+    def _add(self, surface: Surface) -> int:
         known = self._surface_ids.get(id(surface))
         if known is not None:
             return known[1]
@@ -188,7 +218,7 @@ class MaterialTable:
         for graph in graphs.values():
             if graph is not None and graph not in self._graph_ids:
                 self._graph_ids[graph] = self._builder.add_graph(
-                    graph.ops, graph.constants, graph.images, graph.outputs
+                    graph.ops, graph.constants, graph.images, graph.outputs, graph.names
                 )
         return {name: self._graph_ids[g] for name, g in graphs.items() if g is not None}
 
@@ -221,13 +251,22 @@ class MaterialTable:
             return material in self._emitting
         return bool(np.isin(faces, list(self._emitting)).any())
 
-    def plain(self, colour: Iterable[float] = DEFAULT_COLOUR, opacity: float = 1.0) -> int:
-        """Material id of a display colour."""
+    def plain(
+        self,
+        colour: Iterable[float] = DEFAULT_COLOUR,
+        opacity: float = 1.0,
+        varying: tuple[str, ...] = (),
+    ) -> int:
+        """Material id of a display colour.
+
+        ``varying``: which of base_color and opacity primvars give at hits.
+        """
         r, g, b = (max(float(value), 0.0) for value in colour)
-        key = (r, g, b, float(opacity))
+        key = (r, g, b, float(opacity), *varying)
         number = self._plain.get(key)
         if number is None:
-            number = self._plain[key] = self.add(fallback_surface((r, g, b), key[3]))
+            surface = fallback_surface((r, g, b), float(opacity), varying=varying)
+            number = self._plain[key] = self.add(self.varied(surface, varying))
         return number
 
     def _convert(self, material: UsdShade.Material) -> Surface:

@@ -121,8 +121,8 @@ class PreviewReader:
         self.time = time
         self.textures = textures
         self.report = report
-        self.uv_names: list[str] = []
         self.drivers = Drivers(Networks(material, time, textures, report))
+        self.uv_names = self.drivers.networks.uv_names
         self.slots = self.drivers.slots
         self.primvars: dict[str, str] = {}
 
@@ -164,7 +164,7 @@ class PreviewReader:
             program,
             parameters,
             self.slots,
-            tuple(dict.fromkeys((*self.uv_names, *self.drivers.uv_names))),
+            self.drivers.uv_names,
             self.primvars,
             displacement,
             self.drivers.graph(),

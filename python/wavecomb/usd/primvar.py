@@ -94,13 +94,8 @@ def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | Non
     return from_attribute(attribute, name, time)
 
 
-def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np.float32], str]:
-    """A primvar on triangles: ((n, c), "vertex"), ((m, 3, c), "corner") or ((1, c), "constant").
-
-    Args:
-        primvar: As read.
-        topology: Of its mesh.
-        width: Components wanted, c; more are cut.
+def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:
+    """Values (k, width) of a primvar that fits a mesh; more components are cut.
 
     Raises:
         PrimvarError: The number of values or components does not fit.
@@ -120,6 +115,21 @@ def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np
         raise PrimvarError(f"primvar {primvar.name!r} has unknown interpolation {kind!r}")
     if len(values) != wanted:
         raise PrimvarError(f"primvar {primvar.name!r} ({kind}) has the wrong number of values")
+    return values
+
+
+def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np.float32], str]:
+    """A primvar on triangles: ((n, c), "vertex"), ((m, 3, c), "corner") or ((1, c), "constant").
+
+    Args:
+        primvar: As read.
+        topology: Of its mesh.
+        width: Components wanted, c; more are cut.
+
+    Raises:
+        PrimvarError: The number of values or components does not fit.
+    """
+    values, kind = fitting(primvar, topology, width), primvar.interpolation
     if kind == "constant":
         return values, "constant"
     if kind in ("vertex", "varying"):

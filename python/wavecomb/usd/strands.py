@@ -136,14 +136,6 @@ class Strands:
             first, last = points[0], points[-1]
         return first, last
 
-    def means(self, primvar: Primvar, width: int) -> NDArray[np.float32]:
-        """A primvar on each segment: (count, width); (1, width) where it is constant."""
-        values, kind = self.fit(primvar, width)
-        if kind == "constant":
-            return np.asarray(values, np.float32)
-        first, last = self.ends(values, kind)
-        return np.asarray(0.5 * (first + last), np.float32)
-
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
         """Values of a primvar, (n, width), and the interpolation that their number fits.
 

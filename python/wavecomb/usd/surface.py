@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,20 @@ SLOTS = (
 )
 """Parameters that a texture can drive."""
 
+DEFAULTS: dict[str, Any] = {
+    "base_color": (0.18, 0.18, 0.18),
+    "specular_color": (0.0, 0.0, 0.0),
+    "emission": (0.0, 0.0, 0.0),
+    "roughness": 0.5,
+    "metallic": 0.0,
+    "clearcoat": 0.0,
+    "clearcoat_roughness": 0.01,
+    "opacity": 1.0,
+    "normal": (0.0, 0.0, 1.0),
+    "ior": 1.5,
+}
+"""What ``SceneBuilder.add_material`` takes for parameters that are not given."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -32,7 +47,7 @@ class Surface:
         parameters: Keyword arguments of ``SceneBuilder.add_material``.
         textures: Slots as ``SceneBuilder.add_material`` takes them.
         uv_names: Primvars that hold texture coordinates, first use first.
-        primvars: Slots read from a primvar of the mesh: slot -> (primvar, scale).
+        primvars: Slots read from a primvar of the mesh, where it has that.
         displacement: How far points move along their normals: a length, or a texture use; None: not
             at all. Part of the mesh's shape, not of the material's look.
         graph: Computes parameters that neither constants nor plain textures give.
@@ -58,6 +73,11 @@ class Surface:
         within = [{"texture": texture, "uv": (k, 0, 0, 0, k, 0)} for texture, k in images]
         return [*self.textures.values(), *within]
 
+    def emission_attributes(self) -> tuple[str, ...]:
+        """Primvars that what it emits depends on at hits."""
+        emission = None if self.graph is None else self.graph.emission
+        return () if emission is None else emission.names
+
     def brightest(self) -> float:
         """Highest emission that it can reach, textures taken for white."""
         if self.graph is not None and self.graph.emission is not None:
@@ -74,11 +94,21 @@ class Surface:
 
 
 def fallback_surface(
-    colour: tuple[float, float, float], opacity: float = 1.0, name: str = "displayColor"
+    colour: tuple[float, float, float],
+    opacity: float = 1.0,
+    name: str = "displayColor",
+    varying: Sequence[str] = (),
 ) -> Surface:
-    """What is drawn where no material is bound: matt, in the display colour."""
+    """What is drawn where no material is bound: matt, in the display colour.
+
+    ``varying``: which of base_color and opacity have a primvar that differs from place to place.
+    """
     parameters: dict[str, Any] = {"base_color": colour}
-    if opacity >= 1.0:
-        return Surface(name, "diffuse", parameters)
+    primvars = {slot: _DISPLAY[slot] for slot in varying}
+    if opacity >= 1.0 and "opacity" not in varying:
+        return Surface(name, "diffuse", parameters, primvars=primvars)
     parameters |= {"opacity": max(opacity, 0.0), "roughness": 0.5, "presence": True}
-    return Surface(name, "principled", parameters)
+    return Surface(name, "principled", parameters, primvars=primvars)
+
+
+_DISPLAY = {"base_color": "displayColor", "opacity": "displayOpacity"}

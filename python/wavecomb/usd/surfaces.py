@@ -6,7 +6,6 @@ from __future__ import annotations
 import heapq
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +14,13 @@ from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
 from wavecomb.machine import memory_bytes
-from wavecomb.usd.assign import Draw
+from wavecomb.usd.assign import Draw, Worn
+from wavecomb.usd.attributes import RefinedAttributes
 from wavecomb.usd.cage import Cage
 from wavecomb.usd.camera import View
-from wavecomb.usd.mesh import MeshArrays, find_primvar
-from wavecomb.usd.primvar import PrimvarError, as_integers
+from wavecomb.usd.mesh import MeshArrays
+from wavecomb.usd.primvar import as_integers, spread
 from wavecomb.usd.report import LoadReport
-from wavecomb.usd.triangulate import RefinedTopology
 from wavecomb.usd.view_size import ViewSize, placements
 
 if TYPE_CHECKING:
@@ -46,8 +45,6 @@ BYTES_PER_TRIANGLE = 210
 
 _BATCH_TRIANGLES = 4_000_000
 """Refined at once: bounds the memory that refinement itself takes."""
-
-Repaint = Callable[[MeshArrays], tuple[int, Any]]
 
 
 def parse_level(text: str | int) -> str | int:
@@ -78,8 +75,7 @@ class Surface:
         draw: Its prim and bindings.
         cage: Its polygons.
         bounds: (2, 3), in its group.
-        material: Of all that has none of its own.
-        repaint: Material of each triangle of refined arrays; None where all have one.
+        worn: Its materials, and what they read of it.
         group: It is in.
         moves: Displacements: lengths or texture uses.
         face_moves: (faces,) which of them each face has, -1: none.
@@ -90,8 +86,7 @@ class Surface:
     draw: Draw
     cage: Cage
     bounds: NDArray[Any]
-    material: int
-    repaint: Repaint | None
+    worn: Worn
     group: Group
     moves: list[Any] = field(default_factory=list)
     face_moves: NDArray[np.int32] | None = None
@@ -100,7 +95,7 @@ class Surface:
     @property
     def is_plain(self) -> bool:
         """Whether cage and level alone decide over it: materials have no say."""
-        return not self.moves and self.repaint is None
+        return not self.moves and not self.worn.reads
 
     @property
     def lowest(self) -> int:
@@ -147,14 +142,13 @@ class Surfaces:
         number: int,
         draw: Draw,
         mesh: MeshArrays,
-        material: int,
-        repaint: Repaint | None,
+        worn: Worn,
     ) -> None:
         """Notes a mesh that was added as polygons."""
         cage = mesh.cage
         if cage is None:
             return
-        surface = Surface(number, draw, cage, mesh.bounds, material, repaint, group)
+        surface = Surface(number, draw, cage, mesh.bounds, worn, group)
         self._displacements(surface)
         if surface.moves or (cage.scheme != "none" and self.choice != 0):
             group.has_surfaces = True
@@ -286,13 +280,13 @@ class Surfaces:
             if known is None:
                 fresh.append(surface)
             else:
-                self._take(surface, known, [])
+                self._take(surface, known)
         if not fresh:
             return
         described = [self._describe(surface) for surface in fresh]
-        steps = [s.cage.over_shutter(d) for s, (d, _) in zip(fresh, described, strict=True)]
+        steps = [s.cage.over_shutter(d) for s, d in zip(fresh, described, strict=True)]
         made = iter(self.builder.make_surfaces([d for each in steps for d in each], self.threads))
-        for surface, (_, names), each in zip(fresh, described, steps, strict=True):
+        for surface, each in zip(fresh, steps, strict=True):
             refined = _joined([next(made) for _ in each])
             if isinstance(refined, str):
                 what = f"mesh not subdivided, {refined}: drawn as polygons"
@@ -300,7 +294,7 @@ class Surfaces:
                 continue
             if self.stock is not None and surface.is_plain:
                 self.stock.put(surface.cage, surface.level, refined)
-            self._take(surface, refined, names)
+            self._take(surface, refined)
 
     def _stocked(self, surface: Surface) -> dict[str, Any] | None:
         """What the frame before made of a surface, if it can be this one's."""
@@ -308,14 +302,14 @@ class Surfaces:
             return None
         return self.stock.get(surface.cage, surface.level)
 
-    def _take(self, surface: Surface, refined: dict[str, Any], names: list[str]) -> None:
+    def _take(self, surface: Surface, refined: dict[str, Any]) -> None:
         if not refined["manifold"]:
             what = "subdivision mesh with edges or points that are not manifold: sharp there"
             self.report.warn(what, surface.draw.prim.GetPath())
-        self._replace(surface, refined, names)
+        self._replace(surface, refined)
 
-    def _describe(self, surface: Surface) -> tuple[dict[str, Any], list[str]]:
-        """What ``SceneBuilder.make_surfaces`` takes, and the names of its primvars."""
+    def _describe(self, surface: Surface) -> dict[str, Any]:
+        """What ``SceneBuilder.make_surfaces`` takes."""
         cage = surface.cage
         out: dict[str, Any] = {
             "level": surface.level,
@@ -327,26 +321,16 @@ class Surfaces:
         }
         if surface.moves:
             out |= {"displacements": surface.moves, "face_displacement": surface.face_moves}
+        out["primvars"] = RefinedAttributes(surface.worn.reads).described(cage, surface.level)
         if surface.level == 0:
-            return out | self._polygons(cage), []
+            return out | self._polygons(cage)
         out |= {"scheme": cage.scheme, **cage.rules}
         if cage.uvs is not None:
             out["uvs"] = cage.primvar(cage.uvs, 2)
-        names = []
-        if surface.repaint is not None:
-            out["primvars"] = []
-            for name in self._colour_names(surface.draw):
-                primvar = self._varying(surface, name)
-                if primvar is not None:
-                    width = min(primvar.values.shape[1], 4)
-                    out["primvars"].append(cage.primvar(primvar, width))
-                    names.append(name)
-        return out, names
+        return out
 
     def _polygons(self, cage: Cage) -> dict[str, Any]:
         """Polygons that are displaced where their points are."""
-        from wavecomb.usd.primvar import spread
-
         topology = cage.topology
         out: dict[str, Any] = {
             # Its triangles are turned the right way already.
@@ -365,46 +349,17 @@ class Surfaces:
             out["uvs"] = {"interpolation": kind, "values": values}
         return out
 
-    def _colour_names(self, draw: Draw) -> list[str]:
-        """Primvars that materials of single triangles may depend on."""
-        names = ["displayColor", "displayOpacity"]
-        for material in (draw.material, *draw.subset_materials):
-            if material is not None:
-                names += self.materials.surface(material).primvars.values()
-        return list(dict.fromkeys(names))
-
-    def _varying(self, surface: Surface, name: str) -> Any:
-        """A primvar that differs within the faces of a mesh and fits it; else None."""
-        draw, cage = surface.draw, surface.cage
-        try:
-            primvar = find_primvar(draw.prim, name, draw.inherited, self.materials.time)
-        except PrimvarError:
-            return None
-        if primvar is None or primvar.interpolation not in ("vertex", "varying", "faceVarying"):
-            return None
-        per_corner = primvar.interpolation == "faceVarying"
-        wanted = len(cage.indices) if per_corner else len(cage.points)
-        return primvar if len(primvar.values) == wanted else None
-
-    def _replace(self, surface: Surface, refined: dict[str, Any], names: list[str]) -> None:
-        faces, material = None, surface.material
-        triangles, uvs, normals = refined["triangles"], refined["uvs"], refined["normals"]
-        if surface.repaint is not None:
-            topology = RefinedTopology(
-                triangles, None, refined["faces"].astype(np.intp), surface.cage.indices,
-                len(surface.cage.points), len(surface.cage.counts),
-                means=dict(zip(names, refined["primvars"], strict=True)),
-            )  # fmt: skip
-            arrays = MeshArrays(
-                refined["positions"], triangles, normals, uvs, surface.bounds, topology
-            )
-            material, faces = surface.repaint(arrays)
+    def _replace(self, surface: Surface, refined: dict[str, Any]) -> None:
+        worn, faces, normals = surface.worn, None, refined["normals"]
+        if worn.by_face is not None:
+            faces = worn.by_face[refined["faces"]]
         if surface.level == 0 and not surface.cage.smooth:
             normals = None
         try:
             self.builder.replace_mesh(
-                surface.number, refined["positions"], triangles,
-                normals=normals, uvs=uvs, face_materials=faces, material=material,
+                surface.number, refined["positions"], refined["triangles"],
+                normals=normals, uvs=refined["uvs"], face_materials=faces, material=worn.material,
+                attributes=RefinedAttributes(worn.reads).of(refined),
             )  # fmt: skip
         except ValueError as error:
             path = surface.draw.prim.GetPath()

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -59,17 +58,6 @@ class Topology:
     def face_ids(self) -> NDArray[np.intp]:
         """(m,) face of each triangle."""
         return np.arange(self.count) // self.per_face if self.faces is None else self.faces
-
-
-@dataclass(frozen=True)
-class RefinedTopology(Topology):
-    """Triangles of a subdivision surface: ``faces`` are those of its cage.
-
-    Attributes:
-        means: Primvars that vary over the surface, by name: mean on each triangle, (m, c).
-    """
-
-    means: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 def triangulate(

@@ -36,11 +36,13 @@ Vec2<float> hit_uv(const MeshRecord& mesh, uint32_t prim, float u, float v) {
   return uv;
 }
 
-/// What a graph is given of a hit on a triangle: places at rest, and no view.
-GraphPoint<float> presence_point(const SceneView& scene, uint32_t instance, const MeshRecord& mesh,
+/// What a graph is given of a hit: on triangles places at rest, and no view.
+GraphPoint<float> presence_point(const SceneView& scene, uint32_t instance, uint32_t mesh_id,
                                  uint32_t prim, float u, float v, const Vec2<float>& uv) {
+  const MeshRecord& mesh = scene.meshes[mesh_id];
   GraphPoint<float> at;
   at.uv = uv;
+  at.place = {mesh_id, prim, u, v};
   if (mesh.indices == 0 || (mesh.flags & kIsCurved) != 0) return at;
   const auto* indices = reinterpret_cast<const uint32_t*>(mesh.indices) + 3 * size_t{prim};
   const auto* positions = reinterpret_cast<const float*>(mesh.positions);
@@ -113,7 +115,7 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
 
   const Vec2<float> uv = hit_uv(record, prim, u, v);
   GraphPoint<float> point;
-  if (m.opacity_graph != kNoGraph) point = presence_point(scene, instance, record, prim, u, v, uv);
+  if (m.opacity_graph != kNoGraph) point = presence_point(scene, instance, mesh, prim, u, v, uv);
   const float opacity =
       opacity_at(scene, m, material, uv, m.opacity_graph != kNoGraph ? &point : nullptr);
   if (opacity >= 1.f) return true;

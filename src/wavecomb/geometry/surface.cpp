@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/geometry/point.h"
@@ -135,8 +136,9 @@ double distance2(const std::vector<float>& positions, uint32_t a, uint32_t b) {
   return dot_of(d, d);
 }
 
-/// The triangles, with a point for each pair of normal and texture coordinate.
-void emit(const Work& work, bool reversed, SurfaceMesh& mesh) {
+/// The triangles, with a point for each pair of normal and texture coordinate. `origins`, if given,
+/// gets the corner of `work` that each of theirs came from.
+void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32_t>* origins) {
   const uint32_t k = work.faces.size;
   const size_t corners = work.faces.corners.size();
   constexpr uint32_t kEnd = ~0u;
@@ -172,7 +174,10 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh) {
   mesh.faces.reserve((k - 2) * work.faces.count());
   const auto add = [&](size_t at, uint32_t a, uint32_t b, uint32_t c) {
     if (reversed) std::swap(b, c);
-    for (const uint32_t corner : {a, b, c}) mesh.triangles.push_back(ids[at + corner]);
+    for (const uint32_t corner : {a, b, c}) {
+      mesh.triangles.push_back(ids[at + corner]);
+      if (origins) origins->push_back(static_cast<uint32_t>(at + corner));
+    }
     mesh.faces.push_back(work.faces.base[at / k]);
   };
   for (size_t at = 0; at < corners; at += k) {
@@ -214,20 +219,42 @@ Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
   return {};
 }
 
-/// Means over the faces, repeated for each triangle of one.
-std::vector<float> means(const Spread& spread, uint32_t width, const RefinedFaces& faces) {
-  const uint32_t k = faces.size;
-  std::vector<float> out;
-  out.reserve(faces.count() * (k - 2) * width);
-  std::vector<float> mean(width);
-  for (size_t f = 0; f < faces.count(); ++f) {
-    std::fill(mean.begin(), mean.end(), 0.f);
-    for (uint32_t c = 0; c < k; ++c)
-      for (uint32_t i = 0; i < width; ++i)
-        mean[i] += spread.values[size_t{spread.at[f * k + c]} * width + i];
-    for (float& value : mean) value /= static_cast<float>(k);
-    for (uint32_t t = 0; t + 2 < k; ++t) out.insert(out.end(), mean.begin(), mean.end());
+/// The same of polygons, which are triangles.
+Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces) {
+  Spread out{{primvar.values.begin(), primvar.values.end()}, faces.corners};
+  if (primvar.kind == PrimvarKind::kFaceVarying) std::iota(out.at.begin(), out.at.end(), 0u);
+  for (const uint32_t i : out.at)
+    if ((size_t{i} + 1) * primvar.width > out.values.size())
+      throw Error("a primvar has the wrong number of values");
+  return out;
+}
+
+/// A primvar on the triangles, whose corners are those of refined faces that `origins` names.
+SurfaceValues on_triangles(const Spread& spread, uint32_t width,
+                           const std::vector<uint32_t>& origins, const SurfaceMesh& mesh) {
+  SurfaceValues out;
+  const auto value_at = [&](size_t corner) {
+    return &spread.values[size_t{spread.at[origins[corner]]} * width];
+  };
+  constexpr uint32_t kNone = ~0u;
+  std::vector<uint32_t> first(mesh.positions.size() / 3, kNone);
+  out.values.resize(first.size() * width);
+  for (size_t c = 0; c < origins.size(); ++c) {
+    const uint32_t point = mesh.triangles[c];
+    const float* const here = value_at(c);
+    float* const there = &out.values[size_t{point} * width];
+    if (first[point] == kNone) {
+      first[point] = static_cast<uint32_t>(c);
+      std::copy_n(here, width, there);
+    } else if (!std::equal(here, here + width, there)) {
+      out.per_corner = true;
+      break;
+    }
   }
+  if (!out.per_corner) return out;
+  out.values.resize(origins.size() * width);
+  for (size_t c = 0; c < origins.size(); ++c)
+    std::copy_n(value_at(c), width, &out.values[c * width]);
   return out;
 }
 
@@ -288,9 +315,12 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
   check_displacement(desc);
   SurfaceMesh mesh;
   Work work;
+  std::vector<Spread> primvars;
   size_t normal_count = desc.cage.vertex_count;
   if (desc.level == 0) {
     work = polygons(desc);
+    for (const SurfacePrimvar& primvar : desc.primvars)
+      primvars.push_back(spread_polygons(primvar, work.faces));
   } else {
     const Subdivision surface(desc.cage, desc.level);
     mesh.is_manifold = surface.is_manifold();
@@ -308,8 +338,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     work.uvs = std::move(uvs.values);
     work.uv_at = std::move(uvs.at);
     for (const SurfacePrimvar& primvar : desc.primvars)
-      mesh.primvars.push_back(
-          means(spread(primvar, surface, work.faces), primvar.width, work.faces));
+      primvars.push_back(spread(primvar, surface, work.faces));
   }
   if (!desc.displacements.empty()) {
     displace(work, desc);
@@ -317,7 +346,10 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
   }
   bool mirrored = false;
   place(work, desc, mirrored);
-  emit(work, mirrored != desc.left_handed, mesh);
+  std::vector<uint32_t> origins;
+  emit(work, mirrored != desc.left_handed, mesh, primvars.empty() ? nullptr : &origins);
+  for (size_t i = 0; i < primvars.size(); ++i)
+    mesh.primvars.push_back(on_triangles(primvars[i], desc.primvars[i].width, origins, mesh));
   return mesh;
 }
 

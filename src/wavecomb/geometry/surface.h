@@ -27,7 +27,9 @@ enum class PrimvarKind : uint8_t { kNone, kVertex, kVarying, kFaceVarying };
 
 struct SurfacePrimvar {
   PrimvarKind kind = PrimvarKind::kNone;
-  std::span<const float> values;  ///< (points, width), or of its channel
+  /// (points, width), or of its channel; face-varying ones at level 0, but for uvs: (triangles, 3,
+  /// width).
+  std::span<const float> values;
   uint32_t width = 1;
   uint32_t channel = 0;  ///< of Cage::channels, where it is face-varying
 };
@@ -51,14 +53,20 @@ struct SurfaceDesc {
   bool left_handed = false;
 };
 
+/// Values of a primvar on triangles: (points, width), or (triangles, 3, width) where corners of a
+/// point differ.
+struct SurfaceValues {
+  std::vector<float> values;
+  bool per_corner = false;
+};
+
 /// Triangles with values per point: where a normal or a texture coordinate differs between faces,
 /// the point is there once for each, at the same place bit for bit.
 struct SurfaceMesh {
   std::vector<float> positions, normals, uvs;  ///< 3, 3, 2 for each point; uvs may be empty
   std::vector<uint32_t> triangles;             ///< counter-clockwise from outside
   std::vector<uint32_t> faces;                 ///< face of the cage of each triangle
-  /// Of each of SurfaceDesc::primvars, its mean over the refined face of each triangle.
-  std::vector<std::vector<float>> primvars;
+  std::vector<SurfaceValues> primvars;         ///< one for each of SurfaceDesc::primvars
   bool is_manifold = true;
 };
 

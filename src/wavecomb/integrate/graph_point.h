@@ -20,6 +20,7 @@ template <typename F>
   at.position = s.p;
   at.normal = s.ns;
   at.view = -dir;
+  at.place = {hit.mesh, hit.prim, hit.u, hit.v};
   const uint32_t wanted = scene.materials.graphs.inputs;
   const auto unit = [](const Vec3<F>& v, const Vec3<F>& otherwise) {
     const F len2 = length_squared(v);

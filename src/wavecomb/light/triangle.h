@@ -13,9 +13,11 @@ namespace wavecomb::detail {
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> graph_emission(const MaterialView& view, const UInt<F>& graph,
                                                      const Vec3<F>& p, const Vec2<F>& uv,
+                                                     const MeshPlace<F>& place,
                                                      const Mask<F>& active) {
   GraphPoint<F> at;
   at.uv = uv;
+  at.place = place;
   at.position = p;
   return graph_value<F>(view, graph, kEmissionOutput, at, active, Color<F>(F(0.f)));
 }
@@ -103,8 +105,9 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
       plain = textured & not_(driven);
       if (any(driven)) {
         const Vec3<F> at = q;
-        radiance =
-            select<F>(driven, graph_emission<F>(view.materials, graph, at, uv, driven), radiance);
+        const MeshPlace<F> place{float_bits<F>(uvs[6]), float_bits<F>(uvs[7]), b.x, b.y};
+        radiance = select<F>(
+            driven, graph_emission<F>(view.materials, graph, at, uv, place, driven), radiance);
       }
     }
     if (any(plain))

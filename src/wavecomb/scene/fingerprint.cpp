@@ -71,6 +71,10 @@ uint64_t hash_geometry(const Scene& scene) {
     h.add_array(m.radii);
     h.add(m.primitive, m.normals_at, m.uvs_at, m.material);
     if (m.deforms()) h.add(m.steps);
+    for (const MeshAttribute& a : m.attributes) {
+      h.add(a.id, a.rate, a.width);
+      h.add_array(a.values);
+    }
   }
   for (const Group& group : scene.groups()) h.add_array(std::span<const uint32_t>(group.meshes));
   for (const Instance& i : scene.instances()) {

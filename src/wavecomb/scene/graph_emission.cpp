@@ -25,6 +25,7 @@ void mean_graph_emission(const SceneGeometry& geometry, const SceneMaterials& ma
   MaterialView view;
   view.textures = geometry.texture_views.data();
   view.graphs = materials.graphs->view();
+  view.graphs.attributes = geometry.attributes();
   // Centres of four triangles of equal area; textures are read about as coarse as these are.
   constexpr float kPoints[4][2] = {
       {1.f / 3, 1.f / 3}, {1.f / 6, 1.f / 6}, {2.f / 3, 1.f / 6}, {1.f / 6, 2.f / 3}};
@@ -39,6 +40,7 @@ void mean_graph_emission(const SceneGeometry& geometry, const SceneMaterials& ma
     GraphPoint<float> at;
     at.uv = {mixed(t.uv0[0], t.uv1[0], t.uv2[0]), mixed(t.uv0[1], t.uv1[1], t.uv2[1])};
     at.uv_width = width;
+    at.place = {t.mesh, t.prim, u, v};
     at.position = {mixed(t.p0[0], t.p1[0], t.p2[0]), mixed(t.p0[1], t.p1[1], t.p2[1]),
                    mixed(t.p0[2], t.p1[2], t.p2[2])};
     sum += graph_value<float>(view, graph, kEmissionOutput, at, true, Vec3<float>(0.f));

@@ -449,7 +449,8 @@ void make_triangles(LightSet& set, size_t count, const TriangleSource& source, d
       powers[i] = sane_power(made.power);
       if (t.mesh_light != kNoLight) set.mesh_lights[i] = set.record_count + t.mesh_light;
       if (made.light.radiance[0] != TriangleLight::kTextured) return;
-      uvs[chunk].push_back({{t.uv0[0], t.uv0[1]}, {t.uv1[0], t.uv1[1]}, {t.uv2[0], t.uv2[1]}});
+      uvs[chunk].push_back(
+          {{t.uv0[0], t.uv0[1]}, {t.uv1[0], t.uv1[1]}, {t.uv2[0], t.uv2[1]}, t.mesh, t.prim});
     });
   });
   for (size_t chunk = 0; chunk < chunks; ++chunk) {

@@ -28,6 +28,7 @@ struct EmissiveTriangle {
   float uv0[2] = {0, 0}, uv1[2] = {1, 0}, uv2[2] = {0, 1};
   /// Material whose emission slot is textured; kNoLight where the emission is constant.
   uint32_t material = kNoLight;
+  uint32_t mesh = 0, prim = 0;  ///< whose attributes the emission may read
   /// Emitted radiance, W / (m^2 sr), to both sides; not read by kernels where `material` is set.
   float radiance[3] = {0, 0, 0};
   uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight

@@ -152,9 +152,10 @@ struct alignas(64) TriangleLight {
 };
 static_assert(sizeof(TriangleLight) == 64);
 
-/// Texture coordinates of the corners of a triangle with textured emission.
+/// Texture coordinates of the corners of a triangle whose emission varies, and where it is.
 struct alignas(32) TriangleUvs {
   float uv0[2], uv1[2], uv2[2];
+  uint32_t mesh, prim;
 };
 static_assert(sizeof(TriangleUvs) == 32);
 

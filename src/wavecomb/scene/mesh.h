@@ -6,6 +6,9 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
+
+#include "wavecomb/texture/attribute_data.h"
 
 namespace wavecomb {
 
@@ -17,6 +20,14 @@ enum class Attribute : uint8_t {
   kVertex,  ///< one value per vertex, addressed by the triangle's indices
   kCorner,  ///< one value per corner, 3 per triangle in order; 2 per segment of a curve, its ends;
             ///< 1 per point
+};
+
+/// Values that vary over a mesh and that materials may read by their name's id.
+struct MeshAttribute {
+  uint32_t id = kNoAttribute;  ///< SceneBuilder::attribute
+  AttributeRate rate = AttributeRate::kConstant;
+  uint32_t width = 1;             ///< components, 1 to 4
+  std::span<const float> values;  ///< `width` for each value, finite
 };
 
 /// What a mesh is made of.
@@ -49,6 +60,7 @@ struct Mesh {
   uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
   uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight
   uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
+  std::vector<MeshAttribute> attributes;  ///< those of a motion's first step, as uvs are
   uint32_t steps = 1;  ///< of its shape, at equal distances over the shutter; 1: it keeps its shape
   std::shared_ptr<const void> owner;
 

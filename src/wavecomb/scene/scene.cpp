@@ -53,6 +53,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.textures = geometry_->texture_views.data();
   v.materials.openpbr = materials_->openpbr.data();
   v.materials.graphs = materials_->graphs->view();
+  v.materials.graphs.attributes = geometry_->attributes();
   v.lights = lights_->set.view(v.materials);
   v.scale = geometry_->radius;
   v.motion = {geometry_->mesh_motions.data(),
@@ -140,6 +141,8 @@ SceneBytes Scene::bytes() const {
   for (const Mesh& m : meshes())
     b.meshes += m.positions.size_bytes() + m.indices.size_bytes() + m.normals.size_bytes() +
                 m.uvs.size_bytes() + m.face_materials.size_bytes() + m.radii.size_bytes();
+  for (const Mesh& m : meshes())
+    for (const MeshAttribute& a : m.attributes) b.meshes += a.values.size_bytes();
   for (const auto& texture : textures())
     if (!texture->store()) b.textures += texture->bytes();
   if (const TileStore* store = texture_store()) b.textures += store->statistics().resident_bytes;
@@ -149,7 +152,7 @@ SceneBytes Scene::bytes() const {
   b.records =
       of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
          g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
-         g.instance_motions) +
+         g.instance_motions, g.attribute_records, g.mesh_attributes) +
       of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
          materials_->openpbr, materials_->graphs->programs, materials_->graphs->ops,
          materials_->graphs->constants, materials_->graphs->images, materials_->graphs->outputs) +

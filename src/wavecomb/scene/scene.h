@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "wavecomb/scene/camera.h"
@@ -37,7 +38,7 @@ struct SceneView {
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
   uint64_t meshes =
-      0;  ///< points, indices, radii, normals, texture coordinates, materials of faces
+      0;  ///< points, indices, radii, normals, texture coordinates, attributes, materials of faces
   uint64_t textures = 0;  ///< all mip levels, or what of them a store has in memory
   uint64_t records = 0;   ///< instances, materials, lights
 };
@@ -145,6 +146,8 @@ class SceneBuilder {
   uint32_t add_graph(const Graph& graph);
   /// Texture and graph ids in the material must exist.
   uint32_t add_material(Material material);
+  /// The id of an attribute of that name, for MeshAttribute and for graphs.
+  uint32_t attribute(const std::string& name);
   /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name;
   /// faces without area stay (they are never hit).
   uint32_t add_mesh(Mesh mesh);
@@ -216,6 +219,8 @@ class SceneBuilder {
   std::vector<GeometrySet> sets_;
   std::vector<Light> lights_, mesh_lights_;
   std::vector<std::string> light_groups_{kOtherLights};
+  std::vector<std::string> attribute_names_;
+  std::unordered_map<std::string, uint32_t> attribute_ids_;
   NameTable names_;
   Camera camera_;
   std::vector<std::string> warnings_;

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/check_curves.h"
 #include "wavecomb/scene/graph_parameters.h"
+#include "wavecomb/scene/mesh_attributes.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
@@ -153,7 +155,19 @@ const Texture& SceneBuilder::texture(uint32_t id) const {
 uint32_t SceneBuilder::add_graph(const Graph& graph) {
   check_graph(graph, "graph " + std::to_string(graphs_.programs.size()), textures_.size(),
               kGraphOutputCount);
-  graphs_.add(graph);
+  if (graph.attributes.empty()) {
+    graphs_.add(graph);
+  } else {
+    Graph numbered = graph;
+    for (GraphOp& op : numbered.ops) {
+      if (static_cast<GraphCode>(op.code) != GraphCode::kAttribute) continue;
+      const uint32_t id = attribute(graph.attributes[op.number]);
+      if (id > std::numeric_limits<uint16_t>::max())
+        throw Error("graphs read more than 65536 different attributes; use fewer");
+      op.number = static_cast<uint16_t>(id);
+    }
+    graphs_.add(numbered);
+  }
   return static_cast<uint32_t>(graphs_.programs.size() - 1);
 }
 
@@ -171,12 +185,13 @@ uint32_t SceneBuilder::add_material(Material material) {
 
 namespace {
 
-/// What add_mesh and replace_mesh ask of a mesh.
-void check_mesh(const Mesh& mesh) {
+/// What add_mesh and replace_mesh ask of a mesh. `names`: of attributes.
+void check_mesh(const Mesh& mesh, const std::vector<std::string>& names) {
   const auto name = quoted("mesh", mesh.name);
   if (mesh.positions.size() % 3 != 0) throw Error(name + ": positions must be triples");
   if (mesh.is_curved()) {
     check_curves(mesh, name);
+    check_attributes(mesh, name, names);
     return;
   }
   if (mesh.indices.size() % 3 != 0) throw Error(name + ": indices must be triples");
@@ -199,12 +214,20 @@ void check_mesh(const Mesh& mesh) {
   if (!mesh.face_materials.empty() && mesh.face_materials.size() != mesh.triangle_count())
     throw Error(name + " has " + std::to_string(mesh.face_materials.size()) +
                 " face materials for " + std::to_string(mesh.triangle_count()) + " triangles");
+  check_attributes(mesh, name, names);
 }
 
 }  // namespace
 
+uint32_t SceneBuilder::attribute(const std::string& name) {
+  const auto [at, is_new] =
+      attribute_ids_.try_emplace(name, static_cast<uint32_t>(attribute_names_.size()));
+  if (is_new) attribute_names_.push_back(name);
+  return at->second;
+}
+
 uint32_t SceneBuilder::add_mesh(Mesh mesh) {
-  check_mesh(mesh);
+  check_mesh(mesh, attribute_names_);
   if (mesh.mesh_light != kNoLight && mesh.mesh_light >= mesh_lights_.size())
     throw Error(quoted("mesh", mesh.name) + " has a mesh light that was never added");
   meshes_.push_back(std::move(mesh));
@@ -218,7 +241,7 @@ void SceneBuilder::replace_mesh(uint32_t id, Mesh mesh) {
   mesh.light_group = old.light_group;
   mesh.mesh_light = old.mesh_light;
   mesh.asset_length = old.asset_length;
-  check_mesh(mesh);
+  check_mesh(mesh, attribute_names_);
   old = std::move(mesh);
 }
 
@@ -420,6 +443,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->sets = std::move(sets_);
   geometry->mesh_lights = std::move(mesh_lights_);
   geometry->light_groups = std::move(light_groups_);
+  geometry->attribute_names = std::move(attribute_names_);
   geometry->names = std::move(names_);
   geometry->warnings = std::move(warnings_);
   std::shared_ptr<const SceneMaterials> materials;
@@ -454,6 +478,7 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     geometry.mesh_motions.push_back({mesh.positions.size_bytes() / mesh.steps,
                                      mesh.normals.size_bytes() / mesh.steps, mesh.steps - 1, 0});
   }
+  make_attribute_records(geometry);
   for (const auto& texture : geometry.textures) geometry.texture_views.push_back(texture->view());
 
   std::vector<uint32_t> first(geometry.groups.size());

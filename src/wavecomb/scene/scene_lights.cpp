@@ -18,6 +18,7 @@ uint32_t material_of(const Mesh& mesh, const InstanceRecord& instance, size_t fa
 struct EmissiveMesh {
   size_t first;  ///< light of its first triangle, counted over all emissive meshes
   const Mesh* mesh;
+  uint32_t mesh_id;
   const InstanceRecord* instance;
   const Affine* to_world;
   uint32_t mesh_light;  ///< index of its PlacedMeshLight, or kNoLight
@@ -56,6 +57,8 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
   const uint32_t material = material_of(mesh, *source.instance, face);
   EmissiveTriangle t{};
   t.mesh_light = source.mesh_light;
+  t.mesh = source.mesh_id;
+  t.prim = static_cast<uint32_t>(face);
   const Material& m = materials.materials[material];
   Vec3<float> radiance = m.emission;
   if (m.has_texture(Slot::kEmission)) {
@@ -128,7 +131,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
       const uint32_t mesh_light = light ? mesh_lights.back() : kNoLight;
       if (light) placed.push_back({light, to_world, world_area(mesh, to_world), shines});
       if (!shines) continue;
-      sources.push_back({triangle_count, &mesh, &record, &to_world, mesh_light});
+      sources.push_back({triangle_count, &mesh, mesh_id, &record, &to_world, mesh_light});
       triangle_groups.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
       triangle_count += mesh.triangle_count();
     }

@@ -82,10 +82,17 @@ struct SceneGeometry {
   std::vector<InstanceRecord> instance_records;
   std::vector<uint32_t> geometry_mesh;
   std::vector<TextureView> texture_views;
+  std::vector<std::string> attribute_names;        ///< by id
+  std::vector<AttributeRecord> attribute_records;  ///< AttributeView::records
+  std::vector<uint32_t> mesh_attributes;           ///< AttributeView::of_mesh; empty: none has any
   std::vector<MeshMotion> mesh_motions;
   std::vector<MatrixStep> steps;            ///< of all instances that move
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
   bool moves() const { return mesh_motions.size() > 1 || !steps.empty(); }
+  AttributeView attributes() const {
+    if (mesh_attributes.empty()) return {};
+    return {attribute_records.data(), mesh_attributes.data()};
+  }
 
   /// Runs test(material) for what faces of `mesh` wear where the instance's own is `inherited`,
   /// until it says yes.

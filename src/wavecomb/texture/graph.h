@@ -2,6 +2,7 @@
 /// Runs value graphs at hits.
 #pragma once
 
+#include "wavecomb/texture/attribute.h"
 #include "wavecomb/texture/graph_data.h"
 #include "wavecomb/texture/lookup.h"
 #include "wavecomb/texture/noise.h"
@@ -18,6 +19,7 @@ struct GraphPoint {
   Vec3<F> normal{F(0.f), F(0.f), F(1.f)}, local_normal{F(0.f), F(0.f), F(1.f)};
   Vec3<F> tangent{F(1.f), F(0.f), F(0.f)};
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
+  MeshPlace<F> place;  ///< where attributes are read
 };
 
 namespace detail {
@@ -328,6 +330,10 @@ template <typename F>
         for (uint32_t i = 0; i < width; ++i) to[i] = op.number == 1 ? w.cell : w.nearest[i];
         break;
       }
+      case GraphCode::kAttribute:
+        one([](const F& a) { return a; });
+        read_attribute<F>(view.attributes, op.number, width, at.place, active, to);
+        break;
     }
   }
 }

@@ -124,6 +124,8 @@ void check_graph(const Graph& graph, const std::string& name, size_t texture_cou
     if (code == GraphCode::kImage)
       require(op.number < graph.images.size() && graph.images[op.number].texture < texture_count,
               "an image that was never added");
+    if (code == GraphCode::kAttribute)
+      require(op.number < graph.attributes.size(), "an attribute without a name");
     if (code == GraphCode::kFractal3) require(op.number <= kMaxOctaves, "too many octaves");
     if (code == GraphCode::kWorley2 || code == GraphCode::kWorley3)
       require(op.width <= 3, "a vector of a wrong size");

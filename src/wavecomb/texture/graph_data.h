@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/texture/attribute_data.h"
+
 namespace wavecomb {
 
 /// What an operation does, component by component unless it says otherwise. a, b and c are its
@@ -54,8 +56,9 @@ enum class GraphCode : uint8_t {
   kWorley2,  ///< at a, jitter b: distances to the nearest `width` points; the cell's number if
              ///< `number` is 1
   kWorley3,
+  kAttribute,  ///< attribute `number` of the mesh; a where it has none of `width` components
 };
-inline constexpr uint32_t kGraphCodeCount = 38;
+inline constexpr uint32_t kGraphCodeCount = 39;
 
 /// What the surface tells a graph.
 enum class GraphInput : uint8_t {
@@ -108,6 +111,7 @@ struct Graph {
   std::vector<float> constants;
   std::vector<GraphImage> images;
   std::vector<GraphOutput> outputs;
+  std::vector<std::string> attributes;  ///< names of those that operations number
   bool drives(uint32_t first, uint32_t count = 1) const {
     for (const GraphOutput& o : outputs)
       if (o.parameter >= first && o.parameter < first + count) return true;
@@ -128,6 +132,7 @@ struct GraphView {
   const GraphImage* images = nullptr;
   const GraphOutput* outputs = nullptr;
   uint32_t inputs = 0;  ///< graph_input_bit of what any program reads
+  AttributeView attributes{};
 };
 
 /// All programs of a scene, in arrays that lanes read.
@@ -139,11 +144,12 @@ struct GraphSet {
   std::vector<GraphOutput> outputs;
   uint32_t inputs = 0;
 
-  /// Adds a program that check_graph found good.
+  /// Adds a program that check_graph found good, with the scene's numbers of attributes.
   void add(const Graph& graph);
   GraphView view() const {
     if (programs.empty()) return {};
-    return {programs.data(), ops.data(), constants.data(), images.data(), outputs.data(), inputs};
+    return {programs.data(), ops.data(), constants.data(), images.data(), outputs.data(),
+            inputs,          {}};
   }
 };
 
