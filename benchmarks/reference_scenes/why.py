@@ -36,17 +36,11 @@ WHY = {
     "mitsuba bsdf_spheres/test_constant_path": _BECKMANN,
     "mitsuba bsdf_spheres/test_envmap_path": _BECKMANN,
     "mitsuba bsdf_spheres/test_roughdielectric_path": _BECKMANN,
-    "mitsuba bsdf_spheres/test_normalmap_identity_roughconductor_path": "Our fault: a material "
-    "without a texture gets no texture coordinates, and brushed metal no direction. With them the "
-    "absolute difference is 3.2 %, and the mean 2 % above, for ours gives back what is scattered "
-    "between facets",
+    "mitsuba bsdf_spheres/test_normalmap_identity_roughconductor_path": "Brushed and "
+    "rough: ours gives back what is scattered between facets, Mitsuba loses it",
     "mitsuba veach_mis/veach_mis": _BECKMANN,
     "mitsuba bsdf_spheres/test_roughplastic_linear_path": _ROUGH_PLASTIC,
     "mitsuba bsdf_spheres/test_roughplastic_nonlinear_path": _ROUGH_PLASTIC,
-    "mitsuba mesh_attributes/test_mesh_attributes_3_face_direct": "528 colours of faces become the "
-    "256 that a mesh may have (docs/textures.md)",
-    "mitsuba mesh_attributes/test_mesh_attributes_3_vertex_direct": "Colours of corners become one "
-    "value for each face (docs/textures.md)",
 }
 
 _NO_PICTURE = "no reference picture is among the assets, and no Tungsten that would render one"
