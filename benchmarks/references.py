@@ -111,11 +111,9 @@ class Entry:
         )
 
 
-def render(
-    stage: Path, spp: int, frame: float | None = None, **settings: Any
-) -> tuple[Pixels, Pixels]:
+def render(stage: Path, spp: int, **settings: Any) -> tuple[Pixels, Pixels]:
     """Our picture of a stage, and the variance of its pixels."""
-    scene = wavecomb.load(stage, frame=frame)
+    scene = wavecomb.load(stage)
     picture = wavecomb.render(scene, spp=spp, error=True, **settings)
     assert picture.variance is not None
     return np.asarray(picture.beauty), np.asarray(picture.variance)
@@ -150,7 +148,6 @@ def arnold_entry(folder: Path, options: argparse.Namespace) -> Entry:
     ours, variance = render(
         test.stage,
         options.spp,
-        test.frame,
         size=arnold.SIZE,
         filter="gaussian",
         filter_width=arnold.GAUSSIAN_WIDTH,

@@ -34,13 +34,11 @@ class Test:
         stage: The file to render.
         covered_only: Only pixels that the reference's alpha fills: its dome is not seen.
         space: What Arnold rendered in: linear values are of it, the picture is Rec.709.
-        frame: To render, where the stage names none.
         notes: What was translated.
     """
 
     stage: Path
     space: str = "rec709"
-    frame: float | None = None
     covered_only: bool = False
     notes: list[str] = field(default_factory=list)
 
@@ -82,8 +80,6 @@ class _Translator:
         if not scenes:
             self.test.space = "acescg"
             self._note("without an .ass file Arnold rendered in ACEScg")
-        if not self.stage.HasAuthoredTimeCodeRange():
-            self.test.frame = 0.0
         for scene in scenes:
             self._ass(ass_nodes(scene.read_text(encoding="utf-8")))
         for prim in list(self.stage.Traverse()):
