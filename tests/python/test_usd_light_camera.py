@@ -4,7 +4,9 @@
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from usd_recorder import QUAD, load, said
+from usd_recorder import QUAD, Recorder, load, said
+
+from wavecomb.usd import load_stage
 
 
 def light(tmp_path, text, header=""):
@@ -330,3 +332,25 @@ def test_variants(tmp_path):
     for key in ("size", "/A{size}"):
         scene, _ = load(tmp_path, text, variants={key: "large"})
         assert scene.meshes[0]["name"] == "/A/L"
+
+
+@pytest.mark.parametrize(
+    ("authored", "x"), [("", 3.0), ("startTimeCode = 10\nendTimeCode = 20", 5.0)]
+)
+def test_without_a_frame_or_a_range_the_earliest_samples_count(tmp_path, authored, x):
+    """As usdrecord does; default values would put an animated camera at the origin."""
+    path = tmp_path / "moving.usda"
+    path.write_text(
+        f"""#usda 1.0
+        ({authored})
+        def Camera "Cam" {{
+            double3 xformOp:translate.timeSamples = {{ 2: (3, 0, 0), 10: (5, 0, 0) }}
+            uniform token[] xformOpOrder = ["xformOp:translate"]
+            double shutter:open = -0.5
+            double shutter:close = 0.5
+        }}"""
+    )
+    loaded = load_stage(path, builder_factory=Recorder)
+    assert loaded.scene.camera["transform"][3, 0] == pytest.approx(x)
+    assert loaded.frame == (10.0 if authored else None)
+    assert (loaded.shutter is None) == (not authored)

@@ -535,6 +535,15 @@ def test_materialx_metal_without_specular(tmp_path):
     assert scene.material_of("M")["openpbr"]["specular_weight"] == 0.0
 
 
+@pytest.mark.parametrize(("anisotropy", "brushed"), [(0.5, True), (0.0, False)])
+def test_brushed_metal_has_a_direction_without_a_texture(tmp_path, anisotropy, brushed):
+    text = surface(f"float inputs:specular_anisotropy = {anisotropy}")
+    scene, _ = load(
+        tmp_path, text.replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader")
+    )
+    assert (scene.mesh("M")["uvs"] is not None) == brushed
+
+
 def test_materialx_layers(tmp_path):
     """Standard Surface as its published translation to OpenPBR has it, and what has no effect."""
     text = surface(
