@@ -9,19 +9,17 @@ and time, and none of it is made up by repeating work.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from pxr import UsdShade
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.stones import MAX_TRIANGLES, MIN_TRIANGLES, build_field, stones_for
-from wavecomb.scenes.textures import Image, TextureInfo, marble, weave, wood
+from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
+from wavecomb.scenes.textures import Image, TextureInfo
 
 MAX_MATERIALS = 1024
 MAX_TEXTURE_MB = 8192.0
@@ -29,8 +27,6 @@ LAYERS = 8
 """Of the heaviest material."""
 _BYTES_PER_TEXEL = (4.0 + 4.0 + 1.0) * 4.0 / 3.0
 """Of a material: two colour maps and one of roughness, 8 bits each, with mip levels."""
-_TILE = 8
-_PATTERNS = (marble, wood, weave)
 _SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 Inputs = dict[str, Any]
@@ -38,24 +34,11 @@ Inputs = dict[str, Any]
 
 def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
     """Fills the stage; ``SceneOptions`` says with how many materials and how large textures."""
-    stones = stones_for(options.materials)
-    for name, value, low, high in (
-        ("materials", options.materials, 1, MAX_MATERIALS),
-        ("texture_mb", options.texture_mb, 0.1, MAX_TEXTURE_MB),
-        ("triangles", options.triangles, stones * MIN_TRIANGLES, MAX_TRIANGLES),
-    ):
-        if not low <= value <= high:
-            raise SceneError(f"heavy: {name} must be from {low:g} to {high:g}, not {value:g}")
+    check_field("heavy", options, materials=(1, MAX_MATERIALS), texture_mb=(0.1, MAX_TEXTURE_MB))
     rng = np.random.default_rng([options.seed, 2000])
-    edge = texture_edge(options)
+    edge = texture_edge(options, _BYTES_PER_TEXEL, 2 * TILE)
     names = [_material(writer, options, k, edge, rng) for k in range(options.materials)]
     build_field(writer, names, options.triangles, edge, options.aspect or 1.0, rng)
-
-
-def texture_edge(options: SceneOptions) -> int:
-    """Edge of each texture in texels."""
-    texels = options.texture_mb * 1e6 / options.materials / _BYTES_PER_TEXEL
-    return max(2 * _TILE, round(math.sqrt(texels) / _TILE) * _TILE)
 
 
 def layers(options: SceneOptions, index: int) -> int:
@@ -126,14 +109,13 @@ def _material(
 ) -> str:
     name = f"Stone_{index:04d}"
     colours = rng.uniform(0.1, 0.9, (2, 3))
-    pattern = _PATTERNS[index % len(_PATTERNS)]
     maps = {}
     for which, colour in zip("ab", colours, strict=True):
-        maps[which] = _define(writer, f"{name.lower()}_{which}", edge, pattern, colour)
+        maps[which] = _define(writer, f"{name.lower()}_{which}", edge, index, colour)
     if index % (len(_KINDS) + 1) == 0:
         return writer.material(name, looks.diffuse((0.5, 0.5, 0.5), maps["a"]))
     kind = _KINDS[index % (len(_KINDS) + 1) - 1]
-    maps["r"] = _define(writer, f"{name.lower()}_r", edge, pattern, None)
+    maps["r"] = _define(writer, f"{name.lower()}_r", edge, index, None)
     net = Network(writer.stage, f"/World/Looks/{name}")
     colour = _layered(net, writer, maps, layers(options, index), rng)
     rough = net.node("image", "float", file=("filename", writer.texture_file(maps["r"])))
@@ -143,12 +125,12 @@ def _material(
 
 
 def _define(
-    writer: StageWriter, name: str, edge: int, pattern: Any, colour: np.ndarray | None
+    writer: StageWriter, name: str, edge: int, index: int, colour: np.ndarray | None
 ) -> str:
     """A texture's name: a pattern in a colour, or one of roughness."""
 
     def made(size: int, source: np.random.Generator) -> Image:
-        grey = pattern(max(size, 16), source)[:size, :size].mean(axis=2, keepdims=True)
+        grey = grey_pattern(index, size, source)
         tinted = 0.1 + 0.6 * grey if colour is None else 0.2 + grey * colour
         return np.clip(tinted, 0, 1).astype(np.float32)
 

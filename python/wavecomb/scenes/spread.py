@@ -9,62 +9,48 @@ not neighbouring memory, and the more triangles are seen, the more of the textur
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.materials import Colour, MaterialInfo
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.stones import MAX_TRIANGLES, MIN_TRIANGLES, build_field, stones_for
-from wavecomb.scenes.textures import Image, TextureInfo, marble, weave, wood
+from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
+from wavecomb.scenes.textures import Image, TextureInfo
 
 MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
 MAX_COST = 1000.0
 _BYTES_PER_TEXEL = 4.0 * 4.0 / 3.0
 """Of 8 bit colour as the core holds it, mip levels included."""
-_TILE = 8
-"""Texels are stored in tiles of 8 x 8, so small textures take somewhat more than asked for."""
-_PATTERNS = (marble, wood, weave)
 
 
 def build_spread(writer: StageWriter, options: SceneOptions) -> None:
     """Fills the stage; ``SceneOptions`` says with how much."""
-    _check(options)
+    check_field(
+        "spread",
+        options,
+        materials=(1, MAX_MATERIALS),
+        programs=(1, len(_PROGRAMS)),
+        texture_mb=(0, MAX_TEXTURE_MB),
+        shader_cost=(1, MAX_COST),
+    )
     rng = np.random.default_rng([options.seed, 1000])
     names = [_material(writer, options, k, rng) for k in range(options.materials)]
-    build_field(writer, names, options.triangles, texture_edge(options), options.aspect or 1.0, rng)
+    build_field(writer, names, options.triangles, _edge(options), options.aspect or 1.0, rng)
 
 
-def texture_edge(options: SceneOptions) -> int:
+def _edge(options: SceneOptions) -> int:
     """Edge of each material's texture in texels; 0 without textures."""
-    if options.texture_mb <= 0.0:
-        return 0
-    texels = options.texture_mb * 1e6 / options.materials / _BYTES_PER_TEXEL
-    return max(_TILE, round(math.sqrt(texels) / _TILE) * _TILE)
+    return texture_edge(options, _BYTES_PER_TEXEL, TILE) if options.texture_mb > 0.0 else 0
 
 
 def evaluations(options: SceneOptions, index: int) -> int:
     """Of material ``index``: the last has ``shader_cost``, the first 1, geometrically between."""
     share = index / (options.materials - 1) if options.materials > 1 else 1.0
     return round(options.shader_cost**share)
-
-
-def _check(options: SceneOptions) -> None:
-    stones = stones_for(options.materials)
-    for name, value, low, high in (
-        ("materials", options.materials, 1, MAX_MATERIALS),
-        ("programs", options.programs, 1, len(_PROGRAMS)),
-        ("texture_mb", options.texture_mb, 0, MAX_TEXTURE_MB),
-        ("shader_cost", options.shader_cost, 1, MAX_COST),
-        ("triangles", options.triangles, stones * MIN_TRIANGLES, MAX_TRIANGLES),
-    ):
-        if not low <= value <= high:
-            raise SceneError(f"spread: {name} must be from {low:g} to {high:g}, not {value:g}")
 
 
 def _principled(colour: Colour) -> MaterialInfo:
@@ -88,12 +74,11 @@ def _material(
     colour = tuple(float(v) for v in rng.permutation([low, 0.5 * (low + high), high]))
     name = f"Stone_{index:04d}"
     info = _PROGRAMS[index % options.programs]((colour[0], colour[1], colour[2]))
-    edge = texture_edge(options)
+    edge = _edge(options)
     if edge:
-        pattern = _PATTERNS[index % len(_PATTERNS)]
 
         def tinted(size: int, source: np.random.Generator) -> Image:
-            grey = pattern(max(size, 16), source)[:size, :size].mean(axis=2, keepdims=True)
+            grey = grey_pattern(index, size, source)
             return np.clip(0.2 + grey * np.array(colour), 0, 1).astype(np.float32)
 
         texture = f"stone_{index:04d}"

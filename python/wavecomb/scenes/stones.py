@@ -11,21 +11,51 @@ from numpy.typing import NDArray
 from pxr import UsdGeom, Vt
 
 from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import Mesh, grid_faces, smooth_normals, without_flat_faces
+from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
+from wavecomb.scenes.textures import Image, marble, weave, wood
 
 STONES = 144
 """At least so many stones lie in a field."""
 MIN_TRIANGLES = 32
 """Of a stone: a sphere of 4 x 4 cells."""
 MAX_TRIANGLES = 60_000_000
+TILE = 8
+"""Edges of textures are multiples of it."""
 _PITCH = 2.3
 _CHART_TEXELS = 4
+_PATTERNS = (marble, wood, weave)
 
 
 def stones_for(materials: int) -> int:
     """How many stones show so many materials."""
     return max(STONES, materials)
+
+
+def check_field(scene: str, options: SceneOptions, **ranges: tuple[float, float]) -> None:
+    """Raises SceneError for an option outside of its range; triangles have that of all fields."""
+    least = stones_for(options.materials) * MIN_TRIANGLES
+    for name, (low, high) in {**ranges, "triangles": (least, MAX_TRIANGLES)}.items():
+        value = getattr(options, name)
+        if not low <= value <= high:
+            raise SceneError(f"{scene}: {name} must be from {low:g} to {high:g}, not {value:g}")
+
+
+def texture_edge(options: SceneOptions, bytes_per_texel: float, least: int) -> int:
+    """Edge in texels of textures that take ``texture_mb``: each material has ``bytes_per_texel``.
+
+    Texels are stored in tiles of 8 x 8, so small textures take somewhat more than asked for.
+    """
+    texels = options.texture_mb * 1e6 / options.materials / bytes_per_texel
+    return max(least, round(math.sqrt(texels) / TILE) * TILE)
+
+
+def grey_pattern(index: int, size: int, rng: np.random.Generator) -> Image:
+    """Pattern of material ``index``, (size, size, 1): its lightness, from about 0 to 1."""
+    make = _PATTERNS[index % len(_PATTERNS)]
+    return np.asarray(make(max(size, 16), rng)[:size, :size].mean(axis=2, keepdims=True))
 
 
 def build_field(
