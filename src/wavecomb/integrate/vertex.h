@@ -129,17 +129,25 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
                 F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
+/// Where geometry `geom` of instance `inst` is in the arrays that have an entry for each of an
+/// instance's geometries.
+template <typename F>
+inline UInt<F> placed_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                               const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+  return gather<U>(scene.instances,
+                   inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
+                   Mask<U>(active)) +
+         geom;
+}
+
 /// The class that linking knows geometry `geom` of instance `inst` by.
 template <typename F>
 inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                           const Mask<F>& active) {
-  using U = UInt<F>;
-  constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
-  const U first =
-      gather<U>(scene.instances,
-                inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
-                Mask<U>(active));
-  return gather<U>(scene.lights.links.classes, first + geom, Mask<U>(active));
+  return gather<UInt<F>>(scene.lights.links.classes, placed_geometry<F>(scene, inst, geom, active),
+                         Mask<UInt<F>>(active));
 }
 
 /// What a path gets of surfaces that glow with `glow`, before MIS, where there are mesh lights.
@@ -149,13 +157,9 @@ template <typename F>
                                                const PathState<F>& path, bool from_camera,
                                                const Mask<F>& active) {
   using U = UInt<F>;
-  constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
-  const U first =
-      gather<U>(scene.instances,
-                inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
-                Mask<U>(active));
-  const U record = select(Mask<U>(active),
-                          gather<U>(scene.mesh_lights, first + geom, Mask<U>(active)), U(kNoLight));
+  const U place = placed_geometry<F>(scene, inst, geom, active);
+  const U record = select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)),
+                          U(kNoLight));
   return mesh_light_radiance<F>(scene.lights, record, glow, path.dir, path.link,
                                 not_(path.pdf > 0.f), from_camera, active);
 }
@@ -298,12 +302,8 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     if (any(emits)) {
       F light_pdf(0.f);
       if (scene.has_emissive_meshes) {
-        constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
-        const U first = gather<U>(
-            scene.instances,
-            hit.inst * kWords + static_cast<uint32_t>(offsetof(InstanceRecord, emissive) / 4),
-            Mask<U>(emits));
-        const U base = gather<U>(scene.emissive_lights, first + geom, Mask<U>(emits));
+        const U place = placed_geometry<F>(scene, hit.inst, geom, emits);
+        const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
         if (wants_lights)
           aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + hit.prim));
         const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (path.pdf > 0.f);
