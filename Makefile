@@ -23,7 +23,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build wheel render test test-fast test-cpp test-py test-py-fast test-asan test-wheel bench lint format clean
+.PHONY: help setup setup-test build wheel render test test-fast test-cpp test-py test-py-fast test-long test-asan test-wheel bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -93,6 +93,11 @@ test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBe
 
 test-py: build build/.setup-test ## Python and statistical tests
 	$(VENV)/python -m pytest -q -n $(JOBS)
+
+test-long: build build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
+	WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) --verbose --output-on-failure --no-tests=error
+	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
 
 test-wheel: wheel ## Install that wheel into a fresh environment and render with each of its libraries
 	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv

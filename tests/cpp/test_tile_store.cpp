@@ -9,6 +9,7 @@
 #include <numeric>
 #include <thread>
 
+#include "parts.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/texture/texture.h"
 
@@ -104,8 +105,7 @@ size_t resident(const std::byte* at, size_t bytes) {
 class TileStoreTest : public testing::Test {
  protected:
   void SetUp() override {
-    const std::string obstacle = UserFaults::obstacle();
-    if (!obstacle.empty()) GTEST_SKIP() << obstacle;
+    WAVECOMB_NEEDS("userfaultfd", UserFaults::obstacle());
     store = std::make_unique<TileStore>(kLimit, testing::TempDir());
   }
   const std::byte* add(uint32_t seed) {

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from parts import not_here
 
 from wavecomb.bench import columns, counters, noise, peers
 from wavecomb.bench.estimate import Estimator
@@ -398,7 +399,7 @@ def test_processes_that_die_are_said() -> None:
 def test_counters_count_between_start_and_stop(tmp_path: Path) -> None:
     events = counters.available({"cycles": ("task-clock",)}).events
     if not events:
-        pytest.skip("perf does not work here")
+        not_here("perf does not count")
     session = counters.Session(events, tmp_path / "perf.csv")
     code = (
         "import json, sys; from wavecomb.bench.counters import Switch;"

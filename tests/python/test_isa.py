@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from parts import needs, not_here, only_where
 
 import wavecomb
 from wavecomb import isa
@@ -24,7 +24,7 @@ from wavecomb.image import read_layers
 
 V2, V3, V4 = "x86-64-v2", "x86-64-v3", "x86-64-v4"
 BUILT = list(isa.libraries(wavecomb.__path__))
-portable = pytest.mark.skipif(len(BUILT) < 2, reason="one native library here; see make test-wheel")
+portable = only_where(len(BUILT) > 1, "one native library; see make test-wheel")
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def test_pictures_of_every_library(scene: str, tmp_path: Path) -> None:
         assert stats["lanes"] == {V2: 4, V3: 8, V4: 16, "armv8-a": 4}[library]
         pictures[library] = read_layers(picture)
     if len(pictures) < 2:
-        pytest.skip(f"this CPU runs only {', '.join(pictures)}")
+        not_here(f"this CPU runs only {', '.join(pictures)}")
     assert {"beauty", "albedo", "normal", "depth"} <= pictures[V2].keys()
     if {V3, V4} <= pictures.keys():
         for name, layer in pictures[V3].items():
@@ -171,7 +171,7 @@ def far_apart(a: np.ndarray, b: np.ndarray) -> float:
 @portable
 def test_lanes_that_a_library_has_not(tmp_path: Path) -> None:
     if V3 not in runnable():
-        pytest.skip("this CPU does not run x86-64-v3")
+        not_here("this CPU does not run x86-64-v3")
     stage, picture = tmp_path / "stage.usdc", tmp_path / "a.exr"
     assert run("scene", "cornell", "-o", stage).returncode == 0
     done = run("render", stage, "-o", picture, "--size", 8, 8, "--lanes", 16, library=V3)
@@ -183,7 +183,7 @@ def test_lanes_that_a_library_has_not(tmp_path: Path) -> None:
 
 
 @portable
-@pytest.mark.skipif(shutil.which("objdump") is None, reason="needs objdump")
+@needs("bin:objdump")
 def test_no_library_holds_instructions_of_another() -> None:
     avx = r"%ymm|%zmm|\tv[a-z]"
     avx512 = r"%zmm|%[xy]mm(1[6-9]|2\d|3[01])|%k[0-7]"

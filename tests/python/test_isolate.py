@@ -11,10 +11,11 @@ import time
 from pathlib import Path
 
 import pytest
+from parts import only_where
 
 from wavecomb.isolate import patience, trail
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="isolation is for Linux")
+pytestmark = only_where(sys.platform == "linux", "isolation is for Linux")
 
 SUPERVISED = "from wavecomb.isolate import supervisor, trail; supervisor.supervise()\n"
 

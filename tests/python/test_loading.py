@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("pxr")
+from parts import only_where
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 from usd_recorder import Recorder
 
@@ -23,7 +22,7 @@ from wavecomb.image import write_png
 from wavecomb.usd import load_stage, pixels
 from wavecomb.usd.pixels import Image, ReadAhead, TextureError
 
-LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+LINUX = only_where(sys.platform == "linux", "reads /proc")
 
 
 def textured_stage(folder: Path) -> Path:

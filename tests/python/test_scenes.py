@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from parts import asset
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
@@ -27,12 +28,7 @@ from wavecomb.scenes.teapot import teapot, teapot_patches
 from wavecomb.scenes.textures import TEXTURES, sky
 from wavecomb.usd import LoadedStage
 
-ASSETS = Path(__file__).resolve().parents[3] / "shared" / "assets"
-TEAPOT = ASSETS / "meshes" / "teapot"
 SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
-needs_teapot = pytest.mark.skipif(
-    not TEAPOT.is_dir(), reason=f"the published teapot is not at {TEAPOT}"
-)
 
 
 @pytest.fixture(scope="module", params=sorted(SCENES))
@@ -408,9 +404,8 @@ def test_sky_is_a_bright_half(tmp_path: Path) -> None:
 # Teapot
 
 
-@needs_teapot
 def test_teapot_patches_are_the_published_ones() -> None:
-    lines = (TEAPOT / "teapot_patches.txt").read_text().splitlines()
+    lines = asset("meshes/teapot/teapot_patches.txt").read_text().splitlines()
     count = int(lines[0])
     indices = np.array([[int(word) for word in line.split(",")] for line in lines[1 : count + 1]])
     points = np.array([[float(w) for w in line.split(",")] for line in lines[count + 2 :] if line])
@@ -424,12 +419,11 @@ def test_teapot_patches_are_the_published_ones() -> None:
     assert as_set(teapot_patches()) == as_set(published)
 
 
-@needs_teapot
 def test_teapot_surface_is_the_published_one() -> None:
     published = np.array(
         [
             [float(word) for word in line.split()[1:4]]
-            for line in (TEAPOT / "teapot.obj").read_text().splitlines()
+            for line in asset("meshes/teapot/teapot.obj").read_text().splitlines()
             if line.startswith("v ")
         ]
     )
@@ -639,11 +633,10 @@ def test_a_broken_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monke
     assert target.read_text() == "kept"
 
 
-@pytest.mark.skipif(not ASSETS.is_dir(), reason=f"no test assets at {ASSETS}")
 @pytest.mark.parametrize(
     "file", ["xyzrgb_dragon/xyzrgb_dragon.obj", "dragon/dragon_vrip_res4.ply.gz"]
 )
 def test_stanford_dragons_are_imported(file: str) -> None:
-    mesh = load_dragon(ASSETS / "meshes" / file)
+    mesh = load_dragon(asset(f"meshes/{file}"))
     assert_sound(mesh, closed=False)
     assert len(mesh.faces) > 10_000

@@ -3,11 +3,13 @@
 
 import numpy as np
 import pytest
+from parts import ASSETS, needs_asset
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
-from usd_recorder import ASSETS, Recorder, said
+from usd_recorder import Recorder, said
 
 from wavecomb.usd import load_stage
 
+SKELETONS = "usd/openusd/testUsdImagingGLUsdSkel"
 JOINTS = ["A", "A/B", "A/B/C"]
 POINTS = np.array(
     [[-1, -1, 0], [1, -1, 0], [1, 1, 1], [-1, 1, 1], [-1, 1, 3], [1, 1, 3], [0, 0, 4]], float
@@ -231,9 +233,9 @@ def test_instances_with_animations_of_their_own():
     assert len(heights) == 2 and heights[1] - heights[0] > 5
 
 
-@pytest.mark.skipif(not ASSETS.is_dir(), reason="needs ../shared/assets")
+@needs_asset(f"{SKELETONS}/arm.usda", f"{SKELETONS}/arm_baked.usda")
 def test_the_arm_of_openusd_is_as_it_baked_it():
-    folder = ASSETS / "usd" / "openusd" / "testUsdImagingGLUsdSkel"
+    folder = ASSETS / SKELETONS
     for frame in (1, 5, 10):
         mine, baked = (
             load_stage(folder / name, frame=frame, builder_factory=Recorder).scene.meshes[0]

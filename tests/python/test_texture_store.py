@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from parts import needs
 from test_texture_limit import NoStore, textured, write_image
 
 import wavecomb
@@ -25,9 +26,7 @@ TEXTURES, SIZE = 9, 512
 CHUNK_KB = 65536
 """Address space that a store takes at a time."""
 
-needs_store = pytest.mark.skipif(
-    bool(_core.TextureStore.obstacle()), reason=_core.TextureStore.obstacle()
-)
+needs_store = needs("userfaultfd")
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ import subprocess
 import sys
 
 import pytest
-from usd_recorder import ASSETS, QUAD, Recorder, load, said, write
+from parts import ASSETS, needs_asset
+from usd_recorder import QUAD, Recorder, load, said, write
 
 from wavecomb.usd import WavecombError, load_stage
 
@@ -372,7 +373,7 @@ def test_bad_cameras_and_lights(tmp_path):
     assert scene.lights[0]["color"] == (0, 0, 0)
 
 
-@pytest.mark.skipif(not ASSETS.is_dir(), reason="no ../shared/assets beside the repository")
+@needs_asset("usd/Teapot/Teapot.usd")
 def test_every_asset_loads(capfd):
     stages = [p for p in sorted((ASSETS / "usd").rglob("*.usd*")) if p.is_file()]
     assert stages

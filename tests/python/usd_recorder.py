@@ -10,7 +10,6 @@ from wavecomb.usd import LoadedStage, load_stage
 from wavecomb.usd.graph_code import Graph
 
 INHERIT = 0xFFFFFFFF
-ASSETS = Path(__file__).resolve().parents[3] / "shared" / "assets"
 
 
 class Recorder:

@@ -2,13 +2,13 @@
 """`wavecomb view` from a shell: what is missing is told in a line; Xvfb shows the stage."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
 
 import pytest
+from parts import needs
 
 COMMAND = [sys.executable, "-m", "wavecomb", "view"]
 
@@ -138,7 +138,7 @@ print("seen")
 
 
 @pytest.mark.parametrize("scale", [1, 2])
-@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs Xvfb: tools/setup test installs it")
+@needs("bin:Xvfb")
 def test_under_xvfb(cornell, tmp_path, scale):
     read, write = os.pipe()
     server = subprocess.Popen(

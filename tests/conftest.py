@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Skips that CI does not allow, and tests that take minutes; see parts.py."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import parts
+import pytest
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leaves the long tests to `make test-long`."""
+    if parts.is_long():
+        return
+    mark = pytest.mark.skip(reason=parts.LONG + "make test-long runs it")
+    for item in items:
+        if item.get_closest_marker("long"):
+            item.add_marker(mark, append=False)
+
+
+def refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
+    """Makes a failure of a skip for want of a part."""
+    if not report.skipped or hasattr(report, "wasxfail"):
+        return
+    where = report.longrepr
+    reason = str(where[2] if isinstance(where, tuple) else where).removeprefix("Skipped: ")
+    if not reason.startswith((parts.NOT_HERE, parts.LONG)):
+        report.outcome = "failed"
+        report.longrepr = f"skipped where every part has to be (CI or WAVECOMB_STRICT): {reason}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Strict: no test is skipped for want of a part."""
+    report = yield
+    if parts.is_strict():
+        refuse_skip(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Strict: no file of tests is skipped for want of a part."""
+    report = yield
+    if parts.is_strict():
+        refuse_skip(report)
+    return report
