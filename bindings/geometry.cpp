@@ -7,6 +7,7 @@
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/geometry/ears.h"
 #include "wavecomb/geometry/quads.h"
 #include "wavecomb/geometry/screen_size.h"
 #include "wavecomb/geometry/surface.h"
@@ -206,6 +207,17 @@ nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
       split_quads({points.data(), points.size()}, {indices.data(), indices.size()}, first), 3);
 }
 
+nb::tuple ears(const Array<double>& corners, uint64_t most_steps) {
+  if (corners.ndim() != 2 || corners.shape(1) != 2)
+    throw Error("corners must have the shape (k, 2)");
+  Ears found;
+  {
+    const nb::gil_scoped_release release;
+    found = clip_ears({corners.data(), corners.size()}, most_steps);
+  }
+  return nb::make_tuple(array_of(std::move(found.corners), 3), found.hurried);
+}
+
 nb::tuple weld(const Array<int32_t>& corners, uint32_t point_count, const Array<float>& values) {
   if (values.ndim() != 2) throw Error("values must have the shape (corners, width)");
   Welded welded;
@@ -226,5 +238,6 @@ void bind_geometry(nb::module_& m) {
   m.def("edge_pixels", &pixels, "points"_a, "counts"_a, "indices"_a, "transforms"_a, "to_camera"_a,
         "centre"_a, "half"_a, "pixels_per_unit"_a, "projection"_a = "perspective");
   m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
+  m.def("clip_ears", &ears, "corners"_a, "most_steps"_a = kEarSteps);
   m.def("weld_corners", &weld, "corners"_a, "point_count"_a, "values"_a);
 }

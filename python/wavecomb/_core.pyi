@@ -688,6 +688,10 @@ def split_quads(
 
     points (n, 3); indices (corners,), in range; starts (k,): first corners, None: all are quads."""
 
+def clip_ears(corners: NDArray[np.float64], most_steps: int = ...) -> tuple[NDArray[np.int64], int]:
+    """Triangles (k - 2, 3) of a polygon in the plane, corners (k, 2), counter-clockwise, by
+    clipping ears; then how many corners were cut without a look since the steps ran out."""
+
 def weld_corners(
     corners: NDArray[np.int32], point_count: int, values: NDArray[np.float32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

@@ -48,7 +48,7 @@ def test_ears_of_a_polygon_that_crosses_itself_end():
     rng = np.random.default_rng(1)
     points = np.zeros((40, 3))
     points[:, :2] = rng.random((40, 2))
-    triangles = clip_ears(points, np.array([0.0, 0.0, 1.0]))
+    triangles, _ = clip_ears(points, np.array([0.0, 0.0, 1.0]))
     assert triangles.shape == (38, 3)
 
 

@@ -226,6 +226,9 @@ class MeshReader:
         positions = points if matrix == IDENTITY else bake(points, matrix)
         bounds = extent(positions)
         topology = triangulate(points, counts, indices, holes, flip)
+        if topology.hurried:
+            what = "a face crosses itself too often to be split with care; its triangles overlap"
+            self.report.warn(what, prim.GetPath())
         scheme = _scheme(prim, names, time)
         subdivided = self.subdivide and scheme in SCHEMES
         normals = self._normals(prim, points, topology, scheme, names)

@@ -14,8 +14,9 @@ from wavecomb import _core
 _CHUNK = 1 << 17
 """Polygons split at once: bounds the memory in use."""
 
-_EAR_LIMIT = 5000
-"""Corners of the largest polygon that ears are clipped from; beyond that it is a fan."""
+_EAR_STEPS = 1 << 26
+"""Work that one polygon gets, about a second: one of 100,000 corners takes two thirds at the worst
+that is known."""
 
 
 class MeshError(ValueError):
@@ -34,6 +35,7 @@ class Topology:
         point_count: Number of points.
         face_count: Number of faces, holes included.
         per_face: Triangles of each face where ``faces`` is None.
+        hurried: Faces that cross themselves too often to be split with care.
     """
 
     triangles: NDArray[np.uint32]
@@ -43,6 +45,7 @@ class Topology:
     point_count: int
     face_count: int
     per_face: int = 1
+    hurried: int = 0
 
     @property
     def count(self) -> int:
@@ -109,11 +112,11 @@ def triangulate(
     faces = np.flatnonzero(keep)
     if len(faces) == 0:
         raise MeshError("no faces")
-    corners, owners = _split(points, counts, indices, faces)
+    corners, owners, hurried = _split(points, counts, indices, faces)
     if flip:
         corners = corners[:, ::-1]
     triangles = np.ascontiguousarray(indices[corners]).view(np.uint32)
-    return Topology(triangles, corners, owners, indices, len(points), len(counts))
+    return Topology(triangles, corners, owners, indices, len(points), len(counts), hurried=hurried)
 
 
 def _split(
@@ -121,26 +124,31 @@ def _split(
     counts: NDArray[np.int32],
     indices: NDArray[np.int32],
     faces: NDArray[np.intp],
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Corners (m, 3) and faces (m,) of the triangles of some faces, in face order."""
+) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
+    """Corners (m, 3) and faces (m,) of the triangles of some faces, in face order.
+
+    Then how many of the faces were split in a hurry.
+    """
     starts = np.cumsum(counts, dtype=np.intp) - counts
     sizes = counts[faces]
     corners: list[NDArray[np.intp]] = []
     owners: list[NDArray[np.intp]] = []
+    hurried = 0
     for size in np.unique(sizes):
         group = faces[sizes == size]
         step = max(1, _CHUNK * 4 // int(size))
         for first in range(0, len(group), step):
             part = group[first : first + step]
             ring = starts[part][:, None] + np.arange(size)
-            local = _split_rings(points, indices, ring)
+            local, rough = _split_rings(points, indices, ring)
+            hurried += rough
             corners.append(local.reshape(-1, 3))
             owners.append(np.repeat(part, size - 2))
     all_corners, all_owners = np.concatenate(corners), np.concatenate(owners)
     if len(corners) > 1:
         order = np.argsort(all_owners, kind="stable")
         all_corners, all_owners = all_corners[order], all_owners[order]
-    return all_corners, all_owners
+    return all_corners, all_owners, hurried
 
 
 def _quads(
@@ -155,15 +163,17 @@ def _quads(
 
 def _split_rings(
     points: NDArray[np.float32], indices: NDArray[np.int32], ring: NDArray[np.intp]
-) -> NDArray[np.intp]:
-    """Triangles (faces, k - 2, 3) of polygons of k corners each, ring (faces, k)."""
+) -> tuple[NDArray[np.intp], int]:
+    """Triangles (faces, k - 2, 3) of polygons of k corners each, ring (faces, k).
+
+    Then how many of the polygons were split in a hurry.
+    """
     size = ring.shape[1]
     if size == 3:
-        return ring[:, None, :]
+        return ring[:, None, :], 0
     if size == 4:
-        return _core.split_quads(points, indices, np.ascontiguousarray(ring[:, 0])).reshape(
-            -1, 2, 3
-        )
+        pairs = _core.split_quads(points, indices, np.ascontiguousarray(ring[:, 0]))
+        return pairs.reshape(-1, 2, 3), 0
     p = points.take(indices[ring], axis=0).astype(np.float64)
     p -= p[:, :1]
     # Newell's normal; the fan is right where each of its triangles turns the same way.
@@ -174,10 +184,12 @@ def _split_rings(
         [np.zeros(size - 2, np.intp), np.arange(1, size - 1), np.arange(2, size)], axis=1
     )
     out = ring[:, fan]
-    if size <= _EAR_LIMIT:
-        for face in np.flatnonzero(bad):
-            out[face] = ring[face][clip_ears(p[face], normal[face])]
-    return out
+    hurried = 0
+    for face in np.flatnonzero(bad):
+        ears, cuts = clip_ears(p[face], normal[face])
+        out[face] = ring[face][ears]
+        hurried += cuts > 0
+    return out, hurried
 
 
 def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
@@ -191,39 +203,15 @@ def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     return out
 
 
-def clip_ears(points: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Triangles (k - 2, 3) of one simple polygon, points (k, 3), by clipping ears."""
+def clip_ears(
+    points: NDArray[np.float64], normal: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], int]:
+    """Triangles (k - 2, 3) of one simple polygon, points (k, 3), by clipping ears.
+
+    One that crosses itself is split, too, whichever way. Then the corners that were cut without a
+    look, after ``_EAR_STEPS``.
+    """
     drop = int(np.argmax(np.abs(normal)))
     axes = [(drop + 1) % 3, (drop + 2) % 3]
     flat = points[:, axes] * (1.0 if normal[drop] >= 0 else -1.0, 1.0)
-    ring = list(range(len(points)))
-    out: list[tuple[int, int, int]] = []
-    at, misses = 0, 0
-    while len(ring) > 3:
-        size = len(ring)
-        triple = ring[at - 1], ring[at % size], ring[(at + 1) % size]
-        # After a whole round without an ear the polygon crosses itself: cut anyhow.
-        if misses >= size or _is_ear(flat, ring, triple):
-            out.append(triple)
-            ring.pop(at % size)
-            at, misses = at % len(ring), 0
-        else:
-            at, misses = (at + 1) % size, misses + 1
-    out.append((ring[0], ring[1], ring[2]))
-    return np.array(out, np.intp)
-
-
-def _is_ear(flat: NDArray[Any], ring: list[int], triple: tuple[int, int, int]) -> bool:
-    a, b, c = flat[list(triple)]
-    if _turn(a, b, c) <= 0:
-        return False
-    others = flat[[i for i in ring if i not in triple]]
-    inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
-    # A point on a corner (a bridge to a hole) blocks nothing.
-    inside &= ~((others == a).all(1) | (others == b).all(1) | (others == c).all(1))
-    return not bool(inside.any())
-
-
-def _turn(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> Any:
-    """Twice the signed area of the triangle a, b, c in the plane; c may be (n, 2)."""
-    return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])
+    return _core.clip_ears(np.ascontiguousarray(flat), _EAR_STEPS)

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The corners of a polygon by place, for clip_ears.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+namespace wavecomb {
+
+struct Corner {
+  double x, y;
+  bool operator==(const Corner&) const = default;
+};
+
+/// Twice the signed area of the triangle a, b, c.
+inline double turn_of(const Corner& a, const Corner& b, const Corner& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+/// A k-d tree of places, from which corners are taken one by one. Corners at one place are one.
+class CornerTree {
+ public:
+  static constexpr uint32_t kNone = 0xffffffffu;
+
+  explicit CornerTree(std::span<const Corner> corners) : place_of_(corners.size()) {
+    std::vector<uint32_t> order(corners.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+      const Corner &p = corners[a], &q = corners[b];
+      return p.x != q.x ? p.x < q.x : p.y != q.y ? p.y < q.y : a < b;
+    });
+    std::vector<Corner> sorted;
+    std::vector<uint32_t> counts;
+    for (const uint32_t i : order) {
+      if (sorted.empty() || !(sorted.back() == corners[i])) {
+        sorted.push_back(corners[i]);
+        counts.push_back(0);
+      }
+      ++counts.back();
+      place_of_[i] = static_cast<uint32_t>(sorted.size() - 1);
+    }
+    std::vector<uint32_t> places(sorted.size());
+    std::iota(places.begin(), places.end(), 0u);
+    build(sorted, places, 0, static_cast<uint32_t>(places.size()), kNone);
+    std::vector<uint32_t> rank(places.size());
+    leaf_of_.resize(places.size());
+    for (uint32_t i = 0; i < places.size(); ++i) {
+      rank[places[i]] = i;
+      places_.push_back(sorted[places[i]]);
+      counts_.push_back(counts[places[i]]);
+    }
+    for (uint32_t n = 0; n < nodes_.size(); ++n)
+      if (nodes_[n].child == kNone)
+        std::fill(leaf_of_.begin() + nodes_[n].begin, leaf_of_.begin() + nodes_[n].end, n);
+    for (uint32_t& place : place_of_) place = rank[place];
+  }
+
+  size_t place_count() const { return places_.size(); }
+  uint32_t place_of(uint32_t corner) const { return place_of_[corner]; }
+
+  /// Takes a corner; true: it was the last one at its place.
+  bool remove(uint32_t corner) {
+    const uint32_t place = place_of_[corner];
+    if (--counts_[place] > 0) return false;
+    for (uint32_t n = leaf_of_[place]; n != kNone; n = nodes_[n].parent) --nodes_[n].alive;
+    return true;
+  }
+
+  /// A place in or on the triangle a, b, c (counter-clockwise) where corners are left, other than
+  /// those three; kNone: there is none. Which one of several is left to chance, so that what is
+  /// taken next is seldom it. Adds nodes looked at to `steps`.
+  uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {
+    const double lo_x = std::min({a.x, b.x, c.x}), hi_x = std::max({a.x, b.x, c.x});
+    const double lo_y = std::min({a.y, b.y, c.y}), hi_y = std::max({a.y, b.y, c.y});
+    const Edge edges[3] = {{a, b}, {b, c}, {c, a}};
+    uint32_t stack[64], depth = 0;
+    stack[depth++] = 0;
+    while (depth > 0) {
+      const Node& node = nodes_[stack[--depth]];
+      ++steps;
+      if (node.alive == 0 || node.lo.x > hi_x || node.hi.x < lo_x || node.lo.y > hi_y ||
+          node.hi.y < lo_y)
+        continue;
+      if (edges[0].off(node) || edges[1].off(node) || edges[2].off(node)) continue;
+      random_ = random_ * 747796405u + 2891336453u;
+      const uint32_t chance = random_ >> 16;
+      if (node.child != kNone) {
+        stack[depth++] = node.child + (chance & 1u);
+        stack[depth++] = node.child + (~chance & 1u);
+        continue;
+      }
+      const uint32_t size = node.end - node.begin;
+      for (uint32_t k = 0, i = chance % size; k < size; ++k, i = i + 1 == size ? 0 : i + 1) {
+        const Corner& p = places_[node.begin + i];
+        if (counts_[node.begin + i] > 0 && turn_of(a, b, p) >= 0 && turn_of(b, c, p) >= 0 &&
+            turn_of(c, a, p) >= 0 && !(p == a) && !(p == b) && !(p == c))
+          return node.begin + i;
+      }
+    }
+    return kNone;
+  }
+
+ private:
+  static constexpr uint32_t kLeaf = 4;
+
+  struct Node {
+    Corner lo, hi;
+    uint32_t begin, end;     ///< of places
+    uint32_t alive;          ///< places with corners left
+    uint32_t parent, child;  ///< first of two; kNone: a leaf
+  };
+  struct Edge {
+    Corner from, to;
+    /// Whether all of a box is to its right. Rounding is monotonic, so that this is as the places
+    /// in it would say themselves.
+    bool off(const Node& n) const {
+      return turn_of(from, to, {to.y > from.y ? n.lo.x : n.hi.x, to.x > from.x ? n.hi.y : n.lo.y}) <
+             0;
+    }
+  };
+
+  uint32_t build(std::span<const Corner> at, std::vector<uint32_t>& places, uint32_t begin,
+                 uint32_t end, uint32_t parent) {
+    const auto index = static_cast<uint32_t>(nodes_.size());
+    nodes_.emplace_back();
+    fill(index, at, places, begin, end, parent);
+    return index;
+  }
+
+  void fill(uint32_t index, std::span<const Corner> at, std::vector<uint32_t>& places,
+            uint32_t begin, uint32_t end, uint32_t parent) {
+    Node node{at[places[begin]], at[places[begin]], begin, end, end - begin, parent, kNone};
+    for (uint32_t i = begin; i < end; ++i) {
+      const Corner& p = at[places[i]];
+      node.lo = {std::min(node.lo.x, p.x), std::min(node.lo.y, p.y)};
+      node.hi = {std::max(node.hi.x, p.x), std::max(node.hi.y, p.y)};
+    }
+    if (end - begin > kLeaf) {
+      const bool wide = node.hi.x - node.lo.x >= node.hi.y - node.lo.y;
+      const uint32_t middle = begin + (end - begin) / 2;
+      std::nth_element(
+          places.begin() + begin, places.begin() + middle, places.begin() + end,
+          [&](uint32_t a, uint32_t b) { return wide ? at[a].x < at[b].x : at[a].y < at[b].y; });
+      node.child = static_cast<uint32_t>(nodes_.size());
+      nodes_.resize(nodes_.size() + 2);
+      fill(node.child, at, places, begin, middle, index);
+      fill(node.child + 1, at, places, middle, end, index);
+    }
+    nodes_[index] = node;
+  }
+
+  std::vector<Node> nodes_;
+  std::vector<Corner> places_;    ///< in the order of the leaves
+  std::vector<uint32_t> counts_;  ///< corners left at each
+  std::vector<uint32_t> leaf_of_, place_of_;
+  uint32_t random_ = 1;
+};
+
+}  // namespace wavecomb
