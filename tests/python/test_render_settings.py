@@ -204,7 +204,7 @@ def test_all_products_are_rendered_of_one_scene(tmp_path):
     """Each is what it is alone, bit for bit."""
     settings = "uniform int2 resolution = (30, 20)\nrel camera = </A>" + PRODUCTS
     stage = write(tmp_path, stage_text(settings, folder=tmp_path))
-    assert run("render", stage, "--spp", 2) == (0, "")
+    assert run("render", stage, "--spp", 2, "--output-dir", tmp_path) == (0, "")
     one, two = (read_layers(tmp_path / f"{name}.exr") for name in ("one", "two"))
     assert list(one) == ["beauty", "depth"] and one["beauty"].shape == (20, 30, 3)
     assert two["beauty"].shape == (10, 20, 3)

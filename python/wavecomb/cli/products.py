@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,25 @@ class Plan:
 
     choice: RenderChoice
     names: Names
+    folder: str | None = None
+    """Where the picture has to be, as the stage named it; None: the user did."""
+
+    def check_place(self, names: Names) -> None:
+        """Raises WavecombError where the picture would leave ``folder``, through links too.
+
+        Args:
+            names: Those of the plan at a frame.
+        """
+        if self.folder is None:
+            return
+        within = os.path.realpath(self.folder)
+        target = os.path.realpath(names.output)
+        if os.path.commonpath([within, target]) != within or within == target:
+            name = self.choice.output or names.output
+            raise WavecombError(
+                f"{self.choice.product}: productName {name} leaves the folder {within}: give "
+                "-o FILE.exr, or --output-dir with the folder that pictures may go to"
+            )
 
     def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
         """Layers: those of options, else of the render that goes on, else of the product."""
@@ -74,13 +94,19 @@ def plan_products(
     stats: str | None,
     purpose: PurposeOptions,
     frames: str | None,
+    folder: str | None = None,
 ) -> list[Plan]:
     """What is to be rendered: with ``-o`` the first product, without it all.
+
+    ``folder`` is where names that the stage gives count from, and must stay below; None: the
+    working folder.
 
     Raises:
         WavecombError: Nothing says where a picture goes.
     """
     if output is not None:
+        if folder is not None:
+            raise WavecombError("--output-dir is for pictures that the stage names; -o names one")
         return [Plan(choices[0], Names(output, png, stats))]
     plans = []
     for choice in choices:
@@ -92,7 +118,10 @@ def plan_products(
             raise WavecombError(
                 f"{choice.product}: productName {choice.output} must end in .exr; give -o FILE.exr"
             )
-        plans.append(Plan(choice, Names(choice.output, png, stats)))
+        if "\0" in choice.output:
+            raise WavecombError(f"{choice.product}: productName is no file name; give -o FILE.exr")
+        name = choice.output if folder is None else os.path.join(folder, choice.output)
+        plans.append(Plan(choice, Names(name, png, stats), folder or os.curdir))
     if len(plans) > 1:
         single = {
             "--png": png, "--stats": stats, "--checkpoint": purpose.checkpoint,
@@ -104,11 +133,13 @@ def plan_products(
                     f"{option} {name}: is of one picture and the stage has {len(plans)} render "
                     "products; choose one by --product"
                 )
-        names = [plan.names.output for plan in plans]
-        for name in names:
-            if names.count(name) > 1:
+        seen: set[str] = set()
+        for plan in plans:
+            name, target = plan.choice.output, os.path.realpath(plan.names.output)
+            if target in seen:
                 raise WavecombError(
                     f"productName {name} is that of several render products; choose one by "
                     "--product"
                 )
+            seen.add(target)
     return plans

@@ -46,6 +46,13 @@ _INTEGERS = click.IntRange(min=0)
     metavar="FILE.exr",
     help="Picture, all layers.  [default: the productName of each render product]",
 )
+@click.option(
+    "--output-dir",
+    type=click.Path(),
+    metavar="DIR",
+    help="Without -o: the folder that the stage's pictures go to, and may not leave.  "
+    "[default: the working folder]",
+)
 @aov_options
 @click.option("--png", type=click.Path(), metavar="FILE", help="Picture for display, too.")
 @click.option(
@@ -163,6 +170,7 @@ _INTEGERS = click.IntRange(min=0)
 def render_command(
     stage: str,
     output: str | None,
+    output_dir: str | None,
     png: str | None,
     stats_file: str | None,
     size: tuple[int, int] | None,
@@ -191,13 +199,16 @@ def render_command(
     layers = AovOptions.take(options)
     costs_file = costs if costs is not None and costs not in SOURCES else None
 
-    def checked(names: Names) -> tuple[float, ...] | None:
+    def checked(names: Names, plan: Plan | None = None) -> tuple[float, ...] | None:
         """The frames of a sequence; what can be known to fail fails here."""
         numbers = check_frames(frames, skip_existing, source, names, purpose)
         for frame in (None,) if numbers is None else numbers:
+            here = names if frame is None else names.at(frame)
+            if plan is not None:
+                plan.check_place(here)
             _check_outputs(
                 stage,
-                names if frame is None else names.at(frame),
+                here,
                 purpose if frame is None else purpose_at(purpose, frame),
                 costs_file,
             )
@@ -227,7 +238,7 @@ def render_command(
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
     before = None if resumed is None else resumed.aovs
     choices, opened = source.peek(stage)
-    plans = plan_products(choices, output, png, stats_file, purpose, frames)
+    plans = plan_products(choices, output, png, stats_file, purpose, frames, output_dir)
     reporter = make_reporter(purpose.progress, quiet)
 
     def job_of(plan: Plan) -> Job:
@@ -240,7 +251,7 @@ def render_command(
         return Job(stage, settings, aovs, profile, layers, reporter, exposure, tone_map)
 
     # All is checked before the first is rendered.
-    jobs = [(plan, checked(plan.names), job_of(plan)) for plan in plans]
+    jobs = [(plan, checked(plan.names, plan), job_of(plan)) for plan in plans]
     shared = open_frames(jobs[0][2], source) if len(jobs) > 1 and frames is None else None
     for plan, numbers, job in jobs:
         here = plan.source(source)
