@@ -3,9 +3,19 @@
 #include "wavecomb/texture/tile_store.h"
 
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <linux/userfaultfd.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstddef>
 #include <cstring>
+#include <functional>
 #include <numeric>
 #include <thread>
 
@@ -246,6 +256,45 @@ std::string message(const std::function<void()>& body) {
     return e.what();
   }
   return "";
+}
+
+/// Makes UFFDIO_COPY fail with ENOMEM on this thread and on those that it starts from now on.
+bool take_memory_away() {
+  sock_filter program[] = {
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 0, 3),
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, args[1])),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<uint32_t>(UFFDIO_COPY), 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | ENOMEM),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)};
+  const sock_fprog filter{static_cast<unsigned short>(std::size(program)), program};
+  return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+         ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;
+}
+
+TEST_F(TileStoreTest, NoMemoryForATileIsSaidAndReadersGoOn) {
+  for (uint32_t seed : {1u, 2u}) add(seed);
+  bool filters = false;
+  std::string refused;
+  std::thread([&] {
+    filters = take_memory_away();
+    // In memory: who adds is told. Then the store goes to its file, and starts threads.
+    const auto small = content(3, 100'000);
+    refused = message([&] { store->add(small.data(), small.size()); });
+    add(4);
+  }).join();
+  if (!filters) GTEST_SKIP() << "the system has no seccomp";
+  EXPECT_EQ(refused,
+            "texture limit: no memory for textures (Cannot allocate memory); give a smaller limit");
+  EXPECT_NO_THROW(store->check());
+  // Without its thread's care the process would end here, or the readers wait for ever.
+  std::vector<std::thread> readers;
+  std::atomic<int> sum = 0;
+  for (size_t i = 0; i < 3; ++i)
+    readers.emplace_back([&, i] { sum += std::to_integer<int>(places[i][kSize / 2]); });
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_EQ(sum, 0);
+  EXPECT_EQ(message([&] { store->check(); }), refused);
 }
 
 TEST_F(TileStoreTest, SaysWhatIsWrongWithALimitOrAFolder) {

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """``--texture-limit``: the same picture, within the limit, and what stands in the way."""
 
+import ctypes
+import errno
 import os
+import platform
 import re
 import resource
+import struct
 import subprocess
 import sys
 import threading
@@ -185,6 +189,36 @@ def test_a_file_that_cannot_be_read_back_ends_the_render(stage):
             continue
     with pytest.raises(ValueError, match=r"cannot be read back .*; set TMPDIR to another folder"):
         wavecomb.render(loaded, size=(32, 32), spp=1)
+
+
+def no_memory_for_tiles():
+    """Makes the kernel refuse to fill what a store asks for: UFFDIO_COPY fails with ENOMEM."""
+    ioctl, copy, allow, fail = 16, 0xC028AA03, 0x7FFF0000, 0x00050000 | errno.ENOMEM
+    steps = [(0x20, 0, 0, 0), (0x15, 0, 3, ioctl), (0x20, 0, 0, 24), (0x15, 0, 1, copy),
+             (0x06, 0, 0, fail), (0x06, 0, 0, allow)]  # fmt: skip
+    program = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *step) for step in steps))
+    head = ctypes.create_string_buffer(struct.pack("HP", len(steps), ctypes.addressof(program)))
+    prctl = ctypes.CDLL(None).prctl
+    no_new_privs, set_seccomp, mode_filter = 38, 22, 2
+    assert prctl(no_new_privs, 1, 0, 0, 0) == 0
+    assert prctl(set_seccomp, mode_filter, ctypes.byref(head)) == 0
+
+
+@needs_store
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="numbers of system calls of x86_64")
+@pytest.mark.parametrize("limit", ["1", "2"], ids=["on the store's thread", "on the loader's"])
+def test_no_memory_for_a_tile_ends_the_render_in_one_line(stage, limit):
+    """With 1 MB all textures go to the file at once; with 2 the first one is to stay."""
+    done = subprocess.run(
+        [sys.executable, "-m", "wavecomb", "render", stage, "-o", stage.parent / "o.exr", "--size",
+         "64", "64", "--spp", "1", "--texture-limit", limit, "--isolate", "off"],
+        capture_output=True, text=True, timeout=120, check=False, preexec_fn=no_memory_for_tiles,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    last = done.stderr.strip().splitlines()[-1]
+    assert re.match("error: .*no memory for textures .Cannot allocate memory.; give a", last), last
+    assert "Traceback" not in done.stderr and "terminate" not in done.stderr
+    assert not [name for name in os.listdir(stage.parent) if "o.exr" in name or ".part" in name]
 
 
 def run(stage, *options, file_bytes=None, **environment):

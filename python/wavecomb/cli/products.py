@@ -135,10 +135,10 @@ def plan_products(
                 )
         seen: set[str] = set()
         for plan in plans:
-            name, target = plan.choice.output, os.path.realpath(plan.names.output)
+            target = os.path.realpath(plan.names.output)
             if target in seen:
                 raise WavecombError(
-                    f"productName {name} is that of several render products; choose one by "
+                    f"productName {plan.choice.output} is that of several render products; choose one by "
                     "--product"
                 )
             seen.add(target)

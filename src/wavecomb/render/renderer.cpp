@@ -284,7 +284,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     if (const TileStore* store = scene.texture_store()) s.texture_store = store->statistics();
     return s;
   };
+  // What is read since a store failed is black: nobody gets to see it.
+  const auto check_textures = [&] {
+    if (const TileStore* store = scene.texture_store()) store->check();
+  };
   const auto snapshot = [&](bool finished) {
+    check_textures();
     if (options.snapshot)
       options.snapshot({film, loop.pass(), loop.status(), finished, aovs.kept_names, statistics});
   };
@@ -292,9 +297,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
       tbb::global_control::max_allowed_parallelism,
       std::max<size_t>(threads, static_cast<size_t>(tbb::info::default_concurrency())));
   watch.run([&] { tbb::task_arena(static_cast<int>(threads)).execute(work); },
-            [&] { return options.progress ? options.progress(loop.status()) : Request::kGoOn; },
+            [&] {
+              check_textures();
+              return options.progress ? options.progress(loop.status()) : Request::kGoOn;
+            },
             [&] { snapshot(false); });
-  if (const TileStore* store = scene.texture_store()) store->check();
+  check_textures();
   if (options.progress && !watch.stopped()) options.progress(loop.status());
   snapshot(true);
 

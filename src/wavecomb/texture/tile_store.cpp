@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 #include "wavecomb/core/error.h"
@@ -30,6 +31,11 @@ std::string megabytes(uint64_t bytes) {
   if (text.size() < 2) text.insert(0, 1, '0');
   text.insert(text.size() - 1, ".");
   return text + " MB";
+}
+
+std::string no_memory(int reason) {
+  return std::string("texture limit: no memory for textures (") + std::strerror(reason) +
+         "); give a smaller limit";
 }
 
 uint64_t checked(uint64_t limit_bytes) {
@@ -85,11 +91,11 @@ const std::byte* TileStore::add(const std::byte* data, size_t bytes) {
     if (!file_ && resident_bytes() + pages > limit_bytes_) spill();
     if (!file_) {
       const size_t whole = pages == bytes ? bytes : pages - page_bytes();
-      if (whole > 0) faults_.fill(at, data, whole);
+      if (whole > 0) put(at, data, whole);
       if (whole < bytes) {
         std::vector<std::byte> last(page_bytes());
         std::memcpy(last.data(), data + whole, bytes - whole);
-        faults_.fill(at + whole, last.data(), last.size());
+        put(at + whole, last.data(), last.size());
       }
       held_bytes_ += pages;
     } else {
@@ -102,6 +108,7 @@ const std::byte* TileStore::add(const std::byte* data, size_t bytes) {
     }
   } catch (...) {
     if (!lock.owns_lock()) lock.lock();
+    if (!file_) faults_.release(at, count * tile_bytes_);
     free(first, count);
     throw;
   }
@@ -136,8 +143,11 @@ StoreStatistics TileStore::statistics() const {
 }
 
 void TileStore::check() const {
-  const std::lock_guard lock(mutex_);
-  if (!failure_.empty()) throw Error(failure_);
+  const Failure failure = failure_.load(std::memory_order_acquire);
+  if (failure == Failure::kFile)
+    throw Error("texture limit: textures cannot be read back from the file in " + folder_ +
+                "; set TMPDIR to another folder");
+  if (failure == Failure::kMemory) throw Error(no_memory(reason_));
 }
 
 // ---- address space ----
@@ -206,18 +216,38 @@ void TileStore::spill() {
     file->write(address(first), bytes, offset);
     file->write(nothing.data(), range.count * tile_bytes_ - bytes, offset + bytes);
   }
+  // Before anything leaves memory: only they bring it back.
+  start_keepers();
   for (const auto& [first, range] : ranges_)
     faults_.release(address(first), range.count * tile_bytes_);
   held_bytes_ = 0;
   file_ = std::move(file);
+}
+
+void TileStore::start_keepers() {
   const unsigned readers = std::max(1u, std::thread::hardware_concurrency());
   const unsigned count = std::clamp(readers / kReadersPerKeeper, 1u, kMaxKeepers);
+  if (!keepers_.empty()) return;
+  buffers_.resize(count * tile_bytes_);
+  keepers_.reserve(count);
   // Signals are for the threads that were there before.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
-  for (unsigned i = 0; i < count; ++i) keepers_.emplace_back([this] { keep(); });
+  int reason = 0;
+  try {
+    for (unsigned i = 0; i < count; ++i)
+      keepers_.emplace_back([this, buffer = &buffers_[i * tile_bytes_]] { keep(buffer); });
+  } catch (const std::system_error& error) {
+    reason = error.code().value();
+  }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  // A few of them can do what all should.
+  if (keepers_.empty()) throw Error(no_memory(reason));
+}
+
+void TileStore::put(const std::byte* at, const std::byte* from, size_t bytes) {
+  if (const int reason = faults_.fill(at, from, bytes)) throw Error(no_memory(reason));
 }
 
 void TileStore::make_room() {
@@ -229,14 +259,13 @@ void TileStore::make_room() {
   }
 }
 
-void TileStore::keep() {
-  std::vector<const std::byte*> places;
-  std::vector<std::byte> buffer(tile_bytes_);
-  while (faults_.wait(places))
-    for (const std::byte* at : places) serve(at, buffer);
+void TileStore::keep(std::byte* buffer) noexcept {
+  const std::byte* places[UserFaults::kMostPlaces];
+  while (const size_t count = faults_.wait(places))
+    for (size_t i = 0; i < count; ++i) serve(places[i], buffer);
 }
 
-void TileStore::serve(const std::byte* at, std::vector<std::byte>& buffer) {
+void TileStore::serve(const std::byte* at, std::byte* buffer) {
   const Clock::time_point start = Clock::now();
   std::unique_lock lock(mutex_);
   const uint32_t tile = tile_at(at);
@@ -247,18 +276,24 @@ void TileStore::serve(const std::byte* at, std::vector<std::byte>& buffer) {
   make_room();
   counts_.peak_bytes = std::max(counts_.peak_bytes, resident_bytes());
   lock.unlock();
-  std::string failure;
-  if (!file_->read(buffer.data(), tile_bytes_, uint64_t{tile} * tile_bytes_)) {
-    // Readers must go on in any case; the render is told at its end.
-    std::fill(buffer.begin(), buffer.end(), std::byte{0});
-    failure = "texture limit: textures cannot be read back from the file in " + folder_ +
-              "; set TMPDIR to another folder";
+  // Readers must go on in any case; the render is told at the next look.
+  Failure failure = Failure::kNone;
+  if (!file_->read(buffer, tile_bytes_, uint64_t{tile} * tile_bytes_)) {
+    std::fill_n(buffer, tile_bytes_, std::byte{0});
+    failure = Failure::kFile;
   }
-  faults_.fill(place, buffer.data(), tile_bytes_);
+  const int reason = faults_.fill(place, buffer, tile_bytes_);
+  if (reason != 0) {
+    faults_.give_up(place, tile_bytes_);
+    failure = Failure::kMemory;
+  }
   lock.lock();
   queue_.end(tile, room());
   ++counts_.loads;
-  if (failure_.empty()) failure_ = std::move(failure);
+  if (failure != Failure::kNone && failure_.load(std::memory_order_relaxed) == Failure::kNone) {
+    reason_ = reason;
+    failure_.store(failure, std::memory_order_release);
+  }
   load_ns_ += static_cast<uint64_t>(
       std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count());
 }

@@ -2,6 +2,7 @@
 /// Keeps textures within a limit of memory, and the rest of them in a file.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -67,7 +68,8 @@ class TileStore {
 
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
-  /// Throws Error where a tile could not be read back: what was read there since is black.
+  /// Throws Error where a tile could not be read back, or there was no memory for it: what was read
+  /// there since is black.
   void check() const;
 
  private:
@@ -89,9 +91,12 @@ class TileStore {
   size_t room() const;
   void make_room();
   void spill();
+  void start_keepers();
+  void put(const std::byte* at, const std::byte* from, size_t bytes);
 
-  void keep();
-  void serve(const std::byte* at, std::vector<std::byte>& buffer);
+  // On threads of the store, where nobody would catch what is thrown.
+  void keep(std::byte* buffer) noexcept;
+  void serve(const std::byte* at, std::byte* buffer);
 
   const uint64_t limit_bytes_;
   const size_t tile_bytes_;
@@ -108,7 +113,11 @@ class TileStore {
   uint64_t waiting_bytes_ = 0;
   StoreStatistics counts_;
   uint64_t load_ns_ = 0;
-  std::string failure_;
+  /// Of the first tile that could not be had.
+  enum class Failure : uint8_t { kNone, kFile, kMemory };
+  std::atomic<Failure> failure_{Failure::kNone};
+  int reason_ = 0;                  ///< of kMemory: the number of the system's error
+  std::vector<std::byte> buffers_;  ///< a tile for each keeper
   std::vector<std::thread> keepers_;
 };
 

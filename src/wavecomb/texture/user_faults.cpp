@@ -88,45 +88,54 @@ const std::byte* UserFaults::map(size_t bytes) {
   return maps_.back().first;
 }
 
-void UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) {
+int UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept {
   size_t done = 0;
   while (done < bytes) {
     uffdio_copy copy{};
     copy.dst = number(at) + done;
     copy.src = number(from) + done;
     copy.len = bytes - done;
-    if (::ioctl(faults_, UFFDIO_COPY, &copy) == 0) return;
-    if (errno != EAGAIN)
-      throw Error(std::string("no memory for textures (") + std::strerror(errno) + ")");
+    if (::ioctl(faults_, UFFDIO_COPY, &copy) == 0) return 0;
+    if (errno != EAGAIN) return errno;
     // Mappings changed meanwhile; what was copied before that counts.
     if (copy.copy > 0) done += static_cast<size_t>(copy.copy);
   }
+  return 0;
 }
 
-void UserFaults::release(const std::byte* at, size_t bytes) {
+void UserFaults::give_up(const std::byte* at, size_t bytes) noexcept {
+  // From here on the kernel serves the place by itself, as any other memory.
+  uffdio_range range{number(at), bytes};
+  ::ioctl(faults_, UFFDIO_UNREGISTER, &range);
+  wake(at, bytes);
+}
+
+void UserFaults::release(const std::byte* at, size_t bytes) noexcept {
   ::madvise(const_cast<std::byte*>(at), bytes, MADV_DONTNEED);
 }
 
-void UserFaults::wake(const std::byte* at, size_t bytes) {
+void UserFaults::wake(const std::byte* at, size_t bytes) noexcept {
   uffdio_range range{number(at), bytes};
   ::ioctl(faults_, UFFDIO_WAKE, &range);
 }
 
-bool UserFaults::wait(std::vector<const std::byte*>& places) {
-  constexpr size_t kMost = 16;
-  places.clear();
+size_t UserFaults::wait(const std::byte** places) noexcept {
   for (;;) {
     pollfd files[2] = {{faults_, POLLIN, 0}, {stop_, POLLIN, 0}};
-    if (::poll(files, 2, -1) < 0 && errno != EINTR) return false;
-    if (files[1].revents != 0) return false;
-    uffd_msg messages[kMost];
+    // Whatever it says, such as that memory is short: who waits is served.
+    if (::poll(files, 2, -1) < 0) {
+      if (errno != EINTR) ::usleep(1000);
+      continue;
+    }
+    if (files[1].revents != 0) return 0;
+    uffd_msg messages[kMostPlaces];
     const ssize_t size = ::read(faults_, messages, sizeof(messages));
-    if (size <= 0) continue;  // another thread took them
-    for (size_t i = 0; i < static_cast<size_t>(size) / sizeof(uffd_msg); ++i)
+    size_t count = 0;
+    for (size_t i = 0; size > 0 && i < static_cast<size_t>(size) / sizeof(uffd_msg); ++i)
       if (messages[i].event == UFFD_EVENT_PAGEFAULT)
-        places.push_back(
-            reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address}));
-    return true;
+        places[count++] =
+            reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address});
+    if (count > 0) return count;  // else another thread took them
   }
 }
 
@@ -152,11 +161,14 @@ UserFaults::~UserFaults() = default;
 const std::byte* UserFaults::map(size_t) {
   return nullptr;
 }
-void UserFaults::fill(const std::byte*, const std::byte*, size_t) {}
-void UserFaults::release(const std::byte*, size_t) {}
-void UserFaults::wake(const std::byte*, size_t) {}
-bool UserFaults::wait(std::vector<const std::byte*>&) {
-  return false;
+int UserFaults::fill(const std::byte*, const std::byte*, size_t) noexcept {
+  return 0;
+}
+void UserFaults::give_up(const std::byte*, size_t) noexcept {}
+void UserFaults::release(const std::byte*, size_t) noexcept {}
+void UserFaults::wake(const std::byte*, size_t) noexcept {}
+size_t UserFaults::wait(const std::byte**) noexcept {
+  return 0;
 }
 void UserFaults::stop() {}
 size_t page_bytes() {

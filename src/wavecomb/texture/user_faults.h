@@ -28,15 +28,21 @@ class UserFaults {
   /// More address space, to be read only; it stays as long as this does. Throws Error where there
   /// is no more.
   const std::byte* map(size_t bytes);
-  /// Puts a copy of `from` where nothing is, and wakes who waits there.
-  void fill(const std::byte* at, const std::byte* from, size_t bytes);
+  /// Puts a copy of `from` where nothing is, and wakes who waits there. Gives 0, or the number of
+  /// the error where the system cannot; part of it may be there then.
+  [[nodiscard]] int fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept;
+  /// Lets those go on who wait for a place that cannot be filled: they read zeros, or what is there
+  /// of it. Takes no memory.
+  void give_up(const std::byte* at, size_t bytes) noexcept;
   /// Gives memory back. What is read there from then on waits.
-  void release(const std::byte* at, size_t bytes);
+  void release(const std::byte* at, size_t bytes) noexcept;
   /// Lets those go on who waited for a place that was filled before they asked.
-  void wake(const std::byte* at, size_t bytes);
-  /// Waits until someone reads where nothing is, and puts some such places into `places`; false
-  /// once `stop` was called.
-  bool wait(std::vector<const std::byte*>& places);
+  void wake(const std::byte* at, size_t bytes) noexcept;
+  /// Places that one `wait` gives at most.
+  static constexpr size_t kMostPlaces = 16;
+  /// Waits until someone reads where nothing is, and puts some such places into `places`, which has
+  /// room for kMostPlaces; gives their number, 0 once `stop` was called.
+  size_t wait(const std::byte** places) noexcept;
   /// Ends every `wait`, now and later.
   void stop();
 
