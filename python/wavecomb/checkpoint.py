@@ -9,9 +9,8 @@ whatever happens there is a whole one; the archive's checksums find damage.
 from __future__ import annotations
 
 import json
+import math
 import os
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wavecomb import aovs as aov_names
+from wavecomb.archive import ArchiveError, read_archive
 from wavecomb.errors import WavecombError
 from wavecomb.files import replacing
 from wavecomb.stats import plain
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 _KIND = "wavecomb-checkpoint"
-_KEYS = {"version", "library", "stage", "source", "aovs", "settings", "scene", "seconds"}
 
 _HOW = (
     "threads",
@@ -144,23 +144,70 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     if not Path(name).exists():
         raise FileNotFoundError(f"{name}: no such file; a render with --checkpoint makes one")
     try:
-        with Path(name).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            header = json.loads(archive["header"].tobytes())
-            if header["kind"] != _KIND:
-                raise KeyError("kind")
-            if header["format"] != FORMAT:
-                raise WavecombError(
-                    f"{name}: is a checkpoint of format {header['format']}, by Wavecomb "
-                    f"{header['version']}; this is {version()}, which reads format {FORMAT}: "
-                    "resume with that version, or start anew"
-                )
-            if missing := _KEYS - header.keys():
-                raise KeyError(*missing)
-            state = {key: archive[key] for key in archive.files if key != "header"}
-            state["pass.target"] = int(state["pass.target"])
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        header, state = read_archive(name)
+        if not isinstance(header, dict) or header.get("kind") != _KIND:
+            raise ArchiveError("it is of another kind")
+        if header.get("format") != FORMAT:
+            raise WavecombError(
+                f"{name}: is a checkpoint of format {header.get('format')}, by Wavecomb "
+                f"{header.get('version')}; this is {version()}, which reads format {FORMAT}: "
+                "resume with that version, or start anew"
+            )
+        _check_header(header)
+        state["pass.target"] = _check_state(state)
+    except ArchiveError as error:
         raise WavecombError(f"{name}: is no checkpoint, or is damaged; start anew") from error
     return Checkpoint(name, header, state)
+
+
+_PARTS: dict[str, tuple[type, ...]] = {
+    "version": (str,),
+    "library": (str,),
+    "stage": (str, type(None)),
+    "source": (dict,),
+    "aovs": (list,),
+    "settings": (dict,),
+    "scene": (dict,),
+    "seconds": (int, float),
+}
+
+
+def _check_header(header: dict[str, Any]) -> None:
+    """Raises ArchiveError unless all parts are there, and of their types."""
+    for key, types in _PARTS.items():
+        if not isinstance(header.get(key, ()), types):
+            raise ArchiveError(f"its {key} is no good")
+    texts = [*header["aovs"], *header["scene"].values()]
+    if not all(isinstance(text, str) for text in texts):
+        raise ArchiveError("its names are no text")
+    if not 0 <= header["seconds"] < math.inf:
+        raise ArchiveError("its seconds are no time")
+    from wavecomb import _core
+
+    settings = header["settings"]
+    known = picture_settings(
+        {**_core.Settings().to_dict(), "roulette": "cost-aware", "adaptive": 1.0}
+    )
+    if not settings.keys() <= known.keys() or not {"width", "height", "spp"} <= settings.keys():
+        raise ArchiveError("it has settings that are not known")
+    try:
+        aov_names.expand(header["aovs"])
+        _core.Settings(**settings).check()
+    except (TypeError, ValueError, OverflowError, RuntimeError, WavecombError) as error:
+        raise ArchiveError(f"its settings are no good: {error}") from error
+
+
+def _check_state(state: dict[str, Any]) -> int:
+    """The pass that was under way; raises ArchiveError unless arrays are as they are saved."""
+    if not {"pass.target", "pass.active"} <= state.keys():
+        raise ArchiveError("it lacks a part")
+    target = state["pass.target"]
+    if target.shape != () or target.dtype.kind not in "iu" or not 0 <= int(target) < 1 << 32:
+        raise ArchiveError("its pass is no number")
+    for name, array in state.items():
+        if name != "pass.target" and (array.dtype != np.uint8 or array.ndim != 1):
+            raise ArchiveError(f"its {name} is no row of bytes")
+    return int(target)
 
 
 def check_replaceable(path: str | os.PathLike[str]) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from wavecomb.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
 from wavecomb.files import one_line
+from wavecomb.machine import memory_bytes
 
 __all__ = [
     "channel_names",
@@ -190,6 +191,21 @@ def _open(name: str) -> Any:
     return source
 
 
+def _check_size(name: str, spec: Any) -> None:
+    """Raises OSError for a picture that this machine has no memory for, or that has no pixels."""
+    if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
+        raise OSError(f"{name}: has no pixels, or several in depth")
+    # As floats, again by layers, and what the library holds meanwhile.
+    needed = 3 * 4 * spec.width * spec.height * spec.nchannels
+    there = memory_bytes()
+    if there is not None and needed > there:
+        raise OSError(
+            f"{name}: says that it has {spec.width} x {spec.height} pixels with {spec.nchannels} "
+            f"channels, which takes {needed / 2**30:.0f} GiB; this machine has "
+            f"{there / 2**30:.0f}"
+        )
+
+
 def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
     import OpenImageIO as oiio
 
@@ -197,6 +213,7 @@ def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
     source = _open(name)
     try:
         spec = source.spec()
+        _check_size(name, spec)
         pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
         if pixels is None:
             raise OSError(f"{name}: is damaged: {one_line(source.geterror(), name)}")

@@ -101,12 +101,18 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
     sums: dict[str, NDArray[Any]] = {}
     pairs: dict[str, list[NDArray[Any]]] = {}
     names: dict[str, dict[str, int]] = {}
+    shapes: dict[str, tuple[int, ...]] = {}
     for source in sources:
         layers = read_layers(source.name)
         layers.pop("denoised", None)  # it is the sum that is to be denoised
+        _check_shapes(source, layers, shapes)
         _check_layers(first.name, sums, source.name, layers, pairs)
         _add(sums, pairs, layers)
-        for level, manifest in cryptomatte.manifests(source.attributes).items():
+        try:
+            manifests = cryptomatte.manifests(source.attributes)
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            raise WavecombError(f"{source.name}: a Cryptomatte manifest in it is damaged") from None
+        for level, manifest in manifests.items():
             names.setdefault(level, {}).update(manifest)
     all_seeds = tuple(seeds)
     return Merged(_means(sums, pairs), _metadata(sources, all_seeds), names, all_seeds)
@@ -118,8 +124,10 @@ def _source(name: str) -> _Source:
     try:
         settings = json.loads(str(attributes["wavecomb:settings"]))
         seeds = json.loads(str(attributes.get("wavecomb:seeds", f"[{settings['seed']}]")))
+        if not isinstance(settings, dict) or not isinstance(seeds, list):
+            raise TypeError
         return _Source(name, attributes, settings, tuple(int(seed) for seed in seeds))
-    except (KeyError, ValueError, TypeError):
+    except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
         raise WavecombError(
             f"{name}: does not say what settings made it; merge takes EXR files of wavecomb render"
         ) from None
@@ -145,6 +153,28 @@ def _check_fit(first: _Source, other: _Source) -> None:
             f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
             "camera or frame"
         )
+
+
+def _check_shapes(
+    source: _Source, layers: dict[str, NDArray[Any]], shapes: dict[str, tuple[int, ...]]
+) -> None:
+    """Raises WavecombError where layers have not the size that the file says, or other channels.
+
+    ``shapes`` are those of the pictures before; what is new is added.
+    """
+    size = source.settings.get("height"), source.settings.get("width")
+    for name, layer in layers.items():
+        channels = layer.shape[2]
+        good = layer.shape[:2] == size and shapes.setdefault(name, layer.shape) == layer.shape
+        if name == "samples":
+            good = good and channels == 1
+        if cryptomatte.is_crypto(name):
+            good = good and channels == 4
+        if not good:
+            raise WavecombError(
+                f"{source.name}: its layer {name} is {layer.shape[1]} x {layer.shape[0]} with "
+                f"{channels} channels, which does not fit its settings or the other pictures"
+            )
 
 
 def _check_layers(
@@ -258,8 +288,11 @@ def _metadata(sources: list[_Source], seeds: tuple[int, ...]) -> dict[str, Any]:
     }
     for key in ("worldToCamera", "worldToNDC"):
         if key in metadata:
-            metadata[key] = np.reshape(metadata[key], (4, 4))
+            matrix = np.asarray(metadata.pop(key))
+            if matrix.size == 16 and matrix.dtype.kind == "f":
+                metadata[key] = matrix.reshape(4, 4)
     seconds = [source.attributes.get("wavecomb:render_seconds", 0.0) for source in sources]
-    metadata["wavecomb:render_seconds"] = float(sum(float(value) for value in seconds))
+    known = [float(value) for value in seconds if isinstance(value, (int, float))]
+    metadata["wavecomb:render_seconds"] = sum(known)
     metadata["wavecomb:seeds"] = json.dumps(list(seeds))
     return metadata

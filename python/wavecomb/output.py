@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb import cryptomatte
+from wavecomb.errors import WavecombError
 from wavecomb.exr import Compression, check_options, is_exact, write_exr
 from wavecomb.files import replacing_all
 
@@ -158,13 +159,16 @@ def aov_of(layer: str) -> str:
     return layer
 
 
-def split_names(path: str | os.PathLike[str], aovs: Iterable[str]) -> dict[str, Path]:
+def split_names(path: str | os.PathLike[str], aovs: Collection[str]) -> dict[str, Path]:
     """AOV -> its file: that of the beauty is ``path``, of depth with ".depth" before its ending.
 
     >>> split_names("out/a.exr", ["beauty", "depth"])["depth"].name
     'a.depth.exr'
     """
     whole = Path(path)
+    for aov in aovs:
+        if "/" in aov or "\0" in aov or len(os.fsencode(aov)) > 128:
+            raise WavecombError(f"{whole}: layer {aov[:64]!r} cannot be part of a file's name")
     return {
         aov: whole if aov == "beauty" else whole.with_name(f"{whole.stem}.{aov}{whole.suffix}")
         for aov in aovs

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import Real, examples
+from wavecomb.cli.options import Real, examples, isolate_option
 
 _METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")
 _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
@@ -71,6 +71,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     metavar="X",
     help="Exit with 0, too, where no colour channel differs by more than X.",
 )
+@isolate_option
 def compare_command(
     a: str,
     b: str,

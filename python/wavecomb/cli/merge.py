@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.aovs import AovOptions, file_options
-from wavecomb.cli.options import examples
+from wavecomb.cli.options import examples, isolate_option
 
 
 @click.command(
@@ -31,6 +31,7 @@ from wavecomb.cli.options import examples
 )
 @click.option("--png", type=click.Path(), metavar="FILE", help="Picture for display, too.")
 @file_options
+@isolate_option
 def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **options: Any) -> None:
     """Add pictures of one stage that were rendered with different seeds.
 

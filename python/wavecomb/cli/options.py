@@ -65,31 +65,31 @@ def _set_load_limit(
     patience.limit_s = value
 
 
+def isolate_option(command: F) -> F:
+    """--isolate, for commands that read what others wrote."""
+    return click.option(
+        "--isolate",
+        type=click.Choice(["auto", "on", "off"]),
+        default="auto",
+        expose_value=False,
+        is_eager=True,
+        callback=_isolate,
+        help="Work in a child process, so that a crash is one line.  "
+        "[default: auto: unless called from within a program]",
+    )(command)
+
+
 def isolation_options(command: F) -> F:
     """--isolate and --load-limit, for commands that end when their stage is done."""
-    for option in (
-        click.option(
-            "--load-limit",
-            type=Real(0),
-            metavar="S",
-            expose_value=False,
-            callback=_set_load_limit,
-            help="Seconds that USD may compose the stage; 0: any.  "
-            "[default: 6, and 1 for each MB of layers]",
-        ),
-        click.option(
-            "--isolate",
-            type=click.Choice(["auto", "on", "off"]),
-            default="auto",
-            expose_value=False,
-            is_eager=True,
-            callback=_isolate,
-            help="Work in a child process, so that a crash is one line.  "
-            "[default: auto: unless called from within a program]",
-        ),
-    ):
-        command = option(command)
-    return command
+    return click.option(
+        "--load-limit",
+        type=Real(0),
+        metavar="S",
+        expose_value=False,
+        callback=_set_load_limit,
+        help="Seconds that USD may compose the stage; 0: any.  "
+        "[default: 6, and 1 for each MB of layers]",
+    )(isolate_option(command))
 
 
 def stage_options(command: F) -> F:
@@ -243,6 +243,8 @@ class StageOptions:
     def completed(self, before: dict[str, Any]) -> StageOptions:
         """With what was chosen before in place of what is not chosen here."""
         mine = self.as_dict()
+        for name in mine:
+            _check_kept(name, before.get(name))
         values: dict[str, Any] = {name: mine[name] or before.get(name) for name in mine}
         if self.frame is not None:
             values["frame"] = self.frame
@@ -319,6 +321,28 @@ class StageOptions:
     def all_purposes(self) -> tuple[str, ...] | None:
         """Purposes with "default"; None where none was chosen."""
         return tuple(dict.fromkeys(("default", *self.purposes))) if self.purposes else None
+
+
+_NUMBERS = ("frame", "texture_limit", "shutter", "motion_steps")
+_LISTS = ("purposes", "variants", "mask", "shutter")
+
+
+def _check_kept(name: str, value: Any) -> None:
+    """Raises WavecombError where an option, as a file kept it, is not of its type."""
+    from wavecomb.errors import WavecombError
+
+    if value is None or value is False:
+        return
+    wanted: tuple[type, ...] = (int, float) if name in _NUMBERS else (str,)
+    if name == "no_motion_blur":
+        wanted = (bool,)
+    good = isinstance(value, list) == (name in _LISTS)
+    for item in value if isinstance(value, list) else [value]:
+        good = good and isinstance(item, wanted) and item == item
+    if name == "shutter":
+        good = good and len(value) == 2
+    if not good:
+        raise WavecombError(f"the checkpoint's {name} is no good: it is damaged; start anew")
 
 
 def warn(lines: list[str]) -> None:

@@ -46,6 +46,14 @@ class Plan:
                 "-o FILE.exr, or --output-dir with the folder that pictures may go to"
             )
 
+    def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
+        """As ``check_place``, for a file of each layer and frame."""
+        from wavecomb.output import split_names
+
+        for names in [self.names] if frames is None else map(self.names.at, frames):
+            for file in split_names(names.output, aovs).values():
+                self.check_place(replace(names, output=str(file)))
+
     def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
         """Layers: those of options, else of the render that goes on, else of the product."""
         if layers.aovs:
@@ -127,10 +135,10 @@ def plan_products(
             "--png": png, "--stats": stats, "--checkpoint": purpose.checkpoint,
             "--resume": purpose.resume, "--preview": purpose.preview,
         }  # fmt: skip
-        for option, name in single.items():
-            if name is not None:
+        for option, given in single.items():
+            if given is not None:
                 raise WavecombError(
-                    f"{option} {name}: is of one picture and the stage has {len(plans)} render "
+                    f"{option} {given}: is of one picture and the stage has {len(plans)} render "
                     "products; choose one by --product"
                 )
         seen: set[str] = set()
@@ -138,8 +146,8 @@ def plan_products(
             target = os.path.realpath(plan.names.output)
             if target in seen:
                 raise WavecombError(
-                    f"productName {plan.choice.output} is that of several render products; choose one by "
-                    "--product"
+                    f"productName {plan.choice.output} is that of several render products; "
+                    "choose one by --product"
                 )
             seen.add(target)
     return plans

@@ -241,17 +241,23 @@ def render_command(
     plans = plan_products(choices, output, png, stats_file, purpose, frames, output_dir)
     reporter = make_reporter(purpose.progress, quiet)
 
-    def job_of(plan: Plan) -> Job:
+    def job_of(plan: Plan, numbers: tuple[float, ...] | None) -> Job:
         aovs = plan.aovs(layers, before)
         guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
         settings = plan.settings(chosen, aov_names.with_guides(aovs, guides), resumed is not None)
         shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
         further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
         layers.check(plan.names.output, (*aovs, *further))
+        if layers.split:
+            plan.check_split((*aovs, *further), numbers)
         return Job(stage, settings, aovs, profile, layers, reporter, exposure, tone_map)
 
     # All is checked before the first is rendered.
-    jobs = [(plan, checked(plan.names, plan), job_of(plan)) for plan in plans]
+    all_numbers = [checked(plan.names, plan) for plan in plans]
+    jobs = [
+        (plan, numbers, job_of(plan, numbers))
+        for plan, numbers in zip(plans, all_numbers, strict=True)
+    ]
     shared = open_frames(jobs[0][2], source) if len(jobs) > 1 and frames is None else None
     for plan, numbers, job in jobs:
         here = plan.source(source)

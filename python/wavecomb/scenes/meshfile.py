@@ -29,6 +29,8 @@ TARGET_DIAGONAL = 3.05
 _TEXTURE_LENGTH = 0.5
 _USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _MAX_FACE_VERTICES = 255
+MAX_UNPACKED = 1 << 31
+"""Bytes that a .gz may hold: ten times the largest dragon."""
 
 _PLY_TYPES = {
     "char": "i1",
@@ -110,9 +112,12 @@ def _read(path: Path) -> RawMesh:
         return _read_usd(path)
     if kind[0] not in (".obj", ".ply"):
         raise ValueError("the name must end in .obj, .ply, .obj.gz, .ply.gz or a USD ending")
-    data = path.read_bytes()
+    data = b"" if packed else path.read_bytes()
     if packed:
-        data = gzip.decompress(data)
+        with gzip.open(path) as file:
+            data = file.read(MAX_UNPACKED + 1)
+        if len(data) > MAX_UNPACKED:
+            raise ValueError(f"it unpacks to more than {MAX_UNPACKED >> 20} MB")
     return _read_obj(data) if kind[0] == ".obj" else _read_ply(data)
 
 
@@ -227,6 +232,8 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], int]:
             elements[-1].properties.append((words[4], _PLY_TYPES[words[3]], _PLY_TYPES[words[2]]))
         elif words[:1] == ["property"]:
             elements[-1].properties.append((words[2], _PLY_TYPES[words[1]], None))
+    if any(element.count and not element.properties for element in elements):
+        raise ValueError("it has an element without properties")
     if style not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise ValueError(f"its format {style!r} is unknown")
     return style, elements, stop + 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -22,6 +23,7 @@ Floats = NDArray[np.float64]
 MOST_BYTES = 1 << 26
 """Larger files are no profiles."""
 _MOST_VALUES = 1 << 24
+_WORDS = re.compile(r"[^\s,]+")
 _TYPES = {1: "C", 2: "B", 3: "A"}
 
 
@@ -87,7 +89,8 @@ def parse_ies(text: str) -> IesProfile:
 
 
 def _numbers(text: str) -> Iterator[float]:
-    for word in text.replace(",", " ").split():
+    for match in _WORDS.finditer(text):  # one at a time: a list of all would be 20 times the text
+        word = match[0]
         try:
             yield float(word)
         except ValueError:
@@ -217,10 +220,12 @@ class IesTable:
 
     def _read(self, path: str) -> int | IesError:
         try:
+            if not os.path.isfile(path) and os.path.exists(path):
+                raise IesError("it is no regular file")
             if os.path.getsize(path) > MOST_BYTES:
                 raise IesError("it is too large")
             with open(path, encoding="latin-1") as file:
-                profile = parse_ies(file.read())
+                profile = parse_ies(file.read(MOST_BYTES))
         except IesError as error:
             return error
         except (OSError, ValueError, MemoryError) as error:

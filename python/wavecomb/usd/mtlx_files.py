@@ -19,6 +19,12 @@ MAX_DEPTH = 64
 MAX_INCLUDES = 256
 """Files that one document may include, those of its includes too."""
 
+MAX_CHAIN = 32
+"""Files that include each other, one the next: each copies what those below it hold."""
+
+MAX_BYTES = 1 << 26
+"""Of a document with all that it includes."""
+
 _INCLUDE = "http://www.w3.org/2001/XInclude include"
 
 
@@ -62,18 +68,27 @@ def read_document(path: str) -> Document:
     Raises:
         MtlxError: It cannot be read.
     """
-    root = _read(path, (), [MAX_INCLUDES])
+    root = _read(path, (), _Budget())
     graphs = tuple(root.getNodeGraphs())
     definitions = frozenset(item.getName() for item in root.getNodeDefs())
     root.setDataLibrary(library())
     return Document(root, path, graphs, definitions)
 
 
-def _read(path: str, above: tuple[str, ...], left: list[int]) -> Any:
-    """One file; ``above``: those that include it; ``left``: how many more may be included."""
+@dataclass
+class _Budget:
+    """What a document may still include."""
+
+    files: int = MAX_INCLUDES
+    bytes: int = MAX_BYTES
+
+
+def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
+    """One file; ``above``: those that include it."""
     import MaterialX as mx
 
-    data = _bytes(path)
+    data = _bytes(path, left.bytes)
+    left.bytes -= len(data)
     includes = _check(data)
     options = mx.XmlReadOptions()
     options.readXIncludeFunction = None
@@ -87,13 +102,18 @@ def _read(path: str, above: tuple[str, ...], left: list[int]) -> Any:
                 raise MtlxError(f"it includes {name}, which is not there")
             if other in (*above, path):
                 raise MtlxError(f"it includes {name}, which includes it")
-            left[0] -= 1
-            if left[0] < 0:
+            left.files -= 1
+            if left.files < 0:
                 raise MtlxError(f"it includes more than {MAX_INCLUDES} files")
+            if len(above) + 1 >= MAX_CHAIN:
+                raise MtlxError(f"more than {MAX_CHAIN} files include each other")
             try:
                 document.importLibrary(_read(other, (*above, path), left))
             except MtlxError as error:
-                raise MtlxError(f"in {name}, which it includes: {error}") from None
+                # Of a chain the last file says enough.
+                known = str(error).startswith("in ")
+                why = error if known else f"in {name}, which it includes: {error}"
+                raise MtlxError(str(why)) from None
     except UnicodeDecodeError:
         raise MtlxError("it is not UTF-8") from None
     except MtlxError:
@@ -103,10 +123,14 @@ def _read(path: str, above: tuple[str, ...], left: list[int]) -> Any:
     return document
 
 
-def _bytes(path: str) -> bytes:
+def _bytes(path: str, most: int) -> bytes:
+    if not (Ar.IsPackageRelativePath(path) or "://" in path or os.path.isfile(path)):
+        raise MtlxError("it is no file")
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise MtlxError("it cannot be opened")
+    if asset.GetSize() > most:
+        raise MtlxError(f"with what it includes it has more than {MAX_BYTES >> 20} MB")
     return bytes(asset.GetBuffer() or b"")
 
 

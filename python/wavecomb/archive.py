@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""NumPy archives from anywhere: none may take more memory than its file has bytes."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+MAX_HEADER = 1 << 24
+"""Bytes of the text of an archive."""
+
+MAX_ENTRIES = 4096
+
+
+class ArchiveError(Exception):
+    """It is no such archive, or is damaged."""
+
+
+def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
+    """The header (what its JSON says) and the other arrays of an archive that is not compressed.
+
+    Raises:
+        ArchiveError: It is none, says that it holds more than it does, or is damaged.
+        OSError: It cannot be opened.
+    """
+    with Path(path).open("rb") as file:
+        try:
+            _check_sizes(file)
+            with np.load(file, allow_pickle=False) as archive:
+                header = archive["header"]
+                if header.nbytes > MAX_HEADER:
+                    raise ArchiveError("its header is too large")
+                return json.loads(header.tobytes()), {
+                    name: archive[name] for name in archive.files if name != "header"
+                }
+        except ArchiveError:
+            raise
+        # RecursionError: JSON in JSON; NotImplementedError and RuntimeError: kinds of zip files.
+        except (
+            ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, OverflowError,
+            MemoryError, RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile, zlib.error,
+        ) as error:  # fmt: skip
+            raise ArchiveError(f"{type(error).__name__}: {error}") from error
+
+
+def _check_sizes(file: Any) -> None:
+    """Raises ArchiveError for an archive whose parts are larger than its file."""
+    size = os.fstat(file.fileno()).st_size
+    with zipfile.ZipFile(file) as archive:
+        parts = archive.infolist()
+        if len(parts) > MAX_ENTRIES:
+            raise ArchiveError(f"it has {len(parts)} parts")
+        if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
+            raise ArchiveError("it is compressed")
+        if sum(part.file_size for part in parts) > size:
+            raise ArchiveError("it says that it holds more than it does")
+        for part in parts:
+            with archive.open(part) as member:
+                _check_shape(member, part.file_size)
+    file.seek(0)
+
+
+def _check_shape(member: Any, size: int) -> None:
+    """Raises ArchiveError for an array that says that it has more values than there are bytes."""
+    version = np.lib.format.read_magic(member)
+    if version == (1, 0):
+        shape, _, dtype = np.lib.format.read_array_header_1_0(member)
+    elif version == (2, 0):
+        shape, _, dtype = np.lib.format.read_array_header_2_0(member)
+    else:
+        raise ArchiveError(f"its arrays are of version {version}")
+    count = 1
+    for edge in shape:
+        count *= edge
+    if min(shape, default=1) < 0 or dtype.hasobject or count * dtype.itemsize > size:
+        raise ArchiveError("it says that it holds more than it does")
