@@ -7,6 +7,7 @@ import pytest
 from usd_recorder import QUAD, Recorder, load, said
 
 from wavecomb.usd import load_stage
+from wavecomb.usd.light import blackbody
 
 
 def light(tmp_path, text, header=""):
@@ -16,8 +17,6 @@ def light(tmp_path, text, header=""):
 
 
 def test_colour_intensity_exposure_temperature(tmp_path):
-    from pxr import UsdLux
-
     found, _ = light(
         tmp_path,
         """def RectLight "L" { float inputs:intensity = 3
@@ -29,10 +28,34 @@ def test_colour_intensity_exposure_temperature(tmp_path):
         float inputs:height = 5
         bool inputs:normalize = true }""",
     )
-    warm = np.array(UsdLux.BlackbodyTemperatureAsRgb(3000))
+    warm = np.array(blackbody(3000))
     assert found["color"] == pytest.approx(12 * warm * (1, 0.5, 0.25))
     assert (found["kind"], found["width"], found["height"]) == ("rect", 4, 5)
     assert found["normalize"] and found["texture"] is None
+
+
+@pytest.mark.parametrize("kelvin", [4000, 5000, 6500, 8750, 10000, 11000, 13000, 15000])
+def test_colour_temperatures_are_those_of_black_bodies(kelvin):
+    """The Planckian locus by Kim's cubic splines, from 4000 K on; beyond 10,000 K, too."""
+    x = np.polyval([-3.0258469e9, 2.1070379e6, 0.2226347e3, 0.240390], 1 / kelvin)
+    y = np.polyval([3.0817580, -5.87338670, 3.75112997, -0.37001483], x)
+    from_xyz = np.linalg.inv(
+        [[0.412391, 0.357584, 0.180481], [0.212639, 0.715169, 0.072192],
+         [0.019331, 0.119195, 0.950532]]
+    )  # fmt: skip
+    expected = from_xyz @ (x / y, 1.0, (1 - x - y) / y)
+    assert blackbody(kelvin) == pytest.approx(expected, rel=3e-3)
+
+
+def test_colour_temperatures_agree_with_usdlux():
+    """With UsdLux's table where that has values, within 0.3 % of the largest channel."""
+    from pxr import UsdLux
+
+    for kelvin in range(2000, 10001, 250):
+        table = np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+        assert np.abs(blackbody(kelvin) - table).max() < 3e-3 * table.max(), kelvin
+    assert blackbody(500) == blackbody(1000)
+    assert blackbody(40000) == blackbody(15000)
 
 
 def test_schema_defaults(tmp_path):

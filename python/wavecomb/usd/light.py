@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdLux
+from pxr import Gf, Usd
 
 from wavecomb.usd.colour_space import linear_colour, space_of
 from wavecomb.usd.dome import DomeReader
@@ -50,6 +50,22 @@ class Light:
     kind: str
     options: dict[str, Any]
     local: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+
+
+def blackbody(kelvin: float) -> tuple[float, float, float]:
+    """Linear Rec. 709 colour of a black body, of the luminance of (1, 1, 1).
+
+    That of ``Gf.Color``, Krystek's approximation of the Planckian locus from 1000 to 15000 K, which
+    OpenUSD's Embree delegate uses: what is beyond is taken for the nearest end.
+    ``UsdLux.BlackbodyTemperatureAsRgb``, a table that ends at 10000 K, is within 0.002 of it from
+    2000 K on. Components that Rec. 709 cannot hold (blue below 1900 K) are 0.
+    """
+    found = Gf.Color(Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709))
+    found.SetFromPlanckianLocus(min(max(kelvin, 1000.0), 15000.0), 1.0)
+    rgb = found.GetRGB()
+    luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+    r, g, b = (max(float(c) / luminance, 0.0) for c in rgb)
+    return (r, g, b)
 
 
 class LightReader:
@@ -162,7 +178,7 @@ class LightReader:
         tint = (1.0, 1.0, 1.0)
         if self._get(prim, "enableColorTemperature", False):
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
-            tint = UsdLux.BlackbodyTemperatureAsRgb(min(max(kelvin, 1000.0), 10000.0))
+            tint = blackbody(kelvin)
         rgb = [float(c * t * power) for c, t in zip(base, tint, strict=True)]
         working = "rec709" if self.textures is None else self.textures.working
         r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
