@@ -194,7 +194,7 @@ TEST(LightBuilder, PickPdfIsExact) {
 }
 
 TEST(LightBuilder, PickTableOfMillions) {
-  for (const size_t n : {size_t{1500000}, size_t{kMaxLights}}) {
+  for (const size_t n : {size_t{1500000}, size_t{kMaxPicked}}) {
     std::vector<double> weights(n, 1);
     weights[7] = 1e12;
     weights[8] = 0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/film/layer_ids.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/scene/scene.h"
 
@@ -11,6 +12,7 @@ namespace wavecomb {
 
 AovTables::AovTables(const Scene& scene, const Settings& settings) {
   layout.set = settings.aovs;
+  check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials need none of it; positions of objects do.
   if (layout.set.crypto()) crypto = CryptoTables(scene, layout.set);
   if (!layout.set.has(Aov::kLightGroups)) return;

@@ -8,6 +8,7 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/parallel.h"
+#include "wavecomb/scene/scene_limits.h"
 
 namespace wavecomb {
 
@@ -493,7 +494,7 @@ LightView LightSet::view(const MaterialView& materials) const {
   v.triangles = triangles.data();
   v.triangle_uvs = triangle_uvs.data();
   v.pick = pick;
-  v.pick.bins = pick_bins.data();
+  v.pick.bins = pick_bins.empty() ? nullptr : pick_bins.data();
   v.tree = tree.view();
   v.count = static_cast<uint32_t>(size());
   v.first_triangle = first_triangle();
@@ -514,16 +515,25 @@ LightView LightSet::view(const MaterialView& materials) const {
   return v;
 }
 
+void check_light_count(uint64_t count) {
+  if (count > kMaxLights)
+    throw Error("the scene has " + with_commas(count) + " lights and emissive triangles; " +
+                with_commas(kMaxLights) +
+                " can be numbered; give meshes that emit fewer triangles or instances");
+}
+
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const TexturePtr> textures, const LightSet* before,
                       std::span<const IesProfile> profiles,
-                      std::span<const PlacedMeshLight> mesh_lights) {
+                      std::span<const PlacedMeshLight> mesh_lights, size_t most_picked) {
   (void)centre;  // directions of infinite lights do not depend on it
-  if (lights.size() + triangle_count > kMaxLights) {
-    throw Error("the scene has " + std::to_string(lights.size() + triangle_count) +
-                " lights and emissive triangles; " + std::to_string(kMaxLights) + " is the most");
-  }
+  check_light_count(lights.size() + triangle_count);
+  SceneCounts counts{.lights = lights.size() + mesh_lights.size()};
+  for (const Light& light : lights) counts.lights += light.portals.size();
+  for (const IesProfile& p : profiles)
+    counts.profile_values += p.vertical.size() + p.horizontal.size() + p.candela.size();
+  check_counts(counts);
   const double scene_radius = std::isfinite(radius) && radius > 0 ? double{radius} : 1.0;
   LightSet set;
   std::vector<double> powers;
@@ -549,12 +559,14 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   make_triangles(set, triangle_count, triangle, powers.data() + lights.size());
 
   for (const double power : powers) set.total_power += power;
-  std::vector<uint32_t> numbers;
-  set.pick = build_pick_table(powers, set.first_triangle(), set.pick_bins, numbers);
-  const auto pdf = [&](size_t i) { return static_cast<float>(numbers[i]) * 0x1p-24f; };
-  for (size_t i = 0; i < set.record_count; ++i) set.records[i].pick_pdf = pdf(i);
-  for (size_t i = 0; i < triangle_count; ++i)
-    set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
+  if (powers.size() <= most_picked) {
+    std::vector<uint32_t> numbers;
+    set.pick = build_pick_table(powers, set.first_triangle(), set.pick_bins, numbers);
+    const auto pdf = [&](size_t i) { return static_cast<float>(numbers[i]) * 0x1p-24f; };
+    for (size_t i = 0; i < set.record_count; ++i) set.records[i].pick_pdf = pdf(i);
+    for (size_t i = 0; i < triangle_count; ++i)
+      set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
+  }
   set.tree = build_light_tree(set, powers);
   return set;
 }

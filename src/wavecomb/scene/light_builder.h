@@ -47,8 +47,8 @@ struct LightSet {
   std::vector<TriangleLight> triangles;
   std::vector<TriangleUvs> triangle_uvs;  ///< of triangles with textured emission
   std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
-  std::vector<uint32_t> pick_bins;
-  PickTable pick;  ///< without its pointer
+  std::vector<uint32_t> pick_bins;        ///< empty where the tree alone chooses
+  PickTable pick;                         ///< without its pointer
   LightTree tree;
   std::vector<Distribution2D> distributions;
   std::vector<LightRecord> portals;
@@ -72,8 +72,14 @@ struct LightSet {
   LightView view(const MaterialView& materials) const;
 };
 
-/// Most lights that the choice can tell apart (its random number has 24 bits).
-inline constexpr uint32_t kMaxLights = (1u << 24) - 1;
+/// Most lights that a choice by power can tell apart (its random number has 24 bits). Of more, the
+/// tree alone chooses.
+inline constexpr uint32_t kMaxPicked = (1u << 24) - 1;
+/// Most lights that can be numbered: triangles have rows of 16 words each.
+inline constexpr uint32_t kMaxLights = 1u << 28;
+
+/// Throws Error for more lights and emissive triangles than kMaxLights.
+void check_light_count(uint64_t count);
 
 /// Emissive triangle i. Called from many threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
@@ -93,12 +99,14 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 /// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
 /// the power that they send through it. `before`: lights with the same textures, whose densities of
 /// domes are taken over where they fit, or null. Throws Error naming the light for values that are
-/// not finite, unknown textures and more than kMaxLights lights.
+/// not finite, unknown textures and more than kMaxLights lights. Of more than `most_picked` there
+/// is no table to choose by power.
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const TexturePtr> textures, const LightSet* before = nullptr,
                       std::span<const IesProfile> profiles = {},
-                      std::span<const PlacedMeshLight> mesh_lights = {});
+                      std::span<const PlacedMeshLight> mesh_lights = {},
+                      size_t most_picked = kMaxPicked);
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,
@@ -112,7 +120,7 @@ double image_solid_angle(const Distribution2D& d);
 /// The table that chooses among lights of the given weights (>= 0), of which those before
 /// `first_triangle` are one group, and how many of the 2^24 numbers choose each light. Lights of
 /// weight 0 are never chosen, all others have some floor of probability. All weights 0: numbers 0.
-/// At most kMaxLights. The alias tables are Vose's, in integers: M. Vose, "A Linear Algorithm for
+/// At most kMaxPicked. The alias tables are Vose's, in integers: M. Vose, "A Linear Algorithm for
 /// Generating Random Numbers with a Given Distribution", 1991.
 PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
                            std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);

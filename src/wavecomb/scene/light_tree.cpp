@@ -6,9 +6,11 @@
 #include <bit>
 #include <cmath>
 
+#include "wavecomb/core/error.h"
 #include "wavecomb/scene/light_builder.h"
 #include "wavecomb/scene/light_cluster.h"
 #include "wavecomb/scene/parallel.h"
+#include "wavecomb/scene/scene_limits.h"
 
 namespace wavecomb {
 namespace {
@@ -341,6 +343,12 @@ LightTree build_light_tree(const LightSet& set, std::span<const double> powers) 
 
 bool chooses_by_tree(LightSelection selection, const LightView& lights) {
   const float effective = lights.tree.effective_lights;
+  const bool tree_alone = lights.pick.bins == nullptr && lights.count > 0;
+  if (tree_alone && selection == LightSelection::kPower)
+    throw Error("by power one of " + with_commas(kMaxPicked) +
+                " lights can be chosen; the scene has " + with_commas(lights.count) +
+                " lights and emissive triangles; choose --light-selection tree");
+  if (tree_alone) return true;
   if (selection == LightSelection::kAuto) return effective >= kLeastForTree;
   return selection == LightSelection::kTree && effective > 0;
 }

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "wavecomb/scene/names.h"
+#include "wavecomb/scene/scene_limits.h"
 
 namespace wavecomb {
 namespace {
@@ -52,6 +53,7 @@ SceneLinks::SceneLinks(const ObjectNames& names, std::span<const GeometrySet> se
     if (is_new) members.insert(members.end(), bits.begin(), bits.end());
     classes[object] = at->second;
   }
+  check_counts({.link_words = members.size()});
 }
 
 }  // namespace wavecomb

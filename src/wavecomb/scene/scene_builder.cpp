@@ -15,12 +15,12 @@
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
+#include "wavecomb/scene/scene_limits.h"
 
 namespace wavecomb {
 namespace {
 
 constexpr uint64_t kUncounted = ~uint64_t{0};
-constexpr uint64_t kMaxInstances = 0x0fffffff;
 /// What an instance takes at least, Embree's geometry for it before all.
 constexpr uint64_t kInstanceBytes = 400;
 
@@ -274,6 +274,7 @@ void SceneBuilder::add_instance(uint32_t parent, uint32_t child, const Affine& t
   if (!steps.empty())
     motion = {static_cast<uint32_t>(node_steps_.size()), static_cast<uint32_t>(steps.size() - 1)};
   node_steps_.insert(node_steps_.end(), steps.begin(), steps.end());
+  check_counts({.steps = node_steps_.size()});
   children_[parent].push_back({child, transform, material, name, number, motion});
 }
 
@@ -416,6 +417,16 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   if (singular > 0)
     warnings_.push_back(std::to_string(singular) +
                         " instances have a singular transform and were left out");
+
+  SceneCounts counts{.meshes = meshes_.size(),
+                     .materials = materials_.size() + 1,
+                     .instances = geometry->instances.size(),
+                     .placed = groups_[0].meshes.size(),
+                     .placements = geometry->placements.size(),
+                     .steps = geometry->steps.size()};
+  for (const Group& group : groups_) counts.grouped += group.meshes.size();
+  for (const Instance& i : geometry->instances) counts.placed += groups_[i.group].meshes.size();
+  check_counts(counts);
 
   // A grey for meshes that nothing was bound to.
   const auto material_count = static_cast<uint32_t>(materials_.size());

@@ -53,8 +53,8 @@ inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& ind
     return float_bits<F>(
         gather<F>(texture.levels, word + static_cast<uint32_t>(offset_bytes / 4), active));
   };
-  // Offsets fit in 32 bits: storage is below 2^31 words of at most 4 texels, checked by Texture;
-  // the low half of a 64-bit number comes first on the machines that we build for.
+  // Offsets fit in 32 bits: lay_out refuses more texels. The low half of a 64-bit number comes
+  // first on the machines that we build for.
   return {read(offsetof(TextureLevel, width)), read(offsetof(TextureLevel, height)),
           read(offsetof(TextureLevel, tiles_x)), read(offsetof(TextureLevel, offset))};
 }

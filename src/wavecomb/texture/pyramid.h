@@ -25,6 +25,11 @@ float decode_value(const std::byte* p, TexelFormat format, bool srgb);
 /// Place of a texel in the storage of a texture, in texels.
 size_t texel_index(const TextureLevel& level, uint32_t x, uint32_t y);
 
+/// Puts the mip levels of a texture of that size, channels and format one behind the other in
+/// `view`, whose format and channels are set; returns their bytes. Throws Error naming desc.name
+/// where lanes cannot number the texels or words: more than 2^32 texels, 8 GiB or more.
+uint64_t lay_out(const TextureDesc& desc, TextureView& view);
+
 /// Fills the storage of `view`, whose levels are laid out, from the caller's pixels. Levels come of
 /// one another in float; only what is stored is rounded to the format. The bits do not depend on
 /// the order in which `for_each` runs its bodies. Scratch memory is some rows for each thread, and

@@ -16,6 +16,7 @@ namespace {
 constexpr std::align_val_t kAlignment{64};
 constexpr uint64_t kMaxBytes = uint64_t{1}
                                << 33;  // 2^31 words: what a signed 32-bit gather reaches
+constexpr uint64_t kMaxTexels = uint64_t{1} << 32;  // what lanes number them by
 
 using Color4 = std::array<float, 4>;
 
@@ -36,6 +37,31 @@ void check(const TextureDesc& desc) {
 
 }  // namespace
 
+uint64_t lay_out(const TextureDesc& desc, TextureView& view) {
+  constexpr uint32_t kTile = TextureView::kTile;
+  uint64_t texels = 0;
+  uint32_t width = desc.width, height = desc.height;
+  for (uint32_t& n = view.level_count; n < TextureView::kMaxLevels;) {
+    const uint32_t tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;
+    view.levels[n++] = {width, height, tiles_x, 0, texels};
+    texels += uint64_t{tiles_x} * tiles_y * kTile * kTile;
+    if (width == 1 && height == 1) break;
+    width = std::max(1u, width / 2);
+    height = std::max(1u, height / 2);
+  }
+  const uint64_t bytes = texels * view.channels * value_bytes(view.format);
+  const std::string where = "texture '" + desc.name + "': its mip levels ";
+  if (bytes >= kMaxBytes) {
+    throw Error(where + "take " + std::to_string(bytes >> 30) +
+                " GiB; 8 GiB is the most; make it smaller");
+  }
+  if (texels > kMaxTexels) {
+    throw Error(where + "hold " + std::to_string(texels / 1000000) + " million texels; " +
+                std::to_string(kMaxTexels / 1000000) + " million is the most; make it smaller");
+  }
+  return bytes;
+}
+
 void Texture::Free::operator()(const std::byte* p) const {
   if (store)
     store->remove(p);
@@ -53,22 +79,7 @@ Texture::Texture(const TextureDesc& desc, const ForEach& for_each, std::shared_p
   view_.wrap_s = desc.wrap_s;
   view_.wrap_t = desc.wrap_t;
 
-  constexpr uint32_t kTile = TextureView::kTile;
-  uint64_t texels = 0;
-  uint32_t width = desc.width, height = desc.height;
-  for (uint32_t& n = view_.level_count; n < TextureView::kMaxLevels;) {
-    const uint32_t tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;
-    view_.levels[n++] = {width, height, tiles_x, 0, texels};
-    texels += uint64_t{tiles_x} * tiles_y * kTile * kTile;
-    if (width == 1 && height == 1) break;
-    width = std::max(1u, width / 2);
-    height = std::max(1u, height / 2);
-  }
-  const uint64_t total = texels * view_.channels * value_bytes(desc.format);
-  if (total >= kMaxBytes) {
-    throw Error("texture '" + desc.name + "': its mip levels take " + std::to_string(total >> 30) +
-                " GiB; 8 GiB is the most; make it smaller");
-  }
+  const uint64_t total = lay_out(desc, view_);
   bytes_ = static_cast<size_t>(total);
   if (store) {
     const uint64_t pixels = uint64_t{desc.width} * desc.height;

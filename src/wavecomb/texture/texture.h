@@ -47,7 +47,7 @@ class TileStore;
 
 /// What kernels need of a texture, without ownership. Texels are stored in square tiles of
 /// kTile x kTile, row by row; one-channel textures as one value a texel, all others as four.
-/// Every stored value is finite; storage is shorter than 2^31 words of 32 bits.
+/// Every stored value is finite; storage is below 2^31 words of 32 bits, and 2^32 texels at most.
 struct TextureView {
   static constexpr uint32_t kTile = 8;
   static constexpr uint32_t kMaxLevels = 16;
@@ -91,9 +91,9 @@ class Texture {
   static constexpr float kMaxTexel = 1e30f;
 
   /// Builds the pyramid. Values that are not finite become 0 and are counted. Throws Error naming
-  /// desc.name for sizes of 0 or above kMaxSize, bad channels, no data, or more than 8 GiB.
-  /// `for_each` may share the rows among threads; it changes no bit. `store` keeps the levels where
-  /// it is given, with others of its; else they are in memory.
+  /// desc.name for sizes of 0 or above kMaxSize, bad channels, no data, 8 GiB or more, or more than
+  /// 2^32 texels. `for_each` may share the rows among threads; it changes no bit. `store` keeps the
+  /// levels where it is given, with others of its; else they are in memory.
   explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order,
                    std::shared_ptr<TileStore> store = nullptr);
   /// A UDIM texture of others, which it shares: `tiles` are pairs of tile number (1001 to 1100) and
