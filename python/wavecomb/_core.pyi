@@ -356,7 +356,8 @@ class SceneBuilder:
         """A light of the triangles of meshes, for add_mesh. transform: from the light's space, by
         whose -z it is shaped, to that of the mesh's group. material_sync: materialGlowTintsLight,
         independent or noMaterialResponse; give the mesh of the last one an emissive material of
-        radiance 1. Others as in add_light; visible: false where rays do not meet the mesh."""
+        radiance 1. Others as in add_light; visible: false where it shines
+        though rays do not meet the mesh, whose material has constant emission and opacity 0."""
     def add_geometry_set(self, rules: dict[str, str]) -> int:
         """A set for lights, by the rules of a UsdCollectionMembershipQuery: prim paths to
         exclude, explicit or expand."""

@@ -16,6 +16,7 @@ struct Lights {
   std::vector<TexturePtr> textures;
   std::vector<TextureView> views;
   std::vector<IesProfile> profiles;
+  std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;  ///< of materials; only emission slots are set
   LightSet set;
 
@@ -33,7 +34,8 @@ struct Lights {
   }
   /// A material whose emission is a texture.
   uint32_t add_material(uint32_t texture, std::array<float, 4> scale = {1, 1, 1, 1}) {
-    const auto id = static_cast<uint32_t>(uses.size() / kSlotCount);
+    const auto id = static_cast<uint32_t>(records.size());
+    records.emplace_back().texture_slots = slot_bit(Slot::kEmission);
     uses.resize(uses.size() + kSlotCount);
     uses[id * kSlotCount + static_cast<uint32_t>(Slot::kEmission)] = {
         texture, 4, {scale[0], scale[1], scale[2], scale[3]}, {0, 0, 0, 0}, {1, 0, 0, 0, 1, 0}};
@@ -45,7 +47,7 @@ struct Lights {
         lights, triangles.size(), [&triangles](size_t i) { return triangles[i]; }, {0, 0, 0},
         scene_radius, textures, nullptr, profiles);
   }
-  LightView view() const { return set.view({.uses = uses.data(), .textures = views.data()}); }
+  LightView view() const { return set.view({records.data(), uses.data(), views.data()}); }
 };
 
 inline Light make_light(LightKind kind, const Affine& to_world = {}) {

@@ -6,7 +6,7 @@
 #include "wavecomb/accel/curve_shapes.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/denormals.h"
-#include "wavecomb/integrate/surface.h"
+#include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
 namespace {

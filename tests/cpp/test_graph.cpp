@@ -9,7 +9,7 @@
 
 #include "lane_testing.h"
 #include "wavecomb/material/openpbr_params.h"
-#include "wavecomb/scene/graph_emission.h"
+#include "wavecomb/scene/triangle_means.h"
 
 namespace wavecomb {
 namespace {

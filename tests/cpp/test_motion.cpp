@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What moves while the shutter is open: against closed forms, and one picture for all schedules.
-#include "wavecomb/integrate/motion.h"
+#include "wavecomb/surface/motion.h"
 
 #include "curve_testing.h"
 #include "wave_testing.h"
-#include "wavecomb/integrate/surface.h"
+#include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/integrate/surface.h"
+#include "wavecomb/surface/surface.h"
 
 #include <numeric>
 

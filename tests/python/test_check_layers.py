@@ -38,12 +38,14 @@ def test_downward_includes_pass(tmp_path):
         "schedule/policies/none.h": '#include "wavecomb/schedule/policy.h"\n',
         "schedule/policy.h": "#include <span>\n",
         "integrate/wave.cpp": '#include "wavecomb/schedule/policy.h"\n',
+        "surface/uv.h": '#include "wavecomb/scene/scene.h"\n',
+        "light/triangle.h": '#include "wavecomb/surface/uv.h"\n',
         "render/renderer.cpp": '#include <oneapi/tbb.h>\n#include "wavecomb/integrate/wave.h"\n',
         "wavecomb.h": '#include "wavecomb/render/renderer.h"\n',
     }
     result = run(tree(tmp_path, files))
     assert result.returncode == 0, result.stderr
-    assert "9 files, 0 violations" in result.stdout
+    assert "11 files, 0 violations" in result.stdout
 
 
 @pytest.mark.parametrize(
@@ -54,6 +56,8 @@ def test_downward_includes_pass(tmp_path):
         ("integrate/wave.h", '#include "wavecomb/render/renderer.h"', "above it"),
         ("core/rng.h", '#include "wavecomb/wavecomb.h"', "above it"),
         ("texture/tile.h", '#include "wavecomb/scene/scene.h"', "beside it"),
+        ("surface/uv.h", '#include "wavecomb/light/triangle.h"', "above it"),
+        ("scene/scene.h", '#include "wavecomb/surface/uv.h"', "above it"),
         ("material/table.h", '#include "wavecomb/schedule/policy.h"', "beside it"),
         ("light/sampler.h", '#include  "wavecomb/accel/accelerator.h"', "beside it"),
         ("schedule/queue.h", '#include "wavecomb/scene/scene.h"', "only core"),

@@ -9,8 +9,8 @@
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/film/filter.h"
-#include "wavecomb/integrate/motion.h"
 #include "wavecomb/scene/camera.h"
+#include "wavecomb/surface/motion.h"
 
 namespace wavecomb {
 

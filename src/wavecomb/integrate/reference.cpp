@@ -6,6 +6,7 @@
 
 #include "wavecomb/integrate/light_groups.h"
 #include "wavecomb/integrate/vertex.h"
+#include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
 namespace {
@@ -193,11 +194,8 @@ class PathTracer {
   }
 
   uint32_t material_of(const Hit& hit, uint32_t mesh) const {
-    const MeshRecord& record = context_.scene.meshes[mesh];
-    uint32_t material = record.material;
-    if (record.face_materials != 0)
-      material = reinterpret_cast<const uint32_t*>(record.face_materials)[hit.prim];
-    return material == kInheritMaterial ? context_.scene.instances[hit.inst].material : material;
+    const SceneView& scene = context_.scene;
+    return hit_material<F>(scene, scene.instances[hit.inst].material, mesh, hit.prim, true);
   }
 
   VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const Hit& hit, uint32_t mesh,

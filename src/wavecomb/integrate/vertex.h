@@ -15,12 +15,12 @@
 
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
-#include "wavecomb/integrate/graph_point.h"
-#include "wavecomb/integrate/surface.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/material/params.h"
 #include "wavecomb/material/program_table.h"
 #include "wavecomb/schedule/cost_snapshot.h"
+#include "wavecomb/surface/graph_point.h"
+#include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
 
@@ -158,8 +158,8 @@ template <typename F>
                                                const Mask<F>& active) {
   using U = UInt<F>;
   const U place = placed_geometry<F>(scene, inst, geom, active);
-  const U record = select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)),
-                          U(kNoLight));
+  const U record =
+      select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)), U(kNoLight));
   return mesh_light_radiance<F>(scene.lights, record, glow, path.dir, path.link,
                                 not_(path.pdf > 0.f), from_camera, active);
 }

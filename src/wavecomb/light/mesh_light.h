@@ -21,8 +21,8 @@ inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
   const Mask<F> known = active & (s.pdf > 0.f) & Mask<F>(record != UInt<F>(kNoLight));
   if (none(known)) return s.radiance;
   const LightReader<F> reader(view.lights, record, known);
-  const Mask<F> textured = known & (triangle.radiance.x == TriangleLight::kTextured);
-  const Color<F> radiance = select<F>(textured, s.radiance * reader.radiance(), s.radiance);
+  const Mask<F> varies = known & (triangle.radiance.x < 0.f);
+  const Color<F> radiance = select<F>(varies, s.radiance * reader.radiance(), s.radiance);
   if (!view.shapings) return radiance;
   return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
 }

@@ -4,53 +4,10 @@
 
 #include "wavecomb/core/rows.h"
 #include "wavecomb/light/record.h"
-#include "wavecomb/scene/graph_value.h"
-#include "wavecomb/texture/lookup.h"
+#include "wavecomb/surface/presence.h"
+#include "wavecomb/surface/uv.h"
 
 namespace wavecomb::detail {
-
-/// Radiance that the graphs of each lane's material give at a point of a triangle.
-template <typename F>
-[[gnu::noinline, gnu::cold]] Color<F> graph_emission(const MaterialView& view, const UInt<F>& graph,
-                                                     const Vec3<F>& p, const Vec2<F>& uv,
-                                                     const MeshPlace<F>& place,
-                                                     const Mask<F>& active) {
-  GraphPoint<F> at;
-  at.uv = uv;
-  at.place = place;
-  at.position = p;
-  return graph_value<F>(view, graph, kEmissionOutput, at, active, Color<F>(F(0.f)));
-}
-
-/// Radiance that the emission slot of each lane's material gives at `uv`: texel * scale + bias,
-/// read at the finest level, in [0, 1e18] as material/ keeps it.
-template <typename F>
-inline Color<F> textured_emission(const MaterialView& view, const UInt<F>& material,
-                                  const Vec2<F>& uv, const Mask<F>& active) {
-  using R = TextureUseRecord;
-  constexpr auto kWords = static_cast<uint32_t>(sizeof(R) / 4);
-  const UInt<F> first = (material * kSlotCount + static_cast<uint32_t>(Slot::kEmission)) * kWords;
-  const auto real = [&](size_t offset_bytes, size_t i) {
-    return gather<F>(view.uses, first + static_cast<uint32_t>(offset_bytes / 4 + i), active);
-  };
-  F m[6];
-  for (size_t i = 0; i < 6; ++i) m[i] = real(offsetof(R, uv), i);
-  const F s = fma(m[0], uv.x, fma(m[1], uv.y, m[2]));
-  const F t = fma(m[3], uv.x, fma(m[4], uv.y, m[5]));
-  const UInt<F> texture = float_bits<F>(real(offsetof(R, texture), 0));
-  const Texel<F> texel = lookup<F>(view.textures, texture, s, t, F(0.f), active);
-  const auto channel = [&](const F& value, size_t i) {
-    return fma(value, real(offsetof(R, scale), i), real(offsetof(R, bias), i));
-  };
-  const F c[4] = {channel(texel.r, 0), channel(texel.g, 1), channel(texel.b, 2),
-                  channel(texel.a, 3)};
-  const UInt<F> which = float_bits<F>(real(offsetof(R, channel), 0));
-  F one = c[0];
-  for (uint32_t i = 1; i < 4; ++i) one = select(Mask<F>(which == UInt<F>(i)), c[i], one);
-  const Mask<F> rgb = Mask<F>(which >= UInt<F>(4u));
-  const auto sane = [](const F& x) { return min(max(x, F(0.f)), F(1e18f)); };
-  return {sane(select(rgb, c[0], one)), sane(select(rgb, c[1], one)), sane(select(rgb, c[2], one))};
-}
 
 /// The triangles of the lights in the active lanes.
 template <typename F>
@@ -75,6 +32,50 @@ struct TriangleReader {
   }
 };
 
+/// What triangles at barycentrics `b`, world position q, give where it varies: the emission of
+/// `material` (lanes `glows`; 1 in the others) times its opacity. `index`: of TriangleUvs. Textures
+/// are read at their finest level.
+///
+/// Presence is an event: a bounce meets the triangle with probability opacity and then gets all of
+/// the emission. A light sample, whose shadow ray ends before the triangle, gets the mean of that.
+/// Both estimate the integral of opacity * emission, so that the weights of MIS are those of the
+/// directions' densities alone.
+template <typename F>
+[[gnu::noinline]] Color<F> varying_radiance(const LightView& view, const UInt<F>& material,
+                                            const UInt<F>& index, const Vec2<F>& b,
+                                            const Vec3<F>& q, const Mask<F>& glows,
+                                            const Mask<F>& active) {
+  constexpr uint32_t kWords = sizeof(TriangleUvs) / 4;
+  const auto row = load_rows<8, F>(view.triangle_uvs, index * kWords, active);
+  // Vertex 2 goes first: sums of floats have an order.
+  const UvTriangle<F> corners({row[0], row[1]}, {row[4], row[5]}, {row[2], row[3]});
+  const Vec2<F> uv = corners.at(b.y, b.x);
+  const MeshPlace<F> place{float_bits<F>(row[6]), float_bits<F>(row[7]), b.x, b.y};
+  Color<F> radiance(F(1.f));
+  if (any(glows)) {
+    const auto point = [&](const Mask<F>& /*lanes*/) {
+      GraphPoint<F> at;
+      at.uv = uv;
+      at.place = place;
+      at.position = q;
+      return at;
+    };
+    const Color<F> glow = fetch_emission<F>(view.materials, material, uv, F(0.f), point, glows);
+    radiance = select<F>(glows, glow, radiance);
+  }
+  const Mask<F> partly = has_presence<F>(view.materials, material, active);
+  if (any(partly)) {
+    const UInt<F> instance =
+        gather<UInt<F>>(view.triangle_uvs,
+                        index * kWords + static_cast<uint32_t>(offsetof(TriangleUvs, instance) / 4),
+                        Mask<UInt<F>>(partly));
+    const F opacity = opacity_at<F>(view.materials, view.meshes, view.instances, material, instance,
+                                    place, uv, partly);
+    radiance = radiance * select(partly, opacity, F(1.f));
+  }
+  return radiance;
+}
+
 /// A point q = p + b1 u + b2 v, with density 1 / area.
 template <typename F>
 inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const LightView& view,
@@ -86,33 +87,16 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
   const F pdf = area_to_solid_angle<F>(d.length2, abs(dot(d.wi, light.m)), F(1.f));
 
   Color<F> radiance = light.radiance;
-  const Mask<F> textured = active & (pdf > 0.f) & (light.radiance.x == TriangleLight::kTextured);
-  if (any(textured)) {
+  const Mask<F> varies = active & (pdf > 0.f) & (light.radiance.x < 0.f);
+  if (any(varies)) [[unlikely]] {
+    // Copies, so that what plain triangles use may stay in registers.
     const UInt<F> material = float_bits<F>(light.radiance.y),
                   index = float_bits<F>(light.radiance.z);
-    const auto uvs = load_rows<8, F>(view.triangle_uvs, index * 8u, textured);
-    const Vec2<F> uv{fma(F(uvs[2] - uvs[0]), b.x, fma(F(uvs[4] - uvs[0]), b.y, uvs[0])),
-                     fma(F(uvs[3] - uvs[1]), b.x, fma(F(uvs[5] - uvs[1]), b.y, uvs[1]))};
-    Mask<F> plain = textured;
-    if (view.materials.graphs.programs) [[unlikely]] {
-      using U = UInt<F>;
-      const U graph =
-          gather<U>(view.materials.materials,
-                    material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
-                        static_cast<uint32_t>(offsetof(MaterialRecord, emission_graph) / 4),
-                    Mask<U>(textured));
-      const Mask<F> driven = textured & Mask<F>(graph != U(kNoGraph));
-      plain = textured & not_(driven);
-      if (any(driven)) {
-        const Vec3<F> at = q;
-        const MeshPlace<F> place{float_bits<F>(uvs[6]), float_bits<F>(uvs[7]), b.x, b.y};
-        radiance = select<F>(
-            driven, graph_emission<F>(view.materials, graph, at, uv, place, driven), radiance);
-      }
-    }
-    if (any(plain))
-      radiance =
-          select<F>(plain, textured_emission<F>(view.materials, material, uv, plain), radiance);
+    const Vec2<F> at = b;
+    const Vec3<F> place = q;
+    const Mask<F> glows = varies & (light.radiance.x == TriangleLight::kEmission), on = varies;
+    radiance = select<F>(varies, varying_radiance<F>(view, material, index, at, place, glows, on),
+                         radiance);
   }
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }

@@ -5,8 +5,9 @@
 
 #include "wavecomb/film/filter.h"
 #include "wavecomb/integrate/camera_ray.h"
-#include "wavecomb/integrate/surface.h"
 #include "wavecomb/scene/names.h"
+#include "wavecomb/surface/hit.h"
+#include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
 namespace {
@@ -57,10 +58,8 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
     const SceneView view = scene.view();
     const InstanceRecord& instance = view.instances[hit.inst];
     const uint32_t mesh_id = view.geometry_mesh[instance.geometry + hit.geom];
-    const Mesh& mesh = scene.meshes()[mesh_id];
     out.instance = hit.inst;
-    out.material = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[hit.prim];
-    if (out.material == kInheritMaterial) out.material = instance.material;
+    out.material = hit_material<float>(view, instance.material, mesh_id, hit.prim, true);
     const Surface<float> surface = setup_surface<float>(
         view, {hit.inst, mesh_id, hit.prim, hit.u, hit.v, kMiddle}, ray.d, true, false, true);
     out.position = surface.p;

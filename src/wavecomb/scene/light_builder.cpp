@@ -412,20 +412,21 @@ MadeTriangle make_triangle(const LightSet& set, const EmissiveTriangle& t) {
   put(r.m, m);
   const auto sane = [](float x) { return std::clamp(double{x}, 0.0, kMostRadiance); };
   Double3 radiance{sane(t.radiance[0]), sane(t.radiance[1]), sane(t.radiance[2])};
-  bool textured = t.material != kNoLight;
+  float varying = t.material == kNoLight ? 0.f : TriangleLight::kEmission;
   if (t.mesh_light != kNoLight) {
     const LightRecord& mesh = set.records[set.record_count + t.mesh_light];
     const Double3 tint = to_double(mesh.radiance);
     const bool independent = mesh.sync == static_cast<uint32_t>(MaterialSync::kIndependent);
-    textured = textured && !independent;
+    if (independent) varying = t.opacity_varies ? TriangleLight::kOpacity : 0.f;
     radiance =
         independent ? tint : Double3{radiance.x * tint.x, radiance.y * tint.y, radiance.z * tint.z};
   }
+  radiance = radiance * double{t.opacity};
   const double mean = luminance(radiance.x, radiance.y, radiance.z) * double{t.mean_scale};
   put(r.radiance, {std::min(radiance.x, kMostRadiance), std::min(radiance.y, kMostRadiance),
                    std::min(radiance.z, kMostRadiance)});
-  if (textured) {
-    r.radiance[0] = TriangleLight::kTextured;
+  if (varying != 0) {
+    r.radiance[0] = varying;
     r.radiance[1] = std::bit_cast<float>(t.material);
   }
   made.power = area < kLeastArea ? 0 : 2 * kPiD * area * mean;
@@ -449,17 +450,21 @@ void make_triangles(LightSet& set, size_t count, const TriangleSource& source, d
       set.triangles[i] = made.light;
       powers[i] = sane_power(made.power);
       if (t.mesh_light != kNoLight) set.mesh_lights[i] = set.record_count + t.mesh_light;
-      if (made.light.radiance[0] != TriangleLight::kTextured) return;
-      uvs[chunk].push_back(
-          {{t.uv0[0], t.uv0[1]}, {t.uv1[0], t.uv1[1]}, {t.uv2[0], t.uv2[1]}, t.mesh, t.prim});
+      if (!made.light.varies()) return;
+      uvs[chunk].push_back({{t.uv0[0], t.uv0[1]},
+                            {t.uv1[0], t.uv1[1]},
+                            {t.uv2[0], t.uv2[1]},
+                            t.mesh,
+                            t.prim,
+                            t.instance});
     });
   });
   for (size_t chunk = 0; chunk < chunks; ++chunk) {
     if (uvs[chunk].empty()) continue;
     auto next = static_cast<uint32_t>(set.triangle_uvs.size());
     each(chunk, [&](size_t i) {
-      float* const radiance = set.triangles[i].radiance;
-      if (radiance[0] == TriangleLight::kTextured) radiance[2] = std::bit_cast<float>(next++);
+      TriangleLight& t = set.triangles[i];
+      if (t.varies()) t.radiance[2] = std::bit_cast<float>(next++);
     });
     set.triangle_uvs.insert(set.triangle_uvs.end(), uvs[chunk].begin(), uvs[chunk].end());
   }

@@ -26,12 +26,16 @@ struct PlacedMeshLight {
 struct EmissiveTriangle {
   float p0[3], p1[3], p2[3];
   float uv0[2] = {0, 0}, uv1[2] = {1, 0}, uv2[2] = {0, 1};
-  /// Material whose emission slot is textured; kNoLight where the emission is constant.
+  /// Material whose emission or opacity varies; kNoLight where both are constant.
   uint32_t material = kNoLight;
-  uint32_t mesh = 0, prim = 0;  ///< whose attributes the emission may read
+  uint32_t instance = 0, mesh = 0, prim = 0;  ///< where it is
   /// Emitted radiance, W / (m^2 sr), to both sides; not read by kernels where `material` is set.
   float radiance[3] = {0, 0, 0};
   uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight
+  /// How much of the triangle is there, in [0, 1]: what is sampled shines by as much. Where it
+  /// varies, put what to expect of it; only the choice of lights depends on it then.
+  float opacity = 1;
+  bool opacity_varies = false;
   /// Luminance to expect of the emission is luminance(radiance) * mean_scale. With a texture, put
   /// the texture's mean (times scale, plus bias) into `radiance` and leave this at 1. Only the
   /// choice of lights depends on it.
@@ -45,7 +49,7 @@ struct LightSet {
   std::vector<LightRecord> records;
   uint32_t record_count = 0;  ///< without them
   std::vector<TriangleLight> triangles;
-  std::vector<TriangleUvs> triangle_uvs;  ///< of triangles with textured emission
+  std::vector<TriangleUvs> triangle_uvs;  ///< of triangles whose emission or opacity varies
   std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
   std::vector<uint32_t> pick_bins;        ///< empty where the tree alone chooses
   PickTable pick;                         ///< without its pointer

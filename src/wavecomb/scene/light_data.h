@@ -12,6 +12,9 @@
 
 namespace wavecomb {
 
+struct MeshRecord;
+struct InstanceRecord;
+
 enum class LightKind : uint8_t { kRect, kDisk, kSphere, kCylinder, kDistant, kDome, kTriangle };
 inline constexpr uint32_t kLightKindCount = 7;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
@@ -143,21 +146,27 @@ struct IesRecord {
 /// millions, chosen at random: one is one cache line.
 struct alignas(64) TriangleLight {
   float p[3], u[3], v[3];  ///< vertex 0 and the edges from it
-  /// Radiance; where it is textured: kTextured, then the bits of the material whose emission slot
-  /// it is, and of the index of its TriangleUvs.
+  /// Radiance times opacity where both are constant. Else what varies, kEmission or kOpacity, then
+  /// the bits of the material that says so, and of the index of its TriangleUvs.
   float radiance[3];
   float m[3];      ///< unit geometric normal times the area
   float pick_pdf;  ///< probability of choosing this light
-  static constexpr float kTextured = -1.f;
+  /// The material's emission times its opacity.
+  static constexpr float kEmission = -1.f;
+  /// Its opacity alone, by which the radiance of a mesh light is multiplied that shows no glow.
+  static constexpr float kOpacity = -2.f;
+  bool varies() const { return radiance[0] < 0; }
 };
 static_assert(sizeof(TriangleLight) == 64);
 
-/// Texture coordinates of the corners of a triangle whose emission varies, and where it is.
-struct alignas(32) TriangleUvs {
+/// Texture coordinates of the corners of a triangle whose emission or opacity varies, and where it
+/// is.
+struct alignas(16) TriangleUvs {
   float uv0[2], uv1[2], uv2[2];
   uint32_t mesh, prim;
+  uint32_t instance;
 };
-static_assert(sizeof(TriangleUvs) == 32);
+static_assert(sizeof(TriangleUvs) == 48);
 
 /// A piecewise constant density over [0,1]^2 for importance sampling a dome, in counts of 65536:
 /// interval x of row y is chosen for as many of a row's 65536 counts as lie between its cumulative
@@ -276,7 +285,10 @@ struct LightView {
   const uint32_t* mesh_lights = nullptr;
   bool has_sampled_only = false;  ///< some record is that
   LinkView links;
-  MaterialView materials;  ///< textures, and emission of textured triangle lights
+  MaterialView materials;  ///< textures, and emission and opacity of triangles where they vary
+  // For graphs of opacity, which may ask where a triangle is; null where lights stand alone.
+  const MeshRecord* meshes = nullptr;
+  const InstanceRecord* instances = nullptr;
 };
 
 }  // namespace wavecomb

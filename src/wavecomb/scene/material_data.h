@@ -99,8 +99,10 @@ struct Material {
   /// Whether rays must ask how much of the surface is there.
   bool needs_presence() const {
     return (presence || opacity_threshold > 0) &&
-           (opacity < 1 || has_texture(Slot::kOpacity) || opacity_graph != kNoGraph);
+           (opacity < 1 || opacity < opacity_threshold || opacity_varies());
   }
+  /// Whether opacity is not the same all over what wears the material.
+  bool opacity_varies() const { return has_texture(Slot::kOpacity) || opacity_graph != kNoGraph; }
 };
 
 /// A material as lanes read it: 32 floats side by side, so that one record is two cache lines.

@@ -16,13 +16,30 @@ bool same(const Vec3<float>& a, const Vec3<float>& b) {
   return a.x == b.x && a.y == b.y && a.z == b.z;
 }
 
-/// Whether a surface shines alike with either of two materials.
-bool same_emission(const Material& a, const Material& b) {
-  const TextureUse& ta = a.textures[static_cast<size_t>(Slot::kEmission)];
-  const TextureUse& tb = b.textures[static_cast<size_t>(Slot::kEmission)];
-  return a.emits() == b.emits() && same(a.emission, b.emission) && ta.texture == tb.texture &&
-         ta.channel == tb.channel && ta.scale == tb.scale && ta.bias == tb.bias && ta.uv == tb.uv &&
-         a.emission_graph == b.emission_graph;
+bool same(const TextureUse& a, const TextureUse& b) {
+  return a.texture == b.texture && a.channel == b.channel && a.scale == b.scale &&
+         a.bias == b.bias && a.uv == b.uv;
+}
+bool same_texture(const Material& a, const Material& b, Slot slot) {
+  const auto s = static_cast<size_t>(slot);
+  return same(a.textures[s], b.textures[s]);
+}
+
+/// Whether as much of a surface is there with either of two materials.
+bool same_presence(const Material& a, const Material& b) {
+  if (!a.needs_presence() && !b.needs_presence()) return true;
+  return a.needs_presence() == b.needs_presence() && a.opacity == b.opacity &&
+         a.opacity_threshold == b.opacity_threshold && a.opacity_graph == b.opacity_graph &&
+         same_texture(a, b, Slot::kOpacity);
+}
+
+/// Whether a surface shines alike with either of two materials. What does not emit may be a mesh
+/// light (`any_mesh_lights`), which shines where the surface is.
+bool same_emission(const Material& a, const Material& b, bool any_mesh_lights) {
+  if (a.emits() != b.emits()) return false;
+  if (!a.emits()) return !any_mesh_lights || same_presence(a, b);
+  return same(a.emission, b.emission) && a.emission_graph == b.emission_graph &&
+         same_texture(a, b, Slot::kEmission) && same_presence(a, b);
 }
 
 [[noreturn]] void throw_unknown(const char* kind, uint32_t id, size_t count) {
@@ -55,6 +72,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.graphs = materials_->graphs->view();
   v.materials.graphs.attributes = geometry_->attributes();
   v.lights = lights_->set.view(v.materials);
+  v.lights.meshes = v.meshes;
+  v.lights.instances = v.instances;
   v.scale = geometry_->radius;
   v.motion = {geometry_->mesh_motions.data(),
               geometry_->instance_motions.empty() ? nullptr : geometry_->instance_motions.data(),
@@ -89,9 +108,10 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   std::shared_ptr<const SceneMaterials> new_materials = materials_;
   bool shines_otherwise = !edit.lights.empty();
   if (!edit.materials.empty()) {
+    const bool any_mesh_lights = !geometry_->mesh_lights.empty();
     std::vector<Material> all = materials();
     for (const auto& [id, material] : edit.materials) {
-      shines_otherwise = shines_otherwise || !same_emission(all[id], material);
+      shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
     new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs);

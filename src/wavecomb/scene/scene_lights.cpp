@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wavecomb/scene/graph_emission.h"
 #include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/triangle_means.h"
 
 namespace wavecomb {
 namespace {
@@ -18,7 +18,7 @@ uint32_t material_of(const Mesh& mesh, const InstanceRecord& instance, size_t fa
 struct EmissiveMesh {
   size_t first;  ///< light of its first triangle, counted over all emissive meshes
   const Mesh* mesh;
-  uint32_t mesh_id;
+  uint32_t mesh_id, instance_id;
   const InstanceRecord* instance;
   const Affine* to_world;
   uint32_t mesh_light;  ///< index of its PlacedMeshLight, or kNoLight
@@ -50,31 +50,18 @@ double world_area(const Mesh& mesh, const Affine& to_world) {
   return sum;
 }
 
-/// Face `face` of an emissive mesh as a light; radiance 0 where it does not emit.
+/// Face `face` of an emissive mesh as a light; radiance 0 where it does not emit, opacity 0 where
+/// it is not there.
 EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMaterials& materials,
                                    const EmissiveMesh& source, size_t face) {
   const Mesh& mesh = *source.mesh;
   const uint32_t material = material_of(mesh, *source.instance, face);
   EmissiveTriangle t{};
+  const Material& m = materials.materials[material];
   t.mesh_light = source.mesh_light;
+  t.instance = source.instance_id;
   t.mesh = source.mesh_id;
   t.prim = static_cast<uint32_t>(face);
-  const Material& m = materials.materials[material];
-  Vec3<float> radiance = m.emission;
-  if (m.has_texture(Slot::kEmission)) {
-    const TextureUse& use = m.textures[static_cast<size_t>(Slot::kEmission)];
-    const float* mean = geometry.textures[use.texture]->mean();
-    const auto value = [&](uint32_t c) {
-      const uint32_t from = use.channel == 4 ? c : use.channel;
-      return std::max(0.f, mean[from] * use.scale[from] + use.bias[from]);
-    };
-    radiance = {value(0), value(1), value(2)};
-    t.material = material;
-  }
-  if (!can_aim_at(m, *materials.graphs)) radiance = {0, 0, 0};
-  t.radiance[0] = radiance.x;
-  t.radiance[1] = radiance.y;
-  t.radiance[2] = radiance.z;
   float* const corners[3] = {t.p0, t.p1, t.p2};
   float* const uvs[3] = {t.uv0, t.uv1, t.uv2};
   constexpr float kBarycentric[3][2] = {{0, 0}, {1, 0}, {0, 1}};
@@ -90,10 +77,12 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     uvs[k][0] = uv[0];
     uvs[k][1] = uv[1];
   }
-  if (m.emission_graph != kNoGraph && can_aim_at(m, *materials.graphs)) {
+  set_mean_emission(geometry, materials, m, t);
+  // A hidden light shines though no ray meets its mesh.
+  if (mesh.mesh_light == kNoLight || geometry.mesh_lights[mesh.mesh_light].visible)
+    set_mean_opacity(geometry, materials, m, t);
+  if (m.has_texture(Slot::kEmission) || m.emission_graph != kNoGraph || t.opacity_varies)
     t.material = material;
-    mean_graph_emission(geometry, materials, m.emission_graph, t);
-  }
   return t;
 }
 
@@ -131,7 +120,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
       const uint32_t mesh_light = light ? mesh_lights.back() : kNoLight;
       if (light) placed.push_back({light, to_world, world_area(mesh, to_world), shines});
       if (!shines) continue;
-      sources.push_back({triangle_count, &mesh, mesh_id, &record, &to_world, mesh_light});
+      sources.push_back({triangle_count, &mesh, mesh_id, static_cast<uint32_t>(i), &record,
+                         &to_world, mesh_light});
       triangle_groups.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
       triangle_count += mesh.triangle_count();
     }

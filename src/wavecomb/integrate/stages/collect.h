@@ -8,31 +8,9 @@
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
-
-namespace detail {
-
-/// Material of a hit: the face's, else the mesh's, else the instance's.
-template <typename F>
-inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inherited, const UInt<F>& mesh,
-                            const UInt<F>& prim, const Mask<F>& active) {
-  using U = UInt<F>;
-  const Mask<U> on(active);
-  static_assert(offsetof(MeshRecord, face_materials) == 32 && offsetof(MeshRecord, material) == 40);
-  const auto row = load_rows<4, F>(scene.meshes, mesh * 16u + 8u, active);
-  const U lo = float_bits<F>(row[0]), hi = float_bits<F>(row[1]);
-  U material = float_bits<F>(row[2]);
-  const Mask<U> by_face = on & Mask<U>((lo | hi) != U(0u));
-  if (any(by_face)) {
-    using U64 = UInt64<F>;
-    const U64 address = U64(lo) | (U64(hi) << 32);
-    material = select(by_face, gather_at<U>(address, prim, by_face), material);
-  }
-  return select(Mask<U>(material == U(kInheritMaterial)), inherited, material);
-}
-
-}  // namespace detail
 
 /// Distance along the camera's axis, into the depth AOV.
 template <typename F>
@@ -131,7 +109,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const auto row = load_rows<2, F>(scene.instances, inst * 16u + 12u, surface);
     const U first = float_bits<F>(row[0]), inherited = float_bits<F>(row[1]);
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
-    const U material = detail::hit_material<F>(scene, inherited, mesh, prim, surface);
+    const U material = hit_material<F>(scene, inherited, mesh, prim, surface);
     const U program = gather<U>(scene.material_program, material, Mask<U>(surface));
     if (first_hits)
       store_hit<F>(wave.pool, slot, fma(d, t, o),

@@ -4,8 +4,8 @@
 
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/morton.h"
-#include "wavecomb/integrate/surface.h"
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/surface/uv.h"
 
 namespace wavecomb {
 
@@ -17,31 +17,13 @@ template <typename F>
 UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone_width,
                     const Mask<F>& active) {
   using U = UInt<F>;
-  const detail::MeshReader<F> mesh(scene, hit.mesh, active);
+  const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
   const Mask<F> has_uv = active & Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u));
-  const U corner = hit.prim * 3u;
-  const Mask<U> per_corner(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
-  const auto is = [&](uint32_t flag) { return has_uv & Mask<F>((mesh.flags & flag) != U(0u)); };
-  const Mask<F> curved = is(kIsCurved);
-  std::array<U, 3> at = mesh.corners(hit.prim, has_uv & not_(curved));
-  for (uint32_t k = 0; k < 3; ++k) at[k] = select(per_corner, U(corner + k), at[k]);
-  F b1 = hit.u, b2 = hit.v;
-  if (any(curved)) {  // a pair at both ends of a segment, or one for a point
-    const Mask<U> curve(curved), point(is(kIsSphere));
-    const U first = select(point, hit.prim, U(hit.prim * 2u));
-    at = {select(curve, first, at[0]), select(curve, select(point, first, U(first + 1u)), at[1]),
-          select(curve, first, at[2])};
-    b1 = select(curved, clamp(hit.u, F(0.f), F(1.f)), b1);
-    b2 = select(curved, F(0.f), b2);
-  }
-  const auto uv_of = [&](uint32_t k) { return mesh.vec2(&MeshRecord::uvs, at[k], has_uv); };
-  const Vec2<F> t0 = uv_of(0), t1 = uv_of(1), t2 = uv_of(2);
-  const F b0 = 1.f - b1 - b2;
-  const auto mix = [&](const F& a, const F& b, const F& c) {
-    const F x = fma(c, b2, fma(b, b1, F(a * b0)));
+  const Vec2<F> uv = hit_uv<F>(scene.meshes, hit.mesh, hit.prim, hit.u, hit.v, has_uv);
+  const auto within = [](const F& x) {
     return clamp(select(is_finite(x), x, F(0.f)), F(-1e6f), F(1e6f));
   };
-  const F u = mix(t0.x, t1.x, t2.x), v = mix(t0.y, t1.y, t2.y);
+  const F u = within(uv.x), v = within(uv.y);
   const F fu = floor(u), fv = floor(v);
   const U tile = (U(to_int<F>(fu)) + U(to_int<F>(fv)) * 10u) & 0x7fu;
   const U cell = morton_2<U>(U(to_int<F>(F((u - fu) * 128.f))) & 0x7fu,

@@ -2,8 +2,9 @@
 /// From a hit to what shading needs of the surface there.
 #pragma once
 
-#include "wavecomb/integrate/curve_surface.h"
-#include "wavecomb/integrate/surface_reader.h"
+#include "wavecomb/surface/curve_surface.h"
+#include "wavecomb/surface/surface_reader.h"
+#include "wavecomb/surface/uv.h"
 
 namespace wavecomb {
 
@@ -21,8 +22,8 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   using U = UInt<F>;
   Mask<F> active = lanes;
   if (scene.has_curves) active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
-  const detail::MeshReader<F> mesh(scene, hit.mesh, active);
-  detail::InstanceMaps<F> maps(scene, hit.inst, active);
+  const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
+  detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const U corner = hit.prim * 3u;
   const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
   Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
@@ -106,21 +107,9 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   s.dpdu = Vec3<F>(F(0.f));
   s.uv_per_length = F(0.f);
   if (with_uv) {
-    const Mask<F> has_uv =
-        Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u)) & active;
-    Vec2<F> t0{F(0.f), F(0.f)}, t1{F(1.f), F(0.f)}, t2{F(0.f), F(1.f)};
-    if (any(has_uv)) {
-      const Mask<U> pick(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
-      const auto fetch = [&](const U& at, const U& index, Vec2<F>& out) {
-        const Vec2<F> value = mesh.vec2(&MeshRecord::uvs, select(pick, at, index), has_uv);
-        out = {select(has_uv, value.x, out.x), select(has_uv, value.y, out.y)};
-      };
-      fetch(corner, i0, t0);
-      fetch(corner + 1u, i1, t1);
-      fetch(corner + 2u, i2, t2);
-    }
-    const Vec2<F> d1{t1.x - t0.x, t1.y - t0.y}, d2{t2.x - t0.x, t2.y - t0.y};
-    s.uv = {fma(d2.x, b2, fma(d1.x, b1, t0.x)), fma(d2.y, b2, fma(d1.y, b1, t0.y))};
+    const UvTriangle<F> t = uv_triangle<F>(mesh, {i0, i1, i2}, hit.prim, active);
+    const Vec2<F>&d1 = t.d1, &d2 = t.d2;
+    s.uv = t.at(b1, b2);
     const F det = fma(d1.x, d2.y, F(-(d1.y * d2.x)));
     s.uv_per_length = sqrt(F(abs(det) / safe_area2));
     // dp/du = (d2.v e1 - d1.v e2) / det; only its direction is used.

@@ -2,7 +2,7 @@
 /// What value graphs may ask of a hit.
 #pragma once
 
-#include "wavecomb/integrate/surface.h"
+#include "wavecomb/surface/surface.h"
 #include "wavecomb/texture/graph.h"
 
 namespace wavecomb {
@@ -33,7 +33,7 @@ template <typename F>
   if ((wanted & (graph_input_bit(GraphInput::kLocalPosition) |
                  graph_input_bit(GraphInput::kLocalNormal))) == 0)
     return at;
-  detail::InstanceMaps<F> maps(scene, hit.inst, active);
+  detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   if (scene.has_motion)
     maps.place(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
   // The inverse of the transform, by its cofactors.

@@ -2,8 +2,9 @@
 /// From a hit on a curve or point to the surface there; part of surface.h.
 #pragma once
 
-#include "wavecomb/integrate/surface_reader.h"
 #include "wavecomb/scene/curve.h"
+#include "wavecomb/surface/surface_reader.h"
+#include "wavecomb/surface/uv.h"
 
 namespace wavecomb::detail {
 
@@ -77,27 +78,21 @@ inline void merge(Surface<F>& to, const Surface<F>& from, const Mask<F>& m) {
         select<F>(m, from.terminator, to.terminator)};
 }
 
-/// Texture coordinates: authored ones go from one end of a segment to the other, and points have
-/// one pair each; else they are the hit's own.
+/// Texture coordinates, how they change with length, and the tangent along them.
 template <typename F>
 inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const MeshHit<F>& hit,
                    const CurvedPoint<F>& c, const Mask<F>& active, const Mask<F>& strands,
                    Surface<F>& s) {
-  using U = UInt<F>;
   const F scale = length(maps.vector(c.dpdu)) / max(length(c.dpdu), F(1e-30f));
   s.dpdu = maps.vector(c.dpdu);
   // Without authored coordinates a segment has all of the unit square.
   F density2 = 1.f / max(F(c.du * c.dv * scale * scale), F(1e-30f));
-  const Mask<F> authored = active & Mask<F>((mesh.flags & uint32_t{kUvsPerCorner}) != U(0u));
-  if (any(authored)) {
-    const U corner = select(Mask<U>(strands), U(hit.prim * 2u), hit.prim);
-    const Vec2<F> a = mesh.vec2(&MeshRecord::uvs, corner, authored);
-    const Vec2<F> b = mesh.vec2(&MeshRecord::uvs, corner + 1u, authored & strands);
-    const F t = select(strands, s.uv.x, F(0.f));
-    const Vec2<F> d{b.x - a.x, b.y - a.y};
-    s.uv = {select(authored, fma(d.x, t, a.x), s.uv.x), select(authored, fma(d.y, t, a.y), s.uv.y)};
-    const F along2 = fma(d.x, d.x, F(d.y * d.y)) / max(F(sqr(F(c.du * scale))), F(1e-30f));
-    density2 = select(authored, select(strands, along2, F(0.f)), density2);
+  const CurveUv<F> uv = curve_uv<F>(mesh, hit.prim, hit.u, hit.v, active, strands);
+  s.uv = uv.uv;
+  if (any(uv.authored)) {
+    const F along2 =
+        fma(uv.d.x, uv.d.x, F(uv.d.y * uv.d.y)) / max(F(sqr(F(c.du * scale))), F(1e-30f));
+    density2 = select(uv.authored, select(strands, along2, F(0.f)), density2);
   }
   s.uv_per_length = sqrt(density2);
 }
@@ -132,8 +127,8 @@ template <typename F>
 __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHit<F>& hit,
                                             bool with_uv, const Mask<F>& active, Surface<F>& out) {
   using U = UInt<F>;
-  const MeshReader<F> mesh(scene, hit.mesh, active);
-  InstanceMaps<F> maps(scene, hit.inst, active);
+  const MeshReader<F> mesh(scene.meshes, hit.mesh, active);
+  InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const auto is = [&](uint32_t flag) { return active & Mask<F>((mesh.flags & flag) != U(0u)); };
   const Mask<F> spheres = is(kIsSphere), ribbons = is(kIsRibbon);
   const Mask<F> strands = active & not_(spheres);

@@ -5,8 +5,8 @@
 #include "wavecomb/core/frame.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows.h"
-#include "wavecomb/integrate/motion.h"
 #include "wavecomb/scene/scene.h"
+#include "wavecomb/surface/motion.h"
 
 namespace wavecomb {
 
@@ -38,12 +38,12 @@ namespace detail {
 template <typename F>
 class MeshReader {
  public:
-  MeshReader(const SceneView& scene, const UInt<F>& mesh, const Mask<F>& active) {
+  MeshReader(const MeshRecord* meshes, const UInt<F>& mesh, const Mask<F>& active) {
     const InMemory<UInt<F>> index(mesh);
     const uint32_t bits = lane_bits<F>(active);
     for (size_t i = 0; i < kWidth<F>; ++i)
-      records_[i] = scene.meshes + ((bits >> i & 1u) != 0 ? index.value[i] : 0u);
-    flags = gather<UInt<F>>(scene.meshes,
+      records_[i] = meshes + ((bits >> i & 1u) != 0 ? index.value[i] : 0u);
+    flags = gather<UInt<F>>(meshes,
                             mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
                                 static_cast<uint32_t>(offsetof(MeshRecord, flags) / 4),
                             Mask<UInt<F>>(active));
@@ -94,14 +94,14 @@ struct InstanceMaps {
   Vec3<F> row[3], t;
   F side;  ///< sign of the determinant
 
-  InstanceMaps(const SceneView& scene, const UInt<F>& inst, const Mask<F>& active) {
+  InstanceMaps(const InstanceRecord* instances, const UInt<F>& inst, const Mask<F>& active) {
     std::array<F, 16> r;
     if (!kIsScalar<F> && any(active) && is_uniform<F>(inst, active)) {
-      const auto* shared = reinterpret_cast<const float*>(
-          scene.instances + first_active(inst, Mask<UInt<F>>(active)));
+      const auto* shared =
+          reinterpret_cast<const float*>(instances + first_active(inst, Mask<UInt<F>>(active)));
       for (size_t k = 0; k < 16; ++k) r[k] = F(shared[k]);
     } else {
-      r = load_rows<16, F>(scene.instances, inst * 16u, active);
+      r = load_rows<16, F>(instances, inst * 16u, active);
     }
     for (uint32_t i = 0; i < 3; ++i) row[i] = {r[4 * i], r[4 * i + 1], r[4 * i + 2]};
     t = {r[3], r[7], r[11]};

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Opacity at places of meshes that no path has shaded: what rays ask for that meet a cut-out, and
+/// light samples that aim at one.
+#pragma once
+
+#include "wavecomb/surface/surface_reader.h"
+#include "wavecomb/surface/values.h"
+
+namespace wavecomb {
+
+/// Whether materials of lanes are there in part: their opacity is presence and below 1 somewhere.
+template <typename F>
+inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
+                            const Mask<F>& active) {
+  using U = UInt<F>;
+  const U flags = gather<U>(view.materials,
+                            material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
+                                static_cast<uint32_t>(offsetof(MaterialRecord, flags) / 4),
+                            Mask<U>(active));
+  return active & Mask<F>((flags & uint32_t{kPresence}) != U(0u));
+}
+
+/// What graphs are given of a place on a mesh without a path: on triangles places at rest and the
+/// plane's normals, which the view is along; on curves and points texture coordinates alone.
+/// Images are read at their finest level.
+template <typename F>
+[[gnu::noinline, gnu::cold]] GraphPoint<F> point_at_rest(const MeshRecord* meshes,
+                                                         const InstanceRecord* instances,
+                                                         const UInt<F>& instance,
+                                                         const MeshPlace<F>& place,
+                                                         const Vec2<F>& uv, const Mask<F>& active) {
+  using U = UInt<F>;
+  GraphPoint<F> at;
+  at.uv = uv;
+  at.place = place;
+  const detail::MeshReader<F> mesh(meshes, place.mesh, active);
+  const Mask<F> flat = active & Mask<F>((mesh.flags & uint32_t{kIsCurved}) == U(0u));
+  if (none(flat)) return at;
+  const auto corners = mesh.corners(place.prim, flat);
+  const auto corner = [&](size_t k) { return mesh.vec3(&MeshRecord::positions, corners[k], flat); };
+  const detail::InstanceMaps<F> maps(instances, instance, flat);
+  const Vec3<F> p0 = corner(0), e1 = corner(1) - p0, e2 = corner(2) - p0;
+  const Vec3<F> p = fma(e2, place.v, fma(e1, place.u, p0)), n = cross(e1, e2);
+  const auto unit = [&](const Vec3<F>& v, const Vec3<F>& otherwise) {
+    const F size = length(v);
+    const Mask<F> good = flat & (size > 0.f);
+    return select<F>(good, v * F(1.f / select(good, size, F(1.f))), otherwise);
+  };
+  at.local_position = select<F>(flat, p, at.local_position);
+  at.position = select<F>(flat, maps.point(p), at.position);
+  at.local_normal = unit(n, at.local_normal);
+  at.normal = unit(maps.map_normal(n), at.normal);
+  at.view = select<F>(flat, at.normal, at.view);
+  return at;
+}
+
+/// Opacity of `material` at a place of a mesh of `instance`, whose texture coordinates are `uv`.
+template <typename F>
+inline F opacity_at(const MaterialView& view, const MeshRecord* meshes,
+                    const InstanceRecord* instances, const UInt<F>& material,
+                    const UInt<F>& instance, const MeshPlace<F>& place, const Vec2<F>& uv,
+                    const Mask<F>& active) {
+  const auto point = [&](const Mask<F>& lanes) {
+    return point_at_rest<F>(meshes, instances, instance, place, uv, lanes);
+  };
+  return fetch_opacity<F>(view, material, uv, F(0.f), point, active);
+}
+
+}  // namespace wavecomb
