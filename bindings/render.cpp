@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -9,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "bind.h"
 #include "rendering.h"
@@ -398,7 +400,10 @@ void bind_render(nb::module_& m) {
       .def_rw("spp", &Settings::spp)
       .def_rw("max_depth", &Settings::max_depth)
       .def_rw("seed", &Settings::seed)
-      .def_rw("filter_width", &Settings::filter_width)
+      .def_prop_rw(
+          "filter_width", &Settings::used_filter_width,
+          [](Settings& s, std::optional<float> width) { s.filter_width = width; },
+          nb::for_setter(nb::arg("filter_width").none()))
       .def_rw("roulette_depth", &Settings::roulette_depth)
       .def_rw("clamp_indirect", &Settings::clamp_indirect)
       .def_rw("cosine_sampling", &Settings::cosine_sampling)

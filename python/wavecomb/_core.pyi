@@ -402,7 +402,12 @@ class Settings:
     seed: int  # 0
     sampler: str  # "sobol" | "independent"
     filter: str  # "blackman-harris" | "gaussian" | "box"
-    filter_width: float  # pixels
+    @property
+    def filter_width(self) -> float:
+        """Pixels. None sets it to the filter's own: box 1, the others 3."""
+
+    @filter_width.setter
+    def filter_width(self, width: float | None) -> None: ...
     roulette: str  # "throughput" | "off" | "cost-aware"
     roulette_depth: int
     clamp_indirect: float  # 0: off

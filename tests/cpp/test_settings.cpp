@@ -73,7 +73,7 @@ TEST(Settings, EachOptionIsChecked) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInf = std::numeric_limits<float>::infinity();
   for (const float bad : {kNan, kInf, -1.f, 0.f, 33.f})
-    expect_refused<float>(&Settings::filter_width, bad, "filter_width");
+    expect_refused<std::optional<float>>(&Settings::filter_width, bad, "filter_width");
   for (const float bad : {kNan, kInf, -1.f})
     expect_refused<float>(&Settings::clamp_indirect, bad, "clamp_indirect");
 }
@@ -87,8 +87,21 @@ TEST(Settings, BoundsAreTaken) {
   expect_taken<uint32_t>(&Settings::wave_size, 0);
   for (const uint32_t lanes : {0u, 1u, 4u, 8u, 16u})
     expect_taken<uint32_t>(&Settings::lanes, lanes);
-  expect_taken<float>(&Settings::filter_width, 0.01f);
-  expect_taken<float>(&Settings::filter_width, 32.f);
+  expect_taken<std::optional<float>>(&Settings::filter_width, 0.01f);
+  expect_taken<std::optional<float>>(&Settings::filter_width, 32.f);
+}
+
+TEST(Settings, EachFilterHasItsOwnWidth) {
+  Settings s;
+  EXPECT_EQ(s.used_filter_width(), 3.f);  // Blackman-Harris
+  s.filter = FilterKind::kGaussian;
+  EXPECT_EQ(s.used_filter_width(), 3.f);
+  s.filter = FilterKind::kBox;
+  EXPECT_EQ(s.used_filter_width(), 1.f);
+  s.filter_width = 2.5f;
+  EXPECT_EQ(s.used_filter_width(), 2.5f);
+  s.filter_width.reset();
+  EXPECT_EQ(s.used_filter_width(), 1.f);
 }
 
 TEST(Settings, LargestPicture) {

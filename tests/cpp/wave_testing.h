@@ -28,7 +28,7 @@ class WaveRun {
       : case_(wave_case),
         scene_(std::move(scene)),
         accel_(accel ? std::move(accel) : std::make_shared<const EmbreeAccelerator>(scene_, 1u)),
-        filter_(case_.settings.filter, case_.settings.filter_width),
+        filter_(case_.settings.filter, case_.settings.used_filter_width()),
         camera_(scene_->camera(), case_.settings.width, case_.settings.height, filter_),
         traits_(material_traits(*scene_)),
         costs_(model_costs(*scene_)),

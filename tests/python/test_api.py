@@ -214,6 +214,33 @@ def test_scene_builder_for_real(tmp_path: Path) -> None:
         assert wavecomb.compare(other, picture).equal, settings
 
 
+def test_each_filter_has_its_own_width() -> None:
+    """A box is the pixel itself unless another width is asked for."""
+    core = pytest.importorskip("wavecomb._core")
+    widths = {"box": 1.0, "gaussian": 3.0, "blackman-harris": 3.0}
+    for name, width in widths.items():
+        settings = core.Settings(filter=name)
+        assert settings.filter_width == width
+        assert settings.to_dict()["filter_width"] == width
+    settings = core.Settings(filter_width=2.0, filter="box")
+    assert settings.filter_width == 2.0
+    settings.filter_width = None
+    assert settings.filter_width == 1.0
+
+    builder = wavecomb.SceneBuilder()
+    glow = builder.add_material("emissive", emission=(1.0, 1.0, 1.0))
+    corners = np.array([[-0.7, -0.7, -2], [0.7, -0.7, -2], [0.7, 0.7, -2]], np.float32)
+    mesh = builder.add_mesh(corners, np.array([[0, 1, 2]], np.uint32), material=glow)
+    builder.add_to_group(0, mesh)
+    builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5))
+    scene = builder.build()
+    unset = wavecomb.render(scene, size=(16, 16), spp=16, filter="box")
+    one = wavecomb.render(scene, size=(16, 16), spp=16, filter="box", filter_width=1.0)
+    wide = wavecomb.render(scene, size=(16, 16), spp=16, filter="box", filter_width=3.0)
+    assert wavecomb.compare(unset, one).equal
+    assert not wavecomb.compare(unset, wide).equal
+
+
 def test_progress_for_real() -> None:
     pytest.importorskip("wavecomb._core")
     builder = wavecomb.SceneBuilder()

@@ -191,6 +191,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"seed": 1}, "seed 0, and this render has 1"),
     ({"max_depth": 3}, "max-depth 8, and this render has 3"),
     ({"filter_width": 2.0}, "filter-width 3.0, and this render has 2.0"),
+    ({"filter": "box"}, "filter blackman-harris, and this render has box"),
     ({"noise": 0.1}, "noise 0.0, and this render has"),
     ({"error": True}, "error False, and this render has True"),
 ]

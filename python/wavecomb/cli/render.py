@@ -108,7 +108,12 @@ _INTEGERS = click.IntRange(min=0)
     type=click.Choice(["blackman-harris", "gaussian", "box"]),
     help="Pixel filter.  [default: blackman-harris]",
 )
-@click.option("--filter-width", type=Real(0, above=True), metavar="X", help="In pixels.")
+@click.option(
+    "--filter-width",
+    type=Real(0, above=True),
+    metavar="X",
+    help="Full width in pixels.  [default: the filter's own: box 1, the others 3]",
+)
 @click.option(
     "--roulette",
     type=click.Choice(["off", "throughput", "cost-aware"]),

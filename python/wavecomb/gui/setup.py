@@ -23,6 +23,7 @@ class Setup:
     """Settings of a live render. Fields are those of ``wavecomb.Settings`` but for the last ones.
 
     Attributes:
+        filter_width: In pixels; None: the filter's own.
         aovs: Layers to keep beside the beauty, names of docs/aovs.md.
         denoise: Whether frames come denoised, too.
         region: x0, y0, x1, y1 in pixels, end excluded: only these are rendered; None: all.
@@ -37,7 +38,7 @@ class Setup:
     seed: int = 0
     sampler: str = "sobol"
     filter: str = "blackman-harris"
-    filter_width: float = 3.0
+    filter_width: float | None = None
     roulette: str = "throughput"
     roulette_depth: int = 2
     clamp_indirect: float = 0.0

@@ -40,7 +40,7 @@ void Settings::check() const {
   }
   check_range("spp", spp, 1, 1 << 20);
   check_range("max_depth", max_depth, 0, 4096);
-  check_range("filter_width", filter_width, 0.01f, 32);
+  check_range("filter_width", used_filter_width(), 0.01f, 32);
   check_range("roulette_depth", roulette_depth, 0, 4096);
   check_range("clamp_indirect", clamp_indirect, 0, 1e30f);
   check_range("adaptive", adaptive, 0, 1e6f);

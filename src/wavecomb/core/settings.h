@@ -13,6 +13,13 @@ namespace wavecomb {
 
 enum class SamplerKind : uint8_t { kSobol, kIndependent };
 enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
+
+/// Full width of a filter in pixels where none is asked for: the box is the pixel itself; a
+/// Gaussian of 3 (sigma 1/2) is pbrt's, a Blackman-Harris window of 3 is Cycles' default.
+constexpr float default_filter_width(FilterKind kind) {
+  return kind == FilterKind::kBox ? 1.f : 3.f;
+}
+
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// How the light is chosen that a vertex is lit by: by its power alone, or by tree for the vertex
 /// (light/light_tree.h). kAuto: by tree where there are lights enough for it to pay.
@@ -47,7 +54,7 @@ struct Settings {
   uint32_t seed = 0;
   SamplerKind sampler = SamplerKind::kSobol;
   FilterKind filter = FilterKind::kBlackmanHarris;
-  float filter_width = 3.f;  ///< full width in pixels (box: 1 is the pixel itself)
+  std::optional<float> filter_width;  ///< full width in pixels; without: the filter's own
   RouletteKind roulette = RouletteKind::kThroughput;
   uint32_t roulette_depth = 2;  ///< first vertex after which a path may end
   /// Costs decide over the picture through cost-aware roulette only, and then kMeasured makes it
@@ -86,6 +93,7 @@ struct Settings {
   bool progressive = false;
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
+  float used_filter_width() const { return filter_width.value_or(default_filter_width(filter)); }
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Pixels that are rendered.
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }

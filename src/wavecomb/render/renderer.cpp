@@ -226,7 +226,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   });
   const std::vector<MaterialTraits> traits = material_traits(scene);
   RenderCosts costs(scene, traits, settings);
-  const FilterTable filter(settings.filter, settings.filter_width);
+  const FilterTable filter(settings.filter, settings.used_filter_width());
   const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
   const AovTables aovs(scene, settings);
   Film film(settings.width, settings.height, aovs.layout, settings.keeps_error());
