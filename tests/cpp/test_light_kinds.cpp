@@ -168,6 +168,31 @@ TEST(Ies, BilinearBetweenItsAngles) {
   EXPECT_NEAR(candela(30, 90, from_above), 2 - 50 / 60.0, 1e-3);
 }
 
+TEST(Ies, ScaledBeyondItsEnds) {
+  // As OpenUSD's delegate has it: beyond 180 degrees a profile goes on with its value there, below
+  // 0 it is dark.
+  const auto candela = [&](double theta, float angle_scale, const IesProfile& profile) {
+    Shaping shaping{0, {}, 180, 0, 0};
+    shaping.ies_angle_scale = angle_scale;
+    return static_cast<double>(sent(shaping, off_axis(theta), {}, {profile}).y) / 3;
+  };
+  const IesProfile all_around{{0, 90, 180}, {0}, {1, 2, 4}};
+  EXPECT_NEAR(candela(22.5, 0.5f, all_around), 1.5, 1e-3);
+  EXPECT_NEAR(candela(67.5, 0.5f, all_around), 3, 1e-3);
+  for (const double theta : {90.5, 120.0, 150.0, 179.5}) {
+    EXPECT_NEAR(candela(theta, 0.5f, all_around), 4, 1e-5) << theta;
+    EXPECT_NEAR(candela(theta, 0.25f, all_around), 4, 1e-5) << theta;
+  }
+  EXPECT_NEAR(candela(135, -0.5f, all_around), 2, 1e-3);  // 2 theta - 180
+  for (const double theta : {1.0, 45.0, 89.0})
+    EXPECT_EQ(candela(theta, -0.5f, all_around), 0) << theta;
+  // What a profile does not reach stays dark.
+  const IesProfile downwards{{0, 90}, {0}, {1, 2}};
+  EXPECT_NEAR(candela(22.5, 0.5f, downwards), 1.5, 1e-3);
+  for (const double theta : {46.0, 91.0, 120.0, 179.0})
+    EXPECT_EQ(candela(theta, 0.5f, downwards), 0) << theta;
+}
+
 TEST(Ies, MeanIsExactAndNormalizes) {
   // The mean of cos(theta)'s own shape in degrees: a profile linear in theta, from 1 to 0, has
   // 1/2 integral sin (1 - theta / pi) = 1 / 2.

@@ -4,7 +4,8 @@
 /// With e the direction of emission and a the light's axis, both unit, and angle = acos(e . a),
 ///   focus   lerp(focusTint, 1, |e . a|^focus)
 ///   cone    1 - smoothstep(lerp(coneAngle, 0, softness), coneAngle, angle)
-///   IES     candela at (theta, phi) of e in the light's space, theta scaled by angleScale
+///   IES     candela at (theta, phi) of e in the light's space, theta scaled by angleScale: what
+///           that takes beyond 180 degrees has the candela at 180, what it takes below 0 is dark
 /// multiply the radiance.
 #pragma once
 
@@ -129,6 +130,7 @@ inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3
     const F scale = real(offsetof(R, angle_scale));
     const F safe = select(scale == 0.f, F(1.f), abs(scale));
     theta = select(scale < 0.f, F(F(theta - 180.f) / safe + 180.f), F(theta / safe));
+    theta = select(scale == 0.f, theta, min(theta, F(180.f)));
     const F turn = atan2(F(-e.y), F(-e.x)) * kDegrees;
     const F phi = select(turn < 0.f, F(turn + 360.f), turn);
     const F candela = ies_candela<F>(view, ies, theta, phi, profiled);
