@@ -2,16 +2,20 @@
 """Renders the UsdLux suite and compares each picture with its reference.
 
     .venv/bin/python benchmarks/usdlux.py
-    .venv/bin/python benchmarks/usdlux.py sphere rect:28 -o out/usdlux --size 512 --spp 64
+    .venv/bin/python benchmarks/usdlux.py sphere rect:28 -o out/usdlux --size 256 --spp 64
 
 The stages and pictures lie in ../shared/assets (usd/usdlux, reference/usdlux; FRAMES.md there says
 what varies at each frame). Direct light only. The page, index.html in the output folder, shows each
-pair and its errors, all relative to the mean of the reference:
+pair and its errors:
 
-    mean        of the difference: what the two disagree about in brightness
-    absolute    of the absolute difference, which noise and the edges of shapes are part of
+    mean        of the difference, relative: what the two disagree about in brightness
+    noise       one standard error of that
+    worst       the largest difference of a block of 16 x 16 pixels, in standard errors
+    absolute    mean of the absolute difference, which noise and the edges of shapes are part of
 
-Exit code 1 where less than 90 % of the pictures are within 1 % by their mean.
+Each mean must be within 0.5 %, and each block within the noise of both pictures, at a level of 0.01
+for all blocks of a picture together (usdlux_judge.py). Exit code 1 where that does not hold, but
+for what NOT_REACHED lists with the reason.
 """
 
 from __future__ import annotations
@@ -20,11 +24,14 @@ import argparse
 import html
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pictures import Pixels, read, shrunk, white_of, write_row
+from numpy.typing import NDArray
+from pictures import read, shrunk, white_of, write_row
+from usdlux_judge import Verdict, judge
 
 import wavecomb
 from wavecomb.files import replacing
@@ -46,6 +53,17 @@ over "materials" {
 """The references are of Lambert's surfaces. The stages ask for a specularColor of 0 at the index 1.
 By UsdPreviewSurface's specular workflow that still reflects at grazing angles (F90 is 1); by its
 metallic workflow it is Lambert's."""
+NOT_REACHED = {
+    "dome": "the image is seen: OpenUSD's delegate looks up the nearest texel, we are bilinear",
+    "visibleRect": "likewise",
+    **dict.fromkeys(
+        ("distant 1", "distant 5", "distant 10"),
+        "the delegate's 1 - cos(0.265 degrees) is 179 steps of a float for 179.45: 0.25 % too dark",
+    ),
+    "cylinder 25": "a cone of 10 degrees: half a percent is the reference's own noise",
+}
+"""Of stages and pictures that do not reach it, why. Their means still have to be within 0.5 %, or
+within 3 standard errors."""
 NAME = re.compile(r"(?P<stage>\w+)-embree\.(?P<frame>\d+)\.exr")
 
 PAGE = """<!doctype html>
@@ -55,8 +73,9 @@ body {{ font: 14px/1.4 sans-serif; margin: 2em; color: #222 }} img {{ height: 16
 td, th {{ padding: 2px 10px; text-align: right }} td:first-child {{ text-align: left }}
 .off {{ color: #c33 }}
 </style>
-<h1>UsdLux suite: {within} of {count} within 1 %</h1>
-<table><tr><th>picture<th>mean<th>mean difference, %<th>absolute, %<th>ours, reference</tr>
+<h1>UsdLux suite: {agree} of {count} agree</h1>
+<table><tr><th>picture<th>mean<th>mean difference, %<th>noise, %<th>worst block<th>may be
+<th>blocks beyond<th>absolute, %<th>ours, reference</tr>
 {rows}
 </table></html>
 """
@@ -68,39 +87,75 @@ class Entry:
 
     name: str
     mean: float
-    difference: float
+    verdict: Verdict
     absolute: float
     image: str
 
     @property
-    def is_within(self) -> bool:
-        """Whether the means differ by 1 % or less."""
-        return abs(self.difference) <= 0.01
+    def reason(self) -> str:
+        """Why its blocks need not be within noise; or ""."""
+        return NOT_REACHED.get(self.name) or NOT_REACHED.get(self.name.split()[0], "")
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it agrees as far as it has to."""
+        v = self.verdict
+        return v.agrees or (bool(self.reason) and v.mean_agrees_within(3))
 
     def row(self) -> str:
         """Its part of the page."""
+        v = self.verdict
         return (
-            f"<tr{'' if self.is_within else ' class=off'}><td>{html.escape(self.name)}"
-            f"<td>{self.mean:.5f}<td>{100 * self.difference:+.3f}<td>{100 * self.absolute:.2f}"
+            f"<tr{'' if v.agrees else ' class=off'}><td>{html.escape(self.name)}"
+            f"<td>{self.mean:.5f}<td>{100 * v.difference:+.3f}<td>{100 * v.noise:.3f}"
+            f"<td>{v.worst:.1f}<td>{v.limit:.1f}<td>{v.outside} of {v.blocks}"
+            f"<td>{100 * self.absolute:.2f}"
             f'<td><img src="{html.escape(self.image)}" alt=""></tr>'
         )
 
+    def line(self) -> str:
+        """The same as text."""
+        v = self.verdict
+        what = "" if v.agrees else "   NOT REACHED" + (f": {self.reason}" if self.reason else "")
+        if v.outside:
+            what += (
+                f" (block {v.place[0]}, {v.place[1]}: {100 * v.excess:+.2f} %, "
+                f"{v.outside} of {v.blocks} beyond)"
+            )
+        return (
+            f"{self.name:17s} mean {self.mean:9.5f}  difference {100 * v.difference:+7.3f} "
+            f"+- {100 * v.noise:.3f} %  worst block {v.worst:5.1f} of {v.limit:.1f}{what}"
+        )
 
-def render(stage: Path, frame: int, camera: str | None, options: argparse.Namespace) -> Pixels:
-    """Our picture of a frame."""
+
+def render(
+    stage: Path, frame: int, camera: str | None, options: argparse.Namespace
+) -> NDArray[np.float64]:
+    """Independent renders of a frame, (batches, height, width, 3)."""
     lambert = options.out / "lambert.usda"
     lambert.write_text(LAMBERT, encoding="utf-8")
     lights = "visible" if stage.stem in VISIBLE else "hidden"
-    scene = wavecomb.load(stage, frame=frame, camera=camera, lights=lights, session_layer=lambert)
-    picture = wavecomb.render(
-        scene,
-        size=(options.size, options.size),
-        spp=options.spp,
-        max_depth=1,
-        filter="box",
-        filter_width=1.0,
+    scene = wavecomb.load(
+        stage,
+        frame=frame,
+        camera=camera,
+        lights=lights,
+        session_layer=lambert,
+        subdivision="off",  # OpenUSD's delegate draws cages
     )
-    return np.asarray(picture.beauty, np.float32)
+    return np.stack(
+        [
+            wavecomb.render(
+                scene,
+                size=(options.size, options.size),
+                spp=max(1, options.spp // options.batches),
+                seed=seed,
+                max_depth=1,
+                filter="box",
+            ).beauty
+            for seed in range(options.batches)
+        ]
+    ).astype(np.float64)
 
 
 def compare(reference_file: Path, options: argparse.Namespace) -> Entry:
@@ -111,18 +166,17 @@ def compare(reference_file: Path, options: argparse.Namespace) -> Entry:
     reference = shrunk(read(reference_file), options.size)
     cameras = CAMERAS.get(stage, (None,))
     file = ASSETS / "usd" / "usdlux" / f"{stage}.usda"
-    ours = np.concatenate([render(file, frame, camera, options) for camera in cameras], axis=0)
-    name = f"{stage} {frame}"
+    batches = np.concatenate([render(file, frame, c, options) for c in cameras], axis=1)
+    ours = np.asarray(batches.mean(0), np.float32)
     mean = max(float(reference.mean(dtype=np.float64)), 1e-12)
-    difference = np.asarray(ours, np.float64) - reference
+    absolute = float(abs(ours.astype(np.float64) - reference).mean()) / mean
     image = f"{stage}.{frame:04d}.png"
     write_row(options.out / image, [ours, reference], white_of(reference))
-    return Entry(
-        name, mean, float(difference.mean()) / mean, float(abs(difference).mean()) / mean, image
-    )
+    verdict = judge(batches, reference.astype(np.float64))
+    return Entry(f"{stage} {frame}", mean, verdict, absolute, image)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the comparison."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -130,10 +184,13 @@ def main() -> int:
     parser.add_argument("pictures", nargs="*", help="STAGE or STAGE:FRAME; default: all")
     parser.add_argument("-o", "--out", type=Path, default=Path("out/usdlux"))
     parser.add_argument("--size", type=int, default=512, help="width; divides 512")
-    parser.add_argument("--spp", type=int, default=64)
-    options = parser.parse_args()
-    if options.size < 1 or 512 % options.size:
-        parser.error("--size must divide 512")
+    parser.add_argument("--spp", type=int, default=256, help="of all batches together")
+    parser.add_argument("--batches", type=int, default=8, help="independent renders, from 2 on")
+    options = parser.parse_args(arguments)
+    if options.size < 16 or 512 % options.size:
+        parser.error("--size must divide 512 and be 16 or more")
+    if not 2 <= options.batches <= options.spp:
+        parser.error("--batches must be from 2 to --spp")
     references = sorted((ASSETS / "reference" / "usdlux").glob("*-embree.*.exr"))
     if not references:
         parser.error(f"there are no references in {ASSETS}")
@@ -148,22 +205,17 @@ def main() -> int:
         if wanted and not wanted & {stage, f"{stage}:{frame}"}:
             continue
         entries.append(compare(file, options))
-        last = entries[-1]
-        print(
-            f"{last.name:20s} mean {last.mean:9.5f}   difference {100 * last.difference:+8.3f} %   "
-            f"absolute {100 * last.absolute:7.2f} %",
-            flush=True,
-        )
+        print(entries[-1].line(), flush=True)
     if not entries:
         parser.error("no reference has that name")
-    within = sum(entry.is_within for entry in entries)
+    agree = sum(entry.verdict.agrees for entry in entries)
     page = PAGE.format(
-        within=within, count=len(entries), rows="\n".join(entry.row() for entry in entries)
+        agree=agree, count=len(entries), rows="\n".join(entry.row() for entry in entries)
     )
     with replacing(options.out / "index.html") as part:
         Path(part).write_text(page, encoding="utf-8")
-    print(f"{within} of {len(entries)} within 1 %; {options.out / 'index.html'}")
-    return 0 if within >= 0.9 * len(entries) else 1
+    print(f"{agree} of {len(entries)} agree; {options.out / 'index.html'}")
+    return 0 if all(entry.is_good for entry in entries) else 1
 
 
 if __name__ == "__main__":

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The UsdLux suite against its public pictures, and the referee that judges them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from parts import needs, needs_asset
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+pytest.importorskip("OpenImageIO")
+import usdlux
+from usdlux_judge import judge
+
+FEW = ("sphere:18", "rect:28", "cylinder:1", "disk:1", "iesTest:5")
+"""A colour temperature, a soft cone, shapes, and a profile that is scaled by -0.5."""
+
+
+def files(pictures: tuple[str, ...]) -> list[str]:
+    """Of the suite, with their references."""
+    found = []
+    for stage, _, frame in (picture.partition(":") for picture in pictures):
+        found += [
+            f"usd/usdlux/{stage}.usda",
+            f"reference/usdlux/{stage}-embree.{int(frame):04d}.exr",
+        ]
+    return found
+
+
+@needs("wavecomb._core")
+@needs_asset(*files(FEW))
+def test_a_few_pictures(tmp_path: Path) -> None:
+    """Small: blocks of 16 pixels of 64 hold 64 of the reference's."""
+    options = ["--size", "64", "--spp", "64", "-o", str(tmp_path)]
+    assert usdlux.main([*FEW, *options]) == 0
+
+
+@pytest.mark.long
+@needs("wavecomb._core")
+@needs_asset(*files(("sphere:1", "dome:1", "visibleRect:1")))
+def test_the_whole_suite(tmp_path: Path) -> None:
+    """All of it at 512 and 256 samples."""
+    assert usdlux.main(["--size", "512", "--spp", "256", "-o", str(tmp_path)]) == 0
+
+
+def fake(rng: np.random.Generator, noise: float) -> np.ndarray:
+    """A slope with skewed noise, (64, 64, 3)."""
+    slope = np.linspace(0.2, 1.0, 64)[None, :, None] * np.ones((64, 64, 3))
+    return np.asarray(slope * rng.gamma(1 / noise**2, noise**2, slope.shape))
+
+
+def test_the_referee_accepts_noise() -> None:
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        ours = np.stack([fake(rng, 0.2) for _ in range(8)])
+        verdict = judge(ours, fake(rng, 0.1))
+        assert verdict.agrees, verdict
+        assert verdict.noise < 0.005
+
+
+@pytest.mark.parametrize("fault", ["mean", "block", "colour"])
+def test_the_referee_finds_faults(fault: str) -> None:
+    """A mean that is 1 % off; one block that is 6 % off; one colour of one block."""
+    rng = np.random.default_rng(3)
+    ours = np.stack([fake(rng, 0.2) for _ in range(8)])
+    reference = fake(rng, 0.1)
+    if fault == "mean":
+        reference *= 1.01
+    elif fault == "block":
+        reference[16:32, 32:48] *= 1.06
+    else:
+        reference[16:32, 32:48, 2] *= 1.08
+    verdict = judge(ours, reference)
+    assert not verdict.agrees
+    if fault == "mean":
+        assert not verdict.mean_agrees
+    else:
+        assert verdict.place == (2, 1) and verdict.outside <= 3
