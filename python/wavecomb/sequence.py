@@ -128,7 +128,7 @@ class Frames:
         told = LoadReport()
         seen = self._view(options).on(self._stage, told)
         if before.camera_path is None or seen.camera is None:
-            # The bounds are framed; not where a camera is no good.
+            # What is drawn is framed; not where a camera is no good.
             is_same = before.camera_path is None and seen.camera is None
             return before if is_same and before.render == seen.choice else None
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))

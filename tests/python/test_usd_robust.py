@@ -59,7 +59,11 @@ def test_empty_stage_renders_the_environment(tmp_path):
     scene, loaded = load(tmp_path, "")
     assert [light["kind"] for light in scene.lights] == ["dome"]
     assert scene.camera is not None and loaded.camera_path is None
-    for words in ("nothing to draw", "no camera: framed the bounds", "no light: added a soft dome"):
+    for words in (
+        "nothing to draw",
+        "no camera: framed what is drawn",
+        "no light: added a soft dome",
+    ):
         assert words in said(loaded)
 
 

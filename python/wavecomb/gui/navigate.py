@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from wavecomb.gui.camera import UPS, Matrix, Pose, Vector
+from wavecomb.usd.framing import fit, fit_flat
 
 STEEPEST = math.radians(89.9)
 """An orbit stops short of the poles, where the way up is lost."""
-MARGIN = 1.08
 VIEWS = ("front", "back", "right", "left", "top", "bottom")
 
 
@@ -63,21 +63,21 @@ def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
     return _placed(pose, pose.to_world[:3, :3], pivot + (pose.position - pivot) * factor)
 
 
-def frame(pose: Pose, bounds: Matrix, aspect: float) -> Pose:
-    """Looks the same way, from where a box fits the picture.
+def frame(pose: Pose, points: Matrix, aspect: float) -> Pose:
+    """Looks the same way, from where points fill the picture but for a margin.
 
     Args:
         pose: From.
-        bounds: (2, 3), least and greatest corner.
+        points: (n, 3), such as the corners of a box.
         aspect: Width / height of the picture.
     """
-    return _framed(pose, pose.to_world[:3, :3], bounds, aspect)
+    return _framed(pose, pose.to_world[:3, :3], points, aspect)
 
 
-def view(pose: Pose, name: str, bounds: Matrix, up_axis: str, aspect: float) -> Pose:
-    """From a side of the box, whole in the picture: a name of ``VIEWS``."""
+def view(pose: Pose, name: str, points: Matrix, up_axis: str, aspect: float) -> Pose:
+    """From a side, with points (n, 3) whole in the picture: a name of ``VIEWS``."""
     up = np.array(UPS[up_axis])
-    # As `usd.camera.frame_bounds`: the front is +Z, or -Y where Z is up.
+    # As `usd.camera.frame_points`: the front is +Z, or -Y where Z is up.
     front = np.array({"Z": (0.0, -1.0, 0.0)}.get(up_axis, (0.0, 0.0, 1.0)))
     right = np.cross(up, front)
     back, above = {
@@ -88,7 +88,7 @@ def view(pose: Pose, name: str, bounds: Matrix, up_axis: str, aspect: float) -> 
         "top": (up, -front),
         "bottom": (-up, front),
     }[name]
-    return _framed(pose, np.stack([np.cross(above, back), above, back]), bounds, aspect)
+    return _framed(pose, np.stack([np.cross(above, back), above, back]), points, aspect)
 
 
 def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
@@ -97,31 +97,26 @@ def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
     return _placed(pose, pose.to_world[:3, :3] @ turn, pivot + (pose.position - pivot) @ turn)
 
 
-def _framed(pose: Pose, axes: Matrix, bounds: Matrix, aspect: float) -> Pose:
-    centre = 0.5 * (bounds[0] + bounds[1])
-    corners = np.array(
-        [[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i, j, k in np.ndindex(2, 2, 2)]
-    )
-    local = (corners - centre) @ axes.T
+def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = 0.5 * (low + high)
     if pose.projection == "latlong":  # all is in the picture: from the middle
         return _placed(pose, axes, centre)
     x0, x1, y0, y1 = pose.fitted(round(1000 * aspect), 1000)
     half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
-    reach = np.maximum(np.abs(local[:, 0]) / half[0], np.abs(local[:, 1]) / half[1])
-    size = float(np.linalg.norm(bounds[1] - bounds[0]))
+    size = float(np.linalg.norm(high - low))
     if pose.projection == "orthographic":
-        scale = MARGIN * float(reach.max()) or 1.0
+        place, scale = fit_flat(points, axes, half)
         pose = _scaled(pose, scale)
         x0, x1, y0, y1 = (scale * edge for edge in (x0, x1, y0, y1))
         distance, depth = size or 1.0, 1.0
+        place = place + distance * axes[2]
     else:
-        distance = MARGIN * float((reach + local[:, 2]).max())
-        if distance <= 0.0:
-            distance = 1.0
-        depth = distance
+        place = fit(points, axes, half)
+        distance = depth = float((place - centre) @ axes[2])
     # A window that is off the axis looks past the centre.
     shift = -0.5 * (x0 + x1) * depth * axes[0] - 0.5 * (y0 + y1) * depth * axes[1]
-    framed = _placed(pose, axes, centre + distance * axes[2] + shift)
+    framed = _placed(pose, axes, place + shift)
     near = min(framed.near_clip, 1e-3 * distance)
     return replace(framed, near_clip=near, far_clip=max(framed.far_clip, distance + 2.0 * size))
 

@@ -25,6 +25,7 @@ from wavecomb.gui.display import Look, Shown
 from wavecomb.gui.frames import Frame
 from wavecomb.gui.picture_view import PictureView
 from wavecomb.gui.session import Session
+from wavecomb.usd.framing import corners
 
 ORBIT_RADIANS = 0.008
 """Of turning for each device-independent pixel: half a turn is some 400."""
@@ -167,6 +168,13 @@ class Viewport(PictureView):
             return np.array([[-1.0] * 3, [1.0] * 3])
         return bounds
 
+    def outline(self) -> np.ndarray:
+        """Points (n, 3) that are to be seen where all is: what is drawn, or a box about it."""
+        stage = self.session.stage
+        if stage is not None and stage.outline is not None:
+            return stage.outline
+        return corners(self.bounds())
+
     def aspect(self) -> float:
         """Width / height of the picture."""
         return self.session.setup.width / self.session.setup.height
@@ -206,25 +214,25 @@ class Viewport(PictureView):
 
     def frame_all(self) -> None:
         """The whole scene in the picture."""
-        self._frame_bounds(self.bounds())
+        self._frame_points(self.outline())
 
     def frame_selected(self) -> None:
         """What is selected, or all."""
         bounds = self.session.selected_bounds()
-        self._frame_bounds(self.bounds() if bounds is None else bounds)
+        self._frame_points(self.outline() if bounds is None else corners(bounds))
 
-    def _frame_bounds(self, bounds: np.ndarray) -> None:
+    def _frame_points(self, points: np.ndarray) -> None:
         if (pose := self._pose()) is not None:
-            self._pivot = 0.5 * (bounds[0] + bounds[1])
-            self.session.set_camera(navigate.frame(pose, bounds, self.aspect()))
+            self._pivot = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            self.session.set_camera(navigate.frame(pose, points, self.aspect()))
 
     def view_from(self, name: str) -> None:
         """From a side: front, back, right, left, top, bottom."""
         if (pose := self._pose()) is not None:
-            bounds = self.bounds()
-            self._pivot = 0.5 * (bounds[0] + bounds[1])
+            points = self.outline()
+            self._pivot = 0.5 * (points.min(axis=0) + points.max(axis=0))
             up = self.session.up_axis
-            self.session.set_camera(navigate.view(pose, name, bounds, up, self.aspect()))
+            self.session.set_camera(navigate.view(pose, name, points, up, self.aspect()))
 
     def view_opposite(self) -> None:
         """From the other side."""

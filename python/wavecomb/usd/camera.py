@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
+from wavecomb.output import fitted_window
+from wavecomb.usd.framing import corners, fit, fit_flat, planes
 from wavecomb.usd.network import number, pair, word
 from wavecomb.usd.report import LoadReport
 from wavecomb.usd.search import every
@@ -253,35 +255,66 @@ def _rigid(to_world: Matrix) -> Matrix | None:
     return None if abs(np.linalg.det(out[:3, :3])) < 1e-6 else out
 
 
-def frame_bounds(bounds: Matrix | None, up_axis: str, lens: Lens = Lens()) -> View:
-    """A three-quarter view that fits bounds (2, 3) in its frame; None: of the origin."""
-    if bounds is None:
-        bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-    centre = 0.5 * (bounds[0] + bounds[1])
-    size = float(np.linalg.norm(bounds[1] - bounds[0])) or 1.0
+def _frame_axes(up_axis: str) -> Matrix:
+    """Right, up and back of the default camera.
+
+    It is half right of the front, a little above; the front is +Z, or -Y where Z is up.
+    """
     up = np.array({"X": (1.0, 0, 0), "Z": (0, 0, 1.0)}.get(up_axis, (0, 1.0, 0)))
-    # Half right of the front, a little from above; the front is +Z, or -Y where Z is up.
     front = {"X": (0, 0, 1.0), "Z": (0, -1.0, 0)}.get(up_axis, (0, 0, 1.0))
     side = np.cross(up, front)
     back = np.asarray(front) + 0.6 * side + 0.42 * up
     back /= np.linalg.norm(back)
     right = np.cross(up, back)
     right /= np.linalg.norm(right)
-    true_up = np.cross(back, right)
-    picks = [[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    corners = bounds[picks, range(3)] - centre
-    reach = np.maximum(np.abs(corners @ right), np.abs(corners @ true_up)) / _FRAME_TAN
-    distance = 1.08 * float((reach + corners @ back).max()) or size
-    frame = np.eye(4)
-    frame[0, :3], frame[1, :3], frame[2, :3] = right, true_up, back
-    frame[3, :3] = centre + distance * back
+    return np.stack([right, np.cross(back, right), back])
+
+
+def _frame_half(lens: Lens, size: tuple[int, int]) -> tuple[float, float]:
+    """Half of what the default camera's picture shows of the plane z = -1."""
     t = _FRAME_TAN
-    options: dict[str, Any] = {
-        "window": (-t, t, -t, t), "near_clip": 1e-4 * distance, **lens.options()
-    }  # fmt: skip
+    x0, x1, y0, y1 = fitted_window((-t, t, -t, t), *size, lens.conform, lens.pixel_aspect)
+    return 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+
+
+def frame_planes(up_axis: str, lens: Lens, size: tuple[int, int]) -> Matrix:
+    """Directions (4, 3) in which ``frame_points`` asks how far points reach; likewise."""
+    flat = lens.projection == "orthographic"
+    return planes(_frame_axes(up_axis), None if flat else _frame_half(lens, size))
+
+
+def frame_points(
+    points: NDArray[np.float64] | None,
+    up_axis: str,
+    lens: Lens = Lens(),
+    size: tuple[int, int] = (1, 1),
+) -> View:
+    """A three-quarter view that points (n, 3) fill; None: of the origin.
+
+    Args:
+        points: Of what is drawn, as ``framing.outline`` gives them.
+        up_axis: "X", "Y" or "Z".
+        lens: What is chosen of the camera.
+        size: Width and height of the picture, for its shape.
+    """
+    if points is None or len(points) == 0:
+        points = corners(np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]))
+    axes, half, t = _frame_axes(up_axis), _frame_half(lens, size), _FRAME_TAN
+    back = axes[2]
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    frame = np.eye(4)
+    frame[:3, :3] = axes
+    options: dict[str, Any] = dict(lens.options())
     if lens.projection == "orthographic":
-        t *= distance
-        options |= {"window": (-t, t, -t, t), "projection": lens.projection}
-    elif lens.projection == "latlong":
+        extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+        place, scale = fit_flat(points, axes, half)
+        frame[3, :3] = place + extent * back
+        t *= scale
+        options |= {"near_clip": 1e-4 * extent, "projection": lens.projection}
+    else:
+        frame[3, :3] = fit(points, axes, half)
+        options["near_clip"] = 1e-4 * float((frame[3, :3] - middle) @ back)
+    options["window"] = (-t, t, -t, t)
+    if lens.projection == "latlong":
         options |= {"window": ALL_ROUND, "projection": lens.projection}
     return View(frame, options)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf
 
+from wavecomb.usd import framing
 from wavecomb.usd.light import Light
 
 Matrices = NDArray[np.float64]
@@ -22,6 +23,7 @@ class Group:
     Attributes:
         number: In the scene, once something is in it.
         bounds: (2, 3) in its own space.
+        outlines: Where what is in it reaches farthest, in its own space; see ``framing``.
         root: Prim path that the names of what is in it begin with.
         lights: With their transforms (4, 4) in the group.
         children: Groups that hold lights placed in it, transforms (k, 4, 4).
@@ -39,6 +41,8 @@ class Group:
     lit: bool = False
     has_surfaces: bool = False
     sampled_lamp: Sdf.Path | None = None
+    outlines: list[NDArray[np.float64]] = field(default_factory=list)
+    outlined: int = 0
 
     @property
     def empty(self) -> bool:
@@ -52,6 +56,14 @@ class Group:
         else:
             np.minimum(self.bounds[0], bounds[0], out=self.bounds[0])
             np.maximum(self.bounds[1], bounds[1], out=self.bounds[1])
+
+    def reach(self, points: NDArray[np.float64], more: NDArray[np.float64] | None) -> None:
+        """Adds points to the outlines; ``more``: directions in which these are exact."""
+        self.outlines.append(points)
+        self.outlined += len(points)
+        if self.outlined > framing.MANY_POINTS:
+            self.outlines = [framing.outline(np.concatenate(self.outlines), more)]
+            self.outlined = len(self.outlines[0])
 
 
 @dataclass(frozen=True)

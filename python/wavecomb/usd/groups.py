@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.isolate import trail
+from wavecomb.usd import framing
 from wavecomb.usd.assign import Assigner, Draw, Worn
 from wavecomb.usd.attributes import on_shape
 from wavecomb.usd.colour import quantise
@@ -73,8 +74,14 @@ class GroupBuilder:
         surfaces: Surfaces,
         stock: MeshStock | None = None,
         progress: LoadProgress | None = None,
+        framed: NDArray[np.float64] | None = None,
     ) -> None:
-        """``stock``: arrays of meshes to take from and leave there; ``progress``: is told."""
+        """Makes one for a stage.
+
+        ``stock``: arrays of meshes to take from and leave there; ``progress``: is told;
+        ``framed``: directions (k, 3) in which a view asks how far the world reaches; groups keep
+        outlines for it.
+        """
         self.stage = stage
         self.traversal = traversal
         self.time = traversal.time
@@ -88,6 +95,7 @@ class GroupBuilder:
             self.time, report, surfaces, traversal.skeletons, self.motion, stock
         )
         self.progress = progress
+        self.framed = framed
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(materials, self.time, report)
         self.mesh_lights = MeshLights(builder, traversal.lights, materials, report)
@@ -222,9 +230,27 @@ class GroupBuilder:
             return
         self.builder.add_to_group(self._number(group), number)
         group.grow(shape.bounds)
+        if self.framed is not None:
+            more = self.framed if group.number == 0 else None
+            group.reach(self._outline(shape, more), more)
         if isinstance(shape, MeshArrays) and shape.cage is not None:
             self.surfaces.add(group, number, draw, shape, worn)
         self.report.tally(_COUNTS[kind])
+
+    def _outline(
+        self, shape: MeshArrays | CurveArrays, more: NDArray[np.float64] | None
+    ) -> NDArray[np.float64]:
+        """Where a shape reaches farthest, in its group."""
+        points = shape.positions.reshape(-1, 3)
+        if isinstance(shape, CurveArrays):
+            radii = np.tile(shape.radii, len(points) // len(shape.radii))
+            return framing.outline_of_balls(points, radii, more)
+        smooth = None if shape.cage is None else self.surfaces.limit_points(shape.cage)
+        if smooth is not None:
+            return framing.outline(smooth, more)
+        used = np.zeros(shape.positions.shape[-2], bool)
+        used[shape.triangles] = True
+        return framing.outline(shape.positions[..., used, :].reshape(-1, 3), more)
 
     def _draw_alone(
         self,
@@ -495,6 +521,10 @@ class GroupBuilder:
         if child.bounds is not None:
             if motion is not None:
                 transforms = motion.reshape(-1, 4, 4)
+            if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
+                child.outlines = [inner]
+                more = self.framed if parent.number == 0 else None
+                parent.reach(framing.placed(inner, transforms, more), more)
             lo, hi = child.bounds
             centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
             linear = transforms[:, :3, :3]

@@ -57,7 +57,7 @@ class LoadReport:
     """Notes, warnings and what is not supported, in the order they came up.
 
     Attributes:
-        notes: What was chosen or approximated ("no camera: framed the bounds").
+        notes: What was chosen or approximated ("no camera: framed what is drawn").
         warnings: What is wrong in the stage and what was done about it.
         unsupported: What the stage asks for and Wavecomb does not do.
         counts: Prims by kind, as read.

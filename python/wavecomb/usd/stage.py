@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import trail
 from wavecomb.usd import mtlx
-from wavecomb.usd.camera import camera_motion, frame_bounds, read_camera
+from wavecomb.usd.camera import camera_motion, frame_planes, frame_points, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.dome import soft_dome, up_rotation
+from wavecomb.usd.framing import corners, joined
 from wavecomb.usd.group import Group, placed_lights
 from wavecomb.usd.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.identity import LightGroups
@@ -71,6 +73,8 @@ class LoadedStage:
         working_space: What its colours are in: of ``WORKING_SPACES``.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
         leaves_out_levels: Whether textures have only the mip levels that its view needs.
+        outline: Points (n, 3) in the world where what is drawn reaches farthest; None unless a view
+            was framed for it.
     """
 
     scene: _core.Scene
@@ -88,6 +92,7 @@ class LoadedStage:
     render: RenderChoice = field(default_factory=RenderChoice)
     working_space: str = "rec709"
     leaves_out_levels: bool = False
+    outline: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,7 @@ class _Filled:
     frame: float | None
     shutter: tuple[float, float] | None
     render: RenderChoice
+    outline: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True)
@@ -263,6 +269,7 @@ def load_stage(
         filled.render,
         working_space,
         texture_limit is not None and store is None,
+        filled.outline,
     )
 
 
@@ -311,7 +318,7 @@ def _fill(
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
     seen = choice.view.on(stage, report)
-    chosen, lights, shutter = _read(
+    chosen, lights, shutter, outline = _read(
         stage,
         time,
         choice,
@@ -326,7 +333,7 @@ def _fill(
         progress,
     )
     used = frame_number(time)
-    return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice)
+    return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline)
 
 
 def _native_builder(threads: int, store: _core.TextureStore | None) -> _core.SceneBuilder:
@@ -348,8 +355,8 @@ def _read(
     surfaces: Surfaces,
     stock: FrameStock | None,
     progress: LoadProgress | None,
-) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None]:
-    """Fills the builder; gives the paths of the camera and of the lights, and the shutter."""
+) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None, NDArray[np.float64] | None]:
+    """Fills the builder; gives paths of the camera and of lights, the shutter, the outline."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = seen.camera
     groups = LightGroups(report)
@@ -360,24 +367,28 @@ def _read(
     traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
     if choice.texture_limit is not None and textures.store is None:
         _limit_textures(stage, traversal, seen, choice, textures, report)
+    view = None
+    if view_prim is not None:
+        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
+        view = read_camera(view_prim, to_world, time, report, seen.lens)
+    outline = None
+    planes = frame_planes(up_axis, seen.lens, choice.size)
     meshes = None if stock is None else stock.meshes
     surfaces.stock = None if stock is None else stock.refined
     groups_of = GroupBuilder(
-        stage, traversal, builder, materials, groups, report, surfaces, meshes, progress
-    )
+        stage, traversal, builder, materials, groups, report, surfaces, meshes, progress,
+        framed=planes if view is None else None,
+    )  # fmt: skip
     world = groups_of.world()
     lit = materials.glows or has_lights or groups_of.mesh_lights.any
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")
-    view = None
-    if view_prim is not None:
-        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
-        view = read_camera(view_prim, to_world, time, report, seen.lens)
     chosen = None if view is None or view_prim is None else str(view_prim.GetPath())
     if view is None:
-        report.note("no camera: framed the bounds")
-        view = frame_bounds(world.bounds, up_axis, seen.lens)
+        report.note("no camera: framed what is drawn")
+        outline = joined(world.outlines, planes)
+        view = frame_points(outline, up_axis, seen.lens, choice.size)
     elif view_prim is not None:
         moves = camera_motion(view_prim, motion)
         if moves is not None:
@@ -386,7 +397,7 @@ def _read(
     if stock is not None:
         stock.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
-    return chosen, light_paths, None if motion is None else motion.shutter
+    return chosen, light_paths, None if motion is None else motion.shutter, outline
 
 
 def _limit_textures(
@@ -407,8 +418,12 @@ def _limit_textures(
     if view is None:
         cache = UsdGeom.BBoxCache(traversal.time, list(UsdGeom.Imageable.GetOrderedPurposeTokens()))
         box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
-        bounds = None if box.IsEmpty() else np.array([box.GetMin(), box.GetMax()])
-        view = frame_bounds(bounds, str(UsdGeom.GetStageUpAxis(stage)), seen.lens)
+        points = None
+        if not box.IsEmpty():
+            bounds = np.array([box.GetMin(), box.GetMax()])
+            # The ball inside of the box: the view that is found later is no nearer than this one's.
+            points = bounds.mean(axis=0) + (corners(bounds) - bounds.mean(axis=0)) / np.sqrt(3.0)
+        view = frame_points(points, str(UsdGeom.GetStageUpAxis(stage)), seen.lens, choice.size)
     limit = float(choice.texture_limit or 0) * MEGABYTE
     textures.drops = plan_levels(
         stage, traversal.time, ViewSize(view, choice.size), limit, report, textures.working

@@ -43,6 +43,9 @@ AUTO_TRIANGLES = 16_000_000
 BYTES_PER_TRIANGLE = 210
 """Peak memory for each refined triangle, while it is refined; less in the scene (measured)."""
 
+_COARSE_FACES = 4096
+"""Of a cage: a finer one is where its limit surface is, as far as framing goes."""
+
 _BATCH_TRIANGLES = 4_000_000
 """Refined at once: bounds the memory that refinement itself takes."""
 
@@ -155,6 +158,25 @@ class Surfaces:
             self._all.append(surface)
         if cage.scheme != "none":
             self.report.tally("subdivision meshes")
+
+    def limit_points(self, cage: Cage) -> NDArray[np.float32] | None:
+        """Points near the limit surface of a cage that will be subdivided, or None.
+
+        Of a fine cage none: it is near that surface itself.
+        """
+        if cage.scheme == "none" or not self.subdivide or self.choice == 0:
+            return None
+        if len(cage.counts) > _COARSE_FACES:
+            return None
+        description: dict[str, Any] = {
+            "level": 2, "points": cage.points, "counts": cage.counts, "indices": cage.indices,
+            "matrix": np.array(cage.matrix), "left_handed": cage.left_handed,
+            "primvars": [], "scheme": cage.scheme,
+            **cage.rules,
+        }  # fmt: skip
+        made = self.builder.make_surfaces(cage.over_shutter(description), self.threads)
+        points = [one["positions"] for one in made if not isinstance(one, str)]
+        return np.concatenate(points) if points else None
 
     def _displacements(self, surface: Surface) -> None:
         """Which displacement each face has."""

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames what is drawn: the points that its silhouettes hang on, and the view that they fill."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+Matrices = NDArray[np.float64]
+
+FILLED = 0.9
+"""What is seen spans this much of the picture, in the dimension that it fills first."""
+
+_DIRECTIONS = 162
+"""A sphere's silhouette is found to 1.5 %."""
+
+_BLOCK = 1 << 15
+"""Points that are looked at together."""
+
+_FEW_POINTS = 200
+"""These are taken as they are."""
+
+MANY_POINTS = 1 << 16
+"""More are made fewer before others are added."""
+
+_FEW_PLACES = 512
+"""Placements of a group that are all looked at; of more those that reach farthest."""
+
+
+def _spread(count: int) -> Points:
+    """Unit vectors spread evenly over all directions (Fibonacci's lattice), (count, 3)."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
+    r = np.sqrt(1.0 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3), _spread(_DIRECTIONS - 6)])
+"""Along the axes first, so that boxes are framed exactly."""
+
+
+def with_directions(more: Points | None) -> Points:
+    """``DIRECTIONS`` and those in which it is to be exact (k, 3)."""
+    return DIRECTIONS if more is None else np.concatenate([DIRECTIONS, more])
+
+
+def outline(points: NDArray[Any], more: Points | None = None) -> Points:
+    """Those of some points (n, 3) that reach farthest in one of some directions."""
+    if len(points) <= _FEW_POINTS:
+        return np.asarray(points, np.float64)
+    directions = with_directions(more).T.astype(np.float32)
+    kept = np.empty((0, 3), np.float32)
+    for first in range(0, len(points), _BLOCK):
+        some = np.concatenate([kept, np.asarray(points[first : first + _BLOCK], np.float32)])
+        kept = some[np.unique(np.argmax(some @ directions, axis=0))]
+    return kept.astype(np.float64)
+
+
+def outline_of_balls(
+    points: NDArray[Any], radii: NDArray[Any], more: Points | None = None
+) -> Points:
+    """Of balls about points (n, 3): where they reach farthest."""
+    directions = with_directions(more)
+    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
+    found = []
+    for first in range(0, len(points), _BLOCK):
+        some = np.asarray(points[first : first + _BLOCK], np.float64)
+        size = np.asarray(radii[first : first + _BLOCK], np.float64)
+        best = np.argmax(some @ directions.T + size[:, None], axis=0)
+        found.append(some[best] + size[best, None] * directions)
+    return outline(np.concatenate(found), more)
+
+
+def corners(bounds: NDArray[Any]) -> Points:
+    """The eight corners of a box (2, 3)."""
+    return np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i, j, k in np.ndindex(2, 2, 2)])
+
+
+def placed(points: Points, transforms: Matrices, more: Points | None = None) -> Points:
+    """The outline of points (n, 3) that are placed k times, by transforms (k, 4, 4)."""
+    if len(transforms) > _FEW_PLACES:
+        centre = points.mean(axis=0)
+        radius = float(np.linalg.norm(points - centre, axis=1).max())
+        linear = transforms[:, :3, :3]
+        middle = centre @ linear + transforms[:, 3, :3]
+        size = radius * np.sqrt(np.einsum("kij,kij->ki", linear, linear).max(axis=1))
+        farthest: set[int] = set()
+        for direction in with_directions(more):
+            along = middle @ direction
+            farthest |= {int(np.argmax(along)), int(np.argmax(along + size))}
+        transforms = transforms[sorted(farthest)]
+    moved = points @ transforms[:, :3, :3] + transforms[:, 3:, :3]
+    return outline(moved.reshape(-1, 3), more)
+
+
+def joined(parts: Iterable[Points], more: Points | None = None) -> Points | None:
+    """The outline of several together; None of none."""
+    known = list(parts)
+    return outline(np.concatenate(known), more) if known else None
+
+
+def planes(axes: Matrices, half: tuple[float, float] | None) -> Points:
+    """Normals of the planes that ``fit`` works with, (4, 3); ``half`` None: of ``fit_flat``."""
+    return np.array(
+        [
+            sign * axes[axis] + (0.0 if half is None else FILLED * half[axis]) * axes[2]
+            for axis in (0, 1)
+            for sign in (1.0, -1.0)
+        ]
+    )
+
+
+def fit(
+    points: Points, axes: Matrices, half: tuple[float, float], margin: float = FILLED
+) -> Points:
+    """Where a pinhole camera stands from which points fill its picture.
+
+    A point (x, y, z) in the camera's axes is within the picture where |x - cx| <= half (cz - z):
+    four planes, of which two opposite ones touch the points in the end. The points are in the
+    middle of the picture as these planes see them.
+
+    Args:
+        points: (n, 3).
+        axes: (3, 3), rows are right, up and back.
+        half: Half the picture's width and height on the plane z = -1.
+        margin: How much of the picture the points span.
+
+    Returns:
+        (3,) in the space of the points.
+    """
+    local = points @ axes.T
+    place = np.zeros(3)
+    for axis in (0, 1):
+        slope = margin * half[axis]
+        ahead = float((local[:, axis] + slope * local[:, 2]).max())
+        behind = float((-local[:, axis] + slope * local[:, 2]).max())
+        place[axis] = 0.5 * (ahead - behind)
+        depth = 0.5 * (ahead + behind) / slope
+        place[2] = depth if axis == 0 else max(place[2], depth)
+    size = float(np.linalg.norm(np.ptp(local, axis=0)))
+    place[2] = max(place[2], float(local[:, 2].max()) + (1e-3 * size or 1.0))
+    return np.asarray(place @ axes)
+
+
+def fit_flat(
+    points: Points, axes: Matrices, half: tuple[float, float], margin: float = FILLED
+) -> tuple[Points, float]:
+    """The same for an orthographic camera: the middle, and what its window is multiplied by."""
+    local = points @ axes.T
+    low, high = local.min(axis=0), local.max(axis=0)
+    place = 0.5 * (low + high)
+    scale = max(0.5 * float(high[i] - low[i]) / (margin * half[i]) for i in (0, 1))
+    return np.asarray(place @ axes), scale or 1.0
