@@ -127,6 +127,14 @@ def test_files_stay_as_they_are(folder: Path) -> None:
     assert "gold.mtlx@" in (folder / "stage.usda").read_text(encoding="utf-8")
 
 
+def test_reload_keeps_what_did_not_change(folder: Path) -> None:
+    stage = open_stage(folder / "stage.usda")
+    before = value(stage, "/A/Materials/Gold", "base_color")
+    mtlx.reload(stage)
+    assert value(stage, "/A/Materials/Gold", "base_color") == before
+    assert value(open_stage(folder / "stage.usda"), "/A/Materials/Gold", "base_color") == before
+
+
 def test_reload_reads_what_changed(folder: Path) -> None:
     stage = open_stage(folder / "stage.usda")
     write(folder, "gold.mtlx", GOLD.replace("0.9, 0.7, 0.3", "0.25, 0.5, 0.125"))

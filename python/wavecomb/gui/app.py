@@ -70,6 +70,7 @@ def run(
     """Shows the window; returns the exit code when it is closed."""
     application = make_application()
     from wavecomb.gui.main_window import MainWindow
+    from wavecomb.usd.diagnostics import Listening
 
     window = MainWindow(setup)
     theme.apply(str(window.settings.value("theme", theme.SYSTEM)))
@@ -79,7 +80,9 @@ def run(
     # Python looks at signals only while it runs.
     beat = QTimer(window)
     beat.start(200)
-    beat.timeout.connect(lambda: None)
+    # What USD says of edits and of what panels look at goes to the notes, as what loading found.
+    listening = Listening()
+    beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()
     if stage is not None:
         window.open(stage, camera, time, variants, purposes)
@@ -87,3 +90,4 @@ def run(
         return application.exec()
     finally:
         remove()
+        listening.stop()

@@ -46,6 +46,7 @@ class Request:
         fresh: Read the layers of ``usd`` from the disk again, first.
         threads: For textures; 0: all.
         textures: Of the scene read before, to share.
+        size: Of the picture, width and height.
     """
 
     source: Source
@@ -54,6 +55,7 @@ class Request:
     fresh: bool = False
     threads: int = 0
     textures: TextureStock | None = None
+    size: tuple[int, int] = (600, 600)
 
 
 def copied(layer: Sdf.Layer) -> Sdf.Layer:
@@ -122,26 +124,31 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     Raises:
         WavecombError: It cannot be rendered.
     """
-    from wavecomb.usd import load_stage, mtlx, open_stage
+    from wavecomb.usd import LoadReport, load_stage, mtlx, open_editable, open_stage
+    from wavecomb.usd.diagnostics import captured
 
     source = request.source
     usd = request.usd
     if usd is None:
-        usd = open_stage(source.path, source.variants)
-        # The window selects variants while this thread opens the layers that it looks at.
-        mtlx.resolve(usd, everywhere=True)
+        usd = open_editable(source.path, source.variants)
     elif request.fresh:
-        mtlx.reload(usd)
+        with captured(LoadReport()):
+            mtlx.reload(usd)
     overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()
     options: dict[str, Any] = {} if source.purposes is None else {"purposes": source.purposes}
-    loaded = load_stage(
+    said = LoadReport()
+    with captured(said):
         # A stage of its own, so that the window can go on with the other.
-        open_stage(source.path, overrides=overrides),
+        stage = open_stage(source.path, overrides=overrides)
+    loaded = load_stage(
+        stage,
         frame=source.time,
         camera=source.camera,
         threads=request.threads,
         editable=True,
         reuse=request.textures,
+        size=request.size,
         **options,
     )
+    loaded.report.absorb(said)
     return usd, loaded

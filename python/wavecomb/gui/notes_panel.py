@@ -154,6 +154,7 @@ class NotesPanel(QWidget):
         self.kinds.currentIndexChanged.connect(lambda number: self._refilter())
         self.field.textChanged.connect(lambda text: self._refilter())
         session.opened.connect(self.fill)
+        session.noted.connect(self.fill)
         if session.stage is not None:
             self.fill(session.stage)
         self._refilter()

@@ -141,6 +141,7 @@ class ScenePanel(QWidget):
         self.edits.changed.connect(self._on_changed)
         session.selected.connect(self._on_selected)
         session.opened.connect(self._on_opened)
+        session.noted.connect(lambda stage: self._count_notes())
         self._on_changed()
         self._count_notes()
 

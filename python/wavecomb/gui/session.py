@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
     from wavecomb._core import Renderer, Scene
-    from wavecomb.usd import LoadedStage
+    from wavecomb.usd import LoadedStage, LoadReport
 
 __all__ = ["Frame", "Live", "Pose", "Session", "Setup"]
 
@@ -57,6 +57,7 @@ class Session(QObject):
         camera_changed(Pose): The camera moved, or another was chosen.
         selected(str | None): Path of the prim that was chosen, in the picture or elsewhere.
         saved(str): A file was written.
+        noted(LoadedStage): Its report says more than before.
 
     Attributes:
         stage: What was read, or None.
@@ -82,6 +83,7 @@ class Session(QObject):
     camera_changed = Signal(object)
     selected = Signal(object)
     saved = Signal(str)
+    noted = Signal(object)
     _call = Signal(object)
 
     def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
@@ -196,6 +198,7 @@ class Session(QObject):
     def _read(self, request: Request, what: str) -> None:
         if request.usd is not None and self.stage is not None:
             request = replace(request, textures=self.stage.textures)
+        request = replace(request, size=(self.setup.width, self.setup.height))
         self._request_wanted = request
         self._work("load", what)
         self._loader.want(request)
@@ -258,6 +261,12 @@ class Session(QObject):
             if values:
                 edit.lights[i] = dict(values)
         return edit
+
+    def note_words(self, report: LoadReport | None) -> None:
+        """Adds what USD said meanwhile to the report of the stage that is open."""
+        if report is not None and self.stage is not None:
+            self.stage.report.absorb(report)
+            self.noted.emit(self.stage)
 
     # ---- settings, camera, materials, lights ----------------------------------------------------
 

@@ -7,7 +7,7 @@ them; ``mesh``, ``shapes``, ``light``, ``camera`` and ``instancing`` read one ki
 """
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.opening import open_stage
+from wavecomb.usd.opening import open_editable, open_stage
 from wavecomb.usd.peek import peek_products
 from wavecomb.usd.report import Finding, LoadReport
 from wavecomb.usd.stage import LoadedStage, load_stage
@@ -18,6 +18,7 @@ __all__ = [
     "LoadedStage",
     "WavecombError",
     "load_stage",
+    "open_editable",
     "open_stage",
     "peek_products",
 ]

@@ -99,15 +99,47 @@ def captured(report: LoadReport) -> Iterator[None]:
         try:
             yield
         finally:
-            texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
-            lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
-            # What can be said in our words is grouped there, however often it comes.
-            known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
-            for line in known:
-                _tell(report, line)
-            lines = [line for line in lines if line not in set(known)]
-            for line in lines[:MAX_LINES]:
-                _tell(report, line)
-            if len(lines) > MAX_LINES:
-                report.warn(f"USD: {len(lines) - MAX_LINES} more messages like these")
-            trap.Clear()
+            _pass_on(trap, report)
+
+
+def _pass_on(trap: Any, report: LoadReport) -> None:
+    """Tells a report what a trap holds, and empties it."""
+    texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
+    lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
+    # What can be said in our words is grouped there, however often it comes.
+    known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
+    for line in known:
+        _tell(report, line)
+    lines = [line for line in lines if line not in set(known)]
+    for line in lines[:MAX_LINES]:
+        _tell(report, line)
+    if len(lines) > MAX_LINES:
+        report.warn(f"USD: {len(lines) - MAX_LINES} more messages like these")
+    trap.Clear()
+
+
+class Listening:
+    """Collects what USD's C++ side reports on this thread for as long as a program runs.
+
+    With USD versions that have no ``Tf.DiagnosticTrap`` it does nothing.
+    """
+
+    def __init__(self) -> None:
+        kind = getattr(Tf, "DiagnosticTrap", None)
+        self._open = contextlib.ExitStack()
+        self._trap = None if kind is None else self._open.enter_context(kind())
+
+    def take(self) -> LoadReport | None:
+        """What was said since the last call; None: nothing."""
+        if self._trap is None or self._trap.IsClean():
+            return None
+        report = LoadReport()
+        _pass_on(self._trap, report)
+        return report if report.warnings else None
+
+    def stop(self) -> None:
+        """Ends it, on the thread that began it."""
+        if self._trap is not None:
+            self._trap.Clear()
+            self._trap = None
+        self._open.close()

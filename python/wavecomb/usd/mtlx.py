@@ -80,7 +80,16 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
 
 def reload(stage: Usd.Stage) -> None:
     """Reads the files of a stage again that changed, MaterialX files among them."""
+    with _lock:
+        kept = [t.layer for t in _translations.values() if t.layer is not None]
+    # USD takes what has no file for empty.
+    copies = [(layer, Sdf.Layer.CreateAnonymous("kept.usda")) for layer in kept]
+    for layer, copy in copies:
+        copy.TransferContent(layer)
     stage.Reload()
+    for layer, copy in copies:
+        if layer.empty:
+            layer.TransferContent(copy)
     resolve(stage, everywhere=True)
 
 

@@ -14,9 +14,10 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import patience, trail
 from wavecomb.usd import mtlx
-from wavecomb.usd.diagnostics import commentary
+from wavecomb.usd.diagnostics import captured, commentary
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.population import populate
+from wavecomb.usd.report import LoadReport
 from wavecomb.usd.search import every
 
 MAX_SURVEYED = 4096
@@ -174,6 +175,25 @@ def open_stage(
     if mask:
         populate(stage, mask)
     return stage
+
+
+def open_editable(
+    file: Path, variants: Mapping[str, str] | None = None, report: LoadReport | None = None
+) -> Usd.Stage:
+    """The stage of a file, to be looked at and edited while another one of it is loaded.
+
+    It is the stage that ``open_stage`` opens. MaterialX files are resolved in variants that are not
+    selected, too: selecting them later changes no layer, on whatever thread another stage reads.
+
+    Args:
+        file: As ``open_stage`` takes it.
+        variants: Likewise.
+        report: Is told what USD says; None: nobody is.
+    """
+    with captured(LoadReport() if report is None else report):
+        stage = open_stage(file, variants)
+        mtlx.resolve(stage, everywhere=True)
+        return stage
 
 
 def _check_file(file: Path) -> None:
