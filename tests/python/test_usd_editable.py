@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stages that are open and read again: what is known of them, and what is shared."""
 
+import dataclasses
 import os
 import shutil
 
@@ -12,7 +13,12 @@ from usd_recorder import QUAD, Recorder, write
 import wavecomb
 from wavecomb.image import write_png
 from wavecomb.usd import load_stage, open_stage
+from wavecomb.usd.materialx import MODELS
+from wavecomb.usd.mtlx_inputs import definitions
+from wavecomb.usd.openpbr import layers_of
 from wavecomb.usd.parameters import light_radiance, material_parameters
+from wavecomb.usd.surface import DEFAULTS
+from wavecomb.usd.surface_values import surface_values
 
 MATERIAL = """
 def Material "%s" {
@@ -161,23 +167,117 @@ def test_parameters_are_traced_to_attributes(path):
     assert material_parameters(stage.GetPrimAtPath("/W/Key"), time) == {}
 
 
-def test_materialx_weights_are_factors(tmp_path):
-    text = """def Material "X" {
-        token outputs:mtlx:surface.connect = </X/S.outputs:out>
-        def Shader "S" {
-            uniform token info:id = "ND_standard_surface_surfaceshader"
-            float inputs:base = 0.5
-            color3f inputs:base_color = (0.8, 0.4, 0.2)
-            float inputs:emission = 0
-            token outputs:out
-        }
-    }"""
-    stage = open_stage(write(tmp_path, text))
+MTLX = """def Material "X" {
+    token outputs:mtlx:surface.connect = </X/S.outputs:out>
+    def Shader "S" {
+        uniform token info:id = "ND_%s_surfaceshader"
+        %s
+        token outputs:out
+    }
+}"""
+
+
+def test_materialx_inputs_are_its_own(tmp_path):
+    inputs = """float inputs:base = 0
+        color3f inputs:base_color = (0.8, 0.4, 0.2)
+        color3f inputs:opacity = (0.5, 0.5, 0.5)
+        float inputs:coat.connect = </X/Grey.outputs:out>"""
+    stage = open_stage(write(tmp_path, MTLX % ("standard_surface", inputs)))
     found = material_parameters(stage.GetPrimAtPath("/X"), Usd.TimeCode.Default())
-    base = found["base_color"]
-    assert base.value == pytest.approx((0.4, 0.2, 0.1)) and base.factor == 0.5
-    assert tuple(base.authored((0.1, 0.2, 0.3))) == pytest.approx((0.2, 0.4, 0.6))
-    assert "weight" in found["emission"].reason and found["emission"].attribute is None
+    # A weight of 0 hides what it weighs, which keeps its value.
+    assert found["base"].value == 0 and found["base_color"].value == pytest.approx((0.8, 0.4, 0.2))
+    assert found["base_color"].attribute == Sdf.Path("/X/S.inputs:base_color")
+    assert found["base_color"].definition.group == "Base"
+    assert found["opacity"].value == 0.5 and found["opacity"].authored(0.25) == Gf.Vec3f(0.25)
+    assert found["specular_IOR"].attribute == Sdf.Path("/X/S.inputs:specular_IOR")
+    assert found["thin_walled"].value is False
+    assert found["thin_walled"].type_name == Sdf.ValueTypeNames.Bool
+    assert "roughness" not in found and "transmission_scatter" not in found
+
+
+def test_a_colour_in_a_space_of_its_own_has_a_value(tmp_path):
+    inputs = 'color3f inputs:diffuseColor = (0.5, 0.5, 0.5) ( colorSpace = "srgb_texture" )'
+    stage = open_stage(write(tmp_path, material("Red", inputs).replace("</W/", "</")))
+    base = material_parameters(stage.GetPrimAtPath("/Red"), Usd.TimeCode.Default())["base_color"]
+    assert "colour space" in base.reason and base.attribute is None
+    assert base.value == pytest.approx((0.2140,) * 3, abs=1e-3)
+
+
+class Defaults:
+    """Notes which defaults the loader takes, as ``openpbr.Inputs``."""
+
+    def __init__(self):
+        self.found = {}
+
+    def number(self, name, default):
+        self.found[name] = default
+        return 1.0
+
+    def colour(self, name, default):
+        self.found[name] = default
+        return (1.0, 1.0, 1.0)
+
+    def ignored(self, *names):
+        pass
+
+    def approximated(self, what):
+        pass
+
+
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_defaults_of_the_loader_are_materialx_s(model):
+    inputs = Defaults()
+    layers_of(model, inputs)
+    known = definitions(model)
+    assert inputs.found.keys() <= known.keys()
+    for name, default in inputs.found.items():
+        assert known[name].default == pytest.approx(default), name
+    for field in dataclasses.fields(MODELS[model]):
+        spec = getattr(MODELS[model], field.name)
+        if field.name != "normal" and spec[0]:
+            assert definitions(model)[spec[0]].default == pytest.approx(spec[1]), spec[0]
+    assert all(one.soft_low < one.soft_high <= one.high for one in definitions(model).values())
+    groups = [one.group for one in definitions(model).values()]
+    assert len(set(groups)) >= 6 and groups == sorted(groups, key=groups.index)
+
+
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_surface_values_are_what_the_loader_gives_the_core(tmp_path, model):
+    """Of each input in turn at a value that is not its default, and of all together."""
+    known, time = definitions(model), Usd.TimeCode.Default()
+
+    def stage_of(values, file):
+        lines = "\n".join(_authored(known[name], value) for name, value in values.items())
+        text = (MTLX % (model, lines)).replace("/X", "/W/X")
+        return write(tmp_path, 'def Xform "W" {' + text + mesh("X") + "}", file)
+
+    plain = open_stage(stage_of({}, "plain.usda"))
+    for names in [*([name] for name in known), list(known)]:
+        values = {name: _other(known[name]) for name in names}
+        path = stage_of(values, f"{names[0]}{len(names)}.usda")
+        loaded, stage = load_stage(path, editable=True, builder_factory=Recorder), open_stage(path)
+        (have,) = [m for m in loaded.scene.materials if m["name"] == "/W/X"]
+        have = {**DEFAULTS, **have, **have["openpbr"]}
+        by_stage = surface_values(stage.GetPrimAtPath("/W/X"), time)
+        by_value = surface_values(plain.GetPrimAtPath("/W/X"), time, values)
+        for key, value in by_stage.constants.items():
+            assert have[key] == pytest.approx(value), (names, key)
+            assert by_value.constants[key] == pytest.approx(value, rel=1e-6), (names, key)
+
+
+def _other(definition):
+    if definition.kind == "switch":
+        return not definition.default
+    if definition.kind == "colour":
+        return (0.25, 0.5, 0.75)
+    return 0.375 if definition.default != 0.375 else 0.5
+
+
+def _authored(definition, value):
+    kind = {"float": "float", "color3": "color3f", "boolean": "bool"}[definition.type_name]
+    if definition.type_name == "color3" and not isinstance(value, tuple):
+        value = (value, value, value)
+    return f"{kind} inputs:{definition.name} = {value if kind != 'bool' else str(value).lower()}"
 
 
 def test_light_radiance_is_what_the_loader_reads(path):

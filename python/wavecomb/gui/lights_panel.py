@@ -20,7 +20,15 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.headed_model import HeadedModel, lay_out_rows
 from wavecomb.gui.scene_edits import LIGHT_INPUTS
-from wavecomb.gui.value_fields import ColourField, Field, NumberField, Range, swatch
+from wavecomb.gui.value_fields import (
+    ColourField,
+    Field,
+    NumberField,
+    PlainText,
+    Range,
+    differs,
+    swatch,
+)
 from wavecomb.gui.visibility import uneditable
 
 if TYPE_CHECKING:
@@ -194,10 +202,9 @@ class LightsPanel(QWidget):
         if path is None:
             form.addRow(QLabel("No light"))
         else:
-            title = QLabel(path or f"{SOFT_DOME}: the stage has no light")
+            title = PlainText(path or f"{SOFT_DOME}: the stage has no light")
             title.setObjectName("light-title")
-            title.setWordWrap(True)
-            title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            title.setAccessibleName("Light")
             form.addRow(title)
             for name in LIGHT_INPUTS:
                 form.addRow("colour" if name == "color" else name, self._field(path, name))
@@ -211,6 +218,7 @@ class LightsPanel(QWidget):
         where = f"in the picture only, it cannot be saved: {reason}" if reason else "on the stage"
         field.setToolTip(f"{TIPS[name]} ({where})")
         field.changed.connect(partial(self._edits.set_light, path, name))
+        field.typing.connect(self._edits.set_typing)
         field.reset.connect(partial(self._edits.set_light, path, name, None))
         self.fields[name] = field
         return field
@@ -221,6 +229,6 @@ class LightsPanel(QWidget):
             return
         for name, field in self.fields.items():
             value = self._edits.light_value(self._path, name)
-            if isinstance(field, (ColourField, NumberField)) and field.value() != value:
+            if differs(field.value(), value):
                 field.set_value(value)
             field.set_edited(self._edits.light_is_edited(self._path, name))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QModelIndex, QObject, Qt
 from PySide6.QtWidgets import (
-    QFormLayout,
     QLabel,
     QScrollArea,
     QSplitter,
@@ -20,30 +19,14 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import theme
 from wavecomb.gui.headed_model import HeadedModel, lay_out_rows
-from wavecomb.gui.value_fields import (
-    UNIT,
-    ColourField,
-    DrivenField,
-    Field,
-    NumberField,
-    Range,
-    swatch,
-)
+from wavecomb.gui.material_form import Group, Rows, field_of
+from wavecomb.gui.value_fields import Field, PlainText, differs, swatch
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene
     from wavecomb.gui.scene_edits import SceneEdits
     from wavecomb.usd.parameters import Parameter
 
-RANGES = {
-    "emission": Range(0.0, 1e6, 0.0, 10.0),
-    "ior": Range(0.01, 100.0, 1.0, 3.0),
-    "conductor_eta": Range(0.0, 100.0, 0.0, 5.0),
-    "conductor_k": Range(0.0, 100.0, 0.0, 10.0),
-}
-"""Of parameters that are not within 0 and 1."""
-
-LABELS = {"ior": "index of refraction", "conductor_eta": "eta", "conductor_k": "k"}
 NAME, PROGRAM, RECORDS, COST = range(4)
 HEADERS = ("Material", "Program", "Records", "ns")
 TIPS = (
@@ -152,8 +135,9 @@ class MaterialsPanel(QWidget):
         self._edits = edits
         self._session = edits.session
         self._row: Row | None = None
-        self._parameters: dict[str, Parameter] = {}
+        self._folded: dict[str, bool] = {}
         self.fields: dict[str, Field] = {}
+        self.groups: dict[str, Group] = {}
         self.model = MaterialsModel(self)
         self.view = QTableView()
         self._make_view()
@@ -251,41 +235,60 @@ class MaterialsPanel(QWidget):
 
     def _show(self, row: Row | None) -> None:
         """Makes the fields of a material."""
+        self._edits.set_typing(False)
         self._row = row
-        self.fields = {}
-        self._parameters = {}
+        self.fields, self.groups = {}, {}
         inner = QWidget()
-        form = QFormLayout(inner)
-        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
-        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        column = QVBoxLayout(inner)
+        margin = theme.em(0.4)
+        column.setContentsMargins(margin, margin, margin, margin)
         if row is None:
-            form.addRow(QLabel("No stage is open"))
+            column.addWidget(QLabel("No stage is open"))
         else:
-            title = QLabel(row.path or f"{row.name}: made by the loader")
+            title = PlainText(row.path or f"{row.name}: made by the loader")
             title.setObjectName("material-title")
-            title.setWordWrap(True)
-            title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            form.addRow(title)
-            self._parameters = self._edits.parameters(row.path) if row.path else {}
-            for slot, parameter in self._parameters.items():
-                form.addRow(LABELS.get(slot, slot.replace("_", " ")), self._field(row, parameter))
-            if not self._parameters:
-                form.addRow(QLabel("Nothing to edit: no material prim is there for it."))
+            title.setAccessibleName("Material")
+            column.addWidget(title)
+            parameters = self._edits.parameters(row.path) if row.path else {}
+            self._add_rows(column, row, parameters)
+            if not parameters:
+                column.addWidget(QLabel("Nothing to edit: it has no material prim."))
+        column.addStretch(1)
         self.form.setWidget(inner)
         self._on_changed()
 
+    def _add_rows(self, column: QVBoxLayout, row: Row, parameters: dict[str, Parameter]) -> None:
+        """Fields, under the headings that MaterialX gives them."""
+        plain = Rows()
+        column.addWidget(plain)
+        for parameter in parameters.values():
+            rows = plain
+            if parameter.definition is not None:
+                title = parameter.definition.group
+                if title not in self.groups:
+                    self.groups[title] = self._group(title, parameters)
+                    column.addWidget(self.groups[title])
+                rows = self.groups[title].rows
+            rows.add(parameter, self._field(row, parameter))
+
+    def _group(self, title: str, parameters: dict[str, Parameter]) -> Group:
+        """A heading, open where something below it is not as it is by default."""
+        used = any(
+            one.driven_by or one.value != one.definition.default
+            for one in parameters.values()
+            if one.definition is not None and one.definition.group == title
+        )
+        group = Group(title, opened=self._folded.get(title, used or title == "Base"))
+        group.toggled.connect(self._folded.__setitem__)
+        return group
+
     def _field(self, row: Row, parameter: Parameter) -> QWidget:
-        slot = parameter.slot
-        name = slot.replace("_", " ")
-        if parameter.driven_by:
-            return DrivenField(name, parameter.driven_by)
-        bounds = RANGES.get(slot, UNIT)
-        wide = isinstance(parameter.value, tuple)
-        field = ColourField(name, bounds) if wide else NumberField(name, bounds)
-        field.setToolTip(_tip(parameter))
-        field.changed.connect(partial(self._edits.set_parameter, row.path, slot))
-        field.reset.connect(partial(self._edits.set_parameter, row.path, slot, None))
-        self.fields[slot] = field
+        slot, field = parameter.slot, field_of(parameter)
+        if isinstance(field, Field):
+            field.changed.connect(partial(self._edits.set_parameter, row.path, slot))
+            field.reset.connect(partial(self._edits.set_parameter, row.path, slot, None))
+            field.typing.connect(self._edits.set_typing)
+            self.fields[slot] = field
         return field
 
     def _on_changed(self) -> None:
@@ -297,22 +300,11 @@ class MaterialsPanel(QWidget):
         now = self._edits.parameters(row.path)
         for slot, field in self.fields.items():
             parameter = now.get(slot)
-            if parameter is None or parameter.driven_by:
+            if parameter is None:
                 continue
             value = self._edits.parameter_value(row.path, parameter)
-            if isinstance(field, (ColourField, NumberField)) and _differs(field.value(), value):
+            if value is None or parameter.driven_by:
+                continue
+            if differs(field.value(), value):
                 field.set_value(value)
             field.set_edited(self._edits.is_edited(row.path, parameter))
-
-
-def _differs(shown: Any, value: Any) -> bool:
-    """Whether a field must be set anew: not for rounding, which would take the cursor away."""
-    if isinstance(value, tuple):
-        return any(abs(a - b) > 1e-6 * max(1.0, abs(b)) for a, b in zip(shown, value, strict=True))
-    return bool(abs(shown - value) > 1e-6 * max(1.0, abs(value)))
-
-
-def _tip(parameter: Parameter) -> str:
-    if parameter.attribute is not None:
-        return f"Edits {parameter.attribute}"
-    return f"In the picture only, edits of it cannot be saved: {parameter.reason}"

@@ -20,6 +20,7 @@ from wavecomb.usd.parameters import (
     light_radiance,
     material_parameters,
 )
+from wavecomb.usd.surface_values import surface_values
 
 if TYPE_CHECKING:
     from wavecomb.gui.session import Session
@@ -57,6 +58,7 @@ class SceneEdits(QObject):
         self.edits: StageEdits | None = None
         self.solo: str | None = None
         self._before_solo: dict[Key, Opinion | None] = {}
+        self._touched: set[Sdf.Path] = set()
         session.opened.connect(self._on_opened)
         session.closing.connect(self._on_closing)
         if session.stage is not None and session.usd is not None:
@@ -147,6 +149,11 @@ class SceneEdits(QObject):
         self.solo = path
         self.changed.emit()
 
+    def set_typing(self, typing: bool) -> None:
+        """Whether a value is being typed: however slowly, it is one step of undo."""
+        if self.edits is not None:
+            self.edits.set_typing(typing)
+
     # ---- materials -----------------------------------------------------------------------------
 
     def parameters(self, path: str) -> dict[str, Parameter]:
@@ -167,6 +174,10 @@ class SceneEdits(QObject):
             return
         opinion: Opinion | None = None
         if parameter.attribute is None:
+            if value is not None and not self._can_show(path, slot, value):
+                self.session.warned.emit(f"{label}: not changed: {parameter.reason}")
+                self.changed.emit()
+                return
             key = (Sdf.Path(path), f"!{slot}")
             opinion = None if value is None else Opinion(as_stored(value))
         else:
@@ -174,7 +185,7 @@ class SceneEdits(QObject):
             key = (attribute.GetPrimPath(), f".{attribute.name}")
             if value is not None:
                 opinion = Opinion(parameter.authored(value), parameter.type_name)
-        self._do(lambda edits: edits.change(label, {key: opinion}))
+        self._do(lambda edits: edits.change(label, {key: opinion}), (key[0],))
 
     def parameter_value(self, path: str, parameter: Parameter) -> Any:
         """What a parameter is now."""
@@ -244,12 +255,14 @@ class SceneEdits(QObject):
     def undo(self) -> None:
         """Takes the last edit back."""
         self._end_solo()
-        self._do(lambda edits: edits.undo())
+        if self.edits is not None:
+            self._do(lambda edits: edits.undo(), self.edits.next_prims(undo=True))
 
     def redo(self) -> None:
         """Makes the edit again that was taken back last."""
         self._end_solo()
-        self._do(lambda edits: edits.redo())
+        if self.edits is not None:
+            self._do(lambda edits: edits.redo(), self.edits.next_prims(undo=False))
 
     def _end_solo(self) -> None:
         self.solo, self._before_solo = None, {}
@@ -274,9 +287,16 @@ class SceneEdits(QObject):
 
     # ---- into the render -----------------------------------------------------------------------
 
-    def _do(self, action: Callable[[StageEdits], Step | None]) -> None:
+    def _do(
+        self, action: Callable[[StageEdits], Step | None], prims: Iterable[Sdf.Path] = ()
+    ) -> None:
+        """Makes a step and brings it into the picture.
+
+        ``prims``: whose attributes it will change, where materials may be among them.
+        """
         if self.edits is None:
             return
+        before = self._structures(prims)
         try:
             step = action(self.edits)
         except WavecombError as error:
@@ -284,12 +304,44 @@ class SceneEdits(QObject):
             return
         if step is None:
             return
+        self._touched |= set(step.prims)
         if step.structural:
             self.session.rebuild(step.label)
             self.structure_changed.emit()
+        elif self._structures(prims) != before:
+            # A constant that is part of a graph, or of how a texture is read.
+            self.session.rebuild(step.label)
         else:
             self._show(step)
         self.changed.emit()
+
+    def _materials_of(self, prim: Sdf.Path) -> set[str]:
+        """Materials in use that a prim is, or is in."""
+        path, stage = str(prim), self.stage
+        known = {one for one in stage.material_paths if one} if stage is not None else set()
+        return {one for one in known if path == one or path.startswith(one + "/")}
+
+    def _live_values(self, path: str) -> dict[str, Any]:
+        """What was changed of a material and no attribute holds."""
+        values = self.edits.values if self.edits is not None else {}
+        own = Sdf.Path(path)
+        return {what[1:]: value for (prim, what), value in values.items() if prim == own}
+
+    def _can_show(self, path: str, slot: str, value: Any) -> bool:
+        """Whether a value that no attribute can hold can be brought into the picture."""
+        known = self._live_values(path)
+        before = surface_values(self.prim(path), self.time, known)
+        after = surface_values(self.prim(path), self.time, {**known, slot: value})
+        return before is None or after is None or before.structure == after.structure
+
+    def _structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
+        """What of materials cannot be edited in the scene that there is."""
+        out = {}
+        for path in {one for prim in prims for one in self._materials_of(prim)}:
+            found = surface_values(self.prim(path), self.time)
+            if found is not None:
+                out[path] = found.structure
+        return out
 
     def _show(self, step: Step) -> None:
         """Brings a step into the scene that is rendered."""
@@ -301,29 +353,35 @@ class SceneEdits(QObject):
             # Whether a stage without lights gets the soft dome goes by what its materials emit.
             self.session.rebuild(step.label)
         for prim in step.prims:
-            path = str(prim)
             for light in {one for one in stage.light_paths if _light_path(one) == prim}:
                 self._sync_light(light)
-            for material in {one for one in stage.material_paths if one}:
-                if path == material or path.startswith(material + "/"):
-                    self._sync_material(material)
+            for material in self._materials_of(prim):
+                self._sync_material(material)
 
     def _sync_material(self, path: str) -> None:
         """Gives the materials of a prim the values that the stage has now."""
         scene = self.session.scene
         if scene is None:
             return
-        wanted = {
-            slot: as_stored(self.parameter_value(path, parameter))
-            for slot, parameter in self.parameters(path).items()
-            if not parameter.driven_by
-        }
+        surface = surface_values(self.prim(path), self.time, self._live_values(path))
+        if surface is not None:
+            wanted = {name: as_stored(value) for name, value in surface.constants.items()}
+        else:
+            wanted = {
+                slot: as_stored(self.parameter_value(path, parameter))
+                for slot, parameter in self.parameters(path).items()
+                if not parameter.driven_by
+            }
         for number in self.material_ids(path):
             if number >= len(scene.materials):
                 continue
             have = scene.material(number)
+            have |= have.get("openpbr", {})
+            # A mesh may bring a value for a slot, which a graph reads then.
             values = {
-                slot: value for slot, value in wanted.items() if as_stored(have[slot]) != value
+                slot: value
+                for slot, value in wanted.items()
+                if slot not in have.get("driven", ()) and as_stored(have[slot]) != value
             }
             if values:
                 self.session.edit_material(number, **values)
@@ -364,15 +422,17 @@ class SceneEdits(QObject):
         if self.edits is None or self.edits.stage != usd:
             time = Usd.TimeCode.Default() if loaded.frame is None else Usd.TimeCode(loaded.frame)
             self.edits = StageEdits(usd, time)
+            self._touched = set()
             self._end_solo()
             self.reset.emit()
             self.scene_changed.emit()
             self.changed.emit()
             return
         self.scene_changed.emit()
-        # What was edited while the stage was read is not in the scene yet.
-        for prim in {path for path, _ in self.edits.edited()}:
+        # What was edited, or taken back, while the stage was read is not in the scene yet.
+        for prim in {path for path, _ in self.edits.edited()} | self._touched:
             self._show(Step("", {}, {(prim, ""): None}))
+        self._touched = set()
         self.changed.emit()
 
     def _on_closing(self) -> None:

@@ -86,6 +86,7 @@ class StageEdits:
         self._done: list[Step] = []
         self._undone: list[Step] = []
         self._last = -MERGE_S
+        self._typing = self._joins = False
 
     # ---- what there is -------------------------------------------------------------------------
 
@@ -203,7 +204,8 @@ class StageEdits:
         last = self._done[-1] if self._done else None
         # A value that is taken back is a step of its own, however fast it comes.
         drag = not step.structural and None not in step.after.values()
-        quick = moment - self._last < MERGE_S
+        quick = moment - self._last < MERGE_S or self._joins
+        self._joins = self._typing
         if drag and quick and last is not None and last.after.keys() == step.after.keys():
             self._done[-1] = Step(label, last.before, step.after)
         else:
@@ -212,8 +214,19 @@ class StageEdits:
         self._last = moment
         return step
 
+    def next_prims(self, *, undo: bool) -> tuple[Sdf.Path, ...]:
+        """Prims that ``undo`` or ``redo`` would change."""
+        steps = self._done if undo else self._undone
+        return steps[-1].prims if steps else ()
+
+    def set_typing(self, typing: bool) -> None:
+        """Between True and False all changes of one thing are one step, however slow they are."""
+        self._typing, self._joins = typing, False
+        self._last = -MERGE_S
+
     def undo(self) -> Step | None:
         """Takes the last step back; None where there is none. Gives what was done thereby."""
+        self._joins = False
         if not self._done:
             return None
         step = self._done.pop()
@@ -224,6 +237,7 @@ class StageEdits:
 
     def redo(self) -> Step | None:
         """Makes the step again that was taken back last."""
+        self._joins = False
         if not self._undone:
             return None
         step = self._undone.pop()

@@ -9,23 +9,29 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QLocale, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
+from PySide6.QtCore import QEvent, QKeyCombination, QLocale, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QIcon, QKeyEvent, QKeySequence, QPainter, QPalette, QPixmap
 from PySide6.QtWidgets import (
+    QCheckBox,
     QColorDialog,
     QDoubleSpinBox,
     QHBoxLayout,
-    QLabel,
+    QLineEdit,
+    QSizePolicy,
     QSlider,
     QToolButton,
+    QVBoxLayout,
     QWidget,
 )
 
 from wavecomb.gui import theme
 
 Colour = tuple[float, float, float]
+Control = Qt.KeyboardModifier.ControlModifier
 
 SLIDER_STEPS = 1000
+_BAR = 6
+"""Width of the swatch of a colour that can be changed, of its height."""
 
 
 @dataclass(frozen=True)
@@ -68,32 +74,87 @@ def from_display(colour: QColor) -> Colour:
     return float(r), float(g), float(b)
 
 
-def swatch(colour: Colour, size: int) -> QIcon:
-    """A square of a colour, framed so that it is seen on any background."""
+def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
+    """A square of a colour, or a bar of some, framed so that it is seen on any background."""
     ratio = 2.0
-    pixmap = QPixmap(round(size * ratio), round(size * ratio))
+    pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))
     pixmap.setDevicePixelRatio(ratio)
     peak = max(*colour, 1e-30)
     shown = colour if peak <= 1.0 else tuple(c / peak for c in colour)
     pixmap.fill(to_display((shown[0], shown[1], shown[2])))
     with QPainter(pixmap) as painter:
         painter.setPen(theme.dim())
-        painter.drawRect(0, 0, size - 1, size - 1)
+        painter.drawRect(0, 0, wide * size - 1, size - 1)
     return QIcon(pixmap)
 
 
+def _is_history(event: Any) -> bool:
+    """Whether keys ask for undo or redo."""
+    undo, redo = QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo
+    if event.matches(undo) or event.matches(redo):
+        return True
+    return bool(event.keyCombination() == QKeyCombination(Control, Qt.Key.Key_Y))
+
+
+def differs(shown: Any, value: Any) -> bool:
+    """Whether a field must be set anew: not for rounding, which would take the cursor away."""
+    if isinstance(shown, tuple) != isinstance(value, tuple):
+        return True
+    if isinstance(value, tuple):
+        return any(differs(a, b) for a, b in zip(shown, value, strict=True))
+    return bool(abs(shown - value) > 1e-6 * max(1.0, abs(value)))
+
+
 class _Spin(QDoubleSpinBox):
-    """A number that changes as it is typed, with the point as decimal mark."""
+    """A number that changes as it is typed, with the point as decimal mark.
+
+    It has no history of its own: the keys of undo and redo are those of the window.
+
+    Signals:
+        typing(bool): Somebody has begun to type a value, or is done with it.
+    """
+
+    typing = Signal(bool)
 
     def __init__(self, bounds: Range, name: str) -> None:
         super().__init__()
+        self._typed = False
+        self.editingFinished.connect(self._done)
         self.setLocale(QLocale.c())
         self.setDecimals(bounds.decimals)
         self.setRange(bounds.low, bounds.high)
         self.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMinimumWidth(theme.em(4.2))
+        self.setMinimumWidth(theme.em(3.4))
+
+    def show_value(self, value: float) -> None:
+        """Shows a value, also one that nobody would choose here; tells nobody."""
+        with QSignalBlocker(self):
+            self.setRange(min(self.minimum(), value), max(self.maximum(), value))
+            self.setValue(value)
+
+    def event(self, event: QEvent) -> bool:
+        """Leaves undo and redo to the window."""
+        if event.type() == QEvent.Type.ShortcutOverride and _is_history(event):
+            event.ignore()
+            return False
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Undo and redo of the text would change the value behind the stage's back."""
+        if _is_history(event):
+            event.ignore()
+            return
+        if event.text() and not self._typed:
+            self._typed = True
+            self.typing.emit(True)
+        super().keyPressEvent(event)
+
+    def _done(self) -> None:
+        if self._typed:
+            self._typed = False
+            self.typing.emit(False)
 
     def wheelEvent(self, event: Any) -> None:
         """Only where it has the focus: lists are scrolled over it."""
@@ -107,19 +168,24 @@ class Field(QWidget):
     """What is common: a row with a reset button.
 
     Signals:
-        changed(value): By the user: a number or a colour.
+        changed(value): By the user: a number, a colour or a bool.
         reset(): The value of the stage is wanted.
+        typing(bool): A value is being typed, key by key, or that is over.
     """
 
     changed = Signal(object)
     reset = Signal()
+    typing = Signal(bool)
 
     def __init__(self, name: str) -> None:
         super().__init__()
         self.name = name
         self.setObjectName(f"field-{name.replace(' ', '-')}")
-        self.row = QHBoxLayout(self)
-        self.row.setContentsMargins(0, 0, 0, 0)
+        self.lines = QVBoxLayout(self)
+        self.lines.setContentsMargins(0, 0, 0, 0)
+        self.lines.setSpacing(theme.em(0.1))
+        self.row = QHBoxLayout()
+        self.lines.addLayout(self.row)
         self.back = QToolButton()
         self.back.setObjectName("reset")
         self.back.setText("\N{ANTICLOCKWISE OPEN CIRCLE ARROW}")
@@ -131,6 +197,14 @@ class Field(QWidget):
     def finish(self) -> None:
         """Adds the reset button, last."""
         self.row.addWidget(self.back)
+
+    def value(self) -> Any:
+        """What is shown."""
+        raise NotImplementedError
+
+    def set_value(self, value: Any) -> None:
+        """Shows a value; tells nobody."""
+        raise NotImplementedError
 
     def set_edited(self, edited: bool) -> None:
         """Whether there is something to reset."""
@@ -147,12 +221,14 @@ class NumberField(Field):
         self.slider.setRange(0, SLIDER_STEPS)
         self.slider.setPageStep(SLIDER_STEPS // 10)
         self.slider.setAccessibleName(f"{name}, slider")
-        self.slider.setMinimumWidth(theme.em(5))
+        self.slider.setMinimumWidth(theme.em(3))
         self.spin = _Spin(bounds, name)
         self.row.addWidget(self.slider, 1)
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
+        self.spin.setMinimumWidth(theme.em(4.6))
+        self.spin.typing.connect(self.typing)
         self.slider.valueChanged.connect(self._on_slider)
         self.spin.valueChanged.connect(self._on_spin)
 
@@ -162,8 +238,7 @@ class NumberField(Field):
 
     def set_value(self, value: float) -> None:
         """Shows a value; tells nobody."""
-        with QSignalBlocker(self.spin):
-            self.spin.setValue(value)
+        self.spin.show_value(value)
         self._place(value)
 
     def _place(self, value: float) -> None:
@@ -193,8 +268,29 @@ class NumberField(Field):
         self.changed.emit(value)
 
 
+class SwitchField(Field):
+    """A box to be ticked."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.box = QCheckBox()
+        self.box.setAccessibleName(name)
+        self.row.addWidget(self.box, 1)
+        self.finish()
+        self.box.toggled.connect(lambda on: self.changed.emit(on))
+
+    def value(self) -> bool:
+        """Whether it is ticked."""
+        return self.box.isChecked()
+
+    def set_value(self, value: Any) -> None:
+        """Shows a value; tells nobody."""
+        with QSignalBlocker(self.box):
+            self.box.setChecked(bool(value))
+
+
 class ColourField(Field):
-    """A button that shows the colour and opens a dialog, and three linear numbers."""
+    """A button that shows the colour and opens a dialog; below it three linear numbers."""
 
     def __init__(self, name: str, bounds: Range = UNIT) -> None:
         super().__init__(name)
@@ -203,14 +299,20 @@ class ColourField(Field):
         self.button.setToolTip("Choose a colour. The numbers are linear Rec.709")
         self.button.setAccessibleName(f"{name}, choose")
         self.button.clicked.connect(self._choose)
-        self.row.addWidget(self.button)
+        self.button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.row.addWidget(self.button, 1)
+        numbers = QHBoxLayout()
+        numbers.setSpacing(theme.em(0.2))
         self.spins = [_Spin(bounds, f"{name}, {part}") for part in ("red", "green", "blue")]
         # Exact; the fields show rounded ones, and only what is typed counts.
         self._parts = [0.0, 0.0, 0.0]
         for part, spin in enumerate(self.spins):
-            self.row.addWidget(spin, 1)
+            spin.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)
+            numbers.addWidget(spin, 1)
             spin.valueChanged.connect(partial(self._on_spin, part))
+            spin.typing.connect(self.typing)
         self.finish()
+        self.lines.addLayout(numbers)
         self.dialog: QColorDialog | None = None
         self.set_value((0.0, 0.0, 0.0))
         theme.on_change(self._paint)
@@ -224,12 +326,12 @@ class ColourField(Field):
         """Shows a colour; tells nobody."""
         self._parts = [float(part) for part in value]
         for spin, part in zip(self.spins, value, strict=True):
-            with QSignalBlocker(spin):
-                spin.setValue(part)
+            spin.show_value(part)
         self._paint()
 
     def _paint(self) -> None:
-        self.button.setIcon(swatch(self.value(), theme.em(1)))
+        self.button.setIcon(swatch(self.value(), theme.em(1), _BAR))
+        self.button.setIconSize(QSize(_BAR * theme.em(1), theme.em(1)))
 
     def _on_spin(self, part: int, value: float) -> None:
         self._parts[part] = value
@@ -265,6 +367,21 @@ class ColourField(Field):
         self.dialog = None
 
 
+class PlainText(QLineEdit):
+    """A line that can be read and copied, however little room there is for it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.setReadOnly(True)
+        self.setFrame(False)
+        self.setToolTip(text)
+        self.setMinimumWidth(theme.em(3))
+        self.setCursorPosition(0)
+        palette = self.palette()
+        palette.setColor(QPalette.ColorRole.Base, Qt.GlobalColor.transparent)
+        self.setPalette(palette)
+
+
 class DrivenField(QWidget):
     """What stands for a parameter that a texture or a primvar gives."""
 
@@ -272,12 +389,9 @@ class DrivenField(QWidget):
         super().__init__()
         self.setObjectName(f"field-{name.replace(' ', '-')}")
         self.setAccessibleName(f"{name}: {driver}")
-        label = QLabel(driver)
-        label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        label.setEnabled(False)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(label, 1)
+        layout.addWidget(PlainText(driver), 1)
         self.setToolTip(
             f"{name} comes from {driver}, so there is no number to change; "
             "edit that, or the network of the material"

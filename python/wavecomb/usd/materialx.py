@@ -7,12 +7,13 @@ or driven by a value graph.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.graph_code import Value, is_constant
+from wavecomb.usd.graph_code import Value, is_constant, numbers
 from wavecomb.usd.graph_network import Networks
 from wavecomb.usd.graph_surface import Drivers, sampled
 from wavecomb.usd.network import colour, number, source_of
@@ -96,8 +97,15 @@ class MaterialXReader:
     """Reads one MaterialX surface shader."""
 
     def __init__(
-        self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
+        self,
+        material: Usd.Prim,
+        time: Usd.TimeCode,
+        textures: TextureTable,
+        report: LoadReport,
+        values: Mapping[str, Any] | None = None,
     ) -> None:
+        """``values``: constants of the surface shader in place of what the stage says."""
+        self.values = values or {}
         self.material = material
         self.time = time
         self.report = report
@@ -149,10 +157,17 @@ class MaterialXReader:
             graph=self.drivers.graph(),
         )
 
+    def input(self, shader: UsdShade.Shader, name: str, parameter: str) -> Value | None:
+        """What feeds an input of the surface shader; None where nothing does."""
+        if name in self.values:
+            value = self.values[name]
+            return numbers(*value) if isinstance(value, tuple) else numbers(float(value))
+        return self.drivers.value(shader, name, parameter)
+
     def _value(self, shader: UsdShade.Shader, parameter: str, spec: tuple[str, Any]) -> Value:
         """An input, or its default."""
         name, default = spec
-        value = self.drivers.value(shader, name, parameter) if name else None
+        value = self.input(shader, name, parameter) if name else None
         if value is None:
             return tuple(default) if isinstance(default, tuple) else (default,)
         return value
@@ -205,6 +220,8 @@ class _Layers:
             self._missing(f"MaterialX {self._model} input {name} by a node (one value for all)")
 
     def _constant(self, name: str, parameter: str) -> Any:
+        if name in self._reader.values:
+            return self._reader.values[name]
         source = source_of(self._shader, name, self._reader.time)
         if source is None or source.is_value:
             return None if source is None else source.value

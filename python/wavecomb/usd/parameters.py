@@ -7,20 +7,21 @@ holds it, so that a change can be written back.
 
 from __future__ import annotations
 
+import contextlib
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.colour_space import space_of
+from wavecomb.usd.colour_space import LINEAR, RAW, canonical, linear_colour, space_of
 from wavecomb.usd.identity import LightGroups
 from wavecomb.usd.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.light import LightReader
 from wavecomb.usd.material import PREVIEW, surface_source
-from wavecomb.usd.materialx import MODELS
 from wavecomb.usd.mesh import IDENTITY
+from wavecomb.usd.mtlx_inputs import COLOUR, SWITCH, InputDefinition, definitions
 from wavecomb.usd.network import Source, colour, number, shader_id, source_of, value_of
 from wavecomb.usd.preview import INPUTS, USES, constant, program_of
 from wavecomb.usd.report import LoadReport
@@ -34,30 +35,33 @@ class Parameter:
     """One parameter of a material.
 
     Attributes:
-        slot: Keyword argument of ``SceneBuilder.add_material``.
-        value: As the loader reads it; None where it is driven.
+        slot: Keyword argument of ``SceneBuilder.add_material``; of MaterialX the shader's input.
+        value: As the loader reads it: a number, three, or a bool; None where it is driven.
         attribute: To author for another value, there already or not; None: there is none.
         type_name: Of that attribute.
-        factor: The value is the attribute's times this.
         driven_by: What else gives the value: "texture marble.png", "primvar displayColor"; "" of a
             constant.
         reason: Why there is no attribute to author; "" where there is.
+        definition: What MaterialX says of the input; None of UsdPreviewSurface.
     """
 
     slot: str
     value: Any = None
     attribute: Sdf.Path | None = None
     type_name: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
-    factor: float = 1.0
     driven_by: str = ""
     reason: str = ""
+    definition: InputDefinition | None = None
 
     def authored(self, value: Any) -> Any:
         """What the attribute must hold for the parameter to be so."""
+        if isinstance(value, bool):
+            return value if self.type_name == Sdf.ValueTypeNames.Bool else int(value)
         if isinstance(value, (tuple, list)):
-            make = self.type_name.type.pythonClass
-            return make(*(float(v) / self.factor for v in value))
-        return as_stored(float(value) / self.factor)
+            return self.type_name.type.pythonClass(*(float(v) for v in value))
+        if _is_triple(self.type_name):
+            return self.type_name.type.pythonClass(*[float(value)] * 3)
+        return as_stored(float(value))
 
 
 def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
@@ -95,61 +99,56 @@ class _Tracer:
             if program == "metal" and attribute and attribute.HasAuthoredValue():
                 black = (0.0, 0.0, 0.0)
                 value = colour(attribute.Get(self._time), black)
-                out[slot] = self._constant(slot, value, attribute.GetPath(), attribute)
+                path, usual = attribute.GetPath(), Sdf.ValueTypeNames.Color3f
+                out[slot] = self._constant(slot, value, path, attribute, usual)
         return out
 
     def materialx(self, model_name: str) -> dict[str, Parameter]:
-        """Of a MaterialX surface: of the inputs that Wavecomb reads."""
-        model = MODELS[model_name]
-        weight = self._weight(model.base_weight)
-        glow = self._weight(model.emission_weight)
-        if model_name == "open_pbr_surface":
-            glow /= 1000.0
-        specs = [
-            ("base_color", model.base_color, weight),
-            ("roughness", model.roughness, 1.0),
-            ("ior", model.ior, 1.0),
-            ("metallic", model.metallic, 1.0),
-            ("specular_color", model.specular_color, 1.0),
-            ("clearcoat", model.clearcoat, 1.0),
-            ("clearcoat_roughness", model.clearcoat_roughness, 1.0),
-            ("opacity", model.opacity, 1.0),
-            ("emission", model.emission, glow),
-        ]
-        out: dict[str, Parameter] = {}
-        for slot, (name, default), factor in specs:
-            if name:
-                out[slot] = self._input(slot, name, default, factor, clamped=False)
-        return out
+        """Of a MaterialX surface: its own inputs, of those that Wavecomb reads."""
+        known = definitions(model_name, shader_id(self._shader))
+        return {name: self._own_input(one) for name, one in known.items()}
 
-    def _weight(self, spec: tuple[str, Any]) -> float:
-        name, default = spec
-        value = value_of(self._shader, name, self._time) if name else None
-        return number(value, default)
-
-    def _input(
-        self, slot: str, name: str, default: Any, factor: float = 1.0, *, clamped: bool = True
-    ) -> Parameter:
+    def _own_input(self, definition: InputDefinition) -> Parameter:
+        name, default = definition.name, definition.default
         source = source_of(self._shader, name, self._time)
         if source is not None and not source.is_value:
-            return Parameter(slot, driven_by=self._driver(source))
-        if factor <= 0:
-            return Parameter(slot, reason="its weight in the stage is 0")
+            return Parameter(name, driven_by=self._driver(source), definition=definition)
         attribute = None if source is None else source.attribute
-        own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
-        path = own if attribute is None else attribute.GetPath()
         value = default if source is None else source.value
-        if slot in COLOUR_SLOTS and (space := space_of(attribute)):
-            return Parameter(slot, reason=f"it is in the colour space {space}")
-        if clamped:
-            value = constant(slot, value, default)
-        elif isinstance(default, tuple):
+        if definition.kind == SWITCH:
+            value = bool(number(value, default))
+        elif definition.kind == COLOUR:
             value = colour(value, default)
         else:
             value = number(value, default)
-        if factor != 1.0:
-            value = tuple(v * factor for v in value)
-        return self._constant(slot, value, path, attribute, factor)
+        types = Sdf.ValueTypeNames
+        usual = {"color3": types.Color3f, "boolean": types.Bool}.get(
+            definition.type_name, types.Float
+        )
+        return replace(
+            self._constant(name, value, self._path_of(name, attribute), attribute, usual),
+            definition=definition,
+        )
+
+    def _path_of(self, name: str, attribute: Usd.Attribute | None) -> Sdf.Path:
+        """The attribute that an input's value is in, or would be."""
+        own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
+        return own if attribute is None else attribute.GetPath()
+
+    def _input(self, slot: str, name: str, default: Any) -> Parameter:
+        source = source_of(self._shader, name, self._time)
+        if source is not None and not source.is_value:
+            return Parameter(slot, driven_by=self._driver(source))
+        attribute = None if source is None else source.attribute
+        value = constant(slot, default if source is None else source.value, default)
+        space = space_of(attribute) if slot in COLOUR_SLOTS else ""
+        if space and canonical(space) not in (LINEAR, RAW):
+            with contextlib.suppress(ValueError):  # the loader says that it does not know it
+                value = linear_colour(value, attribute)
+            return Parameter(slot, value, reason=f"it is in the colour space {space}")
+        wide = slot in COLOUR_SLOTS
+        usual = Sdf.ValueTypeNames.Color3f if wide else Sdf.ValueTypeNames.Float
+        return self._constant(slot, value, self._path_of(name, attribute), attribute, usual)
 
     def _constant(
         self,
@@ -157,21 +156,19 @@ class _Tracer:
         value: Any,
         path: Sdf.Path,
         attribute: Usd.Attribute | None,
-        factor: float = 1.0,
+        usual: Sdf.ValueTypeName,
     ) -> Parameter:
-        """A parameter whose value is that of an attribute, or would be."""
-        wide = slot in (*COLOUR_SLOTS, "conductor_eta", "conductor_k")
-        types = Sdf.ValueTypeNames
-        type_name = types.Color3f if wide else types.Float
+        """A parameter whose value is that of an attribute, or would be one of the usual type."""
         if self._prim.IsInstanceProxy() or self._prim.IsInPrototype():
             return Parameter(slot, value, reason=IN_INSTANCE)
         if not path.HasPrefix(self._prim.GetPath()):
             return Parameter(slot, value, reason=f"it comes from {path}, outside of the material")
-        if attribute is not None:
-            type_name = attribute.GetTypeName()
-            if wide != (type_name.defaultValue is not None and _is_triple(type_name)):
-                return Parameter(slot, value, reason=f"{path} is a {type_name}")
-        return Parameter(slot, value, path, type_name, factor)
+        if attribute is None:
+            return Parameter(slot, value, path, usual)
+        type_name = attribute.GetTypeName()
+        if _is_triple(usual) != _is_triple(type_name):
+            return Parameter(slot, value, reason=f"{path} is a {type_name}")
+        return Parameter(slot, value, path, type_name)
 
     def _driver(self, source: Source) -> str:
         shader = source.shader
@@ -220,7 +217,9 @@ def light_radiance(
 
 
 def as_stored(value: Any) -> Any:
-    """A number or colour as the core keeps it, in 32 bits."""
+    """A number or colour as the core keeps it, in 32 bits; a bool as it is."""
+    if isinstance(value, bool):
+        return value
     if isinstance(value, (tuple, list)):
         return tuple(float(np.float32(v)) for v in value)
     return float(np.float32(value))
