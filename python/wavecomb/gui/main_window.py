@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QByteArray, QSettings, Qt, QTimer
+from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -84,7 +84,7 @@ class MainWindow(QMainWindow):
         self.setStatusBar(self.status)
         self.setDockNestingEnabled(True)
         self.setAcceptDrops(True)
-        self.resize(theme.em(100), theme.em(60))
+        self.resize(self._room(theme.em(100), theme.em(60)))
         areas = Qt.DockWidgetArea
         self.setCorner(Qt.Corner.BottomLeftCorner, areas.LeftDockWidgetArea)
         self.setCorner(Qt.Corner.BottomRightCorner, areas.RightDockWidgetArea)
@@ -98,6 +98,13 @@ class MainWindow(QMainWindow):
                 dock.visibilityChanged.connect(self._size_bottom)
         sides = [self.docks["scene"], self.docks["inspector"]]
         self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
+
+    def _room(self, wide: int, high: int) -> QSize:
+        """A size, or what the screen has; frames of windows take some of it."""
+        there = self.screen().availableGeometry().size()
+        return QSize(
+            min(wide, there.width() - theme.em(0.5)), min(high, there.height() - theme.em(2.5))
+        )
 
     def _add_dock(
         self,
@@ -353,6 +360,7 @@ class MainWindow(QMainWindow):
         if not self._bottom_sized and dock.isHidden():
             dock.setFloating(True)
             dock.resize(round(0.8 * self.width()), round(0.8 * self.height()))
+            dock.move(self.frameGeometry().center() - dock.rect().center())
         dock.show()
         dock.raise_()
         dock.activateWindow()

@@ -40,7 +40,8 @@ def range_of(parameter: Parameter) -> Range:
     one = parameter.definition
     if one is None:
         return RANGES.get(parameter.slot, UNIT)
-    return Range(one.low, one.high, one.soft_low, one.soft_high)
+    decimals = 1 if one.soft_high >= 100.0 else 3
+    return Range(one.low, one.high, one.soft_low, one.soft_high, decimals)
 
 
 def name_of(parameter: Parameter) -> str:
@@ -91,6 +92,7 @@ class Rows(QWidget):
         label.setWordWrap(True)
         label.setFixedWidth(theme.em(LABEL_EM))
         label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop)
+        label.setContentsMargins(0, theme.em(0.25), 0, 0)
         label.setToolTip(field.toolTip())
         label.setBuddy(field)
         self._form.addRow(label, field)

@@ -85,7 +85,10 @@ def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
     with QPainter(pixmap) as painter:
         painter.setPen(theme.dim())
         painter.drawRect(0, 0, wide * size - 1, size - 1)
-    return QIcon(pixmap)
+    icon = QIcon(pixmap)
+    # Else a row that is selected would tint it.
+    icon.addPixmap(pixmap, QIcon.Mode.Selected)
+    return icon
 
 
 def _is_history(event: Any) -> bool:
@@ -227,7 +230,10 @@ class NumberField(Field):
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
-        self.spin.setMinimumWidth(theme.em(4.6))
+        # Its range would have it wider.
+        widest = max(f"{bounds.soft_high:.{bounds.decimals}f}", "-0.000", key=len)
+        text = self.spin.fontMetrics().horizontalAdvance(widest)
+        self.spin.setFixedWidth(max(text + theme.em(2.2), theme.em(5)))
         self.spin.typing.connect(self.typing)
         self.slider.valueChanged.connect(self._on_slider)
         self.spin.valueChanged.connect(self._on_spin)
