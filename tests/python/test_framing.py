@@ -145,6 +145,14 @@ def test_an_outline_is_what_matters():
     for direction in rng.normal(size=(200, 3)):
         direction /= np.linalg.norm(direction)
         assert (kept @ direction).max() >= 0.98 * (ball @ direction).max()
+    # The same points in an order that has neighbours near each other: most are not looked at.
+    ball = ball[np.lexsort((ball[:, 0], np.round(8 * ball[:, 1]), np.round(8 * ball[:, 2])))]
+    near = framing._near_the_outside(ball.astype(np.float32), framing.DIRECTIONS[:6])
+    assert len(near) < 0.5 * len(ball)
+    sorted_kept = framing.outline(ball)
+    assert np.allclose(
+        (sorted_kept @ framing.DIRECTIONS.T).max(axis=0), (kept @ framing.DIRECTIONS.T).max(axis=0)
+    )
     box = np.array([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]])
     assert len(framing.outline(framing.corners(box))) == 8
     assert len(framing.outline(np.repeat(framing.corners(box), 99, axis=0))) == 8
