@@ -160,10 +160,12 @@ Shot = Callable[..., NDArray[np.float64]]
 
 @pytest.fixture
 def shot(tmp_path: Path, beauty: Any) -> Shot:
-    """Pixels of FLOOR below the square, direct light only."""
+    """Pixels of a floor below the square, direct light only."""
 
-    def render(*prims: str, spp: int = 256, **settings: Any) -> NDArray[np.float64]:
-        stage = write_stage(tmp_path / "stage.usda", AT_FLOOR, FLOOR, *prims)
+    def render(
+        *prims: str, spp: int = 256, view: str = AT_FLOOR, floor: str = FLOOR, **settings: Any
+    ) -> NDArray[np.float64]:
+        stage = write_stage(tmp_path / "stage.usda", view, floor, *prims)
         loaded = wavecomb.load(stage, frame=0)
         picture = beauty(loaded, 16, spp, **({"max_depth": 1} | settings))
         return np.asarray(picture, np.float64).reshape(-1, 3)
@@ -171,7 +173,7 @@ def shot(tmp_path: Path, beauty: Any) -> Shot:
     return render
 
 
-def agree(found: NDArray[np.float64], expected: Any, other: Any = 0.0) -> None:
+def agree(found: NDArray[np.float64], expected: Any) -> None:
     """The mean within 4.5 standard errors, which are small enough to tell.
 
     ``expected`` may be pixels of another picture.
@@ -236,6 +238,20 @@ def test_bounces_and_light_samples_alone(shot: Shot, tmp_path: Path) -> None:
         by_samples = shot(surface, square("independent"))
         agree(by_both, by_bounces)
         agree(by_samples / TINT * GLOW, by_bounces)
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.6])
+def test_on_gloss(shot: Shot, roughness: float) -> None:
+    """Where bounces and light samples share the light, as half of a whole one."""
+    metal = material("M", "metal", diffuseColor=(0.9, 0.9, 0.9), roughness=roughness)
+    scene: dict[str, Any] = {
+        "view": camera((0, 1, 2), (0, 0, 1), half=0.02, lens=SHUTTER),
+        "floor": metal + "\n" + ground("M", 20),
+        "spp": 1024,
+    }
+    whole = shot(constant(1.0), square(), **scene)
+    agree(shot(constant(0.5), square(), **scene), 0.5 * whole)
+    agree(shot(driven(), square(), **scene), 0.5 * whole)  # 1/2 + x, seen along x = 0
 
 
 def test_instances(shot: Shot) -> None:
