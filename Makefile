@@ -10,6 +10,9 @@ BUILD := build/editable
 ASAN := build/asan
 WHEEL := build/wheel
 VENV := .venv/bin
+# Of make fuzz.
+MINUTES ?= 10
+SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
 # One build at a time per directory, whoever starts it.
 LOCK := $(if $(shell command -v flock),flock build/.lock)
@@ -23,7 +26,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build wheel render test test-fast test-cpp test-py test-py-fast test-long test-asan test-wheel bench lint format clean
+.PHONY: help setup setup-test build wheel render test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-wheel bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -106,6 +109,9 @@ test-wheel: wheel ## Install that wheel into a fresh environment and render with
 
 test-py-fast: build build/.setup-test
 	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
+
+fuzz: build build/.setup-test ## Broken inputs for MINUTES=10; those that are wrong are kept in out/fuzz
+	nice $(VENV)/python tests/python/fuzz_stages.py --minutes $(MINUTES) --seed $(SEED) --jobs $(JOBS) --keep out/fuzz
 
 bench: build ## Micro-benchmarks; JSON goes to out/micro
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_benchmarks -j $(JOBS) -- --quiet

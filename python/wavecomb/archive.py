@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import struct
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -46,6 +47,7 @@ def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
         except (
             ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, OverflowError,
             MemoryError, RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile, zlib.error,
+            tokenize.TokenError,
         ) as error:  # fmt: skip
             raise ArchiveError(f"{type(error).__name__}: {error}") from error
 

@@ -8,6 +8,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
@@ -46,6 +47,17 @@ def one_line(message: str, name: str) -> str:
     """A library's message in one line, without the file's name, which the caller gives."""
     line = " ".join(message.replace(f'"{name}"', "it").split())
     return line.rstrip(".") or "unknown reason"
+
+
+def problem_of(library: Any) -> str:
+    """What OpenImageIO, or one of its readers, says went wrong.
+
+    It quotes what it finds in files, which need not be text.
+    """
+    try:
+        return str(library.geterror())
+    except UnicodeDecodeError:
+        return "its header is damaged"
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:

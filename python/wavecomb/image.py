@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
-from wavecomb.files import one_line
+from wavecomb.files import one_line, problem_of
 from wavecomb.machine import memory_bytes
 
 __all__ = [
@@ -187,7 +187,7 @@ def _open(name: str) -> Any:
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(name, hints)
     if source is None:
-        raise OSError(f"{name}: cannot be read as a picture: {one_line(oiio.geterror(), name)}")
+        raise OSError(f"{name}: cannot be read as a picture: {one_line(problem_of(oiio), name)}")
     return source
 
 
@@ -216,7 +216,7 @@ def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
         _check_size(name, spec)
         pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
         if pixels is None:
-            raise OSError(f"{name}: is damaged: {one_line(source.geterror(), name)}")
+            raise OSError(f"{name}: is damaged: {one_line(problem_of(source), name)}")
         names = list(spec.channelnames)
         encoded = spec.format.basetype not in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
         alpha = spec.alpha_channel

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fuzz_graphs import GRAPHS
+from fuzz_inputs import INPUTS, make_input
 from fuzz_seeds import IMAGES, OTHER, image_bytes, stage_bytes, stage_text
 
 Mutation = Callable[[random.Random, bytes], bytes]
@@ -210,13 +211,21 @@ PICTURES: dict[str, Mutation] = {
     "bits": flip_bits, "cut": cut, "counts": huge_words, "splice": splice,
 }  # fmt: skip
 
-KINDS = (*STAGES, *GRAPHS, *(f"{suffix} {how}" for suffix in IMAGES for how in PICTURES))
+KINDS = (
+    *STAGES,
+    *GRAPHS,
+    *(f"{suffix} {how}" for suffix in IMAGES for how in PICTURES),
+    *INPUTS,
+)
 
 
 def make_case(kind: str, seed: int, number: int, folder: Path) -> Path:
-    """Writes the files of a case into an empty folder; gives the stage's."""
+    """Writes the files of a case into an empty folder; gives the stage's, or what it is about."""
     rng = random.Random(f"{seed}/{kind}/{number}")
     (folder / "other.usda").write_text(OTHER)
+    if kind in INPUTS:
+        (folder / "a.png").write_bytes(image_bytes("png"))
+        return make_input(kind, rng, folder, list(PICTURES.values()))
     if kind in GRAPHS:
         return GRAPHS[kind](rng, folder)
     if kind in STAGES:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken stages and images by the thousand: ``python tests/python/fuzz_stages.py``.
+"""Broken stages, images and other inputs by the thousand: ``make fuzz MINUTES=10``.
 
 Each case is made from its kind, the seed and a number (``fuzz_cases``). Workers (``fuzz_worker``)
 load and render cases in turn, with nothing around them: so we see where a library crashes. A case
@@ -7,6 +7,7 @@ that kills its worker, or takes longer than the limit there, is then given to ``
 a user would, which must say one clear line and end with code 2, within the limit.
 
     python tests/python/fuzz_stages.py                       # 2,000 cases of seed 1, a table
+    python tests/python/fuzz_stages.py --minutes 10          # as many as fit, a summary for docs
     python tests/python/fuzz_stages.py --only "usdc bits" --keep out/fuzz
     python tests/python/fuzz_stages.py --case "usdc bits/17" --keep out/fuzz
 """
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
 import select
 import shutil
@@ -33,6 +35,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from fuzz_cases import KINDS, make_case, plan
+from fuzz_inputs import BY_COMMAND, words_for
 from fuzz_seeds import stage_text
 
 GOOD = ("rendered", "warned", "refused", "contained")
@@ -143,6 +146,8 @@ class Worker:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
+                env=environment(self._folder),
+                cwd=self._folder / "work",
             )
             assert isinstance(self._answer(self._process, 60.0), dict), "the worker does not start"
         return self._process
@@ -173,29 +178,60 @@ class Worker:
             process.stdout.close()
 
 
-def command_line(stage: Path, limit_s: float) -> tuple[str, str]:
-    """(outcome, said) of ``wavecomb render`` on a stage, as a user would run it."""
-    out = stage.with_name("out.exr")
-    arguments = ["render", str(stage), "-o", str(out), "--size", "8", "8", "--spp", "1", "--quiet"]
-    command = [sys.executable, "-m", "wavecomb", *arguments]
+PLACES = ("home", "work", "tmp")
+"""Folders of the processes that judge cases, beside those of the cases."""
+
+
+def environment(place: Path) -> dict[str, str]:
+    """Of a process whose files are all below a folder."""
+    for name in PLACES:
+        (place / name).mkdir(exist_ok=True)
+    own = {"HOME": "home", "XDG_CACHE_HOME": "home", "TMPDIR": "tmp"}
+    return os.environ | {name: str(place / folder) for name, folder in own.items()}
+
+
+def strays(place: Path, before: set[Path], case: Path) -> list[str]:
+    """Files that came to a folder beside those of the case."""
+    now = {path for path in place.rglob("*") if not path.is_relative_to(case)}
+    return sorted(str(path) for path in now - before if "tmp" not in path.parts[-2:])
+
+
+def command_line(case: Path, limit_s: float, *, named: bool = False) -> tuple[str, str]:
+    """(outcome, said) of ``wavecomb`` on a case, as a user would run it.
+
+    ``named``: the stage itself says what its pictures are called.
+    """
+    words = words_for(case)
+    out = Path(words[words.index("-o") + 1])
+    if named:
+        words = ["render", case.name, "--spp", "1", "--quiet"]
+    command = [sys.executable, "-m", "wavecomb", *words]
     with tempfile.TemporaryFile("w+", errors="replace") as stderr:
-        done = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=stderr)
+        done = subprocess.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=stderr,
+            env=environment(case.parents[1]),
+            cwd=case.parent,
+        )
         watch = Watch(done.pid, limit_s)
         while done.poll() is None:
             time.sleep(0.05)
             if watch.is_over():
                 done.kill()
                 done.wait()
-                return "hang", f"wavecomb render: no end within {limit_s:g} s"
+                return "hang", f"wavecomb {words[0]}: no end within {limit_s:g} s"
         stderr.seek(0)
         text = stderr.read()
     lines = text.splitlines()
     errors = [line for line in lines if line.startswith("error: ")]
     others = [line for line in lines if not line.startswith(("error: ", "warning: "))]
     if others or done.returncode not in (0, 2) or len(errors) != (done.returncode == 2):
-        return "wrong", f"wavecomb render: code {done.returncode}: {text}"
+        return "wrong", f"wavecomb {words[0]}: code {done.returncode}: {text}"
+    if named:
+        return ("refused" if errors else "rendered"), "; ".join(lines)
     if out.exists() != (done.returncode == 0):
-        return "wrong", f"wavecomb render: code {done.returncode}, and its picture: {out.exists()}"
+        return "wrong", f"wavecomb {words[0]}: code {done.returncode}, and its file: {out.exists()}"
     return "contained", errors[0] if errors else "; ".join(lines)
 
 
@@ -203,13 +239,19 @@ def check(
     worker: Worker, kind: str, number: int, seed: int, folder: Path, limit_s: float
 ) -> Verdict:
     """Makes a case in an empty folder and sees what comes of it."""
-    stage = make_case(kind, seed, number, folder)
+    case = make_case(kind, seed, number, folder)
     worker.start()
+    before = set(folder.parent.rglob("*"))
     start = time.monotonic()
-    outcome, said, death = worker.judge(stage)
+    if kind in BY_COMMAND:
+        outcome, said, death = *command_line(case, limit_s, named=True), ""
+    else:
+        outcome, said, death = worker.judge(case)
     if death:
         start = time.monotonic()
-        outcome, said = command_line(stage, limit_s)
+        outcome, said = command_line(case, limit_s)
+    if stray := strays(folder.parent, before, folder):
+        outcome, said = "wrong", f"outside of its folder: {', '.join(stray)}"
     return Verdict(kind, number, outcome, said, time.monotonic() - start, death)
 
 
@@ -220,8 +262,9 @@ def run(
     jobs: int = 2,
     limit_s: float = LIMIT_S,
     keep: Path | None = None,
+    until: float = math.inf,
 ) -> list[Verdict]:
-    """Checks cases with some workers; faults are kept with their files where ``keep`` says."""
+    """Checks cases with some workers, until a time; faults are kept where ``keep`` says."""
     queue: SimpleQueue[tuple[int, tuple[str, int]]] = SimpleQueue()
     for case in enumerate(cases):
         queue.put(case)
@@ -231,7 +274,7 @@ def run(
         place = tempfile.TemporaryDirectory(prefix="wavecomb-fuzz-")
         worker = Worker(limit_s, Path(place.name))
         try:
-            while True:
+            while time.monotonic() < until:
                 try:
                     index, (kind, number) = queue.get_nowait()
                 except Empty:
@@ -239,6 +282,8 @@ def run(
                 with tempfile.TemporaryDirectory(dir=place.name) as name:
                     verdict = check(worker, kind, number, seed, Path(name), limit_s)
                     found[index] = verdict
+                    if len(found) % 500 == 0:
+                        print(f"{len(found)} cases", file=sys.stderr, flush=True)
                     if keep is not None and verdict.outcome not in GOOD:
                         target = keep / f"{seed}-{kind.replace(' ', '-')}-{number}"
                         shutil.copytree(name, target, dirs_exist_ok=True)
@@ -270,10 +315,41 @@ def table(verdicts: list[Verdict]) -> str:
     return "\n".join(lines)
 
 
+GROUPS = {
+    "usda": ".usda", "usdc": ".usdc", "usdz": ".usdz", "png": "PNG", "jpg": "JPEG", "exr": "EXR",
+    "hdr": "Radiance", "ies": "IES", "mtlx": ".mtlx", "ply": "PLY", "obj": "OBJ",
+    "checkpoint": "checkpoints", "merge": "pictures to merge", "costs": "cost profiles",
+    "product": "names of products",
+}  # fmt: skip
+
+
+def summary(verdicts: list[Verdict], seed: int) -> str:
+    """The table of docs/testing.md: kinds summed up, with the commit."""
+    columns = ("rendered", "warned", "refused", "contained", "wrong", "hang")
+    heads = ("read", "with warnings", "refused", "contained crash", "wrong", "hang")
+    rows: dict[str, Counter[str]] = {}
+    for verdict in verdicts:
+        name = GROUPS.get(verdict.kind.split()[0], verdict.kind)
+        rows.setdefault(name, Counter())[verdict.outcome] += 1
+    rows["all"] = sum(rows.values(), Counter())
+    git = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
+    commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip()
+    lines = [
+        f"{len(verdicts)} cases of seed {seed} at {commit or 'no commit'}:\n",
+        f"| what is broken | cases | {' | '.join(heads)} |",
+        "| --- |" + " --- |" * (len(heads) + 1),
+    ]
+    for name, counts in rows.items():
+        figures = " | ".join(str(counts[column] or "") for column in columns)
+        lines.append(f"| {name} | {counts.total()} | {figures} |")
+    return "\n".join(lines)
+
+
 def main() -> int:
     """The command; 1 where there are faults."""
     parser = argparse.ArgumentParser(description="Fuzzes the loader.")
     parser.add_argument("--cases", type=int, default=2000)
+    parser.add_argument("--minutes", type=float, help="as many cases as fit, instead of --cases")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--only", action="append", choices=KINDS, help="kinds; default: all")
@@ -284,7 +360,7 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, help="folder for the files of faults (--case: of all)")
     parser.add_argument("--details", type=Path, help="JSON of all verdicts")
     options = parser.parse_args()
-    cases = plan(options.cases)
+    cases = plan(options.cases if options.minutes is None else 1_000_000)
     if options.only:
         cases = [case for case in cases if case[0] in options.only]
     if options.case:
@@ -295,9 +371,15 @@ def main() -> int:
             print(make_case(kind, options.seed, number, folder))
     start = time.monotonic()
     verdicts = run(
-        cases, seed=options.seed, jobs=options.jobs, limit_s=options.limit, keep=options.keep
+        cases,
+        seed=options.seed,
+        jobs=options.jobs,
+        limit_s=options.limit,
+        keep=options.keep,
+        until=math.inf if options.minutes is None else start + 60.0 * options.minutes,
     )
     print(table(verdicts))
+    print("\n" + summary(verdicts, options.seed))
     print(f"\n{len(verdicts)} cases in {time.monotonic() - start:.0f} s")
     for verdict in verdicts:
         if verdict.outcome not in GOOD or options.case:

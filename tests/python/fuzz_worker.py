@@ -14,12 +14,42 @@ import resource
 import sys
 import tempfile
 import traceback
+from pathlib import Path
 from typing import NoReturn, TextIO
 
 LOAD_LIMIT_S = 1.5
 """Less than the default, which would make thousands of cases take hours."""
 
 OUTCOMES = ("rendered", "warned", "refused", "wrong")
+
+
+def read(case: Path) -> tuple[str, str]:
+    """What comes of an input that is no stage, by its name (``fuzz_inputs``)."""
+    import wavecomb
+    from wavecomb.costs import load_costs
+    from wavecomb.merge import merge
+    from wavecomb.scenes import SceneError
+    from wavecomb.scenes.meshfile import load_dragon
+
+    stage = case.with_name("stage.usda")
+    small = {"size": (8, 8), "spp": 1, "threads": 1}
+    if case.name.startswith("mesh."):
+        try:
+            load_dragon(case)
+        except SceneError as error:
+            line = str(error)
+            return ("refused" if line and "\n" not in line else "wrong"), line
+    elif case.name == "case.ckpt":
+        wavecomb.render(stage, size=(8, 8), spp=2, threads=1, resume=case)
+    elif case.name == "case.exr":
+        try:
+            merge([case, case.with_name("good.exr")])
+        except OSError as error:  # as it says; the command makes a line of it
+            line = str(error)
+            return ("refused" if line and "\n" not in line else "wrong"), line
+    else:
+        wavecomb.render(stage, policy="adaptive", costs=load_costs(case), **small)
+    return "rendered", ""
 
 
 def judge(stage: str) -> tuple[str, str]:
@@ -31,6 +61,8 @@ def judge(stage: str) -> tuple[str, str]:
     from wavecomb.errors import WavecombError
 
     try:
+        if not Path(stage).name.startswith("stage."):
+            return read(Path(stage))
         loaded = wavecomb.load(stage, threads=1, size=(8, 8))
         picture = wavecomb.render(loaded, size=(8, 8), spp=1, threads=1, max_depth=3)
     except (WavecombError, _core.Error) as error:
@@ -48,6 +80,33 @@ def judge(stage: str) -> tuple[str, str]:
         return "wrong", "\n".join(["the picture is not finite", *lines])
     told = [*loaded.report.warnings, *loaded.scene.warnings]
     return ("warned" if told else "rendered"), "; ".join(lines)
+
+
+def watch_writes(inside: str) -> list[str]:
+    """The paths outside of a folder that Python writes to from now on."""
+    written: list[str] = []
+    writing = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
+
+    def hook(event: str, arguments: tuple[object, ...]) -> None:
+        if event == "open":
+            path, _, flags = arguments
+            if not isinstance(path, (str, bytes)) or not (int(str(flags or 0)) & writing):
+                return
+            paths: tuple[object, ...] = (path,)
+        elif event in ("os.rename", "os.link", "os.symlink"):
+            paths = arguments[:2]
+        elif event in ("os.mkdir", "os.remove", "os.rmdir", "os.truncate"):
+            paths = arguments[:1]
+        else:
+            return
+        for path in paths:
+            if isinstance(path, (str, bytes)):
+                name = os.path.realpath(os.fsdecode(path))
+                if not name.startswith((inside + "/", "/dev/", "/proc/")):
+                    written.append(f"{event} {name}")
+
+    sys.addaudithook(hook)
+    return written
 
 
 def give_up(answers: TextIO, line: str) -> NoReturn:
@@ -72,11 +131,15 @@ def main() -> None:
     patience.on_end = functools.partial(give_up, answers)
     judge(sys.argv[2])  # all is imported, and no case pays for it
     with tempfile.TemporaryFile() as spilt:
+        written = watch_writes(os.path.realpath(os.path.dirname(sys.argv[2])))
         os.dup2(spilt.fileno(), 1)
         os.dup2(spilt.fileno(), 2)
         print(json.dumps({"outcome": "ready", "said": ""}), file=answers, flush=True)
         for line in sys.stdin:
             outcome, said = judge(line.rstrip("\n"))
+            if written:
+                outcome, said = "wrong", f"outside of its folder: {'; '.join(written)}"
+                written.clear()
             sys.stdout.flush()
             sys.stderr.flush()
             if os.fstat(1).st_size:

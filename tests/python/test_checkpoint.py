@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -361,49 +359,6 @@ def test_a_timed_render_is_not_resumed_without_end(stage: Path, tmp_path: Path) 
         f"error: {file}: is of a render that a time limit was to end: give --time-limit or --spp\n"
     )
     invoke(stage, "-o", out, "--resume", file, "--time-limit", 0.1)
-
-
-def kill_and_resume(stage: Path, folder: Path, kills: int, seed: int) -> None:
-    """Kills a render again and again, then lets it end."""
-    rng = random.Random(seed)
-    out, whole, file = folder / "a.exr", folder / "whole.exr", folder / "a.ckpt"
-    settings: list[Any] = ["--noise", 0.004, "--max-spp", 2048]
-    assert run(stage, "-o", whole, *settings).returncode == 0
-    killed = 0
-    while killed < kills:
-        start = ["--resume", file] if file.exists() else ["--checkpoint", file]
-        process = subprocess.Popen(
-            command(stage, "-o", out, *settings, *start, "--every", 0.01, "--quiet"),
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        time.sleep(rng.uniform(0.3, 1.5))
-        process.kill()
-        _, errors = process.communicate()
-        assert process.returncode in (0, -signal.SIGKILL), errors
-        killed += process.returncode != 0
-        if file.exists():
-            load_checkpoint(file)
-        if out.exists():  # it was done before it was killed: begin again
-            assert list(read_layers(out)) == list(read_layers(whole))
-            out.unlink()
-            file.unlink()
-    start = ["--resume", file] if file.exists() else ["--checkpoint", file]
-    done = run(stage, "-o", out, *settings, *start)
-    assert done.returncode == 0, done.stderr
-    first, second = read_layers(whole), read_layers(out)
-    for layer, pixels in first.items():
-        assert pixels.tobytes() == second[layer].tobytes(), layer
-    assert sorted(os.listdir(folder)) == ["a.ckpt", "a.exr", "whole.exr"], "nothing is left over"
-
-
-def test_kill(stage: Path, tmp_path: Path) -> None:
-    kill_and_resume(stage, tmp_path, 4, seed=1)
-
-
-@pytest.mark.slow
-def test_kill_a_hundred_times(stage: Path, tmp_path: Path) -> None:
-    kill_and_resume(stage, tmp_path, 100, seed=2)
 
 
 def test_a_disk_that_is_full_does_not_end_a_render(cornell: Any, tmp_path: Path) -> None:

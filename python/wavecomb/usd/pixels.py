@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Ar
 
+from wavecomb.files import problem_of
 from wavecomb.isolate import trail
 from wavecomb.machine import usable_cores
 
@@ -168,7 +169,7 @@ def _read_file(path: str, stamp: Stamp | None, header_only: bool = False) -> Ima
     source = oiio.ImageInput.open(path, config)
     if source is None:
         trail.note("", "", "image")
-        raise TextureError(" ".join(oiio.geterror().split()) or "not a known image file")
+        raise TextureError(" ".join(problem_of(oiio).split()) or "not a known image file")
     try:
         spec = source.spec()
         channels = min(spec.nchannels, 4)
@@ -187,7 +188,7 @@ def _read_file(path: str, stamp: Stamp | None, header_only: bool = False) -> Ima
         ask = oiio.TypeDesc(oiio.UINT8 if base == oiio.UINT8 else oiio.FLOAT)
         pixels = source.read_image(0, 0, 0, channels, ask)
         if pixels is None:
-            raise TextureError(" ".join(source.geterror().split()) or "it cannot be read")
+            raise TextureError(" ".join(problem_of(source).split()) or "it cannot be read")
     finally:
         source.close()
         trail.note("", "", "image")
