@@ -59,8 +59,11 @@ def describe(error: Exception) -> str:
     core = sys.modules.get("wavecomb._core")
     if isinstance(error, WavecombError) or (core is not None and isinstance(error, core.Error)):
         return str(error)
-    if isinstance(error, MemoryError):
-        return "out of memory; choose a smaller --size or a simpler stage"
+    no_threads = isinstance(error, RuntimeError) and "start new thread" in str(error)
+    if isinstance(error, MemoryError) or no_threads:
+        from wavecomb.isolate.memory import describe_limit
+
+        return f"out of memory; choose a smaller --size or a simpler stage{describe_limit()}"
     if isinstance(error, OSError):
         if error.filename is not None and error.strerror:
             return f"{os.fspath(error.filename)}: {error.strerror}"

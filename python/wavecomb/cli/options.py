@@ -65,8 +65,23 @@ def _set_load_limit(
     patience.limit_s = value
 
 
+def _limit_memory(context: click.Context, parameter: click.Parameter, value: float | None) -> None:
+    from wavecomb.isolate import memory
+
+    if not context.resilient_parsing:
+        memory.limit(value)
+
+
 def isolate_option(command: F) -> F:
-    """--isolate, for commands that read what others wrote."""
+    """--isolate and --memory-limit, for commands that read what others wrote."""
+    command = click.option(
+        "--memory-limit",
+        type=Real(0, above=True),
+        metavar="MB",
+        expose_value=False,
+        callback=_limit_memory,
+        help="Memory that the child process may take.  [default: what the machine has]",
+    )(command)
     return click.option(
         "--isolate",
         type=click.Choice(["auto", "on", "off"]),

@@ -14,8 +14,10 @@ import os
 import signal
 import sys
 import threading
+from typing import Any
 
 from wavecomb.isolate import trail
+from wavecomb.isolate.memory import limit_of
 
 _PASSED_ON = (
     signal.SIGINT,
@@ -27,9 +29,15 @@ _PASSED_ON = (
 )
 _WATCHED = {*_PASSED_ON, signal.SIGTSTP, signal.SIGCONT, signal.SIGCHLD}
 _PR_SET_PDEATHSIG = 1
-CHATTER = ("libpng ", "failed call to posix_madvise", "UnicodeDecodeError: 'utf-8'")
+CHATTER = (
+    "libpng ",
+    "failed call to posix_madvise",
+    "UnicodeDecodeError: 'utf-8'",
+)
 """What libraries print of files that they refuse, and USD of names that are no text; a warning
 says it better."""
+_NO_VALUE = "No to_python (by-value) converter"
+"""What Boost.Python prints of a value that USD could not read."""
 
 
 def is_wise() -> bool:
@@ -82,6 +90,7 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
     if os.getppid() != parent:
         os._exit(2)
     trail.follow(page)
+    sys.excepthook = _print_exception
     # What is said in Python goes where it always went; what libraries write is kept for later.
     stderr = sys.stderr
     own = os.dup(2)
@@ -93,6 +102,11 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
         line_buffering=True,
         write_through=True,
     )
+
+
+def _print_exception(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    if not str(error).startswith(_NO_VALUE):
+        sys.__excepthook__(kind, error, trace)
 
 
 def _wait(child: int) -> tuple[int, set[int]]:
@@ -121,7 +135,8 @@ def _end(status: int, sent: set[int], page: int, words: int) -> None:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _WATCHED)
         os.kill(os.getpid(), -code)
     if code < 0:
-        line = trail.obituary(-code, trail.read(trail.open_page(page)), text)
+        seen = trail.open_page(page)
+        line = trail.obituary(-code, trail.read(seen), text, limit_of(seen))
         os.write(2, f"error: {' '.join(line.split())}\n".encode(errors="replace"))
         os._exit(2)
     rest = [line for line in text.splitlines(keepends=True) if not line.startswith(CHATTER)]

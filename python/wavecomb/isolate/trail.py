@@ -8,7 +8,7 @@ import os
 import signal
 
 _SLOT = 1024
-_SLOTS = ("at", "image")
+_SLOTS = ("at", "image", "limit")
 _page: mmap.mmap | None = None
 
 
@@ -41,7 +41,7 @@ def note(what: str, place: object = "", slot: str = "at") -> None:
     Args:
         what: As in "it crashed while ...".
         place: Prim or file.
-        slot: "at", or "image" for what a thread beside does.
+        slot: "at", "image" for what a thread beside does, or "limit" of memory in MB.
     """
     if _page is None:
         return
@@ -50,27 +50,44 @@ def note(what: str, place: object = "", slot: str = "at") -> None:
     _page[start : start + len(text)] = text
 
 
+def slot(page: mmap.mmap, name: str) -> str:
+    """What the other process noted last in a slot, "" where it noted nothing."""
+    start = _SLOT * _SLOTS.index(name)
+    return page[start : start + _SLOT].split(b"\0")[0].decode(errors="replace").strip()
+
+
 def read(page: mmap.mmap) -> str:
     """What the other process was at last, "" where it noted nothing."""
-    found = (page[_SLOT * i : _SLOT * (i + 1)].split(b"\0")[0] for i in range(len(_SLOTS)))
-    return ", ".join(text for part in found if (text := part.decode(errors="replace").strip()))
+    return ", ".join(filter(None, (slot(page, name) for name in ("at", "image"))))
 
 
-def obituary(number: int, where: str, words: str) -> str:
+_NO_MEMORY = (
+    "bad_alloc",
+    "Cannot allocate memory",
+    "Unable to allocate",
+    "Resource temporarily unavailable",
+    "ut of memory",
+)
+"""How libraries say that there was no memory, for threads too."""
+
+
+def obituary(number: int, where: str, words: str, limit: str = "") -> str:
     """One line on a process that died of a signal.
 
     Args:
         number: Of the signal.
         where: As ``read`` gave it.
         words: What its libraries wrote to stderr.
+        limit: Of its memory, in words.
     """
     try:
         name = signal.Signals(number).name
     except ValueError:
         name = f"signal {number}"
     place = f" while {where}" if where else ""
-    if "bad_alloc" in words:
-        return f"out of memory{place} ({name}): the file is damaged, or too large for this machine"
+    if any(text in words for text in _NO_MEMORY):
+        most = f"the limit of {limit}" if limit else "this machine"
+        return f"out of memory{place} ({name}): the file is damaged, or too large for {most}"
     if number == signal.SIGKILL:
         return f"killed{place} ({name}): most likely it takes more memory than there is"
     said = [line.strip() for line in words.splitlines() if line.strip()]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
-from wavecomb.isolate import trail
+from wavecomb.isolate import memory, patience, trail
 from wavecomb.usd import framing
 from wavecomb.usd.assign import Assigner, Draw, Worn
 from wavecomb.usd.attributes import on_shape
@@ -189,6 +189,8 @@ class GroupBuilder:
             self.report.warn(f"{_WORDS[kind]} left out: {error}", draw.prim.GetPath())
             return
         except (Tf.ErrorException, MemoryError) as error:
+            if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
+                raise MemoryError from error
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
             self.report.warn(f"{_WORDS[kind]} left out: {what}", draw.prim.GetPath())
             return

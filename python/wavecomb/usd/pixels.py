@@ -6,7 +6,8 @@ from __future__ import annotations
 import os
 import tempfile
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
+"""Of memory that decoding one image takes."""
 
 
 Stamp = tuple[int, int]
@@ -123,15 +125,46 @@ def _read(path: str, header_only: bool) -> Image:
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise TextureError("no such file in the package")
-    data = bytes(asset.GetBuffer())
-    suffix = Path(Ar.SplitPackageRelativePathInner(path)[1]).suffix
-    descriptor, name = tempfile.mkstemp(suffix=suffix, prefix="wavecomb-")
+    with _unpacked(asset.GetBuffer(), Ar.SplitPackageRelativePathInner(path)[1]) as name:
+        return _read_file(name, stamp, header_only, path)
+
+
+_BY_ENDING = (".jp2", ".j2k", ".j2c", ".jph")
+"""Kinds that OpenImageIO tells by the name only."""
+
+
+@contextmanager
+def _unpacked(data: Any, name: str) -> Iterator[str]:
+    """A file with the content of one in a package, by a name that it has while this lasts.
+
+    It is in memory and has no name in any folder: whatever ends this process, nothing is left.
+    """
+    ending = Path(name).suffix.lower()
+    if ending not in _BY_ENDING and hasattr(os, "memfd_create"):
+        descriptor = os.memfd_create("wavecomb-image", os.MFD_CLOEXEC)
+        try:
+            _write_all(descriptor, data)
+            yield f"/proc/self/fd/{descriptor}"
+        finally:
+            os.close(descriptor)
+        return
+    # The ending is one of ours: a package may call its files as it likes.
+    ending = ending if ending in _BY_ENDING else ""
+    descriptor, file = tempfile.mkstemp(suffix=ending, prefix="wavecomb-")
     try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-        return _read_file(name, stamp, header_only)
+        try:
+            _write_all(descriptor, data)
+        finally:
+            os.close(descriptor)
+        yield file
     finally:
-        os.unlink(name)
+        os.unlink(file)
+
+
+def _write_all(descriptor: int, data: Any) -> None:
+    rest = memoryview(data or b"")
+    while len(rest):
+        rest = rest[os.write(descriptor, rest) :]
 
 
 _WRAP_WORDS = {"periodic": "repeat"} | {w: w for w in ("black", "clamp", "repeat", "mirror")}
@@ -158,11 +191,14 @@ def _encoded(spec: Any) -> bool | None:
     return True if spec.getattribute("Exif:ColorSpace") == 1 or "sRGB" in profile else None
 
 
-def _read_file(path: str, stamp: Stamp | None, header_only: bool = False) -> Image:
+def _read_file(
+    path: str, stamp: Stamp | None, header_only: bool = False, called: str | None = None
+) -> Image:
+    """``called``: the file in messages."""
     # Not before an image is read: the library takes 30 MB as soon as it is loaded.
     import OpenImageIO as oiio
 
-    trail.note("decoding", path, "image")
+    trail.note("decoding", called or path, "image")
     # Colours as stored: not multiplied by alpha.
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
@@ -179,24 +215,66 @@ def _read_file(path: str, stamp: Stamp | None, header_only: bool = False) -> Ima
         )
         if spec.width < 1 or spec.height < 1 or channels < 1:
             raise TextureError("it has no pixels")
-        size = spec.width * spec.height * channels * np.dtype(dtype).itemsize
+        known = oiio.UINT8, oiio.HALF
+        ask = oiio.TypeDesc(base if base in known else oiio.FLOAT)
+        size = _decoding_bytes(spec, channels, np.dtype(dtype).itemsize, ask.basesize())
         if max(spec.width, spec.height) > MAX_SIDE or size > MAX_BYTES or spec.depth > 1:
             raise TextureError(f"{spec.width} x {spec.height} is too large")
         if header_only:
             nothing = np.broadcast_to(np.zeros(1, dtype), (spec.height, spec.width, channels))
             return Image(nothing, stamp, _wraps(spec), _encoded(spec))
-        ask = oiio.TypeDesc(oiio.UINT8 if base == oiio.UINT8 else oiio.FLOAT)
-        pixels = source.read_image(0, 0, 0, channels, ask)
+        pixels = _decoded(source, spec, channels, dtype, ask)
         if pixels is None:
             raise TextureError(" ".join(problem_of(source).split()) or "it cannot be read")
     finally:
         source.close()
         trail.note("", "", "image")
-    pixels = np.asarray(pixels).reshape(spec.height, spec.width, channels)
+    return Image(pixels, stamp, _wraps(spec), _encoded(spec))
+
+
+_BAND = 64
+"""Rows that are converted at a time, where the library's type is not ours."""
+
+
+def _decoding_bytes(spec: Any, channels: int, itemsize: int, asked: int) -> int:
+    """Memory that decoding takes at most: what the library may hold, what it gives, what we keep.
+
+    Args:
+        spec: Of the file.
+        channels: That we keep.
+        itemsize: Of our values, bytes.
+        asked: Of those that the library gives.
+    """
+    pixels = int(spec.width) * int(spec.height)
+    held = spec.pixel_bytes(True) + channels * itemsize
+    if itemsize != asked and spec.tile_width:
+        held += channels * asked
+    return pixels * held
+
+
+def _decoded(source: Any, spec: Any, channels: int, dtype: Any, ask: Any) -> NDArray[Any] | None:
+    """The pixels as they are kept, finite; None where the library cannot read them."""
+    shape = spec.height, spec.width, channels
+    if np.dtype(dtype).itemsize == ask.basesize() or spec.tile_width:
+        pixels = source.read_image(0, 0, 0, channels, ask)
+        if pixels is None:
+            return None
+        return _finite(np.asarray(pixels).reshape(shape), dtype)
+    kept = np.empty(shape, dtype)
+    for row in range(0, spec.height, _BAND):
+        end = min(row + _BAND, spec.height)
+        band = source.read_scanlines(spec.y + row, spec.y + end, 0, 0, channels, ask)
+        if band is None:
+            return None
+        kept[row:end] = _finite(np.asarray(band).reshape(end - row, *shape[1:]), dtype)
+    return kept
+
+
+def _finite(pixels: NDArray[Any], dtype: Any) -> NDArray[Any]:
     if pixels.dtype != np.uint8:
         limit = 65504.0 if dtype == np.float16 else 3.4e38
         pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=limit, neginf=-limit)
-    return Image(np.ascontiguousarray(pixels, dtype), stamp, _wraps(spec), _encoded(spec))
+    return np.ascontiguousarray(pixels, dtype)
 
 
 class ReadAhead:

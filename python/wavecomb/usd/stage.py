@@ -16,6 +16,7 @@ from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.isolate import trail
+from wavecomb.isolate.memory import describe_limit
 from wavecomb.usd import mtlx
 from wavecomb.usd.camera import camera_motion, frame_planes, frame_points, read_camera
 from wavecomb.usd.diagnostics import NOT_TEXT, captured, commentary
@@ -241,7 +242,9 @@ def load_stage(
         except Tf.ErrorException as error:
             raise WavecombError(f"{file}: USD cannot read it: {commentary(error)}") from None
         except MemoryError:
-            raise WavecombError(f"{file}: out of memory while it was read") from None
+            raise WavecombError(
+                f"{file}: out of memory while it was read{describe_limit()}"
+            ) from None
         finally:
             textures.release()
         trail.note("building the scene of", file)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdShade
 
 from wavecomb.errors import WavecombError
+from wavecomb.isolate import memory
 from wavecomb.usd.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.halve import halve
 from wavecomb.usd.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
@@ -236,6 +237,8 @@ class TextureTable:
             try:
                 found = self._known(path) or self._ahead.read(path)
             except (TextureError, MemoryError, OSError, ValueError) as error:
+                if memory.ran_out(error, int):
+                    raise
                 found = TextureError(str(error) or "out of memory")
             self._images[path] = found
         if isinstance(found, TextureError):

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``--memory-limit``: bombs end the child, in one line, and not the machine."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from parts import only_where
+from pxr import Usd, UsdGeom, Vt
+
+from wavecomb.isolate import memory
+
+pytestmark = only_where(sys.platform == "linux", "the limit is Linux's")
+
+LIMIT_MB = 400
+
+
+def run(*words: object, limit: float = LIMIT_MB) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "wavecomb", *map(str, words), "--memory-limit", str(limit)],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+def packed_indices(folder: Path) -> list[object]:
+    """400 MB of indices in 130 KB."""
+    stage = Usd.Stage.CreateNew(str(folder / "bomb.usdc"))
+    mesh = UsdGeom.Mesh.Define(stage, "/M")
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.zeros((3, 3), np.float32)))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(1, 3, np.int32)))
+    zeros = np.broadcast_to(np.zeros(1, np.int32), 100_000_000)
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(zeros)))
+    stage.Save()
+    assert (folder / "bomb.usdc").stat().st_size < 200_000
+    return ["render", folder / "bomb.usdc", "-o", folder / "o.exr"]
+
+
+def packed_texture(folder: Path) -> list[object]:
+    """320 MB of pixels in a few MB."""
+    spec = oiio.ImageSpec(9000, 9000, 4, "uint8")
+    output = oiio.ImageOutput.create(str(folder / "t.tif"))
+    spec.attribute("compression", "zip")
+    assert output.open(str(folder / "t.tif"), spec)
+    band = np.zeros((1000, 9000, 4), np.uint8)
+    for row in range(0, 9000, 1000):
+        assert output.write_scanlines(row, row + 1000, 0, band)
+    output.close()
+    (folder / "s.usda").write_text(
+        '#usda 1.0\ndef DomeLight "D" {\n    asset inputs:texture:file = @t.tif@\n}\n'
+        'def Sphere "S" {\n    double radius = 1\n}\n'
+    )
+    return ["render", folder / "s.usda", "-o", folder / "o.exr"]
+
+
+def large_picture(folder: Path) -> list[object]:
+    """A small stage whose film is too large."""
+    (folder / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
+    return ["render", folder / "s.usda", "-o", folder / "o.exr", "--size", 6000, 6000]
+
+
+def large_merge(folder: Path) -> list[object]:
+    """Pictures of 190 MB each, in a few KB."""
+    for name in "ab":
+        spec = oiio.ImageSpec(4000, 4000, 3, "float")
+        spec.attribute("compression", "zip")
+        spec.attribute("wavecomb:settings", '{"width": 4000, "height": 4000, "seed": 1}')
+        spec.attribute("wavecomb:seeds", f"[{ord(name)}]")
+        output = oiio.ImageOutput.create(str(folder / f"{name}.exr"))
+        assert output.open(str(folder / f"{name}.exr"), spec)
+        for row in range(0, 4000, 1000):
+            output.write_scanlines(row, row + 1000, 0, np.zeros((1000, 4000, 3), np.float32))
+        output.close()
+    return ["merge", folder / "a.exr", folder / "b.exr", "-o", folder / "o.exr"]
+
+
+@pytest.mark.parametrize("bomb", [packed_indices, packed_texture, large_picture, large_merge])
+def test_bombs_are_one_line(tmp_path: Path, bomb: Callable[[Path], list[object]]) -> None:
+    command = bomb(tmp_path)
+    before = sorted(os.listdir(tmp_path))
+    done = run(*command)
+    lines = done.stderr.strip().splitlines()
+    assert done.returncode == 2 and len(lines) == 1, done.stderr
+    assert lines[0].startswith("error: ") and "emory" in lines[0], done.stderr
+    assert f"{LIMIT_MB} MB (--memory-limit)" in lines[0]
+    assert sorted(os.listdir(tmp_path)) == before
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1.4e6  # KB
+
+
+def test_a_sound_stage_fits(tmp_path: Path) -> None:
+    (tmp_path / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
+    done = run("info", tmp_path / "s.usda")
+    assert done.returncode == 0, done.stderr
+
+
+def test_what_a_limit_cannot_be(tmp_path: Path) -> None:
+    done = run("info", tmp_path / "s.usda", limit=5)
+    assert (done.returncode, done.stderr) == (
+        2, "error: memory limit 5 MB: give at least 256 MB\n",
+    )  # fmt: skip
+    done = run("info", tmp_path / "s.usda", "--isolate", "off")
+    assert done.returncode == 2 and "leave --isolate off out" in done.stderr
+
+
+def test_the_machine_s_limit_is_that_of_its_group(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = memory.memory_bytes()
+    assert machine is not None and 0 < memory.machine_limit() <= machine
+    group = tmp_path / "a" / "b"
+    group.mkdir(parents=True)
+    (group / "memory.max").write_text("max\n")
+    (tmp_path / "a" / "memory.max").write_text("300000000\n")
+    monkeypatch.setattr(memory, "_CGROUP", tmp_path)
+    read = Path.read_text
+    monkeypatch.setattr(
+        Path, "read_text",
+        lambda p, **k: "0::/a/b\n" if str(p) == "/proc/self/cgroup" else read(p, **k),
+    )  # fmt: skip
+    assert memory.machine_limit() == 300_000_000
+
+
+def test_a_damaged_value_is_not_taken_for_a_bomb(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory.trail, "is_expendable", lambda: True)
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (10**10, 10**10))
+    error = ValueError("exception thrown unpacking a value, returning an empty VtValue")
+    assert not memory.ran_out(error, lambda: 100_000)
+    assert memory.ran_out(error, lambda: 2_000_000)
+    assert not memory.ran_out(ValueError("other"), lambda: 2_000_000)
+    assert memory.ran_out(MemoryError(), int)
