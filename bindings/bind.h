@@ -8,6 +8,7 @@
 
 #include "wavecomb/scene/scene.h"
 
+void bind_threads(nanobind::module_& m);
 void bind_scene(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_graphs(nanobind::module_& m);

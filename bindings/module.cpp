@@ -14,6 +14,7 @@ NB_MODULE(_core, m) {
   nb::set_leak_warnings(false);
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_scene(m);
+  bind_threads(m);
   bind_geometry(m);
   bind_graphs(m);
   bind_recording(m);

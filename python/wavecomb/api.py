@@ -200,8 +200,9 @@ def load(
     subdivision: str | int = "auto",
     size: tuple[int, int] = (600, 600),
     progress: Callable[[int, int], None] | None = None,
-    isolate: bool = False,
+    isolate: bool | None = None,
     load_limit: float | None = None,
+    memory_limit: float | None = None,
     shutter: tuple[float, float] | None = None,
     motion_blur: bool | None = None,
     motion_steps: int | None = None,
@@ -233,9 +234,11 @@ def load(
         progress: Called now and then as progress(prims read, prims found so far).
         isolate: Reads the stage in a process of its own first. Where USD or an image library
             crashes on a broken file, that process dies, and this one gets the exception. It takes
-            as long as loading, and 0.3 s; for files that you do not trust.
+            as long as loading, and 0.3 s; for files that you do not trust. It is in a sandbox
+            (docs/decisions/sandbox.md). By default where WAVECOMB_ISOLATE=1 is set.
         load_limit: With ``isolate``: seconds that USD may compose the stage, 0: any; None: 6, and 1
             for each MB of layers.
+        memory_limit: With ``isolate``: MB that the process may take; None: what the machine has.
         shutter: When it opens and closes, time codes from the frame; by default the camera's.
         motion_blur: Whether what moves while the shutter is open is blurred; by default unless the
             render settings disable it.
@@ -286,10 +289,10 @@ def load(
         "working_space": working_space,
         "lights": lights,
     }
-    if isolate:
+    if isolate or (isolate is None and os.environ.get("WAVECOMB_ISOLATE", "0") not in ("", "0")):
         from wavecomb.isolate.probe import check
 
-        check(Path(path), options, load_limit)
+        check(Path(path), options, load_limit, memory_limit)
     return load_stage(Path(path), progress=progress, **options)
 
 

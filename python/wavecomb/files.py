@@ -4,11 +4,41 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
+import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+
+class Publisher(Protocol):
+    """Who gives files their names where this process may not."""
+
+    def is_own(self, target: Path) -> bool:
+        """Whether a file is in a folder that this process may do anything in."""
+
+    def part_of(self, target: Path) -> Path:
+        """Where to write what is to be a file."""
+
+    def check(self, target: Path) -> None:
+        """Raises OSError unless the file could be written now."""
+
+    def publish(self, part: Path, target: Path, *, durable: bool) -> None:
+        """Gives what was written its name."""
+
+
+publisher: Publisher | None = None
+
+
+def _publisher_of(target: Path) -> Publisher | None:
+    return None if publisher is None or publisher.is_own(target) else publisher
+
+
+def private_name(pid: int) -> str:
+    """Folder beside its outputs that a process in a sandbox writes to."""
+    return f".wavecomb.{pid}.part"
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
@@ -66,27 +96,40 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     To be called before long work: writes and removes an empty temporary file.
     """
     target = _target(path)
-    part = _part(target)
+    other = _publisher_of(target)
     try:
+        if other is not None:
+            other.check(target)
+            return
+        part = _part(target)
         # There may be one: in a container each process can have the number of one that was killed.
         part.open("wb").close()
         part.unlink()
     except OSError as error:
-        raise OSError(f"{os.fspath(path)}: cannot be written: {reason(error)}") from error
+        why = reason(error)
+        if other is not None and "cannot be written: " in why:
+            raise OSError(why.replace(os.fspath(target), os.fspath(path))) from error
+        raise OSError(f"{os.fspath(path)}: cannot be written: {why}") from error
 
 
-def _remove_leftovers(target: Path) -> None:
+def remove_leftovers(target: Path) -> None:
     """Removes temporary files of ``target`` whose process is no more: it was killed."""
-    start, end = _prefix(target), f".part{target.suffix}"
+    ends = [(_prefix(target), f".part{target.suffix}"), (".wavecomb.", ".part")]
     for other in target.parent.iterdir():
-        pid = other.name[len(start) : -len(end)]
-        if not (other.name.startswith(start) and other.name.endswith(end) and pid.isdecimal()):
+        for start, end in ends:
+            pid = other.name[len(start) : -len(end)]
+            if other.name.startswith(start) and other.name.endswith(end) and pid.isdecimal():
+                break
+        else:
             continue
         try:
             os.kill(int(pid), 0)
         except ProcessLookupError:
             with contextlib.suppress(OSError):
-                other.unlink()
+                if end == ".part" and other.is_dir() and not other.is_symlink():
+                    shutil.rmtree(other)
+                else:
+                    other.unlink()
         except (OSError, OverflowError):
             pass  # it lives, and is another user's
 
@@ -98,6 +141,28 @@ def _sync(path: Path) -> None:
         os.fsync(number)
     finally:
         os.close(number)
+
+
+def publish(part: Path, target: Path, *, durable: bool = False) -> None:
+    """Gives what was written its name; on another file system by a copy beside it."""
+    if durable:
+        _sync(part)
+    try:
+        os.replace(part, target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        beside = _part(target)
+        try:
+            shutil.copyfile(part, beside)
+            if durable:
+                _sync(beside)
+            os.replace(beside, target)
+        finally:
+            with contextlib.suppress(OSError):
+                beside.unlink()
+    if durable:
+        _sync(target.parent)
 
 
 @contextlib.contextmanager
@@ -115,15 +180,16 @@ def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterato
     ...     _ = part.write_text("42")
     """
     target = _target(path)
-    part = _part(target)
+    other = _publisher_of(target)
+    part = _part(target) if other is None else other.part_of(target)
     try:
-        _remove_leftovers(target)
+        if other is None:
+            remove_leftovers(target)
         yield part
-        if durable:
-            _sync(part)
-        os.replace(part, target)
-        if durable:
-            _sync(target.parent)
+        if other is None:
+            publish(part, target, durable=durable)
+        else:
+            other.publish(part, target, durable=durable)
     except OSError as error:
         if error.errno is None:
             raise

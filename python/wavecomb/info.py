@@ -55,6 +55,47 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
     }
 
 
+def machine_info() -> dict[str, Any]:
+    """What this machine has for a render, as plain data."""
+    from wavecomb import _core
+    from wavecomb.isa import library_info
+    from wavecomb.isolate import box
+    from wavecomb.isolate.memory import machine_limit
+    from wavecomb.machine import memory_bytes, usable_cores
+
+    return {
+        "cores": usable_cores(),
+        "memory_bytes": memory_bytes(),
+        "memory_limit_bytes": machine_limit(),
+        "native": library_info(),
+        "texture_store": {"obstacle": _core.TextureStore.obstacle() or None},
+        "sandbox": box.describe(),
+    }
+
+
+def machine_lines(info: dict[str, Any]) -> list[str]:
+    """The same for people."""
+    from wavecomb.isa import library_text
+
+    memory, limit = info["memory_bytes"], info["memory_limit_bytes"]
+    sandbox = info["sandbox"]
+    if sandbox["landlock"]:
+        files = f"Landlock {sandbox['landlock']}: writes outputs, reads what the stage names"
+        files += "; no TCP" if sandbox["tcp"] else ""
+    else:
+        files = "files are not kept"
+    calls = "no sockets, no programs" if sandbox["seccomp"] else "system calls are not kept"
+    has, may = (memory or 0) / 1e9, (limit or 0) / 1e9
+    lines = [
+        f"cores          {info['cores']}",
+        f"memory         {has:.1f} GB; a child may take {may:.1f} GB",
+        f"native         {library_text()}",
+        f"texture limit  {info['texture_store']['obstacle'] or 'by a store'}",
+        f"sandbox        {files}; {calls}",
+    ]
+    return lines + [f"  not there    {line}" for line in sandbox["lacks"]]
+
+
 def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> None:
     """The same for people."""
     from rich.markup import escape

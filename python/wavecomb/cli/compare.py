@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import Real, examples, isolate_option
+from wavecomb.cli.sandbox import enter_to_read
 
 _METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")
 _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
@@ -99,6 +100,7 @@ def compare_command(
     Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different,
     2 an error.
     """
+    enter_to_read((a, b, variance_a, variance_b), (heatmap,))
     from wavecomb.compare import compare
     from wavecomb.errors import WavecombError
     from wavecomb.files import check_writable

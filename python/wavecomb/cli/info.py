@@ -12,7 +12,7 @@ from wavecomb.cli.options import (
     StageOptions,
     examples,
     isolation_options,
-    stage_options,
+    optional_stage,
     stage_warnings,
     warn,
 )
@@ -23,16 +23,29 @@ from wavecomb.cli.options import (
     epilog=examples(
         "wavecomb info shot.usd",
         "wavecomb info shot.usd --json | jq .triangles",
+        "wavecomb info --machine",
     ),
 )
-@stage_options
+@optional_stage
 @isolation_options
+@click.option("--machine", is_flag=True, help="Say what this machine has, and lacks; no STAGE.")
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
-def info_command(stage: str, as_json: bool, **options: Any) -> None:
+def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any) -> None:
     """Say what would be rendered of STAGE, and what would not."""
+    if machine:
+        if stage is not None:
+            raise click.UsageError("--machine is of no STAGE")
+        _say_machine(as_json)
+        return
+    if stage is None:
+        raise click.UsageError("Missing argument 'STAGE'.")
     from wavecomb.info import print_info, stage_info
+    from wavecomb.isolate import box
+    from wavecomb.isolate.broker import Outputs
 
-    loaded = StageOptions.take(options).load(stage)
+    source = StageOptions.take(options)
+    box.enter(Outputs())
+    loaded = source.load(stage)
     info = stage_info(loaded, stage)
     if as_json:
         click.echo(json.dumps(info, indent=2))
@@ -41,3 +54,10 @@ def info_command(stage: str, as_json: bool, **options: Any) -> None:
 
     warn(stage_warnings(loaded))
     print_info(info, loaded, Console(emoji=False))
+
+
+def _say_machine(as_json: bool) -> None:
+    from wavecomb.info import machine_info, machine_lines
+
+    info = machine_info()
+    click.echo(json.dumps(info, indent=2) if as_json else "\n".join(machine_lines(info)))

@@ -72,8 +72,23 @@ def _limit_memory(context: click.Context, parameter: click.Parameter, value: flo
         memory.limit(value)
 
 
+def _ask_sandbox(context: click.Context, parameter: click.Parameter, value: str) -> None:
+    from wavecomb.isolate import box
+
+    box.ask(mode=value)
+
+
 def isolate_option(command: F) -> F:
-    """--isolate and --memory-limit, for commands that read what others wrote."""
+    """--isolate, --sandbox and --memory-limit, for commands that read what others wrote."""
+    command = click.option(
+        "--sandbox",
+        type=click.Choice(["auto", "on", "off"]),
+        default="auto",
+        expose_value=False,
+        callback=_ask_sandbox,
+        help="What the child may do: read what the stage names, write its outputs; no network, no "
+        "programs.  [default: auto: as far as this system can; on: all of it, or an error]",
+    )(command)
     command = click.option(
         "--memory-limit",
         type=Real(0, above=True),
@@ -220,6 +235,15 @@ def stage_options(command: F) -> F:
         click.argument("stage", type=click.Path()),
     ):
         command = option(command)
+    return command
+
+
+def optional_stage(command: Any) -> Any:
+    """``stage_options`` with a stage that may be left out."""
+    command = stage_options(command)
+    for parameter in command.__click_params__:
+        if parameter.name == "stage":
+            parameter.required = False
     return command
 
 

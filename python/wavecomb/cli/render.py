@@ -16,6 +16,7 @@ from wavecomb.cli.options import Real, StageOptions, examples, isolation_options
 from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
+from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
@@ -203,6 +204,8 @@ def render_command(
     purpose = PurposeOptions.take(options)
     layers = AovOptions.take(options)
     costs_file = costs if costs is not None and costs not in SOURCES else None
+    written = (output, png, stats_file, costs_file, purpose.preview, purpose.checkpoint_file)
+    enter_to_render(written, output, output_dir, frames, split=layers.split, gpu=purpose.denoise)
 
     def checked(names: Names, plan: Plan | None = None) -> tuple[float, ...] | None:
         """The frames of a sequence; what can be known to fail fails here."""

@@ -7,19 +7,10 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import StageOptions, examples, stage_options
+from wavecomb.cli.options import StageOptions, examples, optional_stage
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 _INTEGERS = click.IntRange(min=0)
-
-
-def _optional_stage(command: Any) -> Any:
-    """``stage_options`` with a stage that may be left out."""
-    command = stage_options(command)
-    for parameter in command.__click_params__:
-        if parameter.name == "stage":
-            parameter.required = False
-    return command
 
 
 @click.command(
@@ -30,7 +21,7 @@ def _optional_stage(command: Any) -> Any:
         "wavecomb view shot.usd --variant '/World/Car{paint}=red' --policy adaptive",
     ),
 )
-@_optional_stage
+@optional_stage
 @click.option(
     "--size",
     nargs=2,

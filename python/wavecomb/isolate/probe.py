@@ -1,34 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a stage in a process of its own, so that a crash hits that and not the caller.
 
-``check`` is the caller's side. ``python -m wavecomb.isolate.probe``, the process, opens and
+``check`` is the caller's side. ``python -m wavecomb.isolate.probe``, the process, which is in the
+sandbox, opens and
 composes a stage, reads every array and decodes every image, builds nothing, and answers.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.isolate import patience, trail
+from wavecomb.isolate import box, memory, patience, trail
+from wavecomb.isolate.broker import Outputs
 
 
-def check(path: Path, options: dict[str, Any], load_limit: float | None = None) -> None:
+def check(
+    path: Path,
+    options: dict[str, Any],
+    load_limit: float | None = None,
+    memory_limit: float | None = None,
+) -> None:
     """Raises WavecombError where a stage cannot be read, or would crash who reads it.
 
     Args:
         path: The stage's file.
         options: Keyword arguments of ``wavecomb.usd.load_stage``.
         load_limit: As of ``wavecomb.load``.
+        memory_limit: Likewise.
     """
     page = trail.new_page()
+    temporary = None
+    with contextlib.suppress(OSError):
+        temporary = tempfile.mkdtemp(prefix="wavecomb-", dir=box.temporary_folder())
     try:
-        job = {"path": os.fspath(path), "options": options, "page": page, "limit": load_limit}
+        job = {
+            "path": os.fspath(path), "options": options, "page": page, "limit": load_limit,
+            "memory": memory_limit, "temporary": temporary,
+        }  # fmt: skip
         done = subprocess.run(
             [sys.executable, "-m", "wavecomb.isolate.probe"],
             input=json.dumps(job),
@@ -37,11 +54,15 @@ def check(path: Path, options: dict[str, Any], load_limit: float | None = None) 
             errors="replace",
             pass_fds=(page,),
         )
-        where = trail.read(trail.open_page(page))
+        seen = trail.open_page(page)
     finally:
         os.close(page)
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
     if done.returncode < 0:
-        raise WavecombError(f"{path}: {trail.obituary(-done.returncode, where, done.stderr)}")
+        where, limit = trail.read(seen), memory.limit_of(seen)
+        line = trail.obituary(-done.returncode, where, done.stderr, limit)
+        raise WavecombError(f"{path}: {line}")
     try:
         error = json.loads(done.stdout)
     except ValueError:
@@ -86,9 +107,14 @@ def main() -> None:
 
     patience.on_end = say
     from wavecomb.cli.group import describe
-    from wavecomb.usd import load_stage
 
     try:
+        memory.limit(job["memory"])
+        if job["temporary"] is not None:
+            os.environ["TMPDIR"] = job["temporary"]
+        box.enter(Outputs(), temporary=job["temporary"])
+        from wavecomb.usd import load_stage
+
         load_stage(job["path"], builder_factory=Nowhere, **job["options"])  # type: ignore[arg-type]
     except Exception as error:
         say(" ".join(describe(error).split()))

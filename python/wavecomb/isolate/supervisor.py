@@ -12,11 +12,13 @@ import ctypes
 import io
 import os
 import signal
+import socket
 import sys
 import threading
 from typing import Any
 
-from wavecomb.isolate import trail
+from wavecomb.isolate import box, trail
+from wavecomb.isolate.broker import Broker, Client
 from wavecomb.isolate.memory import limit_of
 
 _PASSED_ON = (
@@ -64,21 +66,29 @@ def supervise() -> None:
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     page, words = trail.new_page(), os.memfd_create("wavecomb-stderr", os.MFD_CLOEXEC)
+    mine, its = socket.socketpair()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _WATCHED)
     chld = signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     parent = os.getpid()
     child = os.fork()
     if child == 0:
+        mine.close()
+        box.ask(client=Client(its))
         _become_expendable(parent, page, words)
         signal.signal(signal.SIGCHLD, chld)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return
+    its.close()
+    broker = Broker(child)
+    threading.Thread(target=broker.serve, args=(mine,), daemon=True).start()
     try:
         status, sent = _wait(child)
     except BaseException:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         raise
+    finally:
+        broker.clean()
     _end(status, sent, page, words)
 
 

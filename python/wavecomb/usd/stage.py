@@ -29,6 +29,7 @@ from wavecomb.usd.ies import IesTable
 from wavecomb.usd.light import LIGHT_SHAPES, LightReader
 from wavecomb.usd.links import LinkTable
 from wavecomb.usd.material import MaterialTable
+from wavecomb.usd.named_files import keep_to
 from wavecomb.usd.opening import Survey, open_stage, select_variants, survey
 from wavecomb.usd.render_settings import RenderChoice
 from wavecomb.usd.report import LoadReport
@@ -315,6 +316,7 @@ def _fill(
 ) -> _Filled:
     """Fills the builder. A stage that was opened here is closed then."""
     stage = choice.opened()
+    keep_to(stage)
     if stock is None:
         mtlx.tell(stage, report)
     time = time_code(stage, choice.frame)
