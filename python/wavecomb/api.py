@@ -289,9 +289,9 @@ def load(
         "working_space": working_space,
         "lights": lights,
     }
-    if isolate or (isolate is None and os.environ.get("WAVECOMB_ISOLATE", "0") not in ("", "0")):
-        from wavecomb.isolate.probe import check
+    from wavecomb.isolate.probe import check, is_wanted
 
+    if is_wanted(isolate):
         check(Path(path), options, load_limit, memory_limit)
     return load_stage(Path(path), progress=progress, **options)
 
@@ -325,6 +325,7 @@ def render(
     checkpoint: str | os.PathLike[str] | None = None,
     every: float = 120.0,
     resume: str | os.PathLike[str] | None = None,
+    isolate: bool | None = None,
     **settings: Any,
 ) -> Picture:
     """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
@@ -348,6 +349,7 @@ def render(
         every: Seconds between checkpoints.
         resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
             is, bit for bit, that of a render that nothing stopped.
+        isolate: As in ``load``; for a path only.
         **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed,
             adaptive, noise, min_spp, time_limit ...
 
@@ -369,9 +371,16 @@ def render(
     from wavecomb.stats import make_stats
 
     if isinstance(source, (str, os.PathLike)):
+        from wavecomb.isolate.probe import check, is_wanted
+
+        if is_wanted(isolate):
+            # Before this process composes anything of it.
+            options = {"camera": camera, "frame": frame, "threads": int(settings.get("threads", 0))}
+            check(Path(source), options)
+            isolate = False
         size, aovs = _asked_for(source, size, aovs, settings)
     own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)
-    scene, loaded, stage = _resolve(source, camera, frame, subdivision, chosen)
+    scene, loaded, stage = _resolve(source, camera, frame, subdivision, isolate, chosen)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
@@ -554,18 +563,20 @@ def _resolve(
     camera: str | None,
     frame: float | None,
     subdivision: str | int | None,
+    isolate: bool | None,
     settings: Settings,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
         loaded = load(
             source, camera=camera, frame=frame, threads=settings.threads,
             subdivision="auto" if subdivision is None else subdivision,
-            size=(settings.width, settings.height),
+            size=(settings.width, settings.height), isolate=isolate,
         )  # fmt: skip
         return loaded.scene, loaded, os.fspath(source)
-    if camera is not None or frame is not None or subdivision is not None:
+    if isolate or camera is not None or frame is not None or subdivision is not None:
         raise TypeError(
-            "camera, frame and subdivision are chosen when the stage is loaded: give them to load()"
+            "camera, frame, subdivision and isolate are chosen when the stage is loaded: "
+            "give them to load()"
         )
     loaded_scene: Any = getattr(source, "scene", None)
     if loaded_scene is not None:

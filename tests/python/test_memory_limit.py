@@ -16,6 +16,8 @@ import pytest
 from parts import only_where
 from pxr import Usd, UsdGeom, Vt
 
+import wavecomb
+from wavecomb import WavecombError
 from wavecomb.isolate import memory
 
 pytestmark = only_where(sys.platform == "linux", "the limit is Linux's")
@@ -92,6 +94,12 @@ def test_bombs_are_one_line(tmp_path: Path, bomb: Callable[[Path], list[object]]
     assert f"{LIMIT_MB} MB (--memory-limit)" in lines[0]
     assert sorted(os.listdir(tmp_path)) == before
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1.4e6  # KB
+
+
+def test_from_python(tmp_path: Path) -> None:
+    packed_indices(tmp_path)
+    with pytest.raises(WavecombError, match=f"out of memory .* the limit is {LIMIT_MB} MB"):
+        wavecomb.load(tmp_path / "bomb.usdc", isolate=True, memory_limit=LIMIT_MB)
 
 
 def test_a_sound_stage_fits(tmp_path: Path) -> None:

@@ -310,3 +310,53 @@ def test_a_home_is_not_read_for_a_module(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setattr(sys, "path", [str(home), str(home / "lib"), ""])
     places = box.library_places()
     assert str(home / "lib") in places and str(home) not in places and os.getcwd() not in places
+
+
+SPY = """
+import os, socket, sys
+said = os.open({said!r}, os.O_WRONLY | os.O_CREAT)
+def tries(deed):
+    try:
+        deed()
+        return "done"
+    except OSError as error:
+        return type(error).__name__
+def hook(event, what):
+    if event == "import" and what[0] == "wavecomb.usd.stage":
+        os.write(said, " ".join([
+            tries(lambda: open({secret!r}, "w")), tries(socket.socket),
+            tries(lambda: open(os.environ["TMPDIR"] + "/x", "w")),
+        ]).encode())
+sys.addaudithook(hook)
+"""
+
+
+@with_landlock
+@with_seccomp
+@pytest.mark.parametrize("how", ["load", "render", "variable", "window"])
+def test_python_reads_it_first_in_such_a_process(
+    place: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    import wavecomb
+
+    code = SPY.format(said=str(place / "said"), secret=str(place / "secret/new"))
+    (place / "sitecustomize.py").write_text(code)
+    monkeypatch.setenv("PYTHONPATH", str(place))
+    monkeypatch.setenv("TMPDIR", str(place / "tmp"))
+    stage = place / "shot/s.usda"
+    if how == "load":
+        wavecomb.load(stage, isolate=True)
+    elif how == "render":
+        wavecomb.render(stage, size=(4, 4), spp=1, isolate=True)
+    elif how == "variable":
+        monkeypatch.setenv("WAVECOMB_ISOLATE", "1")
+        wavecomb.load(stage)
+    else:
+        loader = pytest.importorskip("wavecomb.gui.loader")
+        monkeypatch.setenv("WAVECOMB_ISOLATE", "1")
+        loader.read(loader.Request(loader.Source(stage)))
+    assert (place / "said").read_text() == "PermissionError PermissionError done"
+    assert os.listdir(place / "secret") == ["key"] and not os.listdir(place / "tmp")
+    (place / "said").unlink()
+    wavecomb.load(stage, isolate=False)
+    assert not (place / "said").exists()

@@ -12,6 +12,7 @@ from typing import Any
 from pxr import Sdf, Usd
 
 from wavecomb.cli.group import describe
+from wavecomb.isolate.probe import check, is_wanted
 from wavecomb.usd import LoadedStage
 from wavecomb.usd.texture import TextureStock
 
@@ -130,6 +131,9 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     source = request.source
     usd = request.usd
     if usd is None:
+        if is_wanted():
+            chosen = {"variants": source.variants, "purposes": source.purposes}
+            check(source.path, {key: value for key, value in chosen.items() if value is not None})
         usd = open_editable(source.path, source.variants)
     elif request.fresh:
         with captured(LoadReport()):

@@ -23,6 +23,13 @@ from wavecomb.isolate import box, memory, patience, trail
 from wavecomb.isolate.broker import Outputs
 
 
+def is_wanted(isolate: bool | None = None) -> bool:
+    """Whether a stage is to be read by such a process first; None: as WAVECOMB_ISOLATE says."""
+    if isolate is None:
+        isolate = os.environ.get("WAVECOMB_ISOLATE", "0") not in ("", "0")
+    return isolate
+
+
 def check(
     path: Path,
     options: dict[str, Any],
