@@ -10,9 +10,9 @@
 /// inside it is not.
 #pragma once
 
-#include <algorithm>
 #include <bit>
 
+#include "wavecomb/light/image.h"
 #include "wavecomb/light/portal.h"
 #include "wavecomb/light/record.h"
 #include "wavecomb/texture/lookup.h"
@@ -43,99 +43,28 @@ inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& te
   return light.radiance() * not_negative(Color<F>(texel.r, texel.g, texel.b));
 }
 
-/// Where interval `index` of a row starts, and how many of the row's 65536 counts it has.
+/// Density over solid angle of a direction whose density over the image is `density`: a piece of
+/// the image is 2 pi^2 sin(polar angle) times as large on the sphere.
 template <typename F>
-struct Interval {
-  UInt<F> index, begin, count;
-};
-
-/// The values of interval `index` of a row of n. Two values are read as one word.
-template <typename F>
-inline Interval<F> interval_at(const Distribution2D& d, const UInt<F>& row, uint32_t n,
-                               const UInt<F>& index, const Mask<F>& active) {
-  using U = UInt<F>;
-  const auto value = [&](const U& i, const Mask<F>& lanes) {
-    const U word = gather<U>(d.cumulative.data(), i >> 1, Mask<U>(lanes));
-    return U((word >> ((i & 1u) << 4)) & 0xffffu);
-  };
-  const U at = row * (d.row_lines * Distribution2D::kLine) + index;
-  const Mask<F> inner = active & Mask<F>(index + 1u < U(n));
-  const U begin = value(at, active);
-  const U end = select(Mask<U>(inner), value(at + 1u, inner), U(Distribution2D::kCounts));
-  return {index, begin, end - begin};
-}
-
-/// The last of `n` ascending values of a line that is at most x; the first one is. All are
-/// compared, in a register or two.
-inline uint32_t last_at_most(const Distribution2D::Line& line, uint32_t n, uint16_t x) {
-  uint16_t at_most = 0;
-  for (const uint16_t value : line.value) at_most = static_cast<uint16_t>(at_most + (value <= x));
-  return std::min<uint32_t>(at_most, n) - 1;
-}
-
-/// The interval that holds count x in [0, kCounts) of a row of n intervals.
-template <typename F>
-inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, uint32_t n,
-                                 const UInt<F>& x, const Mask<F>& active) {
-  using U = UInt<F>;
-  constexpr uint32_t kLine = Distribution2D::kLine;
-  const InMemory<U> rows(row), counts(x);
-  InMemory<U> index, begin, count;
-  for (uint64_t bits = lane_bits<F>(active); bits != 0; bits &= bits - 1) {
-    const auto i = static_cast<size_t>(std::countr_zero(bits));
-    const auto one = static_cast<uint16_t>(counts.value[i]);
-    const uint32_t line = last_at_most(d.coarse[rows.value[i]], (n + kLine - 1) / kLine, one);
-    const Distribution2D::Line* const at =
-        &d.cumulative[size_t{rows.value[i]} * d.row_lines + line];
-    const uint32_t in_row = line * kLine + last_at_most(*at, n - line * kLine, one);
-    const uint16_t* const value = at->value + in_row % kLine;
-    index.value[i] = in_row;
-    begin.value[i] = value[0];
-    count.value[i] = (in_row + 1 == n ? Distribution2D::kCounts : value[1]) - value[0];
-  }
-  return {load<U>(index.value), load<U>(begin.value), load<U>(count.value)};
-}
-
-/// Density over solid angle of a direction in a cell whose row and column have the given counts.
-/// That over the unit square is the product of counts / 65536 * intervals; a piece of the square is
-/// 2 pi^2 sin(polar angle) times as large on the sphere.
-template <typename F>
-inline F dome_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt<F>& column_count,
-                  const F& sin_theta) {
-  const float scale = static_cast<float>(d.width) * static_cast<float>(d.height) * 0x1p-32f;
-  const F density = F(Int<F>(row_count)) * F(Int<F>(column_count)) * scale;
+inline F dome_pdf(const F& density, const F& sin_theta) {
   const F measure = sin_theta * kTwoPiSquared;
   const Mask<F> good = measure > 0.f;
   const F pdf = density / select(good, measure, F(1.f));
   return select(good & is_finite(pdf), pdf, F(0.f));
 }
 
-/// A point of the image by its density: the row by the marginal, then the column, each by
-/// inversion.
+/// A direction by the density of the image.
 template <typename F>
 inline KindSample<F> sample_dome_image(const LightReader<F>& light, const TextureView& texture,
                                        const Distribution2D& d, const F& u, const F& v,
                                        const Mask<F>& active) {
-  using U = UInt<F>;
-  // Multiples of 2^-24 times 65536 are exact, and so is the count that they fall on.
-  const F scaled_u = u * float{Distribution2D::kCounts},
-          scaled_v = v * float{Distribution2D::kCounts};
-  const auto inside = [](const F& scaled, const Interval<F>& i) {
-    const F part = (scaled - F(Int<F>(i.begin))) / max(F(Int<F>(i.count)), F(1.f));
-    return min(max(part, F(0.f)), F(kOneMinusEpsilon));
-  };
-  const Interval<F> y = find_interval<F>(d, U(d.height), d.height, U(to_int<F>(scaled_v)), active);
-  const Interval<F> x = find_interval<F>(d, y.index, d.width, U(to_int<F>(scaled_u)), active);
-
-  const F s = (F(Int<F>(x.index)) + inside(scaled_u, x)) * (1.f / static_cast<float>(d.width));
-  const F down = (F(Int<F>(y.index)) + inside(scaled_v, y)) *
-                 (1.f / static_cast<float>(d.height));  // polar angle / pi
-  const auto [sin_theta, cos_theta] = sincos_2pi(F(down * 0.5f));
-  const auto [sin_lon, cos_lon] = sincos_2pi(F(0.5f - s));
+  const ImagePoint<F> at = sample_image<F>(d, u, v, active);
+  const auto [sin_theta, cos_theta] = sincos_2pi(F(at.y * 0.5f));  // y: polar angle / pi
+  const auto [sin_lon, cos_lon] = sincos_2pi(F(0.5f - at.x));
   const Vec3<F> local(sin_theta * sin_lon, cos_theta, sin_theta * cos_lon);
   return {from_dome<F>(light, local), F(kFarAway),
-          dome_radiance<F>(light, texture, s, F(1.f - down), active),
-          dome_pdf<F>(d, y.count, x.count, sin_theta), Mask<F>(false)};
+          dome_radiance<F>(light, texture, at.x, F(1.f - at.y), active),
+          dome_pdf<F>(at.pdf, sin_theta), Mask<F>(false)};
 }
 
 /// A dome without an image: uniform over the sphere.
@@ -176,17 +105,9 @@ inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, con
   const F sin_theta = sqrt(fma(w.x, w.x, F(w.z * w.z)));
   const F s = fnma(atan2(w.x, w.z), F(kInv2Pi), F(0.5f));
   const F down = atan2(sin_theta, w.y) * kInvPi;
-  const auto cell = [](const F& x, uint32_t size) {
-    const F i =
-        clamp(floor(F(x * static_cast<float>(size))), F(0.f), F(static_cast<float>(size - 1)));
-    return UInt<F>(to_int<F>(i));
-  };
-  const UInt<F> y = cell(down, d.height);
-  const Interval<F> row = interval_at<F>(d, UInt<F>(d.height), d.height, y, active);
-  const Interval<F> column = interval_at<F>(d, y, d.width, cell(s, d.width), active);
   return {
       dome_radiance<F>(light, view.materials.textures[record.texture], s, F(1.f - down), active),
-      dome_pdf<F>(d, row.count, column.count, sin_theta)};
+      dome_pdf<F>(image_pdf_at<F>(d, s, down, active), sin_theta)};
 }
 
 /// hit_dome, with the density as seen from `from`.

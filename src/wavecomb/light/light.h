@@ -110,7 +110,7 @@ inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const UI
                                  const F& v, const Mask<F>& lanes) {
   switch (kind) {
     case LightKind::kRect:
-      return sample_rect<F>(light, view.materials.textures, p, u, v, lanes);
+      return sample_rect<F>(view, light, p, u, v, lanes);
     case LightKind::kDisk:
       return sample_disk<F>(light, p, u, v);
     case LightKind::kSphere:
@@ -214,7 +214,7 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
       reader.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
         detail::KindHit<F> hit{Color<F>(F(0.f)), F(0.f)};
         if (kind == LightKind::kRect)
-          hit = detail::hit_rect<F>(reader, view.materials.textures, origin, dir, t, lanes);
+          hit = detail::hit_rect<F>(view, reader, origin, dir, t, lanes);
         if (kind == LightKind::kDisk) hit = detail::hit_disk<F>(reader, dir, t);
         if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
         if (kind == LightKind::kCylinder) hit = detail::hit_cylinder<F>(reader, origin, dir, t);

@@ -1,8 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Rectangle lights: uniform over the solid angle; parallelograms, which a shear makes of them, and
 /// what is seen very small: uniform over the area.
+///
+/// With a picture, a point is taken by that with some probability a, else evenly as said. The
+/// density of a direction is that of the mixture, whichever way it came,
+///     p = a p_image d^2 / (A cos) + (1 - a) p_even,
+/// p_image over the unit square, A the area. Let i be the share of the square that the light of the
+/// picture takes up (Distribution2D::spread), and g that of the rectangle which what is seen of it
+/// takes up, 1 where that is equally near all over: a = g / (g + i) within bounds. What is smaller
+/// finds the light: the picture from afar, the solid angle close by.
 #pragma once
 
+#include "wavecomb/light/image.h"
 #include "wavecomb/light/record.h"
 #include "wavecomb/texture/lookup.h"
 
@@ -104,28 +113,125 @@ inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_li
   return select(r.usable & (by_area > 0.f), by_angle, by_area);
 }
 
+/// Probability that the point on a rect with a picture of that `spread` is taken by the picture: a
+/// multiple of 1/16, so that both choices get whole numbers of the 2^24 that u may be. The share g
+/// is bounded from below by solid angle / (area * the most that a piece gives, z / d^3).
+template <typename F>
+inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
+  const F x = clamp(F(0.f), r.x0, r.x1), y = clamp(F(0.f), r.y0, r.y1);
+  const F d2 = fma(x, x, fma(y, y, F(r.z * r.z)));
+  const F most = area * r.z;
+  const F g = r.solid_angle * d2 * sqrt(d2) / select(r.usable & (most > 0.f), most, F(1.f));
+  const F share = g / F(g + spread);
+  const F sixteenths = clamp(floor(fma(share, F(16.f), F(0.5f))), F(2.f), F(14.f));
+  return select(r.usable, sixteenths, F(14.f)) * 0.0625f;
+}
+
+/// Lanes whose rect has a picture to sample by.
+template <typename F>
+inline Mask<F> has_picture(const LightReader<F>& light, const Mask<F>& active) {
+  return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &
+         Mask<F>(light.bits(offsetof(LightRecord, distribution)) != UInt<F>(kNoDistribution));
+}
+
+/// Runs `one(distribution, lanes)` for each picture among the lanes.
+template <typename F, typename Function>
+inline void for_each_picture(const LightView& view, const LightReader<F>& light,
+                             const Mask<F>& lanes, const Function& one) {
+  const UInt<F> index = light.bits(offsetof(LightRecord, distribution));
+  Mask<F> pending = lanes;
+  while (any(pending)) {
+    const auto first = static_cast<size_t>(std::countr_zero(lane_bits<F>(pending)));
+    const uint32_t number = lane(index, first);
+    const Mask<F> same = pending & Mask<F>(index == UInt<F>(number));
+    one(view.distributions[number], same);
+    pending = pending & not_(same);
+  }
+}
+
+/// Where on the rect (u, v) lands that is chosen evenly, as shares of its edges.
+template <typename F>
+inline Vec2<F> sample_rect_evenly(const SphericalRect<F>& r, const F& u, const F& v,
+                                  const Mask<F>& active) {
+  if (none(active & r.usable)) return {u, v};
+  const Vec2<F> by_angle = sample_spherical_rect<F>(r, u, v);
+  return {select(r.usable, by_angle.x, u), select(r.usable, by_angle.y, v)};
+}
+
+/// A point of the rect as shares of its edges. `share` is 0 and `picture_pdf`, over the unit
+/// square, does not count where there is no picture.
+template <typename F>
+struct RectPoint {
+  Vec2<F> at;
+  F share, picture_pdf;
+};
+
+template <typename F>
+[[gnu::noinline]] RectPoint<F> sample_pictured_rect(const LightView& view,
+                                                    const LightReader<F>& light,
+                                                    const SphericalRect<F>& r, const F& u,
+                                                    const F& v, const Mask<F>& active) {
+  F share(0.f);
+  const Mask<F> pictured = has_picture<F>(light, active);
+  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    share = select(lanes, picture_share<F>(r, light.area(), d.spread), share);
+  });
+  const Mask<F> by_picture = pictured & (u < share);
+  const F rest = clamp(F((u - share) / F(1.f - share)), F(0.f), F(kOneMinusEpsilon));
+  RectPoint<F> point{sample_rect_evenly<F>(r, select(by_picture, u, rest), v, active), share,
+                     F(0.f)};
+  const F within = select(by_picture, F(u / select(by_picture, share, F(1.f))), F(0.f));
+  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const Mask<F> here = lanes & by_picture, elsewhere = lanes & not_(by_picture);
+    if (any(here)) {
+      const ImagePoint<F> p = sample_image<F>(d, within, v, here);
+      point.at = {select(here, p.x, point.at.x), select(here, F(1.f - p.y), point.at.y)};
+      point.picture_pdf = select(here, p.pdf, point.picture_pdf);
+    }
+    if (any(elsewhere)) {
+      const F pdf = image_pdf_at<F>(d, point.at.x, F(1.f - point.at.y), elsewhere);
+      point.picture_pdf = select(elsewhere, pdf, point.picture_pdf);
+    }
+  });
+  return point;
+}
+
+/// The density of the mixture over solid angle, of which `even` is that of even choice.
+template <typename F>
+inline F pictured_rect_pdf(const F& share, const F& picture_pdf, const F& even, const F& distance2,
+                           const F& cos_light, const F& area) {
+  const F by_picture = picture_pdf * area_to_solid_angle<F>(distance2, cos_light, area);
+  return fma(share, by_picture, F(F(1.f - share) * even));
+}
+
 /// A point q = p + a u + b v, towards n only.
 template <typename F>
-inline KindSample<F> sample_rect(const LightReader<F>& light, const TextureView* textures,
+inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& light,
                                  const Vec3<F>& from, const F& u, const F& v,
                                  const Mask<F>& active) {
   const SphericalRect<F> r = make_spherical_rect<F>(light, from);
-  Vec2<F> at{u, v};
-  if (any(active & r.usable)) {
-    const Vec2<F> by_angle = sample_spherical_rect<F>(r, u, v);
-    at = {select(r.usable, by_angle.x, u), select(r.usable, by_angle.y, v)};
-  }
-  const Vec3<F> q = fma(light.u(), at.x, fma(light.v(), at.y, light.p()));
+  RectPoint<F> point{Vec2<F>{u, v}, F(0.f), F(0.f)};
+  const bool pictured = any(has_picture<F>(light, active));
+  if (pictured) [[unlikely]]
+    point = sample_pictured_rect<F>(view, light, r, u, v, active);
+  else
+    point.at = sample_rect_evenly<F>(r, u, v, active);
+  const Vec3<F> q = fma(light.u(), point.at.x, fma(light.v(), point.at.y, light.p()));
   const Direction<F> d = make_direction<F>(q - from);
   const F cos_light = -dot(d.wi, light.n());
-  const F pdf = rect_pdf<F>(r, d.length2, cos_light, light.area());
-  return {d.wi, d.length, rect_radiance<F>(light, textures, at.x, at.y, active & (pdf > 0.f)), pdf,
-          Mask<F>(false)};
+  F pdf = rect_pdf<F>(r, d.length2, cos_light, light.area());
+  if (pictured) [[unlikely]]
+    pdf = pictured_rect_pdf<F>(point.share, point.picture_pdf, pdf, d.length2, cos_light,
+                               light.area());
+  return {d.wi, d.length,
+          rect_radiance<F>(light, view.materials.textures, point.at.x, point.at.y,
+                           active & (pdf > 0.f)),
+          pdf, Mask<F>(false)};
 }
 
 /// What a ray gets from the rect at distance t.
 template <typename F>
-inline KindHit<F> hit_rect(const LightReader<F>& light, const TextureView* textures,
+inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
                            const Vec3<F>& origin, const Vec3<F>& dir, const F& t,
                            const Mask<F>& active) {
   const F cos_light = -dot(dir, light.n());
@@ -138,11 +244,18 @@ inline KindHit<F> hit_rect(const LightReader<F>& light, const TextureView* textu
   const F inverse = 1.f / select(m2 > 0.f, m2, F(1.f));
   const F a = dot(cross(h, edge_v), m) * inverse;
   const F b = dot(cross(edge_u, h), m) * inverse;
-  const Color<F> radiance =
-      rect_radiance<F>(light, textures, clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f)), front);
+  const Vec2<F> at{clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f))};
+  const Color<F> radiance = rect_radiance<F>(light, view.materials.textures, at.x, at.y, front);
   const SphericalRect<F> r = make_spherical_rect<F>(light, origin);
-  return {select<F>(front, radiance, Color<F>(F(0.f))),
-          rect_pdf<F>(r, F(t * t), cos_light, light.area())};
+  F pdf = rect_pdf<F>(r, F(t * t), cos_light, light.area());
+  const Mask<F> pictured = has_picture<F>(light, front);
+  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const F mixed = pictured_rect_pdf<F>(picture_share<F>(r, light.area(), d.spread),
+                                         image_pdf_at<F>(d, at.x, F(1.f - at.y), lanes), pdf,
+                                         F(t * t), cos_light, light.area());
+    pdf = select(lanes, mixed, pdf);
+  });
+  return {select<F>(front, radiance, Color<F>(F(0.f))), pdf};
 }
 
 }  // namespace wavecomb::detail

@@ -252,16 +252,35 @@ void make_distant(Made& made, const Light& light, const Double3& color, double m
   made.power = kPiD * scene_radius * scene_radius * solid_angle * scale * mean;
 }
 
-/// The density of a dome with that texture and radiance: of `before` where it is there.
-Distribution2D dome_distribution(const LightRecord& dome, const LightSet* before,
-                                 std::span<const TexturePtr> textures) {
+/// The density of a light with that texture and radiance: of `before` where it is there.
+Distribution2D distribution_of(const LightRecord& light, const LightSet* before,
+                               std::span<const TexturePtr> textures) {
   if (before)
     for (const LightRecord& other : before->records)
-      if (other.kind == dome.kind && other.texture == dome.texture &&
-          std::ranges::equal(other.radiance, dome.radiance))
+      if (other.kind == light.kind && other.texture == light.texture &&
+          other.distribution != kNoDistribution &&
+          std::ranges::equal(other.radiance, light.radiance))
         return before->distributions[other.distribution];
-  return build_dome_distribution(textures[dome.texture]->view(),
-                                 {dome.radiance[0], dome.radiance[1], dome.radiance[2]});
+  const bool dome = light.kind == static_cast<uint32_t>(LightKind::kDome);
+  return (dome ? build_dome_distribution : build_rect_distribution)(
+      textures[light.texture]->view(), {light.radiance[0], light.radiance[1], light.radiance[2]});
+}
+
+/// Pictures whose density has at least this spread are sampled evenly: it gives no more noise.
+constexpr float kEvenSpread = 0.9f;
+
+/// The density of a rect by its picture; power by its mean.
+void add_picture(Made& made, LightSet& set, const LightSet* before,
+                 std::span<const TexturePtr> textures) {
+  Distribution2D d = distribution_of(made.record, before, textures);
+  made.power = kPiD * double{made.record.area} * d.mean_luminance;
+  if (d.width == 0) {  // black
+    made.record.texture = kNoTexture;
+    put(made.record.radiance, {0, 0, 0});
+  } else if (d.spread < kEvenSpread) {
+    made.record.distribution = static_cast<uint32_t>(set.distributions.size());
+    set.distributions.push_back(std::move(d));
+  }
 }
 
 void make_dome(Made& made, LightSet& set, const Light& light, const Double3& color, double mean,
@@ -284,7 +303,7 @@ void make_dome(Made& made, LightSet& set, const Light& light, const Double3& col
   double mean_radiance = mean;
   if (light.texture != kNoTexture) {
     made.record.distribution = static_cast<uint32_t>(set.distributions.size());
-    set.distributions.push_back(dome_distribution(made.record, before, textures));
+    set.distributions.push_back(distribution_of(made.record, before, textures));
     mean_radiance = set.distributions.back().mean_luminance;
     if (set.distributions.back().width == 0) {  // black
       set.distributions.pop_back();
@@ -322,6 +341,7 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
   r.texture = kNoTexture;
   r.shaping = kNoShaping;
   r.portals = kNoPortals;
+  r.distribution = kNoDistribution;
   r.diffuse = std::max(0.f, light.diffuse);
   r.specular = std::max(0.f, light.specular);
   r.hidden = !light.visible && !is_infinite(light.kind);
@@ -332,22 +352,16 @@ Made make_light(LightSet& set, const Light& light, double scene_radius,
 
   const Double3 color = {std::max(0.0, double{light.color.x}), std::max(0.0, double{light.color.y}),
                          std::max(0.0, double{light.color.z})};
-  double mean = luminance(color.x, color.y, color.z);
+  const double mean = luminance(color.x, color.y, color.z);
   const Affine& m = light.to_world;
   const Double3 x = to_double(m.axis(0)), y = to_double(m.axis(1));
   switch (light.kind) {
     case LightKind::kRect: {
-      if (light.texture != kNoTexture) {
-        const float* texel = textures[light.texture]->mean();
-        // A mean of negative values says nothing; some floor keeps the light in the game.
-        mean = std::max(luminance(color.x * double{texel[0]}, color.y * double{texel[1]},
-                                  color.z * double{texel[2]}),
-                        1e-3 * mean);
-      }
       // Seen from the front, looking along +z with +y up, +x is to the left: s runs along -x.
       const double w = std::fabs(double{light.width}), h = std::fabs(double{light.height});
       put(r.p, to_double(m.point({static_cast<float>(w / 2), static_cast<float>(-h / 2), 0})));
       finish_flat(made, light, x * -w, y * h, 1, color, mean);
+      if (r.texture != kNoTexture) add_picture(made, set, before, textures);
       break;
     }
     case LightKind::kDisk: {

@@ -118,6 +118,9 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
 /// bilinear texture is. An all-black texture gives width 0.
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color);
 
+/// The same for the picture of a rect: at most 1024 x 1024 cells, evenly over the square.
+Distribution2D build_rect_distribution(const TextureView& texture, const Vec3<float>& color);
+
 /// 1 / (integral of the squared density of a dome's image over directions): 4 pi of an even one.
 double image_solid_angle(const Distribution2D& d);
 

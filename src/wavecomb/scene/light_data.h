@@ -21,6 +21,7 @@ inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
 inline constexpr uint32_t kNoPortals = 0xffffffffu;
+inline constexpr uint32_t kNoDistribution = 0xffffffffu;
 /// All geometry: no GeometrySet. kNoSet + 1 is 0.
 inline constexpr uint32_t kNoSet = 0xffffffffu;
 
@@ -110,8 +111,10 @@ struct alignas(64) LightRecord {
   float pick_pdf;  ///< probability of choosing this light
   uint32_t kind;
   uint32_t texture;
-  uint32_t distribution;  ///< dome: index into LightView::distributions
-  uint32_t shaping;       ///< index into LightView::shapings, or kNoShaping
+  /// Dome and rect with a texture: index into LightView::distributions; kNoDistribution: a rect
+  /// that is sampled evenly.
+  uint32_t distribution;
+  uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
   /// Not 0: paths that meet the light by a bounce that light sampling could have made get nothing
   /// of it; what light samples bring counts in full. So it is where a light does not give all
@@ -168,7 +171,7 @@ struct alignas(16) TriangleUvs {
 };
 static_assert(sizeof(TriangleUvs) == 48);
 
-/// A piecewise constant density over [0,1]^2 for importance sampling a dome, in counts of 65536:
+/// A piecewise constant density over [0,1]^2 for importance sampling a picture, in counts of 65536:
 /// interval x of row y is chosen for as many of a row's 65536 counts as lie between its cumulative
 /// value and the next, so that its probability is exact in integers.
 ///
@@ -185,7 +188,10 @@ struct Distribution2D {
   };
   uint32_t width = 0, height = 0;
   uint32_t row_lines = 0;     ///< lines of a row of `cumulative`
-  double mean_luminance = 0;  ///< over the sphere
+  double mean_luminance = 0;  ///< over the sphere (dome) or the square (rect)
+  /// 1 / (integral of the squared density over the square): 1 where it is even, little where few
+  /// places have all the light. Of rects.
+  float spread = 1;
   /// `height` rows of `width` values, each from 0 upwards; then the marginal, `height` values in as
   /// many lines as they need. Each row starts a line.
   std::vector<Line> cumulative;

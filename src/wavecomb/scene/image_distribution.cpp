@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The density that dome lights are sampled by.
+/// The densities that lights with pictures are sampled by.
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -12,7 +12,7 @@ namespace wavecomb {
 namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
-constexpr uint32_t kMaxWidth = 1024, kMaxHeight = 512;
+constexpr uint32_t kMaxWidth = 1024, kMaxDomeHeight = 512, kMaxRectHeight = 1024;
 /// Rows of texels that are read at once.
 constexpr uint32_t kRows = 256;
 /// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; parts of one cell
@@ -94,17 +94,23 @@ double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   return sum;
 }
 
-}  // namespace
+/// Means of the bilinear luminance over the cells of a grid, row 0 at the top. `wrap`: what is
+/// above the top and below the bottom.
+struct Cells {
+  uint32_t width, height;
+  std::vector<double> mean;
 
-Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color) {
+  std::span<const double> row(uint32_t y) const {
+    return std::span(mean).subspan(size_t{y} * width, width);
+  }
+};
+
+Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t most_height,
+                 Wrap wrap) {
   const uint32_t width = texture.levels[0].width, height = texture.levels[0].height;
-  Distribution2D d;
-  d.width = std::min(width, kMaxWidth);
-  d.height = std::min(height, kMaxHeight);
-
-  // Means over cells; the rows above and below bleed in as in RowMeans (the poles are clamped).
-  std::vector<double> cells(size_t{d.width} * d.height, 0.0);
-  const RowMeans means(texture, color, d.width);
+  Cells cells{std::min(width, kMaxWidth), std::min(height, most_height), {}};
+  cells.mean.assign(size_t{cells.width} * cells.height, 0.0);
+  const RowMeans means(texture, color, cells.width);
   std::vector<std::vector<double>> some(std::min(height, kRows));  // means of the next rows
   const auto mean_of = [&](uint32_t y) {
     if (y % kRows == 0)
@@ -112,22 +118,38 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
                    [&](size_t i) { some[i] = means(y + static_cast<uint32_t>(i)); });
     return std::move(some[y % kRows]);
   };
-  std::vector<double> row = mean_of(0), above = row, below;
+  const auto beside = [&](int step, const std::vector<double>& edge) {
+    const uint32_t y = neighbour(wrap, step < 0 ? 0 : height - 1, step, height);
+    if (y == height) return std::vector<double>(cells.width, 0.0);
+    return wrap == Wrap::kRepeat ? means(y) : edge;
+  };
+  // Rows above and below bleed in as in RowMeans.
+  std::vector<double> row = mean_of(0), above = beside(-1, row), below;
   for (uint32_t y = 0; y < height; ++y) {
-    below = y + 1 < height ? mean_of(y + 1) : row;
-    for_each_overlap(y, height, d.height, [&](size_t c, double part) {
-      double* to = cells.data() + c * d.width;
-      for (uint32_t x = 0; x < d.width; ++x) to[x] += part * (above[x] + 6 * row[x] + below[x]) / 8;
+    below = y + 1 < height ? mean_of(y + 1) : beside(1, row);
+    for_each_overlap(y, height, cells.height, [&](size_t c, double part) {
+      double* to = cells.mean.data() + c * cells.width;
+      for (uint32_t x = 0; x < cells.width; ++x)
+        to[x] += part * (above[x] + 6 * row[x] + below[x]) / 8;
     });
     above = std::move(row);
     row = std::move(below);
   }
+  return cells;
+}
 
+/// The density of cells times `part(y)`, the measure of a row. Width 0: all is black.
+template <typename Part>
+Distribution2D make_distribution(const Cells& cells, const Part& part) {
   using Line = Distribution2D::Line;
-  static_assert(kMaxWidth <= Distribution2D::kMost && kMaxHeight <= Distribution2D::kMost);
+  static_assert(kMaxWidth <= Distribution2D::kMost && kMaxDomeHeight <= Distribution2D::kMost &&
+                kMaxRectHeight <= Distribution2D::kMost);
   const auto lines_of = [](uint32_t n) {
     return (n + Distribution2D::kLine - 1) / Distribution2D::kLine;
   };
+  Distribution2D d;
+  d.width = cells.width;
+  d.height = cells.height;
   Line pad;
   std::fill(std::begin(pad.value), std::end(pad.value), Distribution2D::kPad);
   d.row_lines = lines_of(d.width);
@@ -143,10 +165,8 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
   };
   std::vector<double> rows(d.height);
   for (uint32_t y = 0; y < d.height; ++y) {
-    // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
-    const double ring = std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height);
-    const std::span<const double> weights(cells.data() + size_t{y} * d.width, d.width);
-    rows[y] = ring * accumulate(weights, line.data()) / d.width;
+    const double measure = part(y);
+    rows[y] = measure * accumulate(cells.row(y), line.data()) / d.width;
     put(y, d.width);
     d.mean_luminance += rows[y] / 2;
   }
@@ -155,7 +175,9 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
   return d;
 }
 
-double image_solid_angle(const Distribution2D& d) {
+/// Sum over cells of probability^2 / `size(y)`, the measure of a cell of the row.
+template <typename Size>
+double squares(const Distribution2D& d, const Size& size) {
   const auto value = [&](size_t row, uint32_t i) {
     const size_t line = row * d.row_lines + i / Distribution2D::kLine;
     return static_cast<double>(d.cumulative[line].value[i % Distribution2D::kLine]);
@@ -166,15 +188,38 @@ double image_solid_angle(const Distribution2D& d) {
   };
   double sum = 0;
   for (uint32_t y = 0; y < d.height; ++y) {
-    const double row = count(d.height, d.height, y) / Distribution2D::kCounts;
-    // Cells of a row have the same solid angle.
-    const double size =
-        2 * kPiD / d.width * (std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height));
+    const double row = count(d.height, d.height, y) / Distribution2D::kCounts, one = size(y);
     for (uint32_t x = 0; x < d.width; ++x) {
       const double share = row * count(y, d.width, x) / Distribution2D::kCounts;
-      sum += share * share / size;
+      sum += share * share / one;
     }
   }
+  return sum;
+}
+
+}  // namespace
+
+Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color) {
+  const Cells cells = cell_means(texture, color, kMaxDomeHeight, Wrap::kClamp);  // of the poles
+  // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
+  return make_distribution(cells, [&](uint32_t y) {
+    return std::cos(kPiD * y / cells.height) - std::cos(kPiD * (y + 1) / cells.height);
+  });
+}
+
+Distribution2D build_rect_distribution(const TextureView& texture, const Vec3<float>& color) {
+  const Cells cells = cell_means(texture, color, kMaxRectHeight, texture.wrap_t);
+  Distribution2D d = make_distribution(cells, [&](uint32_t) { return 2.0 / cells.height; });
+  const double cell = 1.0 / static_cast<double>(cells.mean.size());
+  if (d.width > 0) d.spread = static_cast<float>(1 / squares(d, [&](uint32_t) { return cell; }));
+  return d;
+}
+
+double image_solid_angle(const Distribution2D& d) {
+  const double sum = squares(d, [&](uint32_t y) {
+    return 2 * kPiD / d.width *
+           (std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height));
+  });
   return sum > 0 ? 1 / sum : 4 * kPiD;
 }
 
