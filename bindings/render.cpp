@@ -85,6 +85,8 @@ const Names<LightSelection> kLightSelections{"light_selection",
                                              {{"auto", LightSelection::kAuto},
                                               {"tree", LightSelection::kTree},
                                               {"power", LightSelection::kPower}}};
+const Names<LightWeights> kLightWeights{
+    "light_weights", {{"calibrated", LightWeights::kCalibrated}, {"power", LightWeights::kPower}}};
 const Names<bool> kFresnel{"fresnel", {{"exact", false}, {"schlick", true}}};
 
 template <typename Class, typename Enum>
@@ -94,38 +96,17 @@ void def_enum(Class& c, const char* attribute, Enum Settings::* member, const Na
       [member, &names](Settings& s, const std::string& text) { s.*member = names.parse(text); });
 }
 
-constexpr const char* kAttributes[] = {"width",
-                                       "height",
-                                       "spp",
-                                       "max_depth",
-                                       "seed",
-                                       "sampler",
-                                       "filter",
-                                       "filter_width",
-                                       "roulette",
-                                       "roulette_depth",
-                                       "clamp_indirect",
-                                       "fresnel",
-                                       "light_selection",
-                                       "cosine_sampling",
-                                       "integrator",
-                                       "aovs",
-                                       "adaptive",
-                                       "noise",
-                                       "min_spp",
-                                       "time_limit",
-                                       "error",
-                                       "region",
-                                       "progressive",
-                                       "threads",
-                                       "wave_size",
-                                       "lanes",
-                                       "traversal",
-                                       "policy",
-                                       "materialize",
-                                       "ray_order",
-                                       "shadow_order",
-                                       "costs",
+constexpr const char* kAttributes[] = {"width",           "height",         "spp",
+                                       "max_depth",       "seed",           "sampler",
+                                       "filter",          "filter_width",   "roulette",
+                                       "roulette_depth",  "clamp_indirect", "fresnel",
+                                       "light_selection", "light_weights",  "cosine_sampling",
+                                       "integrator",      "aovs",           "adaptive",
+                                       "noise",           "min_spp",        "time_limit",
+                                       "error",           "region",         "progressive",
+                                       "threads",         "wave_size",      "lanes",
+                                       "traversal",       "policy",         "materialize",
+                                       "ray_order",       "shadow_order",   "costs",
                                        "cost_weight"};
 
 /// Before the name of a light group, in names of AOVs and of layers.
@@ -432,6 +413,7 @@ void bind_render(nb::module_& m) {
   def_enum(c, "shadow_order", &Settings::shadow_order, kShadowOrders);
   def_enum(c, "costs", &Settings::costs, kCosts);
   def_enum(c, "light_selection", &Settings::light_selection, kLightSelections);
+  def_enum(c, "light_weights", &Settings::light_weights, kLightWeights);
   def_enum(c, "fresnel", &Settings::schlick_fresnel, kFresnel);
 
   nb::class_<Result>(m, "Result")

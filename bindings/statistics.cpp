@@ -64,6 +64,24 @@ nb::dict programs_dict(const RenderStatistics& s) {
   return out;
 }
 
+nb::dict light_calibration_dict(const LightShares& s) {
+  nb::dict d;
+  d["seconds"] = s.seconds;
+  d["paths"] = s.paths;
+  d["kept"] = s.kept;
+  d["tilted_nodes"] = s.tilted_nodes;
+  nb::list shares;
+  for (const LightShare& part : s.parts) {
+    nb::dict one;
+    one["name"] = part.name;
+    one["share"] = part.share;
+    one["by_power"] = part.by_power;
+    shares.append(one);
+  }
+  d["shares"] = shares;
+  return d;
+}
+
 }  // namespace
 
 nb::dict texture_store_dict(const StoreStatistics& s) {
@@ -117,6 +135,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   costs["materials"] = s.cost_materials;
   costs["calibration_s"] = s.calibration_s;
   d["cost_prediction"] = costs;
+  d["light_calibration"] = light_calibration_dict(s.light_calibration);
   nb::dict uses;
   for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
   d["policy_uses"] = uses;

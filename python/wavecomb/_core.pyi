@@ -413,6 +413,7 @@ class Settings:
     clamp_indirect: float  # 0: off
     fresnel: str  # "exact" | "schlick"
     light_selection: str  # "auto" | "tree" | "power"
+    light_weights: str  # "calibrated" | "power"
     cosine_sampling: bool
     integrator: str  # "wavefront" | "reference"
     adaptive: float  # error that a pixel may have; 0: off

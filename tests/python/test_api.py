@@ -149,7 +149,8 @@ def test_schema(fake: Fake, stage: Path) -> None:
         *("working_space", "cancelled", "settings", "seconds"),
         *("phases_s", "sort_overhead", "counts", "passes", "resumed_samples", "error"),
         *("mean_path_length", "depths", "lane_utilisation"),
-        *("coherence", "programs", "materials", "cost_prediction", "policy_uses"),
+        *("coherence", "programs", "materials", "cost_prediction", "light_calibration"),
+        "policy_uses",
         *("samples_per_s", "rays_per_s", "memory_bytes", "peak_rss_bytes", "machine"),
         *("unsupported", "warnings"),
     ]

@@ -43,6 +43,7 @@ SETTINGS = {
     "clamp_indirect": "number",
     "fresnel": "text",
     "light_selection": "text",
+    "light_weights": "text",
     "cosine_sampling": "flag",
     "integrator": "text",
     "threads": "count",

@@ -134,6 +134,12 @@ _INTEGERS = click.IntRange(min=0)
     "[default: auto]",
 )
 @click.option(
+    "--light-weights",
+    type=click.Choice(["calibrated", "power"]),
+    help="What shares of that choice lights have: by what they bring to the picture, which paths "
+    "before the first pass find out, or by power.  [default: calibrated]",
+)
+@click.option(
     "--policy",
     type=click.Choice(POLICIES),
     help="Order of shading; changes no picture (docs/scheduling.md).  [default: program]",

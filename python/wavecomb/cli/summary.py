@@ -15,6 +15,7 @@ MOST_MATERIALS = 6
 """Rows of the table of materials; the statistics file has all."""
 
 MOST_DEPTHS = 8
+MOST_LIGHTS = 5
 
 
 def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[str]) -> None:
@@ -37,6 +38,8 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
     )
     for line in _sampling_lines(stats):
         console.print(line)
+    if lights := light_line(stats["light_calibration"]):
+        console.print(escape(lights))
     for line in _scheduling_lines(stats):
         console.print(escape(line))
     _phases(console, stats)
@@ -77,6 +80,21 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
             line += f"; mean relative error {_percent(stats['error'])}"
         lines.append(line)
     return lines
+
+
+def light_line(calibration: Mapping[str, Any]) -> str | None:
+    """The lights that are chosen most often, by ``light_calibration`` of the statistics."""
+    from wavecomb.progress import count_text
+
+    if not calibration["paths"]:
+        return None
+    parts = sorted(calibration["shares"], key=lambda part: -part["share"])
+    most = [(part["name"].rsplit("/", 1)[-1], part["share"]) for part in parts[:MOST_LIGHTS]]
+    said = ", ".join(f"{name} {_percent(share)}" for name, share in most)
+    return (
+        f"lights: {said}{' ...' if len(parts) > MOST_LIGHTS else ''}, by "
+        f"{count_text(calibration['paths'])} paths in {calibration['seconds']:.2f} s"
+    )
 
 
 def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:

@@ -29,6 +29,7 @@ FIELDS = (
     "roulette",
     "roulette_depth",
     "light_selection",
+    "light_weights",
     "adaptive",
     "noise",
     "min_spp",
@@ -37,7 +38,8 @@ FIELDS = (
 """Settings by which series are told apart; all but those of ``WORK`` leave the picture as it is."""
 
 WORK = (
-    "roulette", "roulette_depth", "light_selection", "adaptive", "noise", "min_spp", "time_limit",
+    "roulette", "roulette_depth", "light_selection", "light_weights", "adaptive", "noise",
+    "min_spp", "time_limit",
 )  # fmt: skip
 """Settings that change how much is done, and with it the noise."""
 
@@ -292,6 +294,7 @@ _WORDS = {
     "cost_weight": "cost weight",
     "roulette_depth": "roulette from",
     "light_selection": "lights",
+    "light_weights": "light shares",
     "adaptive": "pixel error",
     "min_spp": "min spp",
     "time_limit": "seconds",

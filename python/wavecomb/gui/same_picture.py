@@ -15,8 +15,8 @@ from wavecomb.gui.run_log import describe, differences
 
 BITS = (
     "width", "height", "max_depth", "seed", "sampler", "filter", "filter_width", "roulette",
-    "roulette_depth", "clamp_indirect", "fresnel", "light_selection", "cosine_sampling", "adaptive",
-    "noise", "min_spp", "time_limit", "region",
+    "roulette_depth", "clamp_indirect", "fresnel", "light_selection", "light_weights",
+    "cosine_sampling", "adaptive", "noise", "min_spp", "time_limit", "region",
 )  # fmt: skip
 """Settings that decide over the bits, beside the samples of each pixel."""
 

@@ -134,6 +134,12 @@ LIGHT_SELECTION = Choice(
      "tree": "For the place that it lights, by a tree of lights.",
      "power": "By its power, wherever it is."},
 )  # fmt: skip
+LIGHT_WEIGHTS = Choice(
+    "light_weights", "Light shares", "How often each light is chosen.",
+    {"calibrated": "By what it brings to the picture, as some paths before the first pass find "
+     "out. The default.",
+     "power": "By its power, wherever it is."},
+)  # fmt: skip
 ADAPTIVE_MODES = {
     "off": "Every pixel gets as many samples.",
     "pixel": "Pixels stop when their own error is small enough.",
@@ -160,8 +166,8 @@ TIME_LIMIT = Number(
 
 ORDER_FIELDS = (*(choice.field for choice in ORDER_CHOICES), THREADS.field, COST_WEIGHT.field)
 WORK_FIELDS = (
-    "roulette", "roulette_depth", "light_selection", "adaptive", "noise", "min_spp", "spp",
-    "time_limit",
+    "roulette", "roulette_depth", "light_selection", "light_weights", "adaptive", "noise",
+    "min_spp", "spp", "time_limit",
 )  # fmt: skip
 
 

@@ -44,6 +44,7 @@ class Setup:
     clamp_indirect: float = 0.0
     fresnel: str = "exact"
     light_selection: str = "auto"
+    light_weights: str = "calibrated"
     cosine_sampling: bool = False
     integrator: str = "wavefront"
     adaptive: float = 0.0

@@ -39,6 +39,7 @@ class WorkGroup(QGroupBox):
         form.addRow(note)
         self._roulette = ChoiceBox(choices.ROULETTE, self._choose)
         self._lights = ChoiceBox(choices.LIGHT_SELECTION, self._choose)
+        self._weights = ChoiceBox(choices.LIGHT_WEIGHTS, self._choose)
         self._mode = ChoiceBox(_MODE, self._choose_mode)
         self._numbers = {number.field: number_box(number, self._choose) for number in NUMBERS}
         labels = {number.field: number.label for number in NUMBERS}
@@ -52,6 +53,7 @@ class WorkGroup(QGroupBox):
         add("Roulette", self._roulette)
         add(labels["roulette_depth"], self._numbers["roulette_depth"])
         add("Lights", self._lights)
+        add("Light shares", self._weights)
         add("Adaptive", self._mode)
         for field in ("adaptive", "noise", "min_spp", "spp", "time_limit"):
             add(labels[field], self._numbers[field])
@@ -76,6 +78,7 @@ class WorkGroup(QGroupBox):
     def _show(self, setup: Setup) -> None:
         self._roulette.show_value(setup.roulette)
         self._lights.show_value(setup.light_selection)
+        self._weights.show_value(setup.light_weights)
         self._mode.show_value(mode_of(setup))
         for field in _FIRST:
             if getattr(setup, field):

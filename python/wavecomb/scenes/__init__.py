@@ -20,6 +20,7 @@ from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.stage import StageWriter
+from wavecomb.scenes.studio import build_studio
 
 __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
 
@@ -46,6 +47,7 @@ SCENES: dict[str, SceneInfo] = {
     "dragon": SceneInfo("90 dragons and a mirror", 0.1, build_dragon),
     "spread": SceneInfo("a field of stones, for scaling: see --materials", 0.1, build_spread),
     "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
+    "studio": SceneInfo("90 objects, a key, a fill and a dim dome", 0.1, build_studio),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""

@@ -24,6 +24,9 @@ enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// How the light is chosen that a vertex is lit by: by its power alone, or by tree for the vertex
 /// (light/light_tree.h). kAuto: by tree where there are lights enough for it to pay.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
+/// What shares of the choice lights have: by what they bring to the picture, as a calibration finds
+/// before the first pass (render/light_calibration.h), or by power.
+enum class LightWeights : uint8_t { kCalibrated, kPower };
 enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
 /// Order of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
@@ -63,6 +66,7 @@ struct Settings {
   float clamp_indirect = 0;  ///< largest luminance of one indirect contribution; 0: off
   bool schlick_fresnel = false;
   LightSelection light_selection = LightSelection::kAuto;
+  LightWeights light_weights = LightWeights::kCalibrated;
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;

@@ -39,6 +39,14 @@ class PathTracer {
   /// Radiance of the last path by light group, rgb side by side; valid until the next one.
   const std::vector<F>& groups() const { return groups_; }
 
+  /// Traces a path of which nothing is wanted but choices of lights.
+  void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
+    probes_ = {out.probes.data() + path * out.most, out.most};
+    probe_count_ = 0;
+    out.luminance[path] = luminance(trace_path(pixel, sample).radiance);
+    out.counts[path] = probe_count_;
+  }
+
   /// A path as the camera's exposure shows it.
   PathResult exposed_path(uint32_t pixel, uint32_t sample) {
     PathResult result = trace_path(pixel, sample);
@@ -107,11 +115,12 @@ class PathTracer {
       }
       VertexAovs<F> aovs;
       aovs.wants_uv = depth == 0;
-      aovs.wants_lights = !groups_.empty();
+      aovs.wants_lights = !groups_.empty() || !probes_.empty();
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
       result.radiance += v.emitted;
       add_light(aovs.emitter, v.emitted);
       keep_parts(depth, depth);
+      bool is_free = false;
       if (depth == 0) {
         result.uv[0] = aovs.uv.x;
         result.uv[1] = aovs.uv.y;
@@ -125,11 +134,14 @@ class PathTracer {
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         shadow_set_ = v.shadow_set;
-        if (!occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth)) {
+        is_free = !occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth);
+        if (is_free) {
           result.radiance += v.direct;
           add_light(aovs.lit_by, v.direct);
         }
       }
+      if (!probes_.empty() && aovs.light_weight >= 0.f)
+        note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) {
         keep_parts(depth + 1, 1);
         return result;
@@ -137,6 +149,15 @@ class PathTracer {
       path = v.next;
       cone_at_origin = v.next.cone_width;
     }
+  }
+
+  void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
+    if (probe_count_ == probes_.size()) return;
+    probes_[probe_count_++] = {aovs.lit_by,
+                               brought,
+                               aovs.light_weight,
+                               {aovs.lit_at.x, aovs.lit_at.y, aovs.lit_at.z},
+                               v.next.receiver};
   }
 
   struct Hit {
@@ -224,6 +245,8 @@ class PathTracer {
   F time_ = 0.f;  ///< of the path
   bool wants_guides_;
   std::vector<F> groups_;
+  std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
+  uint32_t probe_count_ = 0;
 };
 
 /// Adds what a path found beside radiance to its pixel.
@@ -283,6 +306,17 @@ void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock&
     }
     film.pixel(x, y) = sum;
   }
+  clock.stop();
+}
+
+void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,
+                      size_t count, LightProbes& out) {
+  PhaseClock clock;
+  Counts counts;
+  PathTracer tracer(context, clock, counts);
+  clock.start(Phase::kGenerate);
+  for (size_t i = first; i < first + count; ++i)
+    tracer.probe(pixels[i], static_cast<uint32_t>(i), i, out);
   clock.stop();
 }
 

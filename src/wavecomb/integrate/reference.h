@@ -2,6 +2,9 @@
 /// The oracle: one path at a time, depth first, one lane, single rays.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
@@ -11,5 +14,29 @@ namespace wavecomb {
 /// bit.
 void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock& clock,
                    Counts& counts);
+
+/// What came of choosing a light for a vertex.
+struct LightProbe {
+  uint32_t light;  ///< kNoLight: the tree found none
+  /// Luminance that its sample brought the path, where nothing was in the way, and its MIS weight.
+  float value, weight;
+  float at[3];  ///< LightReceiver
+  uint32_t normal;
+};
+
+/// Choices of a light along paths, at most `most` a path.
+struct LightProbes {
+  LightProbes(size_t paths, uint32_t most_)
+      : most(most_), probes(paths * most_), counts(paths, 0), luminance(paths, 0.f) {}
+
+  uint32_t most;
+  std::vector<LightProbe> probes;  ///< of path i from i * most on
+  std::vector<uint32_t> counts;
+  std::vector<float> luminance;  ///< that a path brought
+};
+
+/// Traces paths `first` to `first + count` - 1: path i is sample i of pixel pixels[i].
+void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,
+                      size_t count, LightProbes& out);
 
 }  // namespace wavecomb

@@ -85,6 +85,10 @@ struct VertexAovs {
   Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
   Vec2<F> uv;
   UInt<F> emitter, lit_by;  ///< lights behind `emitted` and `direct`, or kNoLight
+  // With wants_lights: where a light was chosen for, and the MIS weight in `direct`; weight -1: no
+  // choice was made.
+  Vec3<F> lit_at;
+  F light_weight;
 };
 
 /// What guides a denoiser, of a path that has reached a vertex: albedo, tinted by the mirrors and
@@ -257,7 +261,10 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   out.shadow_set = U(0u);
   out.next.link = U(0u);
   const bool wants_lights = aovs && aovs->wants_lights;
-  if (wants_lights) aovs->emitter = aovs->lit_by = U(kNoLight);
+  if (wants_lights) {
+    aovs->emitter = aovs->lit_by = U(kNoLight);
+    aovs->light_weight = F(-1.f);
+  }
 
   // Programs that emit read one slot more than their BSDF does.
   constexpr bool kEmits = can_emit(Bsdf::kProgram);
@@ -393,7 +400,11 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
         clean<F>(throughput * f_cos * l.weight * w, clamp_limit(settings, depth + 1));
     out.has_shadow = lit & l.valid & consistent(l.wi, wi) & (max_component(c) > 0.f);
     out.direct = c;
-    if (wants_lights) aovs->lit_by = light;
+    if (wants_lights) {
+      aovs->lit_by = light;
+      aovs->lit_at = receiver.p;
+      aovs->light_weight = w;
+    }
     out.shadow_o = spawn_origin<F>(s, l.wi);
     out.shadow_d = l.wi;
     out.shadow_tfar = l.distance * 0.9999f;

@@ -77,4 +77,13 @@ void add_up(const std::vector<Worker>& workers, const WaveContext& context, cons
       s.policy_uses.emplace_back(std::string(context.policies[p]->name()), uses[p]);
 }
 
+LightShares light_shares(const LightCalibration& calibration) {
+  LightShares out{
+      calibration.seconds, calibration.paths, calibration.kept, calibration.tilted_nodes, {}};
+  const LightParts& parts = calibration.parts;
+  for (size_t i = 0; i < parts.size(); ++i)
+    out.parts.push_back({parts.names[i], calibration.weighed.shares[i], parts.power[i]});
+  return out;
+}
+
 }  // namespace wavecomb

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
 #include "wavecomb/scene/scene.h"
@@ -23,6 +24,21 @@ struct MaterialStatistics {
   double measured_ns = 0;    ///< per record, over the timed ones; 0 where none was timed
   double calibrated_ns = 0;  ///< before the first pass
   double predicted_ns = 0;   ///< by the costs that the next pass would be scheduled by
+};
+
+/// The share that a part of the lights had of the choice of a light.
+struct LightShare {
+  std::string name;
+  double share, by_power;
+};
+
+/// What the calibration of lights took and found.
+struct LightShares {
+  double seconds = 0;
+  uint32_t paths = 0;         ///< 0: there was nothing to calibrate
+  bool kept = false;          ///< from the render before
+  uint32_t tilted_nodes = 0;  ///< of the light tree
+  std::vector<LightShare> parts;
 };
 
 /// What a render took. Phase times are sums over workers.
@@ -47,11 +63,15 @@ struct RenderStatistics {
   uint64_t cost_materials = 0;              ///< how many materials that compares; 0: no prediction
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
+  LightShares light_calibration;
   std::optional<StoreStatistics> texture_store;  ///< where textures have a limit
 };
 
 /// Adds up what the workers counted, by phase, depth, policy and material, into `statistics`.
 void add_up(const std::vector<Worker>& workers, const WaveContext& context, const Scene& scene,
             const RenderCosts& costs, RenderStatistics& statistics);
+
+/// Of a calibration, for statistics.
+LightShares light_shares(const LightCalibration& calibration);
 
 }  // namespace wavecomb

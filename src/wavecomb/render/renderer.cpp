@@ -15,6 +15,7 @@
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/energy_tables.h"
+#include "wavecomb/render/light_calibration.h"
 #include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb {
@@ -100,6 +101,7 @@ struct WavefrontRenderer::Impl {
   double build_s = 0;
   RenderStatistics statistics;
   CostProfile profile;  ///< after the last render
+  LightCalibrationCache light_calibrations;
 };
 
 namespace {
@@ -237,7 +239,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   SceneView scene_view = scene.view();
   scene_view.lights.by_tree = chooses_by_tree(settings.light_selection, scene_view.lights);
   if (needs_energy_tables(scene)) scene_view.materials.energy = EnergyTables::shared().data();
-  const WaveContext context{
+  WaveContext context{
       scene_view,
       impl_->accel.get(),
       &settings,
@@ -258,7 +260,11 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   PassRunner runner(context, kernels, reference, threads, wave_size);
   PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), film, runner,
                 costs, watch);
+  const LightCalibration* lights = nullptr;
   const auto work = [&] {
+    lights = &impl_->light_calibrations.get(impl_->scene, *impl_->accel, scene_view, settings,
+                                            [&] { return watch.stopped(); });
+    lights->weighed.apply(context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
     loop.run();
   };
@@ -280,6 +286,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.scene_bytes = scene.bytes();
     s.accelerator_bytes = impl_->accel->bytes();
     s.film_bytes = film.bytes();
+    if (lights) s.light_calibration = light_shares(*lights);
     s.peak_rss_bytes = peak_rss_bytes();
     if (const TileStore* store = scene.texture_store()) s.texture_store = store->statistics();
     return s;
