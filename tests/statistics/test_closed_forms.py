@@ -101,15 +101,16 @@ PROGRAMS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_no_program_makes_energy(shot: Any, program: str, roughness: float) -> None:
-    """White in a white furnace: at most 1, and not much less."""
+    """White in a white furnace: at most 1, and as much as its model keeps."""
     body = material("M", program, roughness=roughness, **PROGRAMS[program])
     depth = 32 if program == "dielectric" else 1
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"), spp=512, size=16, max_depth=depth)
     mean = picture.mean()
-    # Rough plastic and glass lose what is scattered between facets. A glass ball of roughness 1 is
-    # down to 0.36, and Mitsuba's to 0.35: single scattering at two interfaces and more.
+    # Rough glass loses what is scattered between facets (of one crossing, tests/cpp holds it to the
+    # integral). A ball of roughness 1 is down to 0.36, and Mitsuba's to 0.35: single scattering at
+    # two interfaces and more.
     lowest = {"diffuse": 0.999, "metal": 0.97, "dielectric": 0.35 if roughness > 0.6 else 0.74}
-    assert lowest.get(program, 0.75) < mean < 1.003, f"{program} {roughness}: {mean:.4f}"
+    assert lowest.get(program, 0.99) < mean < 1.003, f"{program} {roughness}: {mean:.4f}"
 
 
 def test_clearcoat_makes_no_energy(shot: Any) -> None:

@@ -18,7 +18,9 @@ namespace wavecomb {
 /// not weigh much: for alpha < 0.1 energy is lost at grazing angles (up to 10 %), never gained.
 template <typename F>
 struct LostEnergy {
-  F half_alpha, c1, c2, c3, c4, average;
+  F half_alpha, c1, c2, c3, c4;
+  F mean;     ///< L_avg
+  F average;  ///< L_avg with its floor
 
   LostEnergy() = default;
   explicit LostEnergy(const F& alpha) : half_alpha(0.5f * alpha) {
@@ -29,7 +31,8 @@ struct LostEnergy {
     c2 = cubic(2.91318431f, -21.98678962f, 36.45356626f, -21.42995145f);
     c3 = cubic(-3.98879693f, 32.49001236f, -46.35642476f, 23.46134996f);
     c4 = cubic(1.52192087f, -15.33641364f, 17.03522607f, -5.79982176f);
-    average = max(cubic(-0.02480907f, 0.43841556f, 0.60527856f, -0.43734199f), F(0.02f));
+    mean = max(cubic(-0.02480907f, 0.43841556f, 0.60527856f, -0.43734199f), F(0.f));
+    average = max(mean, F(0.02f));
   }
 
   /// L towards a direction of cosine z >= 0.

@@ -7,10 +7,12 @@
 #include "wavecomb/material/lobes/coat.h"
 #include "wavecomb/material/lobes/lambert.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
+#include "wavecomb/material/lobes/rough_interface.h"
 
 namespace wavecomb {
 
-/// f = coat + base_color / pi * seen_through_coat.
+/// f = coat + base_color / pi * seen_through_coat, by the coat's albedos: those of its roughness,
+/// with what is lost between its facets, so that a white base under a lossless coat loses nothing.
 template <typename F>
 class PlasticBsdf {
  public:
@@ -23,32 +25,38 @@ class PlasticBsdf {
       : base_(params.base_color),
         roughness_(params.roughness),
         coat_(coat_ior(params.ior), F(schlick ? 0.f : 1.f)) {
-    average_ = coat_.average(coat_.f0_exact);
     const F alpha = alpha_from_roughness(roughness_);
     smooth_ = alpha < kDeltaAlpha;
     ggx_.alpha = max(alpha, F(kDeltaAlpha));
+    lost_ = LostEnergy<F>(ggx_.alpha);
+    interface_ = RoughInterface<F>(coat_, roughness_, ggx_.alpha, lost_, smooth_);
+    average_ = interface_.average(coat_.f0_exact, F(0.f));
   }
 
   Color<F> albedo() const { return lerp(base_, Color<F>(F(1.f)), coat_.f0_exact); }
   Mask<F> has_non_delta() const { return not_(smooth_) | not_(is_black(base_)); }
+  F delta_probability(const Vec3<F>& wo) const {
+    const F p = coat_probability(coat_albedo(abs(wo.z)));
+    return select(smooth_ & (wo.z != 0.f), p, F(0.f));
+  }
 
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F side = side_of(wo);
     const Vec3<F> o = mirror_z(wo, side);
-    const F coat = reflectance(o.z);
+    const F coat = coat_albedo(o.z);
     return eval_above(o, mirror_z(wi, side), coat, coat_probability(coat));
   }
 
   Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F side = side_of(wo);
     const Vec3<F> o = mirror_z(wo, side), i = mirror_z(wi, side);
-    return base_ * below_coat(reflectance(o.z), i, select(o.z > 0.f, lambert_cos(i), F(0.f)));
+    return base_ * below_coat(coat_albedo(o.z), i, select(o.z > 0.f, lambert_cos(i), F(0.f)));
   }
 
   BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
     const F side = side_of(wo_);
     const Vec3<F> wo = mirror_z(wo_, side);
-    const F coat = reflectance(wo.z);
+    const F coat = coat_albedo(wo.z);
     const F p = coat_probability(coat);
     const Mask<F> chose_coat = u_lobe < p;
     const Mask<F> delta = chose_coat & smooth_ & (wo.z > 0.f);
@@ -71,6 +79,12 @@ class PlasticBsdf {
  private:
   F reflectance(const F& cos_i) const { return coat_(coat_.f0_exact, cos_i); }
 
+  /// All that the coat reflects towards the cosine z: its reflectance where it is smooth.
+  F coat_albedo(const F& z) const {
+    const F lost = select(smooth_, F(0.f), lost_(z));
+    return interface_.albedo(coat_.f0_exact, F(0.f), z, lost);
+  }
+
   /// Probability of sampling the coat: its share of what is reflected, kept away from 0 and 1
   /// unless the other lobe is black.
   F coat_probability(const F& coat) const {
@@ -81,7 +95,7 @@ class PlasticBsdf {
 
   /// The base's f_cos, without its colour.
   F below_coat(const F& coat_o, const Vec3<F>& wi, const F& cosine) const {
-    return seen_through_coat(coat_o, reflectance(wi.z), average_) * cosine;
+    return seen_through_coat(coat_o, coat_albedo(max(wi.z, F(0.f))), average_) * cosine;
   }
 
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const F& coat_o, const F& p) const {
@@ -96,6 +110,8 @@ class PlasticBsdf {
   Color<F> base_;
   F roughness_;
   CoatFresnel<F> coat_;
+  LostEnergy<F> lost_;
+  RoughInterface<F> interface_;
   F average_;
   Ggx<F> ggx_;
   Mask<F> smooth_;

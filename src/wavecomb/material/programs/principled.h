@@ -7,6 +7,7 @@
 #include "wavecomb/material/lobes/lambert.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
 #include "wavecomb/material/lobes/multiple_scattering.h"
+#include "wavecomb/material/lobes/rough_interface.h"
 
 namespace wavecomb {
 
@@ -16,11 +17,13 @@ namespace wavecomb {
 ///   specular_color
 ///                  in the specular workflow; F90 = 1; with multiple scattering, sampled as
 ///                  diffuse;
-///   diffuse        base_color (1 - metallic) opacity, seen through the specular interface;
+///   diffuse        base_color (1 - metallic) opacity, seen through the specular interface, by the
+///                  albedos of its roughness (RoughInterface);
 ///   transmission   (1 - opacity) times what the interface lets pass, straight on;
-///   clearcoat      GGX of index 1.5 times `clearcoat`; what lies below is dimmed by its
-///   reflectance at
-///                  the flatter of the two directions, which is reciprocal and never gains energy.
+///   clearcoat      GGX of the same index times `clearcoat`; what lies below is dimmed by its
+///                  albedo at the flatter of the two directions, which is reciprocal and never
+///                  gains energy.
+/// docs/decisions/preview-surface.md compares it with the specification and other renderers.
 template <typename F>
 class PrincipledBsdf {
  public:
@@ -36,7 +39,7 @@ class PrincipledBsdf {
         coat_roughness_(params.clearcoat_roughness),
         clearcoat_(params.clearcoat),
         transparency_(1.f - params.opacity),
-        coat_(F(kCoatIor), F(schlick ? 0.f : 1.f)) {
+        coat_(coat_ior(params.ior), F(schlick ? 0.f : 1.f)) {
     const Mask<F> specular_workflow =
         Mask<F>((params.flags & UInt<F>(uint32_t{kSpecularWorkflow})) != UInt<F>(0u));
     const F metallic = select(specular_workflow, F(0.f), params.metallic);
@@ -47,20 +50,33 @@ class PrincipledBsdf {
     // Metals and the specular workflow follow Schlick's formula, dielectrics the exact one.
     const F exact = schlick ? F(0.f) : select(specular_workflow, F(0.f), F(1.f - metallic));
     interface_ = CoatFresnel<F>(ior, exact);
-    average_ = interface_.average(f0_);
     const F alpha = alpha_from_roughness(roughness_);
     smooth_ = alpha < kDeltaAlpha;
     ggx_.alpha = max(alpha, F(kDeltaAlpha));
     lost_ = LostEnergy<F>(ggx_.alpha);
-    multiple_ = select<F>(smooth_, Color<F>(F(0.f)), lost_.tint(average_));
+    multiple_ = select<F>(smooth_, Color<F>(F(0.f)), lost_.tint(interface_.average(f0_)));
+    rough_ = RoughInterface<F>(interface_, roughness_, ggx_.alpha, lost_, smooth_);
+    average_ = rough_.average(f0_, multiple_);
     const F coat_alpha = alpha_from_roughness(coat_roughness_);
     coat_smooth_ = coat_alpha < kDeltaAlpha;
     coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
+    if (any(Mask<F>(clearcoat_ > 0.f))) {
+      coat_lost_ = LostEnergy<F>(coat_ggx_.alpha);
+      rough_coat_ =
+          RoughInterface<F>(coat_, coat_roughness_, coat_ggx_.alpha, coat_lost_, coat_smooth_);
+    }
   }
 
   Color<F> albedo() const { return min(Color<F>(diffuse_ + f0_), Color<F>(F(1.f))); }
   Mask<F> has_non_delta() const {
     return not_(is_black(diffuse_)) | not_(smooth_) | (not_(coat_smooth_) & (clearcoat_ > 0.f));
+  }
+
+  F delta_probability(const Vec3<F>& wo) const {
+    const View v = make_view(Vec3<F>(wo.x, wo.y, abs(wo.z)));
+    const F mirrors =
+        select(smooth_, v.p_specular, F(0.f)) + select(coat_smooth_, v.p_coat, F(0.f));
+    return select(wo.z != 0.f, F(mirrors + v.p_straight), F(0.f));
   }
 
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
@@ -74,8 +90,9 @@ class PrincipledBsdf {
     const Vec3<F> o = mirror_z(wo, side), i = mirror_z(wi, side);
     const F cosine = select(o.z > 0.f, lambert_cos(i), F(0.f));
     const Color<F> through =
-        seen_through_coat(interface_(f0_, o.z), interface_(f0_, i.z), average_);
-    const F passed = select(clearcoat_ > 0.f, below_coat(o, i), F(1.f));
+        seen_through_coat(specular_albedo(o.z), specular_albedo(max(i.z, F(0.f))), average_);
+    const Mask<F> coated = clearcoat_ > 0.f;
+    const F passed = any(coated) ? select(coated, below_coat(o, i), F(1.f)) : F(1.f);
     return diffuse_ * through * F(cosine * passed);
   }
 
@@ -123,14 +140,13 @@ class PrincipledBsdf {
   }
 
  private:
-  static constexpr float kCoatIor = 1.5f;
-
   /// What the clearcoat leaves of the light below it.
   F below_coat(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    return F(1.f - coat_reflectance(min(wo.z, abs(wi.z))));
+    return F(1.f - coat_albedo(max(min(wo.z, abs(wi.z)), F(0.f))));
   }
 
-  /// What depends on wo alone: reflectances towards it and the probabilities of the lobes.
+  /// What depends on wo alone: albedos towards it, which are the reflectances of what is smooth,
+  /// and the probabilities of the lobes.
   struct View {
     F coat, lost;
     Color<F> specular, straight;
@@ -138,13 +154,21 @@ class PrincipledBsdf {
   };
 
   F coat_reflectance(const F& cos_i) const { return clearcoat_ * coat_(coat_.f0_exact, cos_i); }
+  F coat_albedo(const F& z) const {
+    const F lost = select(coat_smooth_, F(0.f), coat_lost_(z));
+    return clearcoat_ * rough_coat_.albedo(coat_.f0_exact, F(0.f), z, lost);
+  }
+  Color<F> specular_albedo(const F& z) const {
+    return rough_.albedo(f0_, multiple_, z, select(smooth_, F(0.f), lost_(z)));
+  }
 
   View make_view(const Vec3<F>& wo) const {
     View v;
     v.coat = F(0.f);
-    if (any(Mask<F>(clearcoat_ > 0.f))) v.coat = coat_reflectance(wo.z);
-    v.specular = interface_(f0_, wo.z);
-    v.lost = lost_(max(wo.z, F(0.f)));
+    if (any(Mask<F>(clearcoat_ > 0.f))) v.coat = coat_albedo(max(wo.z, F(0.f)));
+    const F z = max(wo.z, F(0.f));
+    v.lost = lost_(z);
+    v.specular = specular_albedo(z);
     const F below = 1.f - v.coat;
     const Color<F> passed = Color<F>(F(1.f)) - v.specular;
     v.straight = passed * F(below * transparency_);
@@ -166,8 +190,9 @@ class PrincipledBsdf {
 
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const View& view) const {
     const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
-    const Color<F> through = seen_through_coat(view.specular, interface_(f0_, wi.z), average_);
-    const F again = F(view.lost * lost_(max(wi.z, F(0.f)))) / lost_.average;
+    const F zi = max(wi.z, F(0.f));
+    const Color<F> through = seen_through_coat(view.specular, specular_albedo(zi), average_);
+    const F again = F(view.lost * lost_(zi)) / lost_.average;
     Color<F> f = fma(multiple_, again, diffuse_ * through) * cosine;
     F pdf = view.p_diffuse * cosine;
     if (!all(smooth_)) {
@@ -192,7 +217,8 @@ class PrincipledBsdf {
   F roughness_, coat_roughness_, clearcoat_, transparency_;
   CoatFresnel<F> coat_, interface_;
   Color<F> f0_, diffuse_, average_, multiple_;
-  LostEnergy<F> lost_;
+  LostEnergy<F> lost_, coat_lost_;
+  RoughInterface<F> rough_, rough_coat_;
   Ggx<F> ggx_, coat_ggx_;
   Mask<F> smooth_, coat_smooth_;
 };
