@@ -188,6 +188,23 @@ TEST(Programs, SamplesFollowTheirDensity) {
   }
 }
 
+TEST(Programs, DeltaLobesAreChosenAsOftenAsStated) {
+  // What cosine_sampling weighs all other lobes by. Numbers are stratified: the share errs by a
+  // stratum for each lobe.
+  for (const Case& c : all_cases())
+    with_bsdf(c, [&](const auto& bsdf) {
+      for (const Vec& wo : views(c)) {
+        constexpr int kSamples = 1000;
+        double deltas = 0;
+        for (int i = 0; i < kSamples; ++i) {
+          const auto [l, u, v] = kronecker(static_cast<uint32_t>(i));
+          deltas += bsdf.sample(wo, (static_cast<float>(i) + 0.5f) / kSamples, u, v).is_delta;
+        }
+        EXPECT_NEAR(deltas / kSamples, bsdf.delta_probability(wo), 3e-3) << c.name << " " << wo.z;
+      }
+    });
+}
+
 TEST(Programs, WeightIsValueOverDensity) {
   for (const Case& c : all_cases())
     with_bsdf(c, [&](const auto& bsdf) {
@@ -341,21 +358,31 @@ void record_bits(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi, const F
   const auto e = bsdf.eval(wo, wi);
   const auto s = bsdf.sample(wo, l, u, v);
   const Color<F> a = bsdf.albedo();
-  const F values[] = {e.f_cos.x,   e.f_cos.y,
-                      e.f_cos.z,   e.pdf,
-                      s.wi.x,      s.wi.y,
-                      s.wi.z,      s.weight.x,
-                      s.weight.y,  s.weight.z,
-                      s.pdf,       s.eta,
-                      s.roughness, select(s.is_delta, F(1.f), F(0.f)),
-                      a.x,         a.y,
-                      a.z,         select(bsdf.has_non_delta(), F(1.f), F(0.f))};
+  const F values[] = {e.f_cos.x,
+                      e.f_cos.y,
+                      e.f_cos.z,
+                      e.pdf,
+                      s.wi.x,
+                      s.wi.y,
+                      s.wi.z,
+                      s.weight.x,
+                      s.weight.y,
+                      s.weight.z,
+                      s.pdf,
+                      s.eta,
+                      s.roughness,
+                      select(s.is_delta, F(1.f), F(0.f)),
+                      a.x,
+                      a.y,
+                      a.z,
+                      select(bsdf.has_non_delta(), F(1.f), F(0.f)),
+                      bsdf.delta_probability(wo)};
   for (const F& value : values) {
     wavecomb::store(out, value);
     out += kWidth<F>;
   }
 }
-constexpr size_t kRecorded = 18;
+constexpr size_t kRecorded = 19;
 
 /// One random input of every kind, some at the edges.
 struct Inputs {

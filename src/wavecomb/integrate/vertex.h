@@ -243,6 +243,16 @@ WAVECOMB_INLINE auto fetch_for(const MaterialView& materials, const UInt<F>& mat
     return fetch_params<kSlots, F>(materials, material, uv, uv_width, make_point, active);
 }
 
+/// Density of a bounce by cosine, with which the setting cosine_sampling replaces all lobes of a
+/// program but the deltas: those keep the probability q of their choice, so it is
+///   p(wi) = (1 - q) |cos theta_i| / pi
+/// on wo's side.
+template <typename Bsdf, typename F>
+inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
+  const F rest = max(F(1.f - bsdf.delta_probability(wo)), F(0.f));
+  return select(F(wo.z * wi.z) > 0.f, F(rest * cosine_hemisphere_pdf(abs(wi.z))), F(0.f));
+}
+
 /// Shades vertex `depth` (0: the camera's first hit) of the active lanes' paths with program
 /// `Bsdf`. `material` and `geom` (geometry within the instance's group) belong to `hit`; t is the
 /// length of the ray.
@@ -377,9 +387,7 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
     const Vec3<F> wi = frame.to_local(l.wi);
     const BsdfEval<F> e = bsdf.eval(wo, wi);
     const F bounce_pdf =
-        settings.cosine_sampling && kOpaque
-            ? select(F(wo.z * wi.z) > 0.f, cosine_hemisphere_pdf(abs(wi.z)), F(0.f))
-            : e.pdf;
+        settings.cosine_sampling && kOpaque ? cosine_bounce_pdf(bsdf, wo, wi) : e.pdf;
     F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + bounce_pdf), F(1e-30f))));
     Color<F> f_cos = e.f_cos;
     U light(kNoLight);
@@ -413,10 +421,10 @@ inline VertexResult<F> shade_vertex(const SceneView& scene, const ShadeSettings&
   const Sample4<F> rb = sample_4d<F>(settings.sampler, key, bsdf_set(depth));
   BsdfSample<F> b = bsdf.sample(wo, rb.x, rb.y, rb.z);
   if (settings.cosine_sampling && kOpaque) {
-    // The dissertation's way: the hemisphere by cosine, whatever the lobe.
+    // The dissertation's way: the hemisphere by cosine, whatever the lobe that is not a delta.
     Vec3<F> wi = square_to_cosine_hemisphere(rb.y, rb.z);
-    const F pdf = cosine_hemisphere_pdf(wi.z);
     wi.z = select(wo.z < 0.f, F(-wi.z), wi.z);
+    const F pdf = cosine_bounce_pdf(bsdf, wo, wi);
     const BsdfEval<F> e = bsdf.eval(wo, wi);
     const Mask<F> use = not_(b.is_delta) & (pdf > 0.f);
     const F inv = 1.f / select(pdf > 0.f, pdf, F(1.f));

@@ -10,6 +10,7 @@
 ///   Bsdf(const ShadingParams<F>&, bool schlick);
 ///   Color<F> albedo() const;               for the AOV: diffuse and specular colour
 ///   Mask<F> has_non_delta() const;         lanes where light sampling makes sense
+///   F delta_probability(wo) const;         with which sample() chooses a delta lobe
 ///   BsdfEval<F> eval(wo, wi) const;
 ///   Color<F> diffuse_f_cos(wo, wi) const;  the part of eval's that counts as diffuse
 ///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    numbers in [0, 1)

@@ -28,6 +28,9 @@ class DielectricBsdf {
 
   Color<F> albedo() const { return tint_; }
   Mask<F> has_non_delta() const { return not_(smooth_); }
+  F delta_probability(const Vec3<F>& wo) const {
+    return select(smooth_ & (wo.z != 0.f), F(1.f), F(0.f));
+  }
 
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
     if (all(smooth_)) return {Color<F>(F(0.f)), F(0.f)};

@@ -19,6 +19,7 @@ class DiffuseBsdf {
 
   Color<F> albedo() const { return base_; }
   Mask<F> has_non_delta() const { return not_(is_black(base_)); }
+  F delta_probability(const Vec3<F>& /*wo*/) const { return F(0.f); }
 
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F side = side_of(wo);

@@ -17,6 +17,7 @@ class EmissiveBsdf {
 
   Color<F> albedo() const { return Color<F>(F(0.f)); }
   Mask<F> has_non_delta() const { return Mask<F>(false); }
+  F delta_probability(const Vec3<F>& /*wo*/) const { return F(0.f); }
   BsdfEval<F> eval(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
     return {Color<F>(F(0.f)), F(0.f)};
   }

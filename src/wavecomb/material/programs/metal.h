@@ -42,6 +42,9 @@ class MetalBsdf {
 
   Color<F> albedo() const { return tinted_.f0; }
   Mask<F> has_non_delta() const { return not_(smooth_); }
+  F delta_probability(const Vec3<F>& wo) const {
+    return select(smooth_ & (wo.z != 0.f), F(1.f), F(0.f));
+  }
 
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F side = side_of(wo);

@@ -72,6 +72,13 @@ class OpenPbrBsdf {
            (fuzz_ > 0.f);
   }
 
+  F delta_probability(const Vec3<F>& wo) const {
+    const View v = make_view(wo);
+    const F mirrors =
+        select(base_.smooth, v.p_base, F(0.f)) + select(coat_smooth_, v.p_coat, F(0.f));
+    return select(v.o.z > 0.f, mirrors, F(0.f));
+  }
+
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const View v = make_view(wo);
     return eval_view(v, to_view(v, wi));
