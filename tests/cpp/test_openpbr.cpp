@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "bsdf_testing.h"
 #include "wavecomb/material/programs/openpbr.h"
@@ -155,6 +156,54 @@ TEST(OpenPbr, BrushedMetalHardlyGains) {
               << anisotropy << " r " << r << " z " << z << " phi " << phi;
         }
     }
+}
+
+/// Mean of |f(o, i) - f(i, o)| over that of f, both directions weighed by their cosines.
+double asymmetry(const P& p) {
+  const Bsdf bsdf(p, false);
+  std::mt19937 rng(11);
+  std::uniform_real_distribution<double> unit(0, 1);
+  double difference = 0, sum = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const double zo = std::sqrt(unit(rng)), zi = std::sqrt(unit(rng));
+    const Vec wo = direction(zo, 6.2832 * unit(rng)), wi = direction(zi, 6.2832 * unit(rng));
+    const double a = static_cast<double>(bsdf.eval(wo, wi).f_cos.y) / zi;
+    const double b = static_cast<double>(bsdf.eval(wi, wo).f_cos.y) / zo;
+    difference += std::abs(a - b);
+    sum += 0.5 * (a + b);
+  }
+  return difference / sum;
+}
+
+TEST(OpenPbr, LayersAreNotReciprocalByTheFiguresOfItsPage) {
+  // docs/openpbr.md quotes these: what lies below a layer is dimmed by its albedo towards the
+  // viewer only, and what facets lose is given back by the viewer's side.
+  const auto with = [](auto edit) {
+    P p = plain_params();
+    p.base_color = Vec(0.8f);
+    p.specular_color = Vec(1.f);
+    edit(p);
+    return asymmetry(p);
+  };
+  const auto glossy = [&](float r) { return with([r](P& p) { p.roughness = r; }); };
+  const auto metal = [&](float r) { return with([r](P& p) { p.metallic = 1, p.roughness = r; }); };
+  const auto coat = [&](float r) {
+    return with([r](P& p) { p.clearcoat = 1, p.clearcoat_roughness = r; });
+  };
+  const auto fuzz = [&](float r) {
+    return with([r](P& p) { p.specular_weight = 0, p.fuzz_weight = 1, p.fuzz_roughness = r; });
+  };
+  EXPECT_NEAR(glossy(0.2f), 0.065, 0.006);
+  EXPECT_NEAR(glossy(0.5f), 0.028, 0.003);
+  EXPECT_NEAR(glossy(1.f), 0.010, 0.002);
+  EXPECT_NEAR(metal(0.2f), 0.003, 0.002);
+  EXPECT_NEAR(metal(0.5f), 0.020, 0.003);
+  EXPECT_NEAR(metal(1.f), 0.220, 0.02);
+  EXPECT_NEAR(coat(0.2f), 0.067, 0.006);
+  EXPECT_NEAR(coat(0.5f), 0.031, 0.003);
+  EXPECT_NEAR(fuzz(0.2f), 0.035, 0.004);
+  EXPECT_NEAR(fuzz(0.5f), 0.116, 0.01);
+  EXPECT_LT(with([](P& p) { p.specular_weight = 0, p.diffuse_roughness = 0.5f; }), 1e-4);
 }
 
 }  // namespace
