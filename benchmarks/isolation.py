@@ -4,8 +4,9 @@
     .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
 
 For each stage, in turns, so that a busy machine hits all alike: ``wavecomb info`` with --isolate
-off and on, and ``wavecomb.load`` without and with isolate=True. Medians; CPU seconds are of the
-process with its children, and memory is that of the largest of them.
+off and on (with the sandbox, where the system has it), with --sandbox off and on, and
+``wavecomb.load`` without and with isolate=True. Medians; CPU seconds are of the process with its
+children, and memory is that of the largest of them.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ WAYS = {
         NOTHING + ("supervisor.supervise()" if how == "on" else ""),
     ],
     "info": lambda stage, how: ["-m", "wavecomb", "info", stage, "--isolate", how],
+    "sandbox": lambda stage, how: ["-m", "wavecomb", "info", stage, "--sandbox", how],
     "load": lambda stage, how: ["-c", LOAD, stage, how],
 }
 
@@ -85,7 +87,9 @@ def main() -> None:
             writer.start()
             writer.join()
             stages.append(str(path))
-        jobs = [("nothing", "")] + [(way, stage) for stage in stages for way in ("info", "load")]
+        jobs = [("nothing", "")] + [
+            (way, stage) for stage in stages for way in ("info", "sandbox", "load")
+        ]
         print("| what | off: s | CPU s | MB | on: s | CPU s | MB | more CPU s (pairs) |")
         print("| --- | --- | --- | --- | --- | --- | --- | --- |")
         for way, stage in jobs:
