@@ -21,12 +21,12 @@ export PIP_NO_INPUT := 1
 # The tools of the environment, also where a tool asks PATH.
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
+CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt tests/naive/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
 # Directories too: their time changes when a file comes or goes.
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
-CPP_FILES := $(shell find src bindings tests/cpp benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
+CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build wheel render test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-wheel bench lint format clean
+.PHONY: help setup setup-test build build-naive wheel render test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-wheel bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -94,10 +94,14 @@ test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBe
 	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) --verbose --output-on-failure --no-tests=error
 
-test-py: build build/.setup-test ## Python and statistical tests
+# The naive integrator, which statistical tests compare ours with.
+build-naive: build
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_naive -j $(JOBS) -- --quiet
+
+test-py: build-naive build/.setup-test ## Python and statistical tests
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
-test-long: build build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing
+test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) --verbose --output-on-failure --no-tests=error
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
@@ -107,7 +111,7 @@ test-wheel: wheel ## Install that wheel into a fresh environment and render with
 	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pytest dist/wavecomb-*.whl
 	$(WHEEL)/venv/bin/python -m pytest -q tests/python/test_isa.py tests/python/test_cli.py
 
-test-py-fast: build build/.setup-test
+test-py-fast: build-naive build/.setup-test
 	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
 
 fuzz: build build/.setup-test ## Broken inputs for MINUTES=10; those that are wrong are kept in out/fuzz

@@ -54,7 +54,7 @@ def check_costs(profile: Mapping[str, Any], name: str = "costs") -> Profile:
             good = isinstance(value, (int, float)) and not isinstance(value, bool)
             if not (good and math.isfinite(value) and 0.0 <= value <= 1e12):
                 raise WavecombError(
-                    f"{name}: is no cost profile: cost of {key} is {value!r}; "
+                    f"{name}: is no cost profile: cost of {key!s:.80} is {value!r:.80}; "
                     "it must be nanoseconds, from 0 to 1e12"
                 )
             checked[kind][str(key)] = float(value)

@@ -76,7 +76,7 @@ class Agreement:
         )
 
 
-def _welch(a: Array, b: Array, tolerance: Array | float, noisy: NDArray[np.bool_]) -> Array:
+def welch(a: Array, b: Array, tolerance: Array | float, noisy: NDArray[np.bool_]) -> Array:
     """Welch's t of batches along axis 0 as a normal deviate; NaN where not ``noisy``."""
     va, vb = a.var(axis=0, ddof=1) / len(a), b.var(axis=0, ddof=1) / len(b)
     difference = a.mean(axis=0) - b.mean(axis=0)
@@ -95,7 +95,7 @@ def _deviates(a: Array, b: Array, tolerance: float) -> tuple[Array, Array]:
     level = np.maximum(np.maximum(np.abs(mean_a), np.abs(mean_b)), 1e-6)
     error2 = a.var(axis=0, ddof=1) / len(a) + b.var(axis=0, ddof=1) / len(b)
     noisy = error2 > (2e-5 * level) ** 2
-    return _welch(a, b, tolerance * level, noisy), (mean_a - mean_b) / level
+    return welch(a, b, tolerance * level, noisy), (mean_a - mean_b) / level
 
 
 def _accepted(z: Array) -> float:
@@ -134,7 +134,7 @@ def agreement(a: Array, b: Array, tolerance: float = 0.0) -> Agreement:
     share_a, share_b = ((x / level).mean(axis=(1, 2)) for x in (block_a, block_b))
     excess = share_a.mean(axis=0) - share_b.mean(axis=0)
     error2 = share_a.var(axis=0, ddof=1) / len(a) + share_b.var(axis=0, ddof=1) / len(b)
-    excess_z = _welch(share_a, share_b, tolerance, error2 > 1e-12)
+    excess_z = welch(share_a, share_b, tolerance, error2 > 1e-12)
     quiet = float(np.abs(relative[~noisy]).max()) if (~noisy).any() else 0.0
     return Agreement(
         accepted=_accepted(z),
@@ -171,15 +171,20 @@ def assert_agree(name: str, a: Array, b: Array, *, tolerance: float = 0.0) -> Ag
 
 def save_pictures(name: str, a: Array, b: Array, z: Array) -> Path:
     """Writes a, b and z (grey: 0, red: a brighter, blue: darker; ±5) side by side."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    path = OUT / f"{name.replace(' ', '-')}.png"
+    picture_of(path, a, b, z)
+    return path
+
+
+def picture_of(path: Path, a: Array, b: Array, z: Array) -> None:
+    """Writes a, b and z as ``save_pictures`` says."""
     from wavecomb.image import write_png
 
-    OUT.mkdir(parents=True, exist_ok=True)
     mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)
     scale = 0.8 / max(float(np.percentile(mean_b, 98)), 1e-6)
     shown = np.clip(np.nan_to_num(z).mean(axis=2) / 10.0 + 0.5, 0.0, 1.0)
     marked = np.stack([shown, np.minimum(shown, 1.0 - shown), 1.0 - shown], axis=2)
     row = np.concatenate([mean_a * scale, mean_b * scale, marked], axis=1)
     grown = np.repeat(np.repeat(row, 4, axis=0), 4, axis=1)
-    path = OUT / f"{name.replace(' ', '-')}.png"
     write_png(path, np.ascontiguousarray(grown, np.float32))
-    return path

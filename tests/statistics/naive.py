@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random scenes by the wave and by the naive integrator (tests/naive), which shares no sampling.
+
+    .venv/bin/python tests/statistics/naive.py 17                    # one seed, with its pictures
+    .venv/bin/python tests/statistics/naive.py --from 0 --count 500  # many; exit code 1 on a fault
+
+Both render batches of other random numbers. Means over blocks of 4 x 4 pixels and over the picture,
+by channel, are compared by Welch's t. What looks odd (|z| of 3.3 or more) is rendered again with
+other numbers, twelve times as many, and what still does with sixty times as many. Only what is too
+far each time is a fault, at the level that Sidak's correction leaves of 1 % for all scenes of a
+run: light that uniform directions seldom find makes a mean that is mostly too low, the less so the
+more samples there are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "statistics")]
+
+from agreement import Array, welch  # noqa: E402
+from random_scenes import RandomScene, make_scene  # noqa: E402
+from scipy import stats  # noqa: E402
+
+SIZE, BLOCK, BATCHES = 12, 4, 10
+SPP, SAMPLES, DIRECTIONS = 96, 12, 4
+"""Of a batch: ours, and of the naive integrator with its directions at the first vertex."""
+SUSPICION = 3.3
+MORE = (12, 60)
+LEVEL = 0.01
+TRIES = 64
+"""Numbers by which the naive integrator looks for delta lobes."""
+
+
+def naive_module() -> ModuleType:
+    """The naive integrator of this build.
+
+    Raises:
+        ImportError: It is not built.
+    """
+    import wavecomb._core  # noqa: F401  # its scenes are taken
+
+    for folder in sorted(ROOT.glob("build/*/tests/naive")):
+        if list(folder.glob("wavecomb_naive*.so")):
+            sys.path.insert(0, str(folder))
+            return importlib.import_module("wavecomb_naive")
+    raise ImportError("build target wavecomb_naive, as make test does")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two pictures of one scene, as batches, and how far they are apart.
+
+    Attributes:
+        ours: (n, height, width, 3), the wave's.
+        naive: The naive integrator's.
+        z: Deviates of blocks and of the whole picture, flat; positive: ours is brighter.
+        difference: Relative difference of the whole picture, by channel.
+        error: Its standard error.
+    """
+
+    ours: Array
+    naive: Array
+    z: Array
+    difference: Array
+    error: Array
+
+    @property
+    def worst(self) -> float:
+        """The largest magnitude of z."""
+        return float(np.abs(self.z).max())
+
+    def is_fault(self, scenes: int) -> bool:
+        """Whether it is too far for chance, being one of so many scenes."""
+        return self.worst > limit(self.z.size * scenes)
+
+    def __str__(self) -> str:
+        parts = zip(self.difference, self.error, strict=True)
+        text = " ".join(f"{100 * d:+.2f}±{100 * e:.2f}" for d, e in parts)
+        return f"largest |z| {self.worst:.1f}, mean difference {text} %"
+
+
+def limit(tests: int) -> float:
+    """|z| that is too large for that many tests, by Sidak's correction."""
+    return float(stats.norm.isf((1.0 - (1.0 - LEVEL) ** (1.0 / tests)) / 2.0))
+
+
+def judge(ours: Array, naive: Array) -> Comparison:
+    """Compares two pictures given as batches."""
+
+    def tested(x: Array) -> Array:
+        n, height, width, _ = x.shape
+        cut = x.reshape(n, height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3)
+        blocks = cut.mean(axis=(2, 4)).reshape(n, -1)
+        return np.concatenate([blocks, x.mean(axis=(1, 2))], axis=1)
+
+    a, b = tested(ours), tested(naive)
+    level = np.maximum(np.maximum(np.abs(a.mean(axis=0)), np.abs(b.mean(axis=0))), 1e-6)
+    error2 = a.var(axis=0, ddof=1) / len(a) + b.var(axis=0, ddof=1) / len(b)
+    noisy = error2 > (1e-5 * level) ** 2
+    z = welch(a, b, 0.0, noisy)
+    relative = (a.mean(axis=0) - b.mean(axis=0)) / level
+    # Without noise there is nothing to wait for: rounding is all that may differ.
+    z = np.where(noisy, z, np.where(np.abs(relative) > 1e-3, 99.0 * np.sign(relative), 0.0))
+    return Comparison(ours, naive, z, relative[-3:], (np.sqrt(error2) / level)[-3:])
+
+
+def compare(scene: RandomScene, *, more: int = 1, first_seed: int = 0) -> Comparison:
+    """Renders a scene both ways, with ``more`` times as many samples."""
+    import wavecomb
+
+    module = naive_module()
+    loaded = wavecomb.load(scene.stage, **scene.load)
+    fresnel = "schlick" if scene.schlick else "exact"
+
+    def ours(seed: int) -> NDArray[Any]:
+        return wavecomb.render(
+            loaded,
+            size=(SIZE, SIZE),
+            spp=SPP * more,
+            max_depth=scene.depth,
+            seed=seed,
+            filter="box",
+            filter_width=1.0,
+            fresnel=fresnel,
+            threads=1,
+            **scene.settings,
+        ).beauty
+
+    def naive(seed: int) -> NDArray[Any]:
+        return module.render(
+            loaded.scene,
+            width=SIZE,
+            height=SIZE,
+            samples=SAMPLES * more,
+            max_depth=scene.depth,
+            directions=DIRECTIONS,
+            delta_tries=TRIES if scene.delta else 0,
+            seed=seed,
+            schlick_fresnel=scene.schlick,
+        )
+
+    seeds = range(first_seed, first_seed + BATCHES)
+    return judge(
+        np.stack([np.asarray(ours(s), np.float64) for s in seeds]),
+        np.stack([naive(s) for s in seeds]),
+    )
+
+
+def examine(scene: RandomScene) -> Comparison:
+    """Compares; and again, with more and other samples, what looks odd."""
+    found = compare(scene)
+    for turn, more in enumerate(MORE, 1):
+        if found.worst < SUSPICION:
+            break
+        found = compare(scene, more=more, first_seed=1000 * turn)
+    return found
+
+
+def save(found: Comparison, folder: Path) -> None:
+    """Writes both pictures as EXR files, and side by side with z as PNG."""
+    from agreement import picture_of
+
+    from wavecomb.exr import write_exr
+
+    for name, batches in (("ours", found.ours), ("naive", found.naive)):
+        layers = {"beauty": batches.mean(axis=0).astype(np.float32)}
+        write_exr(folder / f"{name}.exr", layers)
+    count = (SIZE // BLOCK) ** 2
+    z = found.z[: 3 * count].reshape(SIZE // BLOCK, SIZE // BLOCK, 3)
+    z = np.repeat(np.repeat(z, BLOCK, axis=0), BLOCK, axis=1)
+    picture_of(folder / "pictures.png", found.ours, found.naive, z)
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("seed", nargs="?", type=int, help="of one scene")
+    parser.add_argument("--from", dest="first", type=int, default=0, metavar="SEED")
+    parser.add_argument("--count", type=int, default=30, help="scenes, where no seed is given")
+    parser.add_argument("-o", "--out", type=Path, default=ROOT / "out" / "naive")
+    options = parser.parse_args()
+    one = options.seed is not None
+    seeds = [options.seed] if one else range(options.first, options.first + options.count)
+    faults = 0
+    for seed in seeds:
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = options.out / str(seed) if one else Path(temporary)
+            folder.mkdir(parents=True, exist_ok=True)
+            for old in folder.iterdir():
+                old.unlink()
+            scene = make_scene(seed, folder)
+            begin = time.process_time()
+            found = compare(scene, more=MORE[0], first_seed=1000) if one else examine(scene)
+            bad = found.is_fault(len(seeds))
+            faults += bad
+            if one:
+                save(found, folder)
+        seconds = time.process_time() - begin
+        if bad or one:
+            print(f"{seed}: {'FAULT' if bad else 'agrees'}: {found} ({seconds:.1f} s)")
+            print(f"    {', '.join(scene.features)}; depth {scene.depth}", flush=True)
+    print(f"{len(seeds)} scenes, {faults} faults" + (f"; {options.out / str(seed)}" if one else ""))
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

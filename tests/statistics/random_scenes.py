@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small random scenes in which features meet: a floor, some objects, some lights, some settings.
+
+Everything is a function of the seed. Lights are large and near and lobes wide, so that uniform
+directions find them; pictures are tiny, paths short.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from random_lights import SQUARE, Lights
+from random_materials import Materials
+from stages import camera, matrix, mesh, moved, quad, sphere, turned, write_stage
+
+PLACES = [(-1.05, 0.75, 0.2), (1.05, 0.75, -0.1), (0.0, 0.7, 1.1), (0.1, 1.5, -1.0)]
+
+
+@dataclass
+class RandomScene:
+    """A stage on disk and how to render it.
+
+    Attributes:
+        stage: The file.
+        load: Options of ``wavecomb.load``.
+        settings: Of the render: those that may change noise, but no mean.
+        depth: max_depth.
+        schlick: Whether Fresnel is by Schlick's formula.
+        delta: Whether some lobe is perfectly narrow.
+        features: What meets here.
+    """
+
+    stage: Path
+    load: dict[str, Any]
+    settings: dict[str, Any]
+    depth: int
+    schlick: bool
+    delta: bool
+    features: list[str] = field(default_factory=list)
+
+
+class Objects:
+    """Makes objects by chance and keeps their text."""
+
+    def __init__(self, random: Generator, materials: Materials) -> None:
+        self.random = random
+        self.materials = materials
+        self.prims: list[str] = []
+        self.names: list[str] = []
+        self.features: list[str] = []
+        self.load: dict[str, Any] = {}
+        self.moves = False
+
+    def chance(self, p: float) -> bool:
+        return bool(self.random.random() < p)
+
+    def add(self, centre: Any) -> None:
+        """An object about a place."""
+        name = f"O{len(self.names)}"
+        self.names.append(name)
+        kinds = ["ball", "smooth ball", "box", "panel", "cage", "instances", "points", "gprim"]
+        kind = str(self.random.choice(kinds, p=[0.13, 0.13, 0.15, 0.2, 0.12, 0.15, 0.05, 0.07]))
+        self.features.append(kind)
+        material = self.materials.surface()
+        spin = turned(*self.random.uniform(-40, 40, 3))
+        place = spin @ moved(*centre)
+        if self.chance(0.1):
+            self.features.append("mirrored")
+            place = np.diag((-1.0, 1.0, 1.0, 1.0)) @ place
+        where = matrix(place)
+        if self.chance(0.15) and kind != "instances":
+            self.features.append("moving")
+            self.moves = True
+            where = self.moving(place)
+        text = self.body(kind, name, material)
+        if kind == "instances":
+            self.prims.append(self.instances(text, name, centre))
+        else:
+            head, rest = text.split("{", 1)
+            self.prims.append(f"{head}{{\n{where}\n{rest}")
+
+    def moving(self, place: Any) -> str:
+        to = place @ moved(*self.random.uniform(-0.5, 0.5, 3))
+        rows = [
+            "( " + ", ".join("(" + ", ".join(f"{v:.9g}" for v in r) + ")" for r in m) + " )"
+            for m in (place, to)
+        ]
+        return (
+            f"matrix4d xformOp:transform.timeSamples = {{ 0: {rows[0]}, 1: {rows[1]} }}\n"
+            'uniform token[] xformOpOrder = ["xformOp:transform"]'
+        )
+
+    def body(self, kind: str, name: str, material: str) -> str:
+        """The prim about the origin, without its place."""
+        size = float(self.random.uniform(0.5, 0.7))
+        if kind in ("ball", "smooth ball"):
+            return sphere(name, material, radius=size, rings=8, smooth=kind == "smooth ball")
+        if kind in ("panel", "instances"):
+            corners = [(-size, -size, 0), (size, -size, 0), (size, size, 0), (-size, size, 0)]
+            grown = np.asarray(corners) * 1.3
+            return quad(name, grown, material, uv=SQUARE)
+        if kind == "gprim":
+            bound = f"rel material:binding = </World/{material}>"
+            word = str(self.random.choice(["Sphere", "Cube", "Cylinder", "Cone"]))
+            value = {"Cube": f"double size = {2 * size}", "Sphere": f"double radius = {size}"}.get(
+                word, f"double radius = {size}\ndouble height = {size}"
+            )
+            return (
+                f'def {word} "{name}" ( prepend apiSchemas = ["MaterialBindingAPI"] ) '
+                f"{{\n{value}\n{bound}\n}}"
+            )
+        if kind == "points":
+            return f"""def Points "{name}" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {{
+                point3f[] points = [(-0.3, 0, 0), (0.35, 0.1, 0.1), (0, 0.4, -0.2)]
+                float[] widths = [0.6, 0.7, 0.5] ( interpolation = "vertex" )
+                rel material:binding = </World/{material}>
+            }}"""
+        low, high = -0.8 * size, 0.8 * size
+        points = [(x, y, z) for x in (low, high) for y in (low, high) for z in (low, high)]
+        faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+        text = mesh(name, points, faces, material, uv=[SQUARE[i % 4] for i in range(8)])
+        if kind == "cage":
+            self.load["subdivision"] = int(self.random.integers(1, 4))
+            text = text.replace('subdivisionScheme = "none"', 'subdivisionScheme = "catmullClark"')
+        return text
+
+    def instances(self, text: str, name: str, centre: Any) -> str:
+        """The prim as the prototype of two instances."""
+        rows = [
+            turned(*self.random.uniform(-40, 40, 3)) @ moved(*(np.asarray(centre) + shift))
+            for shift in ((-0.3, 0.0, 0.0), (0.3, 0.2, -0.4))
+        ]
+        inner = "\n".join(
+            f'def Xform "I{i}" ( instanceable = true\nreferences = </World/{name}Shape> )'
+            f" {{\n{matrix(m)}\n}}"
+            for i, m in enumerate(rows)
+        )
+        shape = f'class Xform "{name}Shape" {{\n{text}\n}}'
+        return f'{shape}\ndef Xform "{name}" {{\n{inner}\n}}'
+
+
+def view(random: Generator, features: list[str], *, moves: bool) -> tuple[str, dict[str, Any]]:
+    """A camera that sees all objects, and the options that belong to it."""
+    load: dict[str, Any] = {}
+    angle = random.uniform(-0.6, 0.6)
+    eye = (6 * np.sin(angle), random.uniform(2, 4), 6 * np.cos(angle))
+    lens = ""
+    if random.random() < 0.15:
+        features.append("lens")
+        lens = "float fStop = 2\nfloat focusDistance = 6"
+    if moves:
+        lens += "\ndouble shutter:open = 0\ndouble shutter:close = 1"
+        load["frame"] = 0.0
+    text = camera(eye, (0, 0.7, 0), half=0.42, lens=lens)
+    if random.random() < 0.1:
+        features.append("orthographic")
+        text = text.replace(
+            "float focalLength", 'token projection = "orthographic"\nfloat focalLength'
+        )
+        text = text.replace("Aperture = 42.0", "Aperture = 50.0")
+    return text, load
+
+
+def settings(random: Generator, features: list[str]) -> dict[str, Any]:
+    """Settings that change noise, but no mean."""
+
+    def one(*values: Any) -> Any:
+        return values[int(random.integers(len(values)))]
+
+    chosen = {
+        "sampler": one("independent", "independent", "sobol"),
+        "roulette": one("off", "off", "throughput", "cost-aware"),
+        "roulette_depth": 1,
+        "light_selection": one("auto", "tree", "power"),
+        "cosine_sampling": bool(random.random() < 0.15),
+        "policy": one("program", "none", "material", "texture-locality"),
+        "integrator": one("wavefront", "wavefront", "wavefront", "reference"),
+    }
+    features += [str(chosen["sampler"]), f"roulette {chosen['roulette']}"]
+    features.append(f"lights by {chosen['light_selection']}")
+    if chosen["cosine_sampling"]:
+        features.append("cosine sampling")
+    return chosen
+
+
+def make_scene(seed: int, folder: Path) -> RandomScene:
+    """Writes the stage of a seed, with its files, to an empty folder."""
+    random = np.random.default_rng(seed)
+    depth = int(random.choice([1, 2, 3], p=[0.6, 0.32, 0.08]))
+    features: list[str] = []
+    materials = Materials(random, folder, depth)
+    floor = materials.of(str(random.choice(["diffuse", "plastic", "principled", "openpbr"])))
+    half = 3.0
+    corners = [(-half, 0, half), (half, 0, half), (half, 0, -half), (-half, 0, -half)]
+    prims = [quad("Floor", corners, floor, uv=SQUARE)]
+    objects = Objects(random, materials)
+    for k in random.permutation(len(PLACES))[: int(random.integers(1, 4))]:
+        objects.add(PLACES[k])
+    lights = Lights(random, folder, materials, ["Floor", *objects.names])
+    for _ in range(int(random.integers(1, 4))):
+        lights.add()
+    load: dict[str, Any] = {**objects.load, "size": (32, 32)}
+    if random.random() < 0.15:
+        features.append("hidden lights")
+        load["lights"] = "hidden"
+    text, more = view(random, features, moves=objects.moves)
+    chosen = settings(random, features)
+    schlick = bool(random.random() < 0.1)
+    stage = write_stage(
+        folder / "stage.usda", text, *materials.prims, *prims, *objects.prims, *lights.prims
+    )
+    if objects.moves:
+        head = stage.read_text().replace("(\n", "(\nstartTimeCode = 0\nendTimeCode = 1\n", 1)
+        stage.write_text(head)
+    return RandomScene(
+        stage=stage,
+        load=load | more,
+        settings=chosen,
+        depth=depth,
+        schlick=schlick,
+        delta=materials.delta,
+        features=[*materials.features, *objects.features, *lights.features, *features],
+    )
