@@ -8,6 +8,7 @@ SHELL := /bin/bash
 
 BUILD := build/editable
 ASAN := build/asan
+TSAN := build/tsan
 WHEEL := build/wheel
 VENV := .venv/bin
 # Of make fuzz.
@@ -26,7 +27,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-naive wheel render test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-wheel bench lint format clean
+.PHONY: help setup setup-test build build-naive wheel render test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -93,6 +94,13 @@ test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBe
 	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=ON -DWAVECOMB_TESTS=ON
 	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) --verbose --output-on-failure --no-tests=error
+
+test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
+	@test -e $(TSAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(TSAN) -G Ninja --log-level=NOTICE \
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=thread -DWAVECOMB_TESTS=ON
+	@$(LOCK) $(VENV)/cmake --build $(TSAN) --target wavecomb_tests -j $(JOBS) -- --quiet
+	TSAN_OPTIONS="suppressions=$(CURDIR)/tests/cpp/tsan.supp $(TSAN_OPTIONS)" \
+	  $(TSAN)/tests/cpp/wavecomb_tests --gtest_brief=1 $(if $(FILTER),--gtest_filter='$(FILTER)')
 
 # The naive integrator, which statistical tests compare ours with.
 build-naive: build

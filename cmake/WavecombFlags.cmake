@@ -19,7 +19,11 @@ target_compile_options(wavecomb_common INTERFACE
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
 if(WAVECOMB_SANITIZE)
-  set(_sanitize -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  if(WAVECOMB_SANITIZE STREQUAL "thread")
+    set(_sanitize -fsanitize=thread -fno-omit-frame-pointer)
+  else()
+    set(_sanitize -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  endif()
   target_compile_options(wavecomb_common INTERFACE ${_sanitize})
   target_link_options(wavecomb_common INTERFACE ${_sanitize})
 endif()

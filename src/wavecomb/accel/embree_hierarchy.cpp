@@ -11,6 +11,7 @@
 
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/task_order.h"
 
 namespace wavecomb {
 
@@ -101,7 +102,10 @@ EmbreeHierarchy::EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeH
   const std::lock_guard lock(device_->building);
   tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
   try {
-    arena.execute([&] { build(origin); });
+    const auto work = [&] { build(origin); };
+    const TaskOrder order;
+    arena.execute(order.around(work));
+    order.join();
   } catch (...) {
     release();
     throw;
@@ -257,8 +261,10 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
     for (uint32_t mesh : meshes)
       rtcAttachGeometryByID(group_scenes_[g], mesh_geometries_[mesh], id++);
   }
-  tbb::parallel_for(size_t{0}, built.size(),
-                    [&](size_t i) { rtcCommitScene(group_scenes_[built[i]]); });
+  const auto commit = [&](size_t i) { rtcCommitScene(group_scenes_[built[i]]); };
+  const TaskOrder order;
+  tbb::parallel_for(size_t{0}, built.size(), order.around(commit));
+  order.join();
   check("building the hierarchy of a group");
 
   top_ = new_scene();

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "wavecomb/core/denormals.h"
+#include "wavecomb/core/task_order.h"
 #include "wavecomb/integrate/reference.h"
 
 namespace wavecomb {
@@ -37,21 +38,23 @@ PassRunner::PassRunner(const WaveContext& context, const LaneKernels& kernels, b
 
 void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) {
   const std::vector<WaveGroup> groups = wave_groups(plan, wave_size_, threads());
-  tbb::parallel_for(
-      tbb::blocked_range<size_t>(0, groups.size(), 1),
-      [&](const tbb::blocked_range<size_t>& range) {
-        for (size_t g = range.begin(); g != range.end(); ++g) {
-          const WaveGroup& group = groups[g];
-          for (uint32_t done = 0; done < group.samples && !halted(); done += group.wave_samples)
-            run_wave({group.pixels, group.pixel_count, group.first_sample + done,
-                      std::min(group.wave_samples, group.samples - done)});
-        }
-      },
-      tbb::simple_partitioner());
+  const auto run_groups = [&](const tbb::blocked_range<size_t>& range) {
+    for (size_t g = range.begin(); g != range.end(); ++g) {
+      const WaveGroup& group = groups[g];
+      for (uint32_t done = 0; done < group.samples && !halted(); done += group.wave_samples)
+        run_wave({group.pixels, group.pixel_count, group.first_sample + done,
+                  std::min(group.wave_samples, group.samples - done)});
+    }
+  };
+  const TaskOrder order;
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, groups.size(), 1), order.around(run_groups),
+                    tbb::simple_partitioner());
+  order.join();
 }
 
 void PassRunner::run_wave(const WaveTask& task) {
   Worker& worker = workers_[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
+  const SlotOrder slot(&worker);
   const DenormalsOff denormals_off;
   const auto rays = [](const Counts& counts) { return counts.rays + counts.shadow_rays; };
   if (!reference_ && !worker.wave) worker.wave = std::make_unique<Wave>(wave_size_, context_);

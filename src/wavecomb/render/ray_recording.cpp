@@ -13,6 +13,7 @@
 
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/task_order.h"
 #include "wavecomb/schedule/ray_queue.h"
 
 namespace wavecomb {
@@ -153,18 +154,20 @@ ReplayTimes RayRecording::replay(const Replay& how) {
   tbb::task_arena arena(static_cast<int>(threads));
   ReplayTimes total;
   const Clock::time_point start = Clock::now();
+  const auto trace_waves = [&](const tbb::blocked_range<size_t>& range) {
+    const DenormalsOff denormals_off;
+    Buffers& own = buffers[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
+    const SlotOrder slot(&own);
+    for (size_t w = range.begin(); w != range.end(); ++w)
+      for (const Stage& stage : *waves_[w])
+        if (how.wanted[static_cast<size_t>(stage.kind)]) trace(stage, how, own, own.times);
+  };
+  const TaskOrder order;
   arena.execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<size_t>(0, waves_.size(), 1),
-        [&](const tbb::blocked_range<size_t>& range) {
-          const DenormalsOff denormals_off;
-          Buffers& own = buffers[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
-          for (size_t w = range.begin(); w != range.end(); ++w)
-            for (const Stage& stage : *waves_[w])
-              if (how.wanted[static_cast<size_t>(stage.kind)]) trace(stage, how, own, own.times);
-        },
-        tbb::simple_partitioner());
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, waves_.size(), 1), order.around(trace_waves),
+                      tbb::simple_partitioner());
   });
+  order.join();
   total.wall_s = seconds_since(start);
   for (const Buffers& b : buffers)
     for (size_t k = 0; k < kRayKinds; ++k) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/task_order.h"
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/energy_tables.h"
@@ -303,12 +304,18 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const tbb::global_control parallelism(
       tbb::global_control::max_allowed_parallelism,
       std::max<size_t>(threads, static_cast<size_t>(tbb::info::default_concurrency())));
-  watch.run([&] { tbb::task_arena(static_cast<int>(threads)).execute(work); },
-            [&] {
-              check_textures();
-              return options.progress ? options.progress(loop.status()) : Request::kGoOn;
-            },
-            [&] { snapshot(false); });
+  const auto in_arena = [&] {
+    const TaskOrder order;
+    tbb::task_arena(static_cast<int>(threads)).execute(order.around(work));
+    order.join();
+  };
+  watch.run(
+      in_arena,
+      [&] {
+        check_textures();
+        return options.progress ? options.progress(loop.status()) : Request::kGoOn;
+      },
+      [&] { snapshot(false); });
   check_textures();
   if (options.progress && !watch.stopped()) options.progress(loop.status());
   snapshot(true);
