@@ -58,10 +58,6 @@ class Verdict:
         """Whether the means are within half a percent."""
         return abs(self.difference) <= MEAN_LIMIT
 
-    def mean_agrees_within(self, errors: float) -> bool:
-        """Whether they are, or within so many standard errors."""
-        return abs(self.difference) <= max(MEAN_LIMIT, errors * self.noise)
-
     @property
     def agrees(self) -> bool:
         """Whether that holds and each block is within noise."""
