@@ -147,8 +147,13 @@ def test_an_outline_is_what_matters():
         assert (kept @ direction).max() >= 0.98 * (ball @ direction).max()
     # The same points in an order that has neighbours near each other: most are not looked at.
     ball = ball[np.lexsort((ball[:, 0], np.round(8 * ball[:, 1]), np.round(8 * ball[:, 2])))]
-    near = framing._near_the_outside(ball.astype(np.float32), framing.DIRECTIONS[:6])
+    directions = framing.DIRECTIONS.astype(np.float32)
+    near = framing._near_the_outside(ball.astype(np.float32), None, directions[:6])
     assert len(near) < 0.5 * len(ball)
+    sizes = rng.uniform(size=len(ball)).astype(np.float32)
+    balls = framing.outline_of_balls(ball, sizes)
+    exact = (ball @ framing.DIRECTIONS.T + sizes[:, None]).max(axis=0)
+    assert np.allclose((balls @ framing.DIRECTIONS.T).max(axis=0), exact, rtol=1e-5)
     sorted_kept = framing.outline(ball)
     assert np.allclose(
         (sorted_kept @ framing.DIRECTIONS.T).max(axis=0), (kept @ framing.DIRECTIONS.T).max(axis=0)

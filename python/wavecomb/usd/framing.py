@@ -57,29 +57,8 @@ def outline(points: NDArray[Any], more: Points | None = None) -> Points:
     if len(points) <= _FEW_POINTS:
         return np.asarray(points, np.float64)
     directions = with_directions(more).astype(np.float32)
-    points = np.asarray(points, np.float32)
-    if len(points) > _BLOCK:
-        points = _near_the_outside(points, directions)
-    kept = np.empty((0, 3), np.float32)
-    for first in range(0, len(points), _BLOCK):
-        some = np.concatenate([kept, points[first : first + _BLOCK]])
-        kept = some[np.unique(np.argmax(directions @ some.T, axis=1))]
-    return kept.astype(np.float64)
-
-
-def _near_the_outside(points: NDArray[np.float32], directions: NDArray[Any]) -> NDArray[np.float32]:
-    """Leaves out runs of points whose boxes lie inside of what a sample of all reaches.
-
-    Points that follow each other in a mesh are mostly near each other.
-    """
-    sample = points[:: max(1, len(points) // _SAMPLE)]
-    reached = (directions @ sample.T).max(axis=1)
-    whole = len(points) // _RUN * _RUN
-    runs = points[:whole].reshape(-1, _RUN, 3)
-    low, high = runs.min(axis=1), runs.max(axis=1)
-    most = 0.5 * ((low + high) @ directions.T + (high - low) @ np.abs(directions).T)
-    outside = (most > reached).any(axis=1)
-    return np.concatenate([runs[outside].reshape(-1, 3), points[whole:], sample])
+    some = np.asarray(points, np.float32)
+    return some[np.unique(_farthest(some, None, directions))].astype(np.float64)
 
 
 def outline_of_balls(
@@ -88,13 +67,53 @@ def outline_of_balls(
     """Of balls about points (n, 3): where they reach farthest."""
     directions = with_directions(more)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    found = []
-    for first in range(0, len(points), _BLOCK):
-        some = np.asarray(points[first : first + _BLOCK], np.float64)
-        size = np.asarray(radii[first : first + _BLOCK], np.float64)
-        best = np.argmax(some @ directions.T + size[:, None], axis=0)
-        found.append(some[best] + size[best, None] * directions)
-    return outline(np.concatenate(found), more)
+    some, size = np.asarray(points, np.float32), np.asarray(radii, np.float32)
+    best = _farthest(some, size, directions.astype(np.float32))
+    return np.asarray(some[best] + size[best, None] * directions, np.float64)
+
+
+def _farthest(
+    points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
+) -> NDArray[np.intp]:
+    """Which of some points, or balls, reaches farthest in each of some directions (k, 3)."""
+    chosen = np.arange(len(points))
+    if len(points) > _BLOCK:
+        chosen = _near_the_outside(points, radii, directions)
+    most = np.full(len(directions), -np.inf, np.float32)
+    best = np.zeros(len(directions), np.intp)
+    for first in range(0, len(chosen), _BLOCK):
+        these = chosen[first : first + _BLOCK]
+        along = directions @ points[these].T
+        if radii is not None:
+            along += radii[these]
+        at = np.argmax(along, axis=1)
+        reach = along[np.arange(len(at)), at]
+        farther = reach > most
+        most[farther], best[farther] = reach[farther], these[at[farther]]
+    return best
+
+
+def _near_the_outside(
+    points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
+) -> NDArray[np.intp]:
+    """Leaves out runs of points whose boxes lie inside of what a sample of all reaches.
+
+    Points that follow each other in a mesh are mostly near each other.
+    """
+    step = max(1, len(points) // _SAMPLE)
+    reached = directions @ points[::step].T
+    if radii is not None:
+        reached += radii[::step]
+    whole = len(points) // _RUN * _RUN
+    # One axis after the other: reductions over the last one are quick.
+    runs = np.ascontiguousarray(points[:whole].T).reshape(3, -1, _RUN)
+    low, high = runs.min(axis=2), runs.max(axis=2)
+    most = 0.5 * (directions @ (low + high) + np.abs(directions) @ (high - low))
+    if radii is not None:
+        most += radii[:whole].reshape(-1, _RUN).max(axis=1)
+    outside = np.flatnonzero((most >= reached.max(axis=1)[:, None]).any(axis=0))
+    every = (outside[:, None] * _RUN + np.arange(_RUN)).reshape(-1)
+    return np.concatenate([every, np.arange(whole, len(points))])
 
 
 def corners(bounds: NDArray[Any]) -> Points:
@@ -110,11 +129,10 @@ def placed(points: Points, transforms: Matrices, more: Points | None = None) -> 
         linear = transforms[:, :3, :3]
         middle = centre @ linear + transforms[:, 3, :3]
         size = radius * np.sqrt(np.einsum("kij,kij->ki", linear, linear).max(axis=1))
-        farthest: set[int] = set()
-        for direction in with_directions(more):
-            along = middle @ direction
-            farthest |= {int(np.argmax(along)), int(np.argmax(along + size))}
-        transforms = transforms[sorted(farthest)]
+        directions = with_directions(more).T
+        along = middle @ directions
+        bare, whole = np.argmax(along, axis=0), np.argmax(along + size[:, None], axis=0)
+        transforms = transforms[np.unique(np.concatenate([bare, whole]))]
     moved = points @ transforms[:, :3, :3] + transforms[:, 3:, :3]
     return outline(moved.reshape(-1, 3), more)
 
