@@ -48,15 +48,19 @@ def naive_module() -> ModuleType:
     """The naive integrator of this build.
 
     Raises:
-        ImportError: It is not built.
+        ImportError: It is not built, or older than the core.
     """
     import wavecomb._core  # noqa: F401  # its scenes are taken
 
     for folder in sorted(ROOT.glob("build/*/tests/naive")):
-        if list(folder.glob("wavecomb_naive*.so")):
+        for module in folder.glob("wavecomb_naive*.so"):
+            core = folder.parents[1] / "libwavecomb.a"
+            if core.exists() and core.stat().st_mtime > module.stat().st_mtime:
+                # It would take scenes of another layout.
+                raise ImportError("is older than the core: make build-naive")
             sys.path.insert(0, str(folder))
             return importlib.import_module("wavecomb_naive")
-    raise ImportError("build target wavecomb_naive, as make test does")
+    raise ImportError("is not built: make build-naive")
 
 
 @dataclass(frozen=True)
