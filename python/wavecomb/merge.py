@@ -141,7 +141,7 @@ def _check_fit(first: _Source, other: _Source) -> None:
 
     for key in SAME_SETTINGS:
         a, b = first.settings.get(key), other.settings.get(key)
-        if a != b:
+        if not np.array_equal(a, b):  # what a file says may be an array
             refuse(key, a, b)
     for key, what in (("wavecomb:stage", "the stage"), ("wavecomb:camera", "the camera")):
         a, b = (str(source.attributes.get(key, "")) for source in (first, other))
