@@ -141,14 +141,14 @@ def _check_fit(first: _Source, other: _Source) -> None:
 
     for key in SAME_SETTINGS:
         a, b = first.settings.get(key), other.settings.get(key)
-        if not np.array_equal(a, b):  # what a file says may be an array
+        if a != b:
             refuse(key, a, b)
     for key, what in (("wavecomb:stage", "the stage"), ("wavecomb:camera", "the camera")):
         a, b = (str(source.attributes.get(key, "")) for source in (first, other))
         if os.path.basename(a) != os.path.basename(b):
             refuse(what, a or "unknown", b or "unknown")
     a, b = (source.attributes.get("wavecomb:scene") for source in (first, other))
-    if a != b:
+    if not np.array_equal(a, b):  # what a file says may be an array
         raise WavecombError(
             f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
             "camera or frame"
