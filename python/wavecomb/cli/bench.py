@@ -30,7 +30,7 @@ _METRICS = (
         "wavecomb bench run quick -o results --resume",
         "wavecomb bench run my.toml -o results --only 'orders.*'",
         "wavecomb bench report results",
-        "wavecomb bench report results --markdown docs/results/quick.md",
+        "wavecomb bench report results --markdown out/quick.md",
         "wavecomb bench compare results-before results-after",
     ),
 )
