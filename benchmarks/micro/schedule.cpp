@@ -78,6 +78,8 @@ void fill(ShadingQueue& queue, size_t n) {
   queue.ordered = sorter.sort(n, queue.sorted_indices);
 }
 
+constexpr size_t kWords = 8;  ///< of a record's row, as waves have them
+
 /// Reads every record's row and ids once, in lanes: what a very cheap shader would do.
 float read_all(const ShadingQueue& queue) {
   constexpr size_t kLanes = WAVECOMB_MAX_LANES;
@@ -89,7 +91,7 @@ float read_all(const ShadingQueue& queue) {
   for (size_t i = 0; i + kLanes <= queue.size; i += kLanes) {
     const U at = queue.ordered ? load<U>(queue.sorted_indices + i)
                                : lane_index<F>() + static_cast<uint32_t>(i);
-    for (const F& word : load_rows<Q::kRowWords, F>(queue.rows(), at * uint32_t{Q::kRowWords}, all))
+    for (const F& word : load_rows<kWords, F>(queue.row(0), at * uint32_t{kWords}, all))
       sum = sum + word;
     for (uint32_t c = 0; c < Q::kColumns; ++c) {
       const uint32_t* column = queue.uints(static_cast<Q::Column>(c));
@@ -102,7 +104,7 @@ float read_all(const ShadingQueue& queue) {
 
 void read_in_arrival_order(benchmark::State& state) {
   const auto n = static_cast<size_t>(state.range(0));
-  ShadingQueue queue(n);
+  ShadingQueue queue(n, kWords);
   queue.size = n;
   for (auto _ : state) benchmark::DoNotOptimize(read_all(queue));
   count_items(state, "record", n);
@@ -111,7 +113,7 @@ BENCHMARK(read_in_arrival_order)->RangeMultiplier(16)->Range(256, 1 << 20);
 
 void gather_by_index(benchmark::State& state) {
   const auto n = static_cast<size_t>(state.range(0));
-  ShadingQueue queue(n);
+  ShadingQueue queue(n, kWords);
   fill(queue, n);
   for (auto _ : state) benchmark::DoNotOptimize(read_all(queue));
   count_items(state, "record", n);
@@ -120,7 +122,7 @@ BENCHMARK(gather_by_index)->RangeMultiplier(16)->Range(256, 1 << 20);
 
 void materialize_then_read(benchmark::State& state) {
   const auto n = static_cast<size_t>(state.range(0));
-  ShadingQueue queue(n);
+  ShadingQueue queue(n, kWords);
   fill(queue, n);
   for (auto _ : state) {
     queue.ordered = true;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_pool.h"
 
 #include <algorithm>
@@ -18,7 +19,7 @@ float word(uint32_t slot, uint32_t k) {
   return static_cast<float>(100 * slot + k + 1);
 }
 template <typename F>
-PathLanes<F> numbered_path(const UInt<F>& slot) {
+PathRow<F> numbered_path(const UInt<F>& slot) {
   const auto at = [&](uint32_t k) { return F(Int<F>(slot * 100u + k + 1u)); };
   return {{at(0), at(1), at(2)},
           {at(3), at(4), at(5)},
@@ -47,22 +48,23 @@ void for_each_packet_of_slots(uint32_t seed, const Function& f) {
 TEST(PathPool, PathsComeBackFromTheirSlots) {
   for_each_lane_type([]<typename F>() {
     using U = UInt<F>;
-    const PathPool pool(kSlots, {AovSet{0}}, false);
+    const PathPool pool(kSlots, false);
     for_each_packet_of_slots<F>(1, [&](const U& slot, const Mask<F>& active) {
-      store_path<F>(pool, slot, numbered_path<F>(slot), active);
+      store_row<PathRow, F>(pool.paths, slot, numbered_path<F>(slot), active);
     });
     for (uint32_t s = 0; s < kSlots; ++s) {
-      const float* row = pool.paths + s * PathPool::kPathWords;
+      const float* row = pool.paths + s * kRowWords<PathRow>;
       for (uint32_t k = 0; k < 13; ++k) ASSERT_EQ(row[k], word(s, k)) << s << ", " << k;
       ASSERT_EQ(std::bit_cast<uint32_t>(row[13]), 100 * s + 0x7f800001u);
       ASSERT_EQ(std::bit_cast<uint32_t>(row[14]), 100 * s + 0xff800001u);
       ASSERT_EQ(std::bit_cast<uint32_t>(row[15]), 100 * s + 0x7fc00001u);
     }
     // Shadow rays and radiance are untouched.
-    ASSERT_TRUE(std::all_of(pool.shadows, pool.radiance + kSlots * PathPool::kRadianceWords,
+    ASSERT_TRUE(std::all_of(pool.shadows, pool.radiance + kSlots * kRadianceWords,
                             [](float x) { return x == 0; }));
     for_each_packet_of_slots<F>(2, [&](const U& slot, const Mask<F>& active) {
-      const PathLanes<F> p = load_path<F>(pool, slot, active), q = numbered_path<F>(slot);
+      const PathRow<F> p = load_row<PathRow, F>(pool.paths, slot, active),
+                       q = numbered_path<F>(slot);
       const F a[] = {p.o.x,       p.o.y,          p.o.z,          p.d.x,          p.d.y,
                      p.d.z,       p.throughput.x, p.throughput.y, p.throughput.z, p.pdf,
                      p.eta_scale, p.cone_width,   p.cone_spread};
@@ -82,21 +84,21 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
 TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
   for_each_lane_type([]<typename F>() {
     using U = UInt<F>;
-    const PathPool pool(kSlots, {AovSet{0}}, false);
+    const PathPool pool(kSlots, false);
     std::vector<std::array<float, 3>> expected(kSlots, {0, 0, 0});
     for (uint32_t round = 0; round < 3; ++round)
       for_each_packet_of_slots<F>(round, [&](const U& slot, const Mask<F>& active) {
         // Every third slot sits one round out.
         const Mask<F> lit = active & Mask<F>((slot + round) % 3u != U(0u));
         const F x = F(Int<F>(slot)) + 0.125f;
-        add_radiance<F>(pool, slot, {x, F(2.f * x), F(3.f * x)}, lit);
+        add_radiance<F>(pool.radiance, slot, {x, F(2.f * x), F(3.f * x)}, lit);
         for (size_t k = 0; k < kWidth<F>; ++k)
           if ((lane_bits<F>(lit) >> k & 1u) != 0)
             for (size_t c = 0; c < 3; ++c)
               expected[lane(slot, k)][c] += static_cast<float>(c + 1) * lane(x, k);
       });
     for (uint32_t s = 0; s < kSlots; ++s) {
-      const float* row = pool.radiance + s * PathPool::kRadianceWords;
+      const float* row = pool.radiance + s * kRadianceWords;
       for (size_t c = 0; c < 3; ++c) ASSERT_EQ(row[c], expected[s][c]) << s;
     }
     ASSERT_TRUE(std::all_of(pool.paths, pool.radiance, [](float x) { return x == 0; }));
@@ -104,41 +106,62 @@ TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
 }
 
 TEST(PathPool, BlocksOfRows) {
-  const PathPool plain(100, {AovSet{0}}, false), aovs(100, {AovSet{}}, false);
-  for (const float* rows : {plain.first, plain.depth, plain.hits, plain.centre, plain.parts[0],
-                            plain.parts[1], plain.groups, plain.cost_ns})
-    EXPECT_EQ(rows, nullptr);
-  ASSERT_NE(aovs.first, nullptr);
-  ASSERT_NE(aovs.depth, nullptr);
-  EXPECT_GE(std::abs(aovs.depth - aovs.first), 100);
-  EXPECT_EQ(aovs.hits, nullptr);
-  EXPECT_LT(plain.bytes(), aovs.bytes());
-  EXPECT_GE(plain.bytes(),
-            400u * (PathPool::kPathWords + PathPool::kShadowWords + PathPool::kRadianceWords));
+  const PathPool plain(100, false), cold(100, true);
+  EXPECT_EQ(plain.cold, nullptr);
+  ASSERT_NE(cold.cold, nullptr);
+  EXPECT_LT(plain.bytes(), cold.bytes());
+  EXPECT_GE(plain.bytes(), 400u * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords));
   // Paths and shadow rays are cache lines.
   EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.paths) % 64, 0u);
   EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.shadows) % 64, 0u);
-  EXPECT_EQ(plain.shadows - plain.paths, 100 * PathPool::kPathWords);
-  EXPECT_EQ(plain.radiance - plain.shadows, 100 * PathPool::kShadowWords);
+  EXPECT_EQ(plain.shadows - plain.paths, 100 * ptrdiff_t{kRowWords<PathRow>});
+  EXPECT_EQ(plain.radiance - plain.shadows, 100 * ptrdiff_t{kRowWords<ShadowRow>});
   // What nobody asks for takes nothing: a path, its shadow ray and its radiance are 144 bytes.
   EXPECT_LE(plain.bytes(), 100u * 144 + 4 * (SoaBlock::kPad + 32));
-  const PathPool all(100, {AovSet{(1u << kAovCount) - 1}, 3}, false);
-  for (const float* rows :
-       {all.hits, all.centre, all.parts[0], all.parts[1], all.groups, all.cost_ns})
-    EXPECT_NE(rows, nullptr);
-  EXPECT_TRUE(all.wants_uv);
 }
 
-TEST(PathPool, LightGroupsKeepApart) {
-  const PathPool pool(8, {AovSet{static_cast<uint32_t>(Aov::kLightGroups)}, 3}, false);
-  add_group_radiance<float>(pool, 2, 1, {1.f, 2.f, 3.f}, true);
-  add_group_radiance<float>(pool, 2, 1, {1.f, 0.f, 0.f}, true);
-  add_group_radiance<float>(pool, 2, kNoGroup, {9.f, 9.f, 9.f}, true);
-  add_group_radiance<float>(pool, 3, 0, {9.f, 9.f, 9.f}, false);
-  for (uint32_t word = 0; word < 8 * 3 * PathPool::kRadianceWords; ++word) {
-    const uint32_t row = 2 * 3 + 1, at = word - row * PathPool::kRadianceWords;
-    const float expected = at == 0 ? 2.f : at == 1 ? 2.f : at == 2 ? 3.f : 0.f;
-    EXPECT_EQ(pool.groups[word], at < 3 ? expected : 0.f) << word;
+TEST(PathPool, ColdFieldsComeBackOneByOne) {
+  for_each_lane_type([]<typename F>() {
+    using U = UInt<F>;
+    const PathPool pool(kSlots, true);
+    for_each_packet_of_slots<F>(3, [&](const U& slot, const Mask<F>& active) {
+      scatter_field<F>(pool.cold, &PathColdRow<float>::time, slot, F(Int<F>(slot)), active);
+      scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, U(slot + 0x80000000u), active);
+    });
+    for (uint32_t s = 0; s < kSlots; ++s) {
+      const auto row = load_row<PathColdRow, float>(pool.cold, s, true);
+      EXPECT_EQ(row.time, static_cast<float>(s));
+      EXPECT_EQ(row.link, s + 0x80000000u);
+    }
+  });
+}
+
+TEST(PathAovs, OnlyWhatIsAskedForTakesRoom) {
+  const PathAovs none(100, {AovSet{0}}, nullptr), usual(100, {AovSet{}}, nullptr);
+  const PathAovs all(100, {AovSet{(1u << kAovCount) - 1}, 3}, nullptr);
+  EXPECT_EQ(none.bytes(), 0u);
+  EXPECT_FALSE(none.wants_hits() || none.wants_vertex(0) || none.wants_groups() ||
+               none.wants_cost());
+  EXPECT_TRUE(usual.wants_vertex(0));
+  EXPECT_FALSE(usual.wants_vertex(1));
+  EXPECT_LT(usual.bytes(), all.bytes());
+  EXPECT_TRUE(all.wants_vertex(5) && all.wants_cost());
+  EXPECT_TRUE(all.wanted<float>(0).wants_uv);
+  EXPECT_FALSE(all.wanted<float>(1).wants_uv);
+}
+
+TEST(PathAovs, LightGroupsKeepApart) {
+  const PathAovs aovs(8, {AovSet{static_cast<uint32_t>(Aov::kLightGroups)}, 3}, nullptr);
+  aovs.add<float>(2, 1, {1.f, 2.f, 3.f}, true);
+  aovs.add<float>(2, 1, {1.f, 0.f, 0.f}, true);
+  aovs.add<float>(2, kNoGroup, {9.f, 9.f, 9.f}, true);
+  aovs.add<float>(3, 0, {9.f, 9.f, 9.f}, false);
+  for (uint32_t row = 0; row < 8 * 3; ++row) {
+    const Color<float> sum = load_row<RadianceRow, float>(aovs.group_rows(), row, true).sum;
+    const bool lit = row == 2 * 3 + 1;
+    EXPECT_EQ(sum.x, lit ? 2.f : 0.f) << row;
+    EXPECT_EQ(sum.y, lit ? 2.f : 0.f) << row;
+    EXPECT_EQ(sum.z, lit ? 3.f : 0.f) << row;
   }
 }
 

@@ -241,7 +241,7 @@ TEST(Policies, BatchesCoverTheQueueOnce) {
     for (const size_t n : kSizes) {
       for (const bool materialize : {false, true}) {
         Records r = random_records(n, 7);
-        ShadingQueue queue(kFull);
+        ShadingQueue queue(kFull, 1);
         queue.size = n;
         std::copy_n(r.program.data(), n, queue.uints(ShadingQueue::kProgram));
         std::copy_n(r.material.data(), n, queue.uints(ShadingQueue::kMaterial));

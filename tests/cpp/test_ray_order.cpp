@@ -37,24 +37,24 @@ struct PoolRays {
   std::vector<uint32_t> slot;
 
   explicit PoolRays(const std::vector<Ray>& rays)
-      : pool(2 * rays.size() + 1, {AovSet{0}}, false), slot(rays.size()) {
+      : pool(2 * rays.size() + 1, false), slot(rays.size()) {
     std::vector<uint32_t> slots(2 * rays.size());
     std::iota(slots.begin(), slots.end(), 0u);
     std::shuffle(slots.begin(), slots.end(), std::mt19937(1));
     std::copy_n(slots.begin(), rays.size(), slot.begin());
     for (size_t i = 0; i < rays.size(); ++i) {
       const Ray& r = rays[i];
-      store_path<float>(pool, slot[i],
-                        {{r.o[0], r.o[1], r.o[2]},
-                         {r.d[0], r.d[1], r.d[2]},
-                         {2, 3, 4},
-                         5,
-                         6,
-                         7,
-                         8,
-                         {9, static_cast<uint32_t>(i)},
-                         10},
-                        true);
+      store_row<PathRow, float>(pool.paths, slot[i],
+                                {{r.o[0], r.o[1], r.o[2]},
+                                 {r.d[0], r.d[1], r.d[2]},
+                                 {2, 3, 4},
+                                 5,
+                                 6,
+                                 7,
+                                 8,
+                                 {9, static_cast<uint32_t>(i)},
+                                 10},
+                                true);
     }
     slot.resize(rays.size() + SoaBlock::kPad);
   }
@@ -226,7 +226,7 @@ struct BareWave {
 
 /// Writes a shadow ray to its row: ten words.
 void store_shadow(const PathPool& pool, uint32_t slot, const Ray& r, float first) {
-  float* row = pool.shadows + slot * PathPool::kShadowWords;
+  float* row = pool.shadows + slot * kRowWords<ShadowRow>;
   std::copy_n(r.o, 3, row);
   std::copy_n(r.d, 3, row + 3);
   std::iota(row + 6, row + 10, first);  // tfar, r, g, b
@@ -254,7 +254,8 @@ TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
           const Vec3<float> o(r.o[0], r.o[1], r.o[2]), d(r.d[0], r.d[1], r.d[2]);
           ray_of[slot[i]] = i;
           key[i] = direction_key<float>(d);
-          store_path<float>(wave.pool, slot[i], {o, d, {1, 1, 1}, 0, 0, 0, 0, {1, 2}, 0}, true);
+          store_row<PathRow, float>(wave.pool.paths, slot[i],
+                                    {o, d, {1, 1, 1}, 0, 0, 0, 0, {1, 2}, 0}, true);
           store_shadow(wave.pool, slot[i], r, static_cast<float>(10 * i));
           wave.rays.slot[i] = wave.shadows.slot[i] = slot[i];
           wave.rays.direction[i] = wave.shadows.direction[i] = key[i];

@@ -11,11 +11,12 @@ namespace wavecomb {
 namespace {
 
 using Q = ShadingQueue;
+constexpr size_t kWords = 8;  // of a row
 
 /// A record as it arrived: its columns, its row's words, and what is noted by arrival.
 struct Record {
   std::array<uint32_t, Q::kColumns> column;
-  std::array<uint32_t, Q::kRowWords> row;
+  std::array<uint32_t, kWords> row;
   uint32_t slot, outcome;
 };
 
@@ -31,7 +32,7 @@ std::vector<Record> fill(ShadingQueue& queue, size_t n, uint32_t seed) {
     for (uint32_t c = 0; c < Q::kColumns; ++c)
       queue.uints(static_cast<Q::Column>(c))[i] = r.column[c] = random();
     for (uint32_t& word : r.row) word = random();
-    std::memcpy(queue.rows() + i * Q::kRowWords, r.row.data(), sizeof(r.row));
+    std::memcpy(queue.row(i), r.row.data(), sizeof(r.row));
     queue.slot[i] = r.slot = random();
     queue.outcome[i] = r.outcome = random();
   }
@@ -49,7 +50,7 @@ void expect_records(const ShadingQueue& queue, const std::vector<Record>& record
     const Record& r = records[order[i]];
     for (uint32_t c = 0; c < Q::kColumns; ++c)
       ASSERT_EQ(queue.uints(static_cast<Q::Column>(c))[i], r.column[c]) << c << ", " << i;
-    ASSERT_EQ(std::memcmp(queue.rows() + i * Q::kRowWords, r.row.data(), sizeof(r.row)), 0) << i;
+    ASSERT_EQ(std::memcmp(queue.row(i), r.row.data(), sizeof(r.row)), 0) << i;
     // By arrival, wherever the record stands.
     ASSERT_EQ(queue.slot[i], records[i].slot);
     ASSERT_EQ(queue.outcome[i], records[i].outcome);
@@ -57,7 +58,7 @@ void expect_records(const ShadingQueue& queue, const std::vector<Record>& record
 }
 
 TEST(ShadingQueue, MaterializeMovesColumnsAndRows) {
-  ShadingQueue queue(300);
+  ShadingQueue queue(300, kWords);
   for (uint32_t round = 0; round < 5; ++round) {
     for (const size_t n : {300u, 1u, 0u, 17u, 299u}) {
       const auto records = fill(queue, n, 10 * round + static_cast<uint32_t>(n));
@@ -70,16 +71,16 @@ TEST(ShadingQueue, MaterializeMovesColumnsAndRows) {
       // Where each record arrived is known still.
       EXPECT_EQ(std::vector<uint32_t>(queue.sorted_indices, queue.sorted_indices + n), order);
       // In order already: nothing moves.
-      const float* before = queue.rows();
+      const float* before = queue.row(0);
       queue.materialize();
-      EXPECT_EQ(queue.rows(), before);
+      EXPECT_EQ(queue.row(0), before);
       expect_records(queue, records, order);
     }
   }
 }
 
 TEST(ShadingQueue, WithoutAnOrderNothingMoves) {
-  ShadingQueue queue(40);
+  ShadingQueue queue(40, kWords);
   const auto records = fill(queue, 40, 3);
   queue.ordered = false;
   queue.materialize();
@@ -90,12 +91,12 @@ TEST(ShadingQueue, WithoutAnOrderNothingMoves) {
 }
 
 TEST(ShadingQueue, ColumnsAreAlignedAndApart) {
-  const ShadingQueue queue(100);
+  const ShadingQueue queue(100, kWords);
   struct Range {
     const void* begin;
     size_t words;
   };
-  std::vector<Range> ranges = {{queue.rows(), 100 * Q::kRowWords},
+  std::vector<Range> ranges = {{queue.row(0), 100 * kWords},
                                {queue.sorted_indices, 100},
                                {queue.slot, 100},
                                {queue.outcome, 100}};
@@ -112,11 +113,11 @@ TEST(ShadingQueue, ColumnsAreAlignedAndApart) {
     }
   }
   // Records twice, since they are moved from one block to another.
-  EXPECT_GE(queue.bytes(), 4u * 100 * (2u * Q::kColumns + 2u * Q::kRowWords + 3u));
+  EXPECT_GE(queue.bytes(), 4u * 100 * (2u * Q::kColumns + 2u * kWords + 3u));
 }
 
 TEST(ShadingQueue, ClearForgetsTheOrder) {
-  ShadingQueue queue(10);
+  ShadingQueue queue(10, kWords);
   fill(queue, 10, 1);
   queue.clear();
   EXPECT_EQ(queue.size, 0u);

@@ -57,6 +57,7 @@ class WaveRun {
     context_.aovs = &aovs_;
     context_.traversal_width = case_.traversal;
     context_.measures_costs = true;
+    reference_ = std::make_unique<ReferenceIntegrator>(context_, 1);
     const Bounds& b = scene_->bounds();
     if (b.empty()) return;
     const float lo[3] = {b.lo.x, b.lo.y, b.lo.z}, hi[3] = {b.hi.x, b.hi.y, b.hi.z};
@@ -109,13 +110,13 @@ class WaveRun {
     return picture;
   }
   const Wave& wave() const { return *wave_; }
-  const Counts& reference_counts() const { return counts_; }
+  const Counts& reference_counts() const { return *reference_->worker(0).counts; }
 
  private:
   void run(const WaveTask& task) {
     switch (case_.lanes) {
       case kReferenceLanes:
-        return run_reference(context_, task, clock_, counts_);
+        return reference_->run(0, task);
 #ifdef WAVECOMB_HAS_LANES_1
       case 1:
         return run_wave<1>(*wave_, context_, task);
@@ -152,8 +153,7 @@ class WaveRun {
   std::vector<std::unique_ptr<SchedulingPolicy>> policies_;
   std::vector<const SchedulingPolicy*> context_policies_;
   WaveContext context_{};
-  PhaseClock clock_;
-  Counts counts_;
+  std::unique_ptr<ReferenceIntegrator> reference_;
 };
 
 }  // namespace wavecomb::wave_testing

@@ -7,6 +7,7 @@
 /// 2008.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/hash.h"
 #include "wavecomb/core/settings.h"
 
@@ -17,6 +18,7 @@ template <typename F>
 struct SampleKey {
   UInt<F> pixel_hash;
   UInt<F> sample;
+  WAVECOMB_FIELDS(pixel_hash, sample)
 };
 
 template <typename F>

@@ -16,7 +16,7 @@ namespace wavecomb {
 /// Material, instance or object where nothing was hit.
 inline constexpr uint32_t kNothingHit = 0xffffffffu;
 
-/// What a camera ray met first: a row of 8 words, as waves keep it for each path.
+/// What a camera ray met first.
 struct AovHit {
   float position[3] = {0, 0, 0};
   uint32_t object = kNothingHit;  ///< as ObjectNames numbers them
@@ -24,7 +24,6 @@ struct AovHit {
   uint32_t instance = kNothingHit;
   uint32_t pad[2] = {0, 0};
 };
-static_assert(sizeof(AovHit) == 32);
 
 /// A layer of a picture: `channels` values a pixel, row 0 at the top.
 struct AovLayer {

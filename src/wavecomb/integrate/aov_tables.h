@@ -14,6 +14,9 @@ namespace wavecomb {
 
 class Scene;
 
+/// A light group that is not kept.
+inline constexpr uint32_t kNoGroup = 0xffffffffu;
+
 /// Made once a render; read by all waves.
 struct AovTables {
   AovLayout layout;

@@ -2,7 +2,7 @@
 /// Whose light a contribution is. Run only where light groups are asked for.
 #pragma once
 
-#include "wavecomb/integrate/path_pool.h"
+#include "wavecomb/integrate/aov_tables.h"
 #include "wavecomb/integrate/vertex.h"
 
 namespace wavecomb {

@@ -1,65 +1,63 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/integrate/reference.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "wavecomb/integrate/light_groups.h"
+#include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
+
+struct ReferenceWorker {
+  explicit ReferenceWorker(const WaveContext& context)
+      : aovs(1, context.film->aovs().layout(), context.aovs) {}
+  PhaseClock clock;
+  Counts counts;
+  PathAovs aovs;  ///< of the path that is traced, in slot 0
+};
+
 namespace {
 
 using F = float;
 
-/// What one path gives.
-struct PathResult {
-  Color<F> radiance{0.f, 0.f, 0.f};
-  Color<F> parts[2];  ///< radiance before scattering 0 and 1
-  Color<F> albedo{0.f, 0.f, 0.f};
-  Vec3<F> normal{0.f, 0.f, 0.f};
-  F uv[2] = {0.f, 0.f};
-  F depth = INFINITY;
-  AovHit hit;
-  F centre2 = 0.f;
-  std::array<F, 6> guides{};  ///< albedo, normal
-};
-
+/// Traces paths one after the other, each depth first.
 class PathTracer {
  public:
-  PathTracer(const WaveContext& context, PhaseClock& clock, Counts& counts)
+  PathTracer(const WaveContext& context, ReferenceWorker& worker)
       : context_(context),
         settings_(*context.settings),
-        clock_(clock),
-        counts_(counts),
-        wants_guides_(context.film->aovs().layout().set.guides()),
-        groups_(size_t{3} * context.film->aovs().layout().light_groups) {}
+        clock_(worker.clock),
+        counts_(worker.counts),
+        aovs_(worker.aovs) {}
 
-  /// Radiance of the last path by light group, rgb side by side; valid until the next one.
-  const std::vector<F>& groups() const { return groups_; }
-
+  /// Radiance of a path, as the camera's exposure shows it; what else it found is in the AOVs' slot
+  /// 0.
+  Color<F> exposed_path(uint32_t pixel, uint32_t sample) {
+    aovs_.clear(1);
+    radiance_ = {};
+    const uint32_t last = trace_path(pixel, sample);
+    aovs_.end_path(last, radiance(), 1);
+    const F exposure = context_.camera->exposure;
+    if (exposure != 1) {
+      radiance_.sum *= exposure;
+      aovs_.expose(exposure, 1);
+    }
+    return radiance_.sum;
+  }
   /// Traces a path of which nothing is wanted but choices of lights.
   void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
     probes_ = {out.probes.data() + path * out.most, out.most};
     probe_count_ = 0;
-    out.luminance[path] = luminance(trace_path(pixel, sample).radiance);
+    aovs_.clear(1);
+    radiance_ = {};
+    trace_path(pixel, sample);
+    out.luminance[path] = luminance(radiance_.sum);
     out.counts[path] = probe_count_;
   }
-
-  /// A path as the camera's exposure shows it.
-  PathResult exposed_path(uint32_t pixel, uint32_t sample) {
-    PathResult result = trace_path(pixel, sample);
-    const F exposure = context_.camera->exposure;
-    if (exposure == 1) return result;
-    result.radiance *= exposure;
-    for (Color<F>& part : result.parts) part *= exposure;
-    for (F& value : groups_) value *= exposure;
-    return result;
-  }
+  const float* radiance() const { return reinterpret_cast<const float*>(&radiance_); }
 
  private:
-  PathResult trace_path(uint32_t pixel, uint32_t sample) {
+  /// Gives the first depth whose light is not yet a part of its own.
+  uint32_t trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
     keys_ = {&key.pixel_hash, &key.sample, 1, 0};
@@ -67,14 +65,8 @@ class PathTracer {
     time_ = context_.moves() ? path_time<F>(settings_.sampler, key) : 0.f;
     const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
                                            static_cast<F>(pixel >> 16), r, true, time_);
-    PathResult result;
-    result.centre2 = centre_distance2<F>(*context_.camera, r, true);
-    std::fill(groups_.begin(), groups_.end(), 0.f);
-    const auto keep_parts = [&](uint32_t first, uint32_t last) {
-      for (uint32_t d = first; d <= last && d < 2; ++d) result.parts[d] = result.radiance;
-    };
+    aovs_.begin<F>(*context_.camera, r, kSlot, true);
     F cone_at_origin = ray.width;
-    bool is_seen = true;  // only clear surfaces so far
     PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u};
     ++counts_.samples;
 
@@ -85,67 +77,41 @@ class PathTracer {
       clock_.enter(Phase::kShade);
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
       if (hit.inst == kNoHit) {
-        result.radiance += environment_emission<F>(scene, settings_, depth, path, true);
-        if (!groups_.empty())
-          split_environment<F>(
-              scene, settings_, depth, context_.aovs->kept_group.data(), path, true,
-              [&](uint32_t group, const Color<F>& share) { add_to_group(group, share); });
-        keep_parts(depth, 1);
-        return result;
+        radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
+        if (aovs_.wants_groups())
+          aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
+        return depth;
       }
-      if (depth == 0)
-        result.depth = camera_depth<F>(*context_.camera, fma(path.dir, hit.t, path.o), time_, true);
-      if (depth == 0) note_hit(result.hit, hit, fma(path.dir, hit.t, path.o));
+      const Vec3<F> p = fma(path.dir, hit.t, path.o);
       if (hit.inst == kLightShape) {
-        const Color<F> c = shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true);
-        result.radiance += c;
-        add_light(hit.geom, c);
-        keep_parts(depth, 1);
-        return result;
+        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time_, hit.geom, true);
+        add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
+        return depth;
       }
       const uint32_t mesh = mesh_of(hit), material = material_of(hit, mesh);
-      if (depth == 0) result.hit.material = material;
+      if (depth == 0)
+        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time_, hit.inst, hit.geom, material, true);
       if (settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
-        if (!(cost_aware_number<F>(key, depth) < q)) {
-          keep_parts(depth, 1);
-          return result;
-        }
+        if (!(cost_aware_number<F>(key, depth) < q)) return depth;
         path.throughput *= 1.f / q;
       }
-      VertexAovs<F> aovs;
-      aovs.wants_uv = depth == 0;
-      aovs.wants_lights = !groups_.empty() || !probes_.empty();
+      VertexAovs<F> aovs = aovs_.wanted<F>(depth);
+      aovs.wants_lights |= !probes_.empty();
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
-      result.radiance += v.emitted;
-      add_light(aovs.emitter, v.emitted);
-      keep_parts(depth, depth);
+      add(aovs.emitter, v.emitted);
+      aovs_.vertex<F>(depth, kSlot, aovs, path, true);
+      aovs_.end_depth(depth, radiance(), 1);
       bool is_free = false;
-      if (depth == 0) {
-        result.uv[0] = aovs.uv.x;
-        result.uv[1] = aovs.uv.y;
-        result.albedo = aovs.albedo;
-        result.normal = aovs.normal;
-      }
-      if (wants_guides_ && is_seen) {
-        result.guides = guides_of<F>(aovs, path);
-        is_seen = aovs.is_clear;
-      }
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         shadow_set_ = v.shadow_set;
         is_free = !occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth);
-        if (is_free) {
-          result.radiance += v.direct;
-          add_light(aovs.lit_by, v.direct);
-        }
+        if (is_free) add(aovs.lit_by, v.direct);
       }
       if (!probes_.empty() && aovs.light_weight >= 0.f)
         note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
-      if (!v.alive) {
-        keep_parts(depth + 1, 1);
-        return result;
-      }
+      if (!v.alive) return depth + 1;
       path = v.next;
       cone_at_origin = v.next.cone_width;
     }
@@ -167,7 +133,7 @@ class PathTracer {
 
   Hit intersect(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
     Hit h;
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1, times()};
+    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kSlot, 1, times()};
     keys_.salt = 2 * depth;
     keys_.shadow_set = nullptr;
     context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
@@ -176,7 +142,7 @@ class PathTracer {
   }
 
   bool occluded(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kFirstSlot, 1, times()};
+    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kSlot, 1, times()};
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
     keys_.shadow_set = context_.scene.lights.links.members ? &shadow_set_ : nullptr;
@@ -185,28 +151,10 @@ class PathTracer {
     return blocked != 0;
   }
 
-  /// All that the first hit says of itself but its material.
-  void note_hit(AovHit& out, const Hit& hit, const Vec3<F>& p) const {
-    const AovTables* tables = context_.aovs;
-    out = {{p.x, p.y, p.z}, kNothingHit, kNothingHit, kNothingHit, {0, 0}};
-    if (hit.inst == kLightShape) {
-      if (tables) out.object = tables->light_object(hit.geom);
-      return;
-    }
-    out.instance = hit.inst;
-    if (tables) out.object = tables->object<F>(hit.inst, hit.geom, true);
-  }
-
-  void add_to_group(uint32_t group, const Color<F>& c) {
-    if (group == kNoGroup) return;
-    groups_[3 * group] += c.x;
-    groups_[3 * group + 1] += c.y;
-    groups_[3 * group + 2] += c.z;
-  }
-  /// Adds what light record `light` gave to its group.
-  void add_light(uint32_t light, const Color<F>& c) {
-    if (!groups_.empty())
-      add_to_group(kept_group<F>(context_.aovs->kept_group.data(), light, true), c);
+  /// Light `light`, or kNoLight, has brought `c`.
+  void add(uint32_t light, const Color<F>& c) {
+    radiance_.sum += c;
+    if (aovs_.wants_groups()) aovs_.add<F>(kSlot, aovs_.group_of<F>(light, true), c, true);
   }
 
   uint32_t mesh_of(const Hit& hit) const {
@@ -235,7 +183,7 @@ class PathTracer {
 
   const float* times() const { return context_.scene.has_motion ? &time_ : nullptr; }
 
-  static constexpr uint32_t kFirstSlot = 0;
+  static constexpr uint32_t kSlot = 0;  ///< the one that there is
   const WaveContext& context_;
   const ShadeSettings settings_;
   PhaseClock& clock_;
@@ -243,81 +191,60 @@ class PathTracer {
   PresenceKeys keys_;
   uint32_t shadow_set_ = 0;
   F time_ = 0.f;  ///< of the path
-  bool wants_guides_;
-  std::vector<F> groups_;
+  PathAovs& aovs_;
+  RadianceRow<F> radiance_;
   std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
   uint32_t probe_count_ = 0;
 };
 
-/// Adds what a path found beside radiance to its pixel.
-void add_aovs(AovFilm& film, size_t pixel, const PathResult& path, const std::vector<F>& groups,
-              const AovTables* tables) {
-  const AovSet& set = film.layout().set;
-  const auto rgb = [](const Color<F>& c) { return std::array<F, 3>{c.x, c.y, c.z}; };
-  if (film.has_first()) {
-    AovFilm::First& first = film.first(pixel);
-    const auto albedo = rgb(path.albedo), normal = rgb(path.normal);
-    for (size_t c = 0; c < 3; ++c) {
-      first.albedo[c] += albedo[c];
-      first.normal[c] += normal[c];
-    }
-    if (std::isfinite(path.depth)) {
-      first.depth += path.depth;
-      ++first.depth_samples;
-    }
-  }
-  if (set.nearest() || set.crypto())
-    film.add_hit(pixel, path.hit, path.centre2, path.uv, tables ? &tables->crypto : nullptr);
-  if (set.parts())
-    film.add_parts(pixel, rgb(path.parts[0]).data(), rgb(path.parts[1]).data(),
-                   rgb(path.radiance).data());
-  if (set.guides()) film.add_guides(pixel, path.guides.data());
-  for (size_t i = 0; i < groups.size(); ++i) film.groups(pixel)[i] += double{groups[i]};
-}
-
 }  // namespace
 
-void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock& clock,
-                   Counts& counts) {
-  PathTracer tracer(context, clock, counts);
-  Film& film = *context.film;
-  clock.start(Phase::kGenerate);
-  for (uint32_t i = 0; i < task.pixel_count; ++i) {
-    const uint32_t pixel = task.pixels[i], x = pixel & 0xffffu, y = pixel >> 16;
+ReferenceIntegrator::ReferenceIntegrator(const WaveContext& context, uint32_t threads)
+    : context_(context) {
+  for (uint32_t i = 0; i < threads; ++i)
+    workers_.push_back(std::make_unique<ReferenceWorker>(context));
+}
+ReferenceIntegrator::~ReferenceIntegrator() = default;
+
+WorkerView ReferenceIntegrator::worker(size_t i) const {
+  return {&workers_[i]->clock, &workers_[i]->counts};
+}
+
+void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
+  ReferenceWorker& worker = *workers_[i];
+  PathTracer tracer(context_, worker);
+  Film& film = *context_.film;
+  worker.clock.start(Phase::kGenerate);
+  for (uint32_t p = 0; p < task.pixel_count; ++p) {
+    const uint32_t pixel = task.pixels[p], x = pixel & 0xffffu, y = pixel >> 16;
     Film::Pixel sum = film.pixel(x, y);
     for (uint32_t s = 0; s < task.samples; ++s) {
-      clock.enter(Phase::kGenerate);
-      const auto start = PhaseClock::Clock::now();
-      const PathResult path = tracer.exposed_path(pixel, task.first_sample + s);
-      if (film.aovs().layout().set.has(Aov::kCost))
-        film.aovs().add_cost(
-            film.index(x, y),
-            std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count());
-      clock.enter(Phase::kResolve);
-      if (film.has_error()) {
-        const F rgb[3] = {path.radiance.x, path.radiance.y, path.radiance.z};
-        film.error(x, y).add(rgb, sum.samples, {sum.r, sum.g, sum.b});
-      }
-      sum.r += path.radiance.x;
-      sum.g += path.radiance.y;
-      sum.b += path.radiance.z;
+      worker.clock.enter(Phase::kGenerate);
+      const auto start = worker.aovs.start_cost();
+      const Color<F> radiance = tracer.exposed_path(pixel, task.first_sample + s);
+      worker.aovs.spread_cost(1, start, [](size_t) { return 0; });
+      worker.clock.enter(Phase::kResolve);
+      if (film.has_error())
+        film.error(x, y).add(tracer.radiance(), sum.samples, {sum.r, sum.g, sum.b});
+      sum.r += radiance.x;
+      sum.g += radiance.y;
+      sum.b += radiance.z;
       ++sum.samples;
-      add_aovs(film.aovs(), film.index(x, y), path, tracer.groups(), context.aovs);
+      worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
     }
     film.pixel(x, y) = sum;
   }
-  clock.stop();
+  worker.clock.stop();
 }
 
 void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,
                       size_t count, LightProbes& out) {
-  PhaseClock clock;
-  Counts counts;
-  PathTracer tracer(context, clock, counts);
-  clock.start(Phase::kGenerate);
+  ReferenceWorker worker(context);
+  PathTracer tracer(context, worker);
+  worker.clock.start(Phase::kGenerate);
   for (size_t i = first; i < first + count; ++i)
     tracer.probe(pixels[i], static_cast<uint32_t>(i), i, out);
-  clock.stop();
+  worker.clock.stop();
 }
 
 }  // namespace wavecomb

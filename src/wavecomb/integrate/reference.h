@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The oracle: one path at a time, depth first, one lane, single rays.
+/// The scalar integrator: one path after the other, depth first, without queues. It gives the same
+/// bits as the waves do, and is what they are held to.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,11 +11,21 @@
 
 namespace wavecomb {
 
-/// Runs the paths of `task` one after another with the same kernels as a wave and adds them to the
-/// film in the same order. No queue, no schedule, no packet: what every wave must equal, bit for
-/// bit.
-void run_reference(const WaveContext& context, const WaveTask& task, PhaseClock& clock,
-                   Counts& counts);
+struct ReferenceWorker;
+
+class ReferenceIntegrator final : public Integrator {
+ public:
+  ReferenceIntegrator(const WaveContext& context, uint32_t threads);
+  ~ReferenceIntegrator() override;
+
+  void run(size_t worker, const WaveTask& task) override;
+  WorkerView worker(size_t i) const override;
+  uint32_t lanes() const override { return 1; }
+
+ private:
+  const WaveContext& context_;
+  std::vector<std::unique_ptr<ReferenceWorker>> workers_;
+};
 
 /// What came of choosing a light for a vertex.
 struct LightProbe {

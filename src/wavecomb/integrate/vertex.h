@@ -11,8 +11,6 @@
 /// 1997, 9.2).
 #pragma once
 
-#include <array>
-
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/light/light.h"
@@ -91,20 +89,24 @@ struct VertexAovs {
   F light_weight;
 };
 
-/// What guides a denoiser, of a path that has reached a vertex: albedo, tinted by the mirrors and
-/// glass before it, and normal. Both are replaced by the next vertex where this one is clear.
+/// What guides a denoiser.
 template <typename F>
-inline std::array<F, 6> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
+struct Guides {
+  Color<F> albedo;
+  Vec3<F> normal;
+};
+
+/// That of a path that has reached a vertex: albedo, tinted by the mirrors and glass before it, and
+/// normal. Both are replaced by the next vertex where this one is clear.
+template <typename F>
+inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
   const auto tinted = [&](const F& albedo, const F& throughput) {
     // Without the scaling of radiance by indices of refraction; roulette may have made it larger.
     return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
   };
-  return {tinted(v.albedo.x, path.throughput.x),
-          tinted(v.albedo.y, path.throughput.y),
-          tinted(v.albedo.z, path.throughput.z),
-          v.normal.x,
-          v.normal.y,
-          v.normal.z};
+  return {{tinted(v.albedo.x, path.throughput.x), tinted(v.albedo.y, path.throughput.y),
+           tinted(v.albedo.z, path.throughput.z)},
+          v.normal};
 }
 
 /// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and

@@ -13,9 +13,12 @@
 #include "wavecomb/integrate/aov_tables.h"
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/integrate/integrator.h"
+#include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/phase_clock.h"
 #include "wavecomb/integrate/ray_recorder.h"
+#include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/statistics.h"
 #include "wavecomb/schedule/chooser.h"
 #include "wavecomb/schedule/coherence.h"
@@ -49,18 +52,11 @@ struct WaveContext {
 
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }
+  /// Whether paths keep the class of the surface that they left, where lights are linked.
+  bool links() const { return scene.lights.links.members != nullptr; }
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
   }
-};
-
-/// Pixels (x | y << 16) and their samples [first_sample, first_sample + samples).
-struct WaveTask {
-  const uint32_t* pixels;
-  uint32_t pixel_count;
-  uint32_t first_sample;
-  uint32_t samples;
-  uint32_t path_count() const { return pixel_count * samples; }
 };
 
 /// A worker's buffers.
@@ -68,11 +64,11 @@ struct WaveTask {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.film->aovs().layout(), context.moves(),
-             context.scene.lights.links.members != nullptr),
+      : pool(capacity, context.moves() || context.links()),
+        aovs(capacity, context.film->aovs().layout(), context.aovs),
         rays(capacity),
         hits(capacity),
-        shading(capacity),
+        shading(capacity, kRowWords<ShadingRecord>),
         shadows(capacity),
         columns(3, capacity),
         times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
@@ -87,6 +83,7 @@ struct Wave {
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 
   PathPool pool;
+  PathAovs aovs;
   RayQueue rays;
   HitBuffer hits;
   ShadingQueue shading;
@@ -104,8 +101,8 @@ struct Wave {
   Counts counts;
 
   size_t bytes() const {
-    return pool.bytes() + rays.bytes() + hits.bytes() + shading.bytes() + shadows.bytes() +
-           columns.bytes() + times.bytes();
+    return pool.bytes() + aovs.bytes() + rays.bytes() + hits.bytes() + shading.bytes() +
+           shadows.bytes() + columns.bytes() + times.bytes();
   }
 };
 

@@ -59,7 +59,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
           std::chrono::duration<double, std::nano>(Clock::now() - start).count(),
           choice.prepare_ns);
     compact<F>(wave);
-    if (depth < 2) keep_part(wave.pool, depth, task.path_count());
+    wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
 
     if (wave.shadows.size == 0) continue;
     const RayOrderChoice shadow_order = order_rays<F>(
@@ -71,7 +71,7 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
     learn_order(wave.shadow_chooser, depth, shadow_order, start);
   }
   clock.enter(Phase::kResolve);
-  for (; depth < 2; ++depth) keep_part(wave.pool, depth, task.path_count());
+  wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
   resolve(wave, context, task);
   clock.stop();
 }
@@ -92,26 +92,20 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     const float u = a - std::floor(a), v = b - std::floor(b);
     const Vec3<float> d = square_to_sphere(u, v);
     const CalibrationHit& hit = hits.hits[i % hits.distinct];
-    const auto id = [](uint32_t x) { return std::bit_cast<float>(x); };
-    const float row[Q::kRowWords] = {0.1f * context.scene.scale,
-                                     0.5f * u,
-                                     0.5f * v,
-                                     id(hit.prim),
-                                     id(hit.inst),
-                                     id(hit.mesh),
-                                     id(hit.geom),
-                                     id(i)};
-    std::memcpy(queue.rows() + i * Q::kRowWords, row, sizeof(row));
+    store_row<ShadingRecord, float>(
+        queue.row(0), i,
+        {0.1f * context.scene.scale, 0.5f * u, 0.5f * v, hit.prim, hit.inst, hit.mesh, hit.geom, i},
+        true);
     queue.uints(Q::kMaterial)[i] = hits.material;
     queue.uints(Q::kProgram)[i] = context.traits[hits.material].program;
     queue.slot[i] = i;
     const SampleKey<float> key{i * 0x9e3779b9u, i};
-    store_path<float>(wave.pool, i,
-                      {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f,
-                       0.01f * context.scene.scale, 0.f, key, 0u},
-                      true);
-    std::memset(wave.pool.radiance + i * PathPool::kRadianceWords, 0, 4 * PathPool::kRadianceWords);
-    if (wave.pool.time) wave.pool.time[i] = u;
+    store_row<PathRow, float>(wave.pool.paths, i,
+                              {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f,
+                               0.01f * context.scene.scale, 0.f, key, 0u},
+                              true);
+    store_row<RadianceRow, float>(wave.pool.radiance, i, {}, true);
+    if (wave.pool.cold) store_row<PathColdRow, float>(wave.pool.cold, i, {u, 0u}, true);
   }
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {

@@ -5,6 +5,8 @@
 #include <string>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/integrate/reference.h"
+#include "wavecomb/integrate/wave_integrator.h"
 
 namespace wavecomb {
 
@@ -46,6 +48,14 @@ uint32_t choose_lanes(uint32_t wanted) {
   for (uint32_t w : built) list += (list.empty() ? "" : ", ") + std::to_string(w);
   throw Error("lanes is " + std::to_string(wanted) + ", which the " + library_name() +
               " library has no kernels for; it has " + list);
+}
+
+std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveContext& context,
+                                            uint32_t lanes, uint32_t threads, uint32_t wave_size) {
+  if (kind == IntegratorKind::kReference)
+    return std::make_unique<ReferenceIntegrator>(context, threads);
+  return std::make_unique<WaveIntegrator>(context, lane_kernels(lanes).run, lanes, threads,
+                                          wave_size);
 }
 
 const char* library_name() {

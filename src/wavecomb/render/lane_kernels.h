@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "wavecomb/integrate/integrator.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
@@ -22,6 +24,9 @@ std::vector<uint32_t> lane_widths();
 /// The width to use where `wanted` is asked for; 0: the widest. Throws Error for one that is not
 /// there.
 uint32_t choose_lanes(uint32_t wanted);
+/// The integrator that the settings ask for: waves of `lanes` lanes, or the reference.
+std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveContext& context,
+                                            uint32_t lanes, uint32_t threads, uint32_t wave_size);
 /// The -march that this library is compiled with: "native", "x86-64-v3" ...; "default" without one.
 const char* library_name();
 

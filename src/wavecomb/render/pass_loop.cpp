@@ -50,8 +50,8 @@ void PassLoop::run() {
     runner_.run(plan, [this] { return watch_.halted() || is_late(); });
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
-    for (Worker& worker : runner_.workers())
-      if (worker.wave) costs_.take(worker.wave->costs);
+    for (uint32_t i = 0; i < runner_.threads(); ++i)
+      if (CostTracker* costs = runner_.integrator().worker(i).costs) costs_.take(*costs);
     costs_.merge();
     if (watch_.stopped() || is_late()) return;
     watch_.rest();

@@ -8,7 +8,7 @@
 
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/core/task_order.h"
-#include "wavecomb/integrate/reference.h"
+#include "wavecomb/integrate/statistics.h"
 
 namespace wavecomb {
 
@@ -28,13 +28,8 @@ std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uin
   return groups;
 }
 
-PassRunner::PassRunner(const WaveContext& context, const LaneKernels& kernels, bool reference,
-                       uint32_t threads, uint32_t wave_size)
-    : context_(context),
-      kernels_(kernels),
-      reference_(reference),
-      wave_size_(wave_size),
-      workers_(threads) {}
+PassRunner::PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size)
+    : integrator_(integrator), wave_size_(wave_size), slots_(threads) {}
 
 void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) {
   const std::vector<WaveGroup> groups = wave_groups(plan, wave_size_, threads());
@@ -46,25 +41,25 @@ void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) 
                   std::min(group.wave_samples, group.samples - done)});
     }
   };
+  integrator_.begin_pass();
   const TaskOrder order;
   tbb::parallel_for(tbb::blocked_range<size_t>(0, groups.size(), 1), order.around(run_groups),
                     tbb::simple_partitioner());
   order.join();
+  integrator_.end_pass();
 }
 
 void PassRunner::run_wave(const WaveTask& task) {
-  Worker& worker = workers_[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
-  const SlotOrder slot(&worker);
+  const auto worker = static_cast<size_t>(tbb::this_task_arena::current_thread_index());
+  const SlotOrder slot(&slots_[worker]);
   const DenormalsOff denormals_off;
-  const auto rays = [](const Counts& counts) { return counts.rays + counts.shadow_rays; };
-  if (!reference_ && !worker.wave) worker.wave = std::make_unique<Wave>(wave_size_, context_);
-  const Counts& counts = reference_ ? worker.counts : worker.wave->counts;
-  const uint64_t before = rays(counts);
-  if (reference_)
-    run_reference(context_, task, worker.clock, worker.counts);
-  else
-    kernels_.run(*worker.wave, context_, task);
-  rays_ += rays(counts) - before;
+  const auto rays = [&]() -> uint64_t {
+    const Counts* counts = integrator_.worker(worker).counts;
+    return counts ? counts->rays + counts->shadow_rays : 0;
+  };
+  const uint64_t before = rays();
+  integrator_.run(worker, task);
+  rays_ += rays() - before;
   if (samples_.fetch_add(task.path_count()) == 0)
     first_samples_s_ =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();

@@ -5,21 +5,12 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
-#include <memory>
 #include <vector>
 
-#include "wavecomb/integrate/wave.h"
-#include "wavecomb/render/lane_kernels.h"
+#include "wavecomb/integrate/integrator.h"
 #include "wavecomb/render/pass_plan.h"
 
 namespace wavecomb {
-
-/// What one worker owns.
-struct Worker {
-  std::unique_ptr<Wave> wave;
-  PhaseClock clock;  ///< of the reference integrator, as are the counts
-  Counts counts;
-};
 
 /// A share of a plan for one worker: pixels whose samples it renders one wave after the other, so
 /// that each gets its samples in their order.
@@ -36,16 +27,14 @@ std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uin
 /// Contract: run() is called on one thread, within the arena whose threads are the workers.
 class PassRunner {
  public:
-  /// `reference`: the scalar integrator, in place of kernels.
-  PassRunner(const WaveContext& context, const LaneKernels& kernels, bool reference,
-             uint32_t threads, uint32_t wave_size);
+  PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size);
 
   /// Runs a plan until it is done or `halted` says so; asked before each wave, by all workers.
   /// Every pixel then has whole waves of samples, without gaps.
   void run(const PassPlan& plan, const std::function<bool()>& halted);
 
-  std::vector<Worker>& workers() { return workers_; }
-  uint32_t threads() const { return static_cast<uint32_t>(workers_.size()); }
+  const Integrator& integrator() const { return integrator_; }
+  uint32_t threads() const { return static_cast<uint32_t>(slots_.size()); }
   uint32_t wave_size() const { return wave_size_; }
   /// So far; may be read while waves run.
   uint64_t samples_done() const { return samples_; }
@@ -56,11 +45,9 @@ class PassRunner {
  private:
   void run_wave(const WaveTask& task);
 
-  const WaveContext& context_;
-  LaneKernels kernels_;
-  bool reference_;
+  Integrator& integrator_;
   uint32_t wave_size_;
-  std::vector<Worker> workers_;
+  std::vector<char> slots_;  ///< one for each worker, by whose addresses they are told apart
   std::atomic<uint64_t> samples_{0}, rays_{0};
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double first_samples_s_ = 0;

@@ -14,7 +14,7 @@ std::vector<uint64_t> reached(const Counts& at) {
   return {at.begin(), at.begin() + static_cast<std::ptrdiff_t>(n)};
 }
 
-std::vector<MaterialStatistics> material_statistics(const std::vector<Worker>& workers,
+std::vector<MaterialStatistics> material_statistics(const std::vector<WorkerView>& workers,
                                                     const WaveContext& context, const Scene& scene,
                                                     const RenderCosts& costs) {
   std::vector<MaterialStatistics> out;
@@ -22,8 +22,8 @@ std::vector<MaterialStatistics> material_statistics(const std::vector<Worker>& w
     MaterialStatistics material;
     material.name = scene.materials()[m].name;
     material.program = kProgramNames[context.traits[m].program];
-    for (const Worker& worker : workers)
-      if (worker.wave) material.records += worker.wave->costs.seen()[m];
+    for (const WorkerView& worker : workers)
+      if (worker.costs) material.records += worker.costs->seen()[m];
     material.timed_records = costs.total_timed()[m];
     if (material.timed_records > 0)
       material.measured_ns = costs.total_ns()[m] / static_cast<double>(material.timed_records);
@@ -36,23 +36,24 @@ std::vector<MaterialStatistics> material_statistics(const std::vector<Worker>& w
 
 }  // namespace
 
-void add_up(const std::vector<Worker>& workers, const WaveContext& context, const Scene& scene,
+void add_up(const PassRunner& runner, const WaveContext& context, const Scene& scene,
             const RenderCosts& costs, RenderStatistics& s) {
   PhaseClock clock;
   Counts counts;
   CoherenceCounts coherence;
   std::vector<uint64_t> uses(context.policies.size());
-  for (const Worker& worker : workers) {
-    clock.add(worker.clock);
-    counts.add(worker.counts);
-    if (!worker.wave) continue;
-    const Wave& wave = *worker.wave;
-    clock.add(wave.clock);
-    counts.add(wave.counts);
-    coherence.add(wave.coherence);
-    s.wave_bytes += wave.bytes();
-    for (size_t p = 0; p < uses.size(); ++p) uses[p] += wave.policy_chooser.used()[p];
+  std::vector<WorkerView> workers;
+  for (uint32_t i = 0; i < runner.threads(); ++i) {
+    const WorkerView worker = runner.integrator().worker(i);
+    if (worker.clock) clock.add(*worker.clock);
+    if (worker.counts) counts.add(*worker.counts);
+    if (worker.coherence) coherence.add(*worker.coherence);
+    for (size_t p = 0; worker.policies && p < uses.size(); ++p)
+      uses[p] += worker.policies->used()[p];
+    s.wave_bytes += worker.bytes;
+    workers.push_back(worker);
   }
+  s.lanes = runner.integrator().lanes();
   for (size_t i = 0; i < kPhaseCount; ++i)
     s.phases_s.emplace_back(kPhaseNames[i], 1e-9 * static_cast<double>(clock.ns()[i]));
   s.samples = counts.samples;

@@ -68,7 +68,7 @@ struct RenderStatistics {
 };
 
 /// Adds up what the workers counted, by phase, depth, policy and material, into `statistics`.
-void add_up(const std::vector<Worker>& workers, const WaveContext& context, const Scene& scene,
+void add_up(const PassRunner& runner, const WaveContext& context, const Scene& scene,
             const RenderCosts& costs, RenderStatistics& statistics);
 
 /// Of a calibration, for statistics.

@@ -215,7 +215,6 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const uint32_t lanes = choose_lanes(settings.lanes);
   const LaneKernels kernels = lane_kernels(lanes);
   const uint32_t threads = thread_count(settings);
-  const bool reference = settings.integrator == IntegratorKind::kReference;
   std::vector<std::unique_ptr<SchedulingPolicy>> owned;
   std::vector<const SchedulingPolicy*> policies;
   if (options.policy) {
@@ -258,7 +257,9 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
       &aovs};
 
   const Clock::time_point start = Clock::now();
-  PassRunner runner(context, kernels, reference, threads, wave_size);
+  const std::unique_ptr<Integrator> integrator =
+      make_integrator(settings.integrator, context, lanes, threads, wave_size);
+  PassRunner runner(*integrator, threads, wave_size);
   PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), film, runner,
                 costs, watch);
   const LightCalibration* lights = nullptr;
@@ -277,13 +278,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.first_samples_s = runner.first_samples_s();
     s.threads = threads;
     s.wave_size = wave_size;
-    s.lanes = reference ? 1 : lanes;
     s.cancelled = watch.stopped();
     const RenderStatus status = loop.status();
     s.passes = status.passes;
     s.resumed_samples = status.resumed_samples;
     s.error = status.error;
-    add_up(runner.workers(), context, scene, costs, s);
+    add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();
     s.accelerator_bytes = impl_->accel->bytes();
     s.film_bytes = film.bytes();

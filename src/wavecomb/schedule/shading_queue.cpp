@@ -13,7 +13,8 @@ void ShadingQueue::materialize() {
   const float* from = rows_.floats(0);
   float* to = moved_rows_.floats(0);
   for (size_t i = 0; i < size; ++i)
-    std::memcpy(to + i * kRowWords, from + sorted_indices[i] * kRowWords, 4 * kRowWords);
+    std::memcpy(to + i * row_words_, from + sorted_indices[i] * row_words_,
+                row_words_ * sizeof(float));
   std::swap(block_, moved_);
   std::swap(rows_, moved_rows_);
   ordered = false;

@@ -26,15 +26,14 @@ class ShadingQueue {
     kPositionKey,  ///< Morton code of the hit; where a policy asks
     kColumns
   };
-  /// Words of a record's row, floats and ids.
-  enum Word : uint32_t { kT, kU, kV, kPrim, kInst, kMesh, kGeom, kSlot, kRowWords };
-
   ShadingQueue() = default;
-  explicit ShadingQueue(size_t capacity)
+  /// `row_words`: of a record's row, whatever those words mean.
+  ShadingQueue(size_t capacity, size_t row_words)
       : block_(kColumns, capacity),
         moved_(kColumns, capacity),
-        rows_(1, capacity * kRowWords),
-        moved_rows_(1, capacity * kRowWords),
+        rows_(1, capacity * row_words),
+        moved_rows_(1, capacity * row_words),
+        row_words_(row_words),
         arrival_(3, capacity) {
     sorted_indices = arrival_.uints(0);
     slot = arrival_.uints(1);
@@ -53,7 +52,8 @@ class ShadingQueue {
   static constexpr uint32_t kRayKeyShift = 8, kShadowKeyShift = 16;
 
   uint32_t* uints(Column c) const { return block_.uints(c); }
-  float* rows() const { return rows_.floats(0); }
+  /// The row of record `i`, and behind it those that follow.
+  float* row(size_t i) const { return rows_.floats(0) + i * row_words_; }
 
   /// Makes the physical order the logical one: afterwards records stand as they are shaded.
   void materialize();
@@ -64,7 +64,9 @@ class ShadingQueue {
   void clear();
 
  private:
-  SoaBlock block_, moved_, rows_, moved_rows_, arrival_;
+  SoaBlock block_, moved_, rows_, moved_rows_;
+  size_t row_words_ = 0;
+  SoaBlock arrival_;
 };
 
 }  // namespace wavecomb

@@ -4,49 +4,13 @@
 #pragma once
 
 #include "wavecomb/core/rows.h"
-#include "wavecomb/integrate/light_groups.h"
+#include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
-
-/// Distance along the camera's axis, into the depth AOV.
-template <typename F>
-inline void store_depth(PathPool& pool, const CameraSetup& camera, const Vec3<F>& o,
-                        const Vec3<F>& d, const F& t, const UInt<F>& slot, const Mask<F>& active) {
-  const F time = camera.moves() ? gather<F>(pool.time, slot, active) : F(0.f);
-  scatter<F>(pool.depth, camera_depth<F>(camera, fma(d, t, o), time, active), slot, active);
-}
-
-/// What camera rays met, into the rows of AovHit.
-template <typename F>
-inline void store_hit(const PathPool& pool, const UInt<F>& slot, const Vec3<F>& p,
-                      const UInt<F>& object, const UInt<F>& material, const UInt<F>& instance,
-                      const Mask<F>& active) {
-  const F none(0.f);
-  store_rows<PathPool::kHitWords, F>(pool.hits, slot * PathPool::kHitWords,
-                                     {p.x, p.y, p.z, bits_float<F>(object), bits_float<F>(material),
-                                      bits_float<F>(instance), none, none},
-                                     active);
-}
-
-/// Splits the radiance of paths that end in lanes `missed` (the environment) or `shape` (light
-/// `light`, `c`) by light group.
-template <typename F>
-inline void add_ended_groups(const PathPool& pool, const WaveContext& context,
-                             const ShadeSettings& settings, uint32_t depth, const UInt<F>& slot,
-                             const UInt<F>& light, const Color<F>& c, const PathState<F>& path,
-                             const Mask<F>& missed, const Mask<F>& shape) {
-  const uint32_t* kept = context.aovs->kept_group.data();
-  if (any(missed))
-    split_environment<F>(context.scene, settings, depth, kept, path, missed,
-                         [&](uint32_t group, const Color<F>& share) {
-                           add_group_radiance<F>(pool, slot, UInt<F>(group), share, missed);
-                         });
-  if (any(shape)) add_group_radiance<F>(pool, slot, kept_group<F>(kept, light, shape), c, shape);
-}
 
 /// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order.
 template <typename F>
@@ -72,14 +36,14 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const Vec3<F> d{load<F>(rays.dx + i), load<F>(rays.dy + i), load<F>(rays.dz + i)};
     const Mask<F> ended = missed | shape;
     const Mask<F> wanted = cost_aware ? active : ended;
-    PathLanes<F> path;
+    PathRow<F> path;
     PathState<F> state;
     if (any(wanted)) {
-      path = load_path<F>(wave.pool, slot, wanted);
+      path = load_row<PathRow, F>(wave.pool.paths, slot, wanted);
       state = {path.d, path.throughput, path.pdf, path.eta_scale,
                F(0.f), F(0.f),          path.o,   path.receiver};
-      if (wave.pool.link && depth > 0)
-        state.link = gather<U>(wave.pool.link, slot, Mask<U>(wanted));
+      if (context.links() && depth > 0)
+        state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
     }
     if (any(ended)) {
       Color<F> c(F(0.f));
@@ -89,18 +53,22 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         const U light = load<U>(hits.geom + i);
         c = select<F>(shape, shape_emission<F>(scene, settings, depth, light, t, state, shape), c);
       }
-      add_radiance<F>(wave.pool, slot, c, ended & not_(is_black(c)));
-      if (wave.pool.groups)
-        add_ended_groups<F>(wave.pool, context, settings, depth, slot, load<U>(hits.geom + i), c,
-                            state, missed, shape);
+      add_radiance<F>(wave.pool.radiance, slot, c, ended & not_(is_black(c)));
+      if (wave.aovs.wants_groups()) {
+        if (any(missed)) wave.aovs.add_environment<F>(scene, settings, depth, slot, state, missed);
+        if (any(shape))
+          wave.aovs.add<F>(slot, wave.aovs.group_of<F>(load<U>(hits.geom + i), shape), c, shape);
+      }
     }
-    const bool first_hits = depth == 0 && wave.pool.hits;
-    if (depth == 0 && wave.pool.depth)
-      store_depth<F>(wave.pool, *context.camera, o, d, t, slot, active & not_(missed));
-    if (first_hits && any(shape))
-      store_hit<F>(wave.pool, slot, fma(d, t, o),
-                   context.aovs->light_object(load<U>(hits.geom + i)), U(kNothingHit),
-                   U(kNothingHit), shape);
+    const bool notes_hits = depth == 0 && wave.aovs.wants_hits();
+    const auto time = [&] {
+      return context.camera->moves()
+                 ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, active)
+                 : F(0.f);
+    };
+    if (notes_hits && any(shape))
+      wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
+                             shape);
     if (none(surface)) continue;
 
     const U prim = load<U>(hits.prim + i);
@@ -111,15 +79,15 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
     const U material = hit_material<F>(scene, inherited, mesh, prim, surface);
     const U program = gather<U>(scene.material_program, material, Mask<U>(surface));
-    if (first_hits)
-      store_hit<F>(wave.pool, slot, fma(d, t, o),
-                   context.aovs->template object<F>(inst, geom, surface), material, inst, surface);
+    if (notes_hits)
+      wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,
+                               surface);
     if (cost_aware) {
       const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, state, surface);
       surface = surface & (cost_aware_number<F>(path.key, depth) < q);
       path.throughput *= F(1.f) / q;
       if (none(surface)) continue;
-      store_path<F>(wave.pool, slot, path, surface);
+      store_row<PathRow, F>(wave.pool.paths, slot, path, surface);
     }
 
     using Q = ShadingQueue;
@@ -130,10 +98,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     put(queue.uints(Q::kProgram), program);
     if (context.wants_position)
       put(queue.uints(Q::kPositionKey), position_key<F>(context.grid, fma(d, t, o)));
-    n += compress_rows<Q::kRowWords, F>(
-        queue.rows() + n * Q::kRowWords,
-        {t, load<F>(hits.u + i), load<F>(hits.v + i), bits_float<F>(prim), bits_float<F>(inst),
-         bits_float<F>(mesh), bits_float<F>(geom), bits_float<F>(slot)},
+    n += compress_row<ShadingRecord, F>(
+        queue.row(n), {t, load<F>(hits.u + i), load<F>(hits.v + i), prim, inst, mesh, geom, slot},
         surface);
   }
   queue.size = n;

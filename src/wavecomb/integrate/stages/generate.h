@@ -2,8 +2,6 @@
 /// Stage 1: a camera ray for every slot.
 #pragma once
 
-#include <limits>
-
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
@@ -20,6 +18,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   const uint32_t n = task.path_count();
   const float inv_samples = 1.f / static_cast<float>(task.samples);
   float* tfar = wave.shadows.tfar;  // free until the first shading
+  wave.aovs.clear(n);
   for (uint32_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
     const U slot = lane_index<F>() + i;
@@ -30,18 +29,17 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, settings.seed);
     const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
     F time(0.f);
-    if (pool.time) {
+    if (context.moves()) {
       time = path_time<F>(settings.sampler, key);
-      store(pool.time + i, time);
+      scatter_field<F>(pool.cold, &PathColdRow<float>::time, slot, time, active);
     }
     const CameraRay<F> ray =
         camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active, time);
-    store_path<F>(
-        pool, slot,
+    store_row<PathRow, F>(
+        pool.paths, slot,
         {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), ray.width, ray.spread, key, UInt<F>(0u)},
         active);
-    if (pool.depth) store(pool.depth + i, F(std::numeric_limits<float>::infinity()));
-    if (pool.centre) store(pool.centre + i, centre_distance2<F>(camera, r, active));
+    wave.aovs.begin<F>(camera, r, slot, active);
     store(rays.ox + i, ray.o.x);
     store(rays.oy + i, ray.o.y);
     store(rays.oz + i, ray.o.z);
@@ -51,17 +49,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     store(rays.slot + i, slot);
     store(tfar + i, ray.tfar);
   }
-  std::memset(pool.radiance, 0, size_t{n} * PathPool::kRadianceWords * 4);
-  if (pool.first) std::memset(pool.first, 0, size_t{n} * PathPool::kFirstWords * 4);
-  if (pool.hits) {
-    const AovHit none;
-    for (uint32_t i = 0; i < n; ++i)
-      std::memcpy(pool.hits + size_t{i} * PathPool::kHitWords, &none, sizeof(none));
-  }
-  if (pool.groups)
-    std::memset(pool.groups, 0, size_t{n} * pool.light_groups * PathPool::kRadianceWords * 4);
-  if (pool.guides) std::memset(pool.guides, 0, size_t{n} * PathPool::kGuideWords * 4);
-  if (pool.cost_ns) std::memset(pool.cost_ns, 0, size_t{n} * 4);
+  std::memset(pool.radiance, 0, n * kRadianceWords * sizeof(float));
   rays.size = n;
   return camera.has_far ? tfar : nullptr;
 }

@@ -48,14 +48,13 @@ void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
     const Mask<F> active = first_lanes<F>(queue.size - i);
     if (wanted & kPositionColumn)
       store(wave.columns.uints(1) + i, load<U>(queue.uints(Q::kPositionKey) + i));
-    const U row = (lane_index<F>() + static_cast<uint32_t>(i)) * uint32_t{Q::kRowWords};
-    const auto r = load_rows<Q::kRowWords, F>(queue.rows(), row, active);
-    const auto id = [&](Q::Word w) { return float_bits<F>(r[w]); };
-    const PathLanes<F> path = load_path<F>(wave.pool, id(Q::kSlot), active);
+    const auto r = load_row<ShadingRecord, F>(queue.row(0),
+                                              lane_index<F>() + static_cast<uint32_t>(i), active);
+    const auto path = load_row<PathRow, F>(wave.pool.paths, r.slot, active);
     if (wanted & kThroughputColumn) store(wave.columns.floats(0) + i, luminance(path.throughput));
     if (wanted & kTextureColumn) {
-      const MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), r[Q::kU], r[Q::kV]};
-      const F width = fma(path.cone_spread, r[Q::kT], path.cone_width);
+      const MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
+      const F width = fma(path.cone_spread, r.t, path.cone_width);
       store(wave.columns.uints(2) + i, texture_key<F>(context.scene, hit, width, active));
     }
   }

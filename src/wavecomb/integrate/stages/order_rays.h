@@ -38,15 +38,15 @@ template <typename F>
 void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid& grid,
               bool by_octant, uint64_t* keys) {
   using U = UInt<F>;
-  static_assert(PathPool::kPathWords == PathPool::kShadowWords);
+  static_assert(kRowWords<PathRow> == kRowWords<ShadowRow>);
   alignas(64) uint32_t lanes[kWidth<F>];
   for (size_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
-    const auto r = load_rows<8, F>(rows, load<U>(slot + i) * PathPool::kPathWords, active);
-    U key = position_key<F>(grid, Vec3<F>(r[0], r[1], r[2]));
+    const auto ray = load_head<RayHead, PathRow, F>(rows, load<U>(slot + i), active);
+    U key = position_key<F>(grid, ray.o);
     // The octant takes the two spare bits and the place of the lowest: it is worth more than that
     // one.
-    if (by_octant) key = ((direction_key<F>(Vec3<F>(r[3], r[4], r[5])) >> 3) << 29) | (key >> 1);
+    if (by_octant) key = ((direction_key<F>(ray.d) >> 3) << 29) | (key >> 1);
     store(lanes, key);
     const size_t m = std::min(kWidth<F>, n - i);
     for (size_t k = 0; k < m; ++k) keys[i + k] = lanes[k];

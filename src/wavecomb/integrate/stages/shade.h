@@ -2,28 +2,12 @@
 /// Stage 3c: shading, batch by batch, in lanes.
 #pragma once
 
-#include "wavecomb/integrate/light_groups.h"
-#include "wavecomb/integrate/stages/cost.h"
+#include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
-
-/// Notes what guides a denoiser, of paths that have met clear surfaces only so far.
-template <typename F>
-void store_guides(const PathPool& pool, const UInt<F>& slot, const VertexAovs<F>& v,
-                  const PathState<F>& path, const Mask<F>& active) {
-  constexpr uint32_t kWords = PathPool::kGuideWords;
-  const UInt<F> word = slot * kWords;
-  const auto row = load_rows<kWords, F>(pool.guides, word, active);
-  const Mask<F> seen = active & (row[6] == 0.f);
-  if (none(seen)) return;
-  const std::array<F, 6> g = guides_of<F>(v, path);
-  store_rows<kWords, F>(
-      pool.guides, word,
-      {g[0], g[1], g[2], g[3], g[4], g[5], select(v.is_clear, F(0.f), F(1.f)), F(0.f)}, seen);
-}
 
 /// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. A path's
 /// next ray takes the place of its last in the pool; what became of it is noted by arrival.
@@ -34,28 +18,23 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   using Q = ShadingQueue;
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
-  const bool wants_first = depth == 0 && pool.first;
-  VertexAovs<F> aovs;
-  aovs.wants_uv = depth == 0 && pool.wants_uv;
-  aovs.wants_lights = pool.groups != nullptr;
-  aovs.uv = {F(0.f), F(0.f)};
-  const bool wants_aovs = wants_first || pool.guides || pool.groups;
+  VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
+  const bool wants_aovs = wave.aovs.wants_vertex(depth);
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
     const U here = lane_index<F>() + static_cast<uint32_t>(i);
     const U sorted = queue.ordered || queue.moved ? load<U>(queue.sorted_indices + i) : here;
     const U at = queue.ordered ? sorted : here;
-    const auto r = load_rows<Q::kRowWords, F>(queue.rows(), at * uint32_t{Q::kRowWords}, active);
-    const auto id = [&](Q::Word w) { return float_bits<F>(r[w]); };
-    const U slot = id(Q::kSlot);
+    const auto r = load_row<ShadingRecord, F>(queue.row(0), at, active);
+    const U slot = r.slot;
     const U material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, on)
                                      : load<U>(queue.uints(Q::kMaterial) + i);
-    MeshHit<F> hit{id(Q::kInst), id(Q::kMesh), id(Q::kPrim), r[Q::kU], r[Q::kV]};
+    MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
     if (context.scene.has_motion) [[unlikely]]
-      hit.time = gather<F>(pool.time, slot, active);
-    PathLanes<F> path = load_path<F>(pool, slot, active);
-    const F t = r[Q::kT];
+      hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
+    const auto path = load_row<PathRow, F>(pool.paths, slot, active);
+    const F t = r.t;
     PathState<F> state{path.d,
                        path.throughput,
                        path.pdf,
@@ -64,48 +43,37 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                        path.cone_spread,
                        path.o,
                        path.receiver};
-    if (pool.link && context.scene.mesh_lights && depth > 0) [[unlikely]]
-      state.link = gather<U>(pool.link, slot, on);
+    if (context.links() && context.scene.mesh_lights && depth > 0) [[unlikely]]
+      state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
     const VertexResult<F> v =
-        shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, id(Q::kGeom), t,
-                              material, state, wants_aovs ? &aovs : nullptr, active);
+        shade_vertex<Bsdf, F>(context.scene, settings, path.key, depth, hit, r.geom, t, material,
+                              state, wants_aovs ? &aovs : nullptr, active);
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
-    if (any(emits)) add_radiance<F>(pool, slot, v.emitted, emits);
-    F lit_by(0.f);
+    if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
+    U lit_by(0u);
     if (aovs.wants_lights) {
-      const uint32_t* kept = context.aovs->kept_group.data();
-      add_group_radiance<F>(pool, slot, kept_group<F>(kept, aovs.emitter, emits), v.emitted, emits);
-      lit_by = bits_float<F>(kept_group<F>(kept, aovs.lit_by, v.has_shadow));
+      wave.aovs.template add<F>(slot, wave.aovs.template group_of<F>(aovs.emitter, emits),
+                                v.emitted, emits);
+      lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
     }
-    if (wants_first) {
-      store_rows<PathPool::kFirstWords, F>(
-          pool.first, slot * PathPool::kFirstWords,
-          {aovs.albedo.x, aovs.albedo.y, aovs.albedo.z, aovs.normal.x, aovs.normal.y, aovs.normal.z,
-           aovs.uv.x, aovs.uv.y},
-          active);
-    }
-    if (pool.guides) store_guides<F>(pool, slot, aovs, state, active);
+    if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
     const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
                       select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
                       (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |
                       (direction_key<F>(v.shadow_d) << Q::kShadowKeyShift);
     scatter<U>(queue.outcome, outcome, sorted, on);
-    if (any(v.has_shadow)) {
-      const F none(0.f);
-      store_rows<PathPool::kShadowWords, F>(
-          pool.shadows, slot * PathPool::kShadowWords,
-          {v.shadow_o.x, v.shadow_o.y, v.shadow_o.z, v.shadow_d.x, v.shadow_d.y, v.shadow_d.z,
-           v.shadow_tfar, v.direct.x, v.direct.y, v.direct.z, lit_by, bits_float<F>(v.shadow_set),
-           none, none, none, none},
-          v.has_shadow);
-    }
+    if (any(v.has_shadow))
+      store_row<ShadowRow, F>(
+          pool.shadows, slot,
+          {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, lit_by, v.shadow_set}, v.has_shadow);
     if (any(v.alive))
-      store_path<F>(pool, slot,
-                    {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
-                     v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
-                    v.alive);
-    if (pool.link) scatter<U>(pool.link, v.next.link, slot, Mask<U>(v.alive));
+      store_row<PathRow, F>(pool.paths, slot,
+                            {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
+                             v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
+                            v.alive);
+    if (context.links())
+      scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }
@@ -152,7 +120,7 @@ inline void spread_batch(Wave& wave, size_t begin, size_t end,
   const auto slot = [&](size_t i) {
     return queue.slot[queue.ordered || queue.moved ? queue.sorted_indices[begin + i] : begin + i];
   };
-  spread_cost(wave.pool, end - begin, start, slot);
+  wave.aovs.spread_cost(end - begin, start, slot);
 }
 
 /// Shades the whole queue, batch by batch.
@@ -166,12 +134,12 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
     const auto program = static_cast<ProgramId>(queue.uints(ShadingQueue::kProgram)[at]);
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
-    if (timed || wave.pool.cost_ns) start = PhaseClock::Clock::now();
+    if (timed || wave.aovs.wants_cost()) start = PhaseClock::Clock::now();
     visit_program<F>(program, [&]<typename Bsdf>() {
       shade_batch<Bsdf, F>(wave, context, settings, depth, begin, end);
     });
     if (timed) charge_batch(wave, begin, end, start);
-    if (wave.pool.cost_ns) spread_batch(wave, begin, end, start);
+    if (wave.aovs.wants_cost()) spread_batch(wave, begin, end, start);
     begin = end;
   }
 }

@@ -2,20 +2,18 @@
 /// Stage 2: what the rays hit. Stage 4: what the shadow rays meet.
 #pragma once
 
-#include "wavecomb/integrate/stages/cost.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
 
-/// Brings words 0, 1, 2 ... of the rows of the queue's slots side by side, a column each. Rows are
-/// of kPathWords, of which N are loaded.
-template <size_t N, typename F, typename Queue, size_t C>
+/// Brings what the rows of the queue's slots begin with side by side, a column each.
+template <template <typename> class Head, template <typename> class Row, typename F, typename Queue,
+          size_t C>
 void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
-  static_assert(C <= N && PathPool::kPathWords == PathPool::kShadowWords);
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i);
-    const auto r = load_rows<N, F>(rows, load<UInt<F>>(q.slot + i) * PathPool::kPathWords, active);
-    for (size_t c = 0; c < C; ++c) store(columns[c] + i, r[c]);
+    store_columns<Head, F>(load_head<Head, Row, F>(rows, load<UInt<F>>(q.slot + i), active),
+                           columns, i);
   }
 }
 
@@ -23,14 +21,15 @@ void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
 template <typename F>
 void fetch_rays(Wave& wave) {
   RayQueue& q = wave.rays;
-  fetch<8, F>(q, wave.pool.paths, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz});
+  fetch<RayHead, PathRow, F>(q, wave.pool.paths, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz});
 }
 
 /// Brings the shadow rays of the listed slots side by side.
 template <typename F>
 void fetch_shadows(Wave& wave) {
   ShadowQueue& q = wave.shadows;
-  fetch<16, F>(q, wave.pool.shadows, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
+  fetch<ShadowHead, ShadowRow, F>(q, wave.pool.shadows,
+                                  {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
 }
 
 /// Times of the listed slots' paths side by side; null where the scene stands still.
@@ -40,7 +39,8 @@ const float* fetch_times(Wave& wave, const Queue& q) {
   if (!times) return nullptr;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i);
-    store(times + i, gather<F>(wave.pool.time, load<UInt<F>>(q.slot + i), active));
+    store(times + i, gather_field<F>(wave.pool.cold, &PathColdRow<float>::time,
+                                     load<UInt<F>>(q.slot + i), active));
   }
   return times;
 }
@@ -49,11 +49,12 @@ const float* fetch_times(Wave& wave, const Queue& q) {
 /// `linked`: and stop at the geometry of their own set.
 inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow,
                                   bool linked = false) {
-  const auto* words = reinterpret_cast<const uint32_t*>(pool.paths);
-  PresenceKeys keys{words + 13, words + 14, PathPool::kPathWords, 2 * depth + (shadow ? 1u : 0u)};
+  const auto* path = reinterpret_cast<const PathRow<float>*>(pool.paths);
+  PresenceKeys keys{&path->key.pixel_hash, &path->key.sample, kRowWords<PathRow>,
+                    2 * depth + (shadow ? 1u : 0u)};
   if (linked) {
-    keys.shadow_set = reinterpret_cast<const uint32_t*>(pool.shadows) + PathPool::kShadowSet;
-    keys.shadow_stride = PathPool::kShadowWords;
+    keys.shadow_set = &reinterpret_cast<const ShadowRow<float>*>(pool.shadows)->set;
+    keys.shadow_stride = kRowWords<ShadowRow>;
   }
   return keys;
 }
@@ -65,11 +66,10 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size, times};
   if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
   const HitBuffer& h = wave.hits;
-  PhaseClock::Clock::time_point start;
-  if (wave.pool.cost_ns) start = PhaseClock::Clock::now();
+  const auto start = wave.aovs.start_cost();
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
                            coherent, presence_keys(wave.pool, depth, false));
-  if (wave.pool.cost_ns) spread_cost(wave.pool, q.size, start, [&](size_t i) { return q.slot[i]; });
+  wave.aovs.spread_cost(q.size, start, [&](size_t i) { return q.slot[i]; });
   wave.counts.add_rays(depth, q.size);
 }
 
@@ -82,8 +82,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
                      q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
-  PhaseClock::Clock::time_point start;
-  if (wave.pool.cost_ns) start = PhaseClock::Clock::now();
+  const auto start = wave.aovs.start_cost();
   context.accel->occluded(
       rays, q.occluded, context.traversal_width, false,
       presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
@@ -91,15 +90,13 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
     const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
-    add_radiance<F>(wave.pool, slot, c, active);
-    if (wave.pool.groups) {
-      const U group =
-          gather<U>(wave.pool.shadows, slot * PathPool::kShadowWords + PathPool::kShadowGroup,
-                    Mask<U>(active));
-      add_group_radiance<F>(wave.pool, slot, group, c, active);
-    }
+    add_radiance<F>(wave.pool.radiance, slot, c, active);
+    if (wave.aovs.wants_groups())
+      wave.aovs.add<F>(slot,
+                       gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active),
+                       c, active);
   }
-  if (wave.pool.cost_ns) spread_cost(wave.pool, q.size, start, [&](size_t i) { return q.slot[i]; });
+  wave.aovs.spread_cost(q.size, start, [&](size_t i) { return q.slot[i]; });
   wave.counts.add_shadow_rays(depth, q.size);
 }
 

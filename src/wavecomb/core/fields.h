@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rows with named fields. A row is a struct template on the float type: Row<float> is what lies in
+/// memory, Row<packet> what lanes hold of as many rows. Its fields are listed once; loads, stores
+/// and the places of fields follow from the list.
+///
+///   template <typename F>
+///   struct Ray {
+///     Vec3<F> o, d;
+///     UInt<F> slot;
+///     WAVECOMB_FIELDS(o, d, slot)
+///   };
+///   Ray<F> ray = load_row<Ray, F>(rows, index, active);
+///
+/// A field is F, UInt<F>, Vec2<F>, Vec3<F>, or a struct with fields of its own. Rows lie
+/// kRowWords<Row> words apart, a power of two, so that none is cut by a cache line.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <tuple>
+#include <type_traits>
+
+#include "wavecomb/core/rows.h"
+#include "wavecomb/core/vec3.h"
+
+/// Lists all fields of a row, in their order.
+#define WAVECOMB_FIELDS(...)                      \
+  WAVECOMB_INLINE constexpr auto fields() {       \
+    return std::tie(__VA_ARGS__);                 \
+  }                                               \
+  WAVECOMB_INLINE constexpr auto fields() const { \
+    return std::tie(__VA_ARGS__);                 \
+  }
+
+/// For lambdas that are to be inlined, too.
+#define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
+
+namespace wavecomb {
+
+namespace detail {
+
+template <typename T>
+concept HasFields = requires(T& t) { t.fields(); };
+
+template <typename T>
+struct WordsOf;
+template <typename Tuple>
+struct WordsOfTuple;
+template <typename... T>
+struct WordsOfTuple<std::tuple<T&...>> {
+  static constexpr size_t value = (WordsOf<std::remove_const_t<T>>::value + ... + 0);
+};
+template <typename T>
+struct WordsOf {
+  static constexpr size_t count() {
+    if constexpr (HasFields<T>)
+      return WordsOfTuple<decltype(std::declval<T&>().fields())>::value;
+    else
+      return 1;
+  }
+  static constexpr size_t value = count();
+};
+template <typename F>
+struct WordsOf<Vec2<F>> {
+  static constexpr size_t value = 2;
+};
+template <typename F>
+struct WordsOf<Vec3<F>> {
+  static constexpr size_t value = 3;
+};
+
+/// Runs one(word, value) for each word of `value`, whose first is word `At`; `one` takes and gives
+/// values of type F.
+template <size_t At, typename F, typename T, typename One>
+WAVECOMB_INLINE void for_each_word(T& value, const One& one);
+
+template <size_t At, typename F, typename One>
+WAVECOMB_INLINE void for_each_field(const One&) {}
+template <size_t At, typename F, typename One, typename First, typename... Rest>
+WAVECOMB_INLINE void for_each_field(const One& one, First& first, Rest&... rest) {
+  for_each_word<At, F>(first, one);
+  for_each_field<At + WordsOf<std::remove_const_t<First>>::value, F>(one, rest...);
+}
+template <size_t At, typename F, typename T, typename One>
+WAVECOMB_INLINE void for_each_word(T& value, const One& one) {
+  using Plain = std::remove_const_t<T>;
+  if constexpr (std::is_same_v<Plain, F> || std::is_same_v<Plain, UInt<F>>)
+    one(std::integral_constant<size_t, At>(), value);
+  else if constexpr (std::is_same_v<Plain, Vec2<F>>)
+    for_each_field<At, F>(one, value.x, value.y);
+  else if constexpr (std::is_same_v<Plain, Vec3<F>>)
+    for_each_field<At, F>(one, value.x, value.y, value.z);
+  else
+    std::apply([&](auto&... field) WAVECOMB_INLINE_LAMBDA { for_each_field<At, F>(one, field...); },
+               value.fields());
+}
+
+}  // namespace detail
+
+/// Words that the fields of a row take.
+template <template <typename> class Row>
+inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
+/// Words from one row to the next.
+template <template <typename> class Row>
+inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
+
+/// The word of a row, or of any record, at which a member lies: word_of(&Row<float>::slot).
+template <typename Record, typename Member>
+inline uint32_t word_of(Member Record::* member) {
+  static_assert(sizeof(member) == sizeof(ptrdiff_t));  // a byte offset, as the Itanium ABI has it
+  return static_cast<uint32_t>(std::bit_cast<ptrdiff_t>(member) / 4);
+}
+
+/// A row as the words of its lanes: what store_rows takes. Words beyond the fields are 0.
+template <template <typename> class Row, typename F>
+WAVECOMB_INLINE std::array<F, kRowWords<Row>> words_of_row(const Row<F>& row) {
+  static_assert(sizeof(Row<float>) == 4 * kFieldWords<Row>, "WAVECOMB_FIELDS lists all fields");
+  std::array<F, kRowWords<Row>> words;
+  detail::for_each_word<0, F>(row, [&](auto at, const auto& value) WAVECOMB_INLINE_LAMBDA {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, F>)
+      words[at] = value;
+    else
+      words[at] = bits_float<F>(value);
+  });
+  for (size_t i = kFieldWords<Row>; i < kRowWords<Row>; ++i) words[i] = F(0.f);
+  return words;
+}
+
+namespace detail {
+
+template <typename Head, typename Row>
+struct IsHead;
+template <typename... H, typename... R>
+struct IsHead<std::tuple<H&...>, std::tuple<R&...>> {
+  template <size_t... I>
+  static constexpr bool same(std::index_sequence<I...>) {
+    return (std::is_same_v<std::tuple_element_t<I, std::tuple<H...>>,
+                           std::tuple_element_t<I, std::tuple<R...>>> &&
+            ...);
+  }
+  static constexpr bool value =
+      sizeof...(H) <= sizeof...(R) && same(std::make_index_sequence<sizeof...(H)>());
+};
+
+}  // namespace detail
+
+/// Whether the first fields of Row are those of Head.
+template <template <typename> class Head, template <typename> class Row>
+inline constexpr bool kIsHead =
+    detail::IsHead<decltype(std::declval<Head<float>&>().fields()),
+                   decltype(std::declval<Row<float>&>().fields())>::value;
+
+/// The first fields, those of Head, of row `index` of the rows of type Row at `base`, for each
+/// active lane; 0 in the others. Nothing else of the row is read, but up to a power of two of
+/// words.
+template <template <typename> class Head, template <typename> class Row, typename F>
+WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const Mask<F>& active) {
+  static_assert(sizeof(Head<float>) == 4 * kFieldWords<Head>, "WAVECOMB_FIELDS lists all fields");
+  static_assert(kIsHead<Head, Row>);
+  const auto words =
+      load_rows<kRowWords<Head>, F>(base, index * static_cast<uint32_t>(kRowWords<Row>), active);
+  Head<F> head;
+  detail::for_each_word<0, F>(head, [&](auto at, auto& value) WAVECOMB_INLINE_LAMBDA {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, F>)
+      value = words[at];
+    else
+      value = float_bits<F>(words[at]);
+  });
+  return head;
+}
+
+/// Row `index` of the rows at `base`, for each active lane; 0 in the others.
+template <template <typename> class Row, typename F>
+WAVECOMB_INLINE Row<F> load_row(const void* base, const UInt<F>& index, const Mask<F>& active) {
+  return load_head<Row, Row, F>(base, index, active);
+}
+
+/// Writes the rows `index` of the active lanes, which are distinct.
+template <template <typename> class Row, typename F>
+WAVECOMB_INLINE void store_row(void* base, const UInt<F>& index, const Row<F>& row,
+                               const Mask<F>& active) {
+  constexpr auto kWords = static_cast<uint32_t>(kRowWords<Row>);
+  store_rows<kWords, F>(base, index * kWords, words_of_row<Row, F>(row), active);
+}
+
+/// Writes the rows of the active lanes one behind the other at `to`; returns how many.
+template <template <typename> class Row, typename F>
+WAVECOMB_INLINE uint32_t compress_row(float* to, const Row<F>& row, const Mask<F>& active) {
+  return compress_rows<kRowWords<Row>, F>(to, words_of_row<Row, F>(row), active);
+}
+
+/// One field of row `index` of the rows at `base`, for each active lane; 0 in the others. For
+/// fields that few read: whole rows are quicker.
+template <typename F, template <typename> class Row>
+WAVECOMB_INLINE F gather_field(const void* base, float Row<float>::* field, const UInt<F>& index,
+                               const Mask<F>& active) {
+  return gather<F>(base, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field), active);
+}
+template <typename F, template <typename> class Row>
+WAVECOMB_INLINE UInt<F> gather_field(const void* base, uint32_t Row<float>::* field,
+                                     const UInt<F>& index, const Mask<F>& active) {
+  return gather<UInt<F>>(base, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field),
+                         Mask<UInt<F>>(active));
+}
+template <typename F, template <typename> class Row>
+WAVECOMB_INLINE void scatter_field(void* base, float Row<float>::* field, const UInt<F>& index,
+                                   const F& value, const Mask<F>& active) {
+  scatter<F>(base, value, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field), active);
+}
+template <typename F, template <typename> class Row>
+WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::* field, const UInt<F>& index,
+                                   const UInt<F>& value, const Mask<F>& active) {
+  scatter<UInt<F>>(base, value, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field),
+                   Mask<UInt<F>>(active));
+}
+
+/// Stores the words of the lanes' heads side by side: word k of all lanes from columns[k] on.
+template <template <typename> class Head, typename F, size_t C>
+WAVECOMB_INLINE void store_columns(const Head<F>& head, float* const (&columns)[C], size_t at) {
+  static_assert(C == kFieldWords<Head>);
+  detail::for_each_word<0, F>(head, [&](auto word, const auto& value) WAVECOMB_INLINE_LAMBDA {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, F>)
+      store(columns[word] + at, value);
+    else
+      store(columns[word] + at, bits_float<F>(value));
+  });
+}
+
+}  // namespace wavecomb

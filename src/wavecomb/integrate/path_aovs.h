@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What paths find for AOVs, beside their radiance. Both integrators own one of these, a row a path
+/// slot, and tell it what happens to a path:
+///
+///   begin      a camera ray starts
+///   hit_light, hit_surface   what it met first
+///   vertex     a surface was shaded
+///   add        light reached the path
+///   end_depth  all light that scattering `depth` has met is in the radiance
+///   resolve    the path's sums go to the film
+///
+/// Only what is asked for takes room and time. Radiance by parts costs shading nothing: it is
+/// copied once before the first scattering brings light, and once after.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "wavecomb/core/fields.h"
+#include "wavecomb/film/aov_film.h"
+#include "wavecomb/integrate/aov_tables.h"
+#include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/integrate/light_groups.h"
+#include "wavecomb/integrate/path_pool.h"
+#include "wavecomb/integrate/phase_clock.h"
+#include "wavecomb/integrate/vertex.h"
+
+namespace wavecomb {
+
+/// Of what the camera's ray met, once it was shaded.
+template <typename F>
+struct FirstVertexRow {
+  Color<F> albedo;
+  Vec3<F> normal;
+  Vec2<F> uv;
+  WAVECOMB_FIELDS(albedo, normal, uv)
+};
+
+/// What the camera's ray met, before it is shaded; kNothingHit where it did not.
+template <typename F>
+struct FirstHitRow {
+  Vec3<F> position;
+  UInt<F> object, material, instance;
+  WAVECOMB_FIELDS(position, object, material, instance)
+};
+
+/// Albedo and normal of the last vertex that guides a denoiser.
+template <typename F>
+struct GuideRow {
+  Color<F> albedo;
+  Vec3<F> normal;
+  F is_final;  ///< 1 once a vertex was not clear
+  WAVECOMB_FIELDS(albedo, normal, is_final)
+};
+
+/// Contract: owned by one wave, or one reference integrator; slots below the capacity.
+class PathAovs {
+ public:
+  PathAovs() = default;
+  /// `tables` may be null where nothing of `layout` needs them.
+  PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
+      : layout_(layout), tables_(tables) {
+    const AovSet& set = layout.set;
+    const auto rows = [&](Block& block, bool wanted, size_t words) {
+      if (wanted) block = Block(capacity, words);
+    };
+    rows(first_, set.first() || set.has(Aov::kUv), kRowWords<FirstVertexRow>);
+    rows(depth_, set.has(Aov::kDepth), 1);
+    rows(hits_, set.nearest() || set.crypto(), kRowWords<FirstHitRow>);
+    rows(centre_, set.nearest(), 1);
+    for (Block& part : parts_) rows(part, set.parts(), kRadianceWords);
+    rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
+    rows(cost_ns_, set.has(Aov::kCost), 1);
+    rows(guides_, set.guides(), kRowWords<GuideRow>);
+  }
+
+  size_t bytes() const {
+    size_t n = 0;
+    for (const Block* block : blocks()) n += block->bytes();
+    return n;
+  }
+
+  // ---- before the first ray ---------------------------------------------------------------------
+
+  /// Forgets the paths in slots below `slots`.
+  void clear(size_t slots) {
+    for (Block* block : {&first_, &guides_, &cost_ns_, &groups_}) block->zero(slots);
+    if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
+    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit, kNothingHit};
+    for (uint32_t i = 0; hits_ && i < slots; ++i)
+      store_row<FirstHitRow, float>(hits_.rows, i, none, true);
+  }
+
+  /// The camera ray of numbers `r` starts.
+  template <typename F>
+  void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
+             const Mask<F>& active) const {
+    if (centre_) scatter<F>(centre_.rows, centre_distance2<F>(camera, r, active), slot, active);
+  }
+
+  // ---- first hits -------------------------------------------------------------------------------
+
+  bool wants_hits() const { return hits_ || depth_; }
+
+  /// The camera's ray has met the shape of light `light` at `p`.
+  template <typename F>
+  void hit_light(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                 const UInt<F>& light, const Mask<F>& active) const {
+    store_depth<F>(camera, slot, p, time, active);
+    if (!hits_) return;
+    const UInt<F> none(kNothingHit);
+    store_row<FirstHitRow, F>(hits_.rows, slot, {p, tables_->light_object(light), none, none},
+                              active);
+  }
+
+  /// The camera's ray has met geometry `geom` of instance `inst` at `p`.
+  template <typename F>
+  void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                   const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& material,
+                   const Mask<F>& active) const {
+    store_depth<F>(camera, slot, p, time, active);
+    if (hits_)
+      store_row<FirstHitRow, F>(
+          hits_.rows, slot, {p, tables_->template object<F>(inst, geom, active), material, inst},
+          active);
+  }
+
+  // ---- vertices ---------------------------------------------------------------------------------
+
+  /// What shading is to give at `depth`.
+  template <typename F>
+  VertexAovs<F> wanted(uint32_t depth) const {
+    VertexAovs<F> v;
+    v.wants_uv = depth == 0 && layout_.set.has(Aov::kUv);
+    v.wants_lights = bool(groups_);
+    v.uv = {F(0.f), F(0.f)};
+    return v;
+  }
+  /// Whether that is anything at all.
+  bool wants_vertex(uint32_t depth) const { return (depth == 0 && first_) || guides_ || groups_; }
+
+  /// A vertex was shaded, which `path` had reached.
+  template <typename F>
+  void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
+              const Mask<F>& active) const {
+    if (depth == 0 && first_)
+      store_row<FirstVertexRow, F>(first_.rows, slot, {v.albedo, v.normal, v.uv}, active);
+    if (guides_) store_guides<F>(slot, v, path, active);
+  }
+
+  // ---- light ------------------------------------------------------------------------------------
+
+  bool wants_groups() const { return bool(groups_); }
+  /// Where the group of the lanes' lights is kept, or kNoGroup.
+  template <typename F>
+  UInt<F> group_of(const UInt<F>& light, const Mask<F>& active) const {
+    return kept_group<F>(tables_->kept_group.data(), light, active);
+  }
+  /// Light of `group` has reached the paths in the active lanes' slots, which are distinct.
+  template <typename F>
+  void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
+           const Mask<F>& active) const {
+    const Mask<F> kept = active & Mask<F>(group != UInt<F>(kNoGroup));
+    if (any(kept)) add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, kept);
+  }
+  /// The environment's light has reached the paths of the active lanes.
+  template <typename F>
+  void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
+                       const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
+    split_environment<F>(scene, settings, depth, tables_->kept_group.data(), path, active,
+                         [&](uint32_t group, const Color<F>& share) {
+                           add<F>(slot, UInt<F>(group), share, active);
+                         });
+  }
+
+  /// Keeps the radiance of slots below `slots` as a part: it holds all light that scattering
+  /// `depth` has met, and none that it gathers.
+  void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
+    if (depth < parts_.size() && parts_[depth])
+      std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
+  }
+  /// The same for `depth` and all that follow, of paths that have ended.
+  void end_path(uint32_t depth, const float* radiance, size_t slots) const {
+    for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
+  }
+
+  // ---- time -------------------------------------------------------------------------------------
+
+  bool wants_cost() const { return bool(cost_ns_); }
+  PhaseClock::Clock::time_point start_cost() const {
+    return cost_ns_ ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
+  }
+  /// Spreads the time since `start` evenly over the paths in slots slot(0) ... slot(n - 1): time is
+  /// taken a batch at a time, so a path's share is the mean of its batch.
+  template <typename Slot>
+  void spread_cost(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
+    if (!cost_ns_ || n == 0) return;
+    const double ns =
+        std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count();
+    const auto share = static_cast<float>(ns / static_cast<double>(n));
+    for (size_t i = 0; i < n; ++i) cost_ns_.rows[slot(i)] += share;
+  }
+
+  // ---- to the film ------------------------------------------------------------------------------
+
+  /// The camera's exposure: multiplies what is radiance.
+  void expose(float exposure, size_t slots) const {
+    const auto scale = [&](const Block& block, size_t words) {
+      for (size_t i = 0; block && i < slots * words; ++i) block.rows[i] *= exposure;
+    };
+    for (const Block& part : parts_) scale(part, kRadianceWords);
+    scale(groups_, kRadianceWords * layout_.light_groups);
+  }
+  /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
+  void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
+
+  // For tests: rows of what is kept, or null.
+  const float* first_rows() const { return first_.rows; }
+  const float* group_rows() const { return groups_.rows; }
+
+ private:
+  /// Rows of some words a slot.
+  struct Block {
+    SoaBlock owner;
+    float* rows = nullptr;
+    size_t words = 0;
+
+    Block() = default;
+    Block(size_t capacity, size_t words_)
+        : owner(1, capacity * words_), rows(owner.floats(0)), words(words_) {}
+    explicit operator bool() const { return rows != nullptr; }
+    void zero(size_t slots) const {
+      if (rows) std::memset(rows, 0, slots * words * sizeof(float));
+    }
+    size_t bytes() const { return owner.bytes(); }
+  };
+
+  std::array<const Block*, 9> blocks() const {
+    return {&first_,    &depth_,  &hits_,    &centre_, &parts_[0],
+            &parts_[1], &groups_, &cost_ns_, &guides_};
+  }
+
+  /// Distance along the camera's axis.
+  template <typename F>
+  void store_depth(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                   const Mask<F>& active) const {
+    if (depth_) scatter<F>(depth_.rows, camera_depth<F>(camera, p, time, active), slot, active);
+  }
+
+  /// What guides a denoiser, of paths that have met clear surfaces only so far.
+  template <typename F>
+  void store_guides(const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
+                    const Mask<F>& active) const {
+    const GuideRow<F> before = load_row<GuideRow, F>(guides_.rows, slot, active);
+    const Mask<F> seen = active & (before.is_final == 0.f);
+    if (none(seen)) return;
+    const Guides<F> g = guides_of<F>(v, path);
+    store_row<GuideRow, F>(guides_.rows, slot,
+                           {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, seen);
+  }
+
+  AovLayout layout_;
+  const AovTables* tables_ = nullptr;
+  Block first_, depth_, hits_;
+  Block centre_;                ///< squared distance of the sample from the pixel's centre, pixels
+  std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
+  Block groups_;                ///< radiance by light group, a slot's groups side by side
+  Block cost_ns_, guides_;
+};
+
+}  // namespace wavecomb
