@@ -147,8 +147,8 @@ def _check_fit(first: _Source, other: _Source) -> None:
         a, b = (str(source.attributes.get(key, "")) for source in (first, other))
         if os.path.basename(a) != os.path.basename(b):
             refuse(what, a or "unknown", b or "unknown")
-    a, b = (source.attributes.get("wavecomb:scene") for source in (first, other))
-    if not np.array_equal(a, b):  # what a file says may be an array
+    scenes: list[Any] = [source.attributes.get("wavecomb:scene") for source in (first, other)]
+    if not np.array_equal(*scenes):  # what a file says may be an array
         raise WavecombError(
             f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
             "camera or frame"

@@ -181,8 +181,8 @@ TEST(Limits, many_lights_that_are_dark_give_no_sample) {
 }
 
 TEST(Limits, lights_are_numbered_to_the_last) {
-  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(TriangleLight) / 4), kRowWords);
-  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(LightTreeNode) / 4), kRowWords);
+  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(TriangleLight) / 4), kMostRowWords);
+  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(LightTreeNode) / 4), kMostRowWords);
   EXPECT_LT(kMaxLights, kTreeLeaf);
   EXPECT_EQ(refusal([] { check_light_count(kMaxLights); }), "");
   EXPECT_EQ(refusal([] { check_light_count(uint64_t{kMaxLights} + 1); }),

@@ -10,7 +10,7 @@ namespace wavecomb {
 /// Words of a table that lanes gather from: the indices of a gather are signed.
 inline constexpr uint64_t kGatherWords = uint64_t{1} << 31;
 /// Words of a table whose rows lanes load: theirs are not.
-inline constexpr uint64_t kRowWords = uint64_t{1} << 32;
+inline constexpr uint64_t kMostRowWords = uint64_t{1} << 32;
 
 /// Instances that kernels can number, of 16 words each; the first is the world.
 inline constexpr uint64_t kMaxInstances = kGatherWords / 16 - 1;
