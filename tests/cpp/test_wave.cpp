@@ -169,17 +169,24 @@ TEST(Wave, ThreadsDoNotShow) {
   for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
     Settings s = small_settings();
-    const Picture expected = reference(scene, s, accel);
     WavefrontRenderer renderer(scene);
-    for (const uint32_t threads : {1u, 2u, 3u}) {
-      for (const uint32_t wave_size : {0u, 64u, 4096u}) {
-        s.threads = threads;
-        s.wave_size = wave_size;
-        expect_same_picture(expected, renderer.render(s), std::to_string(threads) + " threads");
-      }
+    for (const LightWeights weights : {LightWeights::kPower, LightWeights::kCalibrated}) {
+      s.light_weights = weights;
+      s.threads = 1;
       s.integrator = IntegratorKind::kReference;
-      expect_same_picture(expected, renderer.render(s), "reference, threads");
-      s.integrator = IntegratorKind::kWavefront;
+      // Without a renderer lights have their shares by power.
+      const Picture expected =
+          weights == LightWeights::kPower ? reference(scene, s, accel) : renderer.render(s);
+      for (const uint32_t threads : {1u, 2u, 3u}) {
+        s.threads = threads;
+        s.integrator = IntegratorKind::kWavefront;
+        for (const uint32_t wave_size : {0u, 64u, 4096u}) {
+          s.wave_size = wave_size;
+          expect_same_picture(expected, renderer.render(s), std::to_string(threads) + " threads");
+        }
+        s.integrator = IntegratorKind::kReference;
+        expect_same_picture(expected, renderer.render(s), "reference, threads");
+      }
     }
   }
 }
