@@ -34,10 +34,13 @@ _FAR = 1e4
 """Distance of the sphere that stands for a distant light, in sizes of the scene."""
 
 
-def find_llvm() -> None:
-    """Names a libLLVM that Dr.Jit can use (16 or newer), where the environment does not."""
+def find_llvm() -> bool:
+    """Names a libLLVM that Dr.Jit can use (16 or newer), where the environment does not.
+
+    Returns whether there is one: with an older one Dr.Jit ends the process.
+    """
     if "DRJIT_LIBLLVM_PATH" in os.environ:
-        return
+        return True
     for folder in ("/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib64"):
         for version in (19, 20, 18, 17, 16):
             for name in (
@@ -47,7 +50,8 @@ def find_llvm() -> None:
             ):
                 if (Path(folder) / name).exists():
                     os.environ["DRJIT_LIBLLVM_PATH"] = str(Path(folder) / name)
-                    return
+                    return True
+    return False
 
 
 def load_mitsuba(variant: str | None = None, threads: int | None = None) -> ModuleType:
@@ -56,9 +60,12 @@ def load_mitsuba(variant: str | None = None, threads: int | None = None) -> Modu
     Raises:
         ImportError: Mitsuba or the variant is not there.
     """
-    find_llvm()
+    has_llvm = find_llvm()
+    if not has_llvm and (variant or "").startswith("llvm"):
+        raise ImportError("Mitsuba's llvm variants need libLLVM 16 or newer: tools/setup test")
     mi = importlib.import_module("mitsuba")
-    for name in [variant] if variant else ["llvm_ad_rgb", "scalar_rgb"]:
+    usual = ["llvm_ad_rgb", "scalar_rgb"] if has_llvm else ["scalar_rgb"]
+    for name in [variant] if variant else usual:
         try:
             mi.set_variant(name)
             if name.startswith("llvm"):
