@@ -122,16 +122,28 @@ def remove_leftovers(target: Path) -> None:
                 break
         else:
             continue
-        try:
-            os.kill(int(pid), 0)
-        except ProcessLookupError:
-            with contextlib.suppress(OSError):
-                if end == ".part" and other.is_dir() and not other.is_symlink():
-                    shutil.rmtree(other)
-                else:
-                    other.unlink()
-        except (OSError, OverflowError):
-            pass  # it lives, and is another user's
+        if _is_running(int(pid)):
+            continue
+        with contextlib.suppress(OSError):
+            if end == ".part" and other.is_dir() and not other.is_symlink():
+                shutil.rmtree(other)
+            else:
+                other.unlink()
+
+
+def _is_running(pid: int) -> bool:
+    """Whether a process has this number; one that was killed but not yet waited for has not."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True  # it lives, and is another user's
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return True  # no Linux
+    return state[:1] not in (["Z"], ["X"])
 
 
 def _sync(path: Path) -> None:

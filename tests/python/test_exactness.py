@@ -322,7 +322,7 @@ def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
         "costs": "model",
     }
     lengths = [
-        render(scene_of(scene), (96, 64), 16, max_depth=depth, roulette="off", **settings).stats[
+        render(scene_of(scene), (192, 128), 16, max_depth=depth, roulette="off", **settings).stats[
             "coherence"
         ]["run_length"]
         for depth in (7, 8)
