@@ -25,7 +25,7 @@ LOAD = (
     "import sys, wavecomb, wavecomb.usd; from wavecomb import _core; "
     "wavecomb.load(sys.argv[1], isolate=sys.argv[2] == 'on')"
 )
-NOTHING = "import sys; from wavecomb.isolate import supervisor; "
+NOTHING = "import sys; from wavecomb.run.isolate import supervisor; "
 WAYS = {
     "nothing": lambda stage, how: [
         "-c",

@@ -24,8 +24,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from wavecomb.files import replacing
-from wavecomb.stats import machine
+from wavecomb.picture.files import replacing
+from wavecomb.run.stats import machine
 
 RESULTS = Path(__file__).resolve().parent / "results" / "loading.json"
 STAGES = ("cornell", "mixed", "dragon")
@@ -42,7 +42,7 @@ def resident(key):
         return next(int(line.split()[1]) * 1024 for line in file if line.startswith(key))
 import wavecomb.usd
 from wavecomb import _core, api
-from wavecomb.stats import make_stats
+from wavecomb.run.stats import make_stats
 imports, imports_bytes = time.monotonic(), resident("VmRSS")
 stage, output, size, threads = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
 settings = api.make_settings((size, size), 1, threads=threads)

@@ -34,9 +34,9 @@ from reference_scenes.stage import Inexpressible
 from reference_scenes.why import LISTED, WHY
 
 import wavecomb
-from wavecomb.compare import compare
-from wavecomb.files import replacing
-from wavecomb.working_space import to_rec709
+from wavecomb.picture.compare import compare
+from wavecomb.picture.files import replacing
+from wavecomb.picture.working_space import to_rec709
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 EDGE = 128

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 import wavecomb
-from wavecomb.files import replacing
+from wavecomb.picture.files import replacing
+from wavecomb.run.stats import SORTING, machine
 from wavecomb.scenes import write_scene
-from wavecomb.stats import SORTING, machine
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"

@@ -97,7 +97,7 @@ def differ(ours: Any, theirs: Any) -> dict[str, Any]:
 
 def show(path: Path, names: list[str], found: Noise) -> None:
     """A PNG: above, each renderer's picture at equal samples; below, what it converges to."""
-    from wavecomb.image import write_png
+    from wavecomb.picture.image import write_png
 
     rows = [np.concatenate([f(n) for n in names], axis=1) for f in (found.noisy, found.converged)]
     write_png(path, np.concatenate(rows).astype(np.float32))

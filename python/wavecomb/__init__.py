@@ -14,18 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb import isa
 
-# Eager, for it has the name of its module: a late import of the module would hide the function.
-from wavecomb.compare import compare
-
 isa.install()
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene, SceneBuilder, Settings
     from wavecomb.api import Picture, load, render
-    from wavecomb.compare import Comparison
     from wavecomb.errors import WavecombError
+    from wavecomb.picture import cryptomatte
+    from wavecomb.picture.compare import Comparison, compare
+    from wavecomb.run.sequence import render_frames
     from wavecomb.scheduling import SchedulingPolicy
-    from wavecomb.sequence import render_frames
 
     __version__: str
 
@@ -39,22 +37,24 @@ __all__ = [
     "WavecombError",
     "__version__",
     "compare",
+    "cryptomatte",
     "load",
     "render",
     "render_frames",
 ]
 
 _HOMES = {
-    "Comparison": "wavecomb.compare",
+    "Comparison": "wavecomb.picture.compare",
     "Picture": "wavecomb.api",
     "Scene": "wavecomb._core",
     "SceneBuilder": "wavecomb._core",
     "SchedulingPolicy": "wavecomb.scheduling",
     "Settings": "wavecomb._core",
     "WavecombError": "wavecomb.errors",
+    "compare": "wavecomb.picture.compare",
     "load": "wavecomb.api",
     "render": "wavecomb.api",
-    "render_frames": "wavecomb.sequence",
+    "render_frames": "wavecomb.run.sequence",
 }
 
 
@@ -63,6 +63,8 @@ def __getattr__(name: str) -> Any:
         from wavecomb.version import version
 
         value: Any = version()
+    elif name == "cryptomatte":
+        from wavecomb.picture import cryptomatte as value
     elif name in _HOMES:
         from importlib import import_module
 

@@ -523,7 +523,7 @@ def render(
     policy: as wavecomb.SchedulingPolicy, in place of the settings' one; what its order() raises
     comes out of here. costs: a profile to start from, as Result.costs; one that knows all materials
     and textures spares the measuring. recorder: keeps the rays of
-    the wavefront integrator. watcher: as wavecomb.watcher.Watcher: progress(status) is called like
+    the wavefront integrator. watcher: as run.watcher.Watcher: progress(status) is called like
     progress and answers None, "snapshot" or "stop"; snapshot(snapshot) gets the snapshots that were
     asked for and one at the end. state: of a snapshot of a render with the same settings, to go on
     from."""

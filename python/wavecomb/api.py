@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb import aovs as aov_names
 from wavecomb.machine import memory_bytes
+from wavecomb.run import aovs as aov_names
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
-    from wavecomb.exr import Compression
-    from wavecomb.image import Transfer
+    from wavecomb.picture.exr import Compression
+    from wavecomb.picture.image import Transfer
+    from wavecomb.run.watcher import Watcher
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
-    from wavecomb.watcher import Watcher
 
 Progress = Callable[[int, int], "bool | None"]
 
@@ -78,7 +78,7 @@ class Picture:
 
     def layers(self) -> dict[str, NDArray[Any]]:
         """The layers of an EXR file by name and in order; a Cryptomatte is several there."""
-        from wavecomb import cryptomatte
+        from wavecomb.picture import cryptomatte
 
         arrays = {
             "beauty": self.beauty,
@@ -112,8 +112,8 @@ class Picture:
         Raises:
             WavecombError: The extra ``denoise`` is missing; says how to install it.
         """
-        from wavecomb.denoise import denoise
         from wavecomb.errors import WavecombError
+        from wavecomb.picture.denoise import denoise
 
         albedo = self.aovs.get("guide_albedo", self.albedo)
         normal = self.aovs.get("guide_normal", self.normal)
@@ -157,9 +157,9 @@ class Picture:
         >>> picture.save("mixed.exr", half=True)  # doctest: +SKIP
         >>> picture.save("mixed.png", exposure=0.5)  # doctest: +SKIP
         """
-        from wavecomb.image import write_png
-        from wavecomb.output import save_layers
-        from wavecomb.working_space import to_rec709
+        from wavecomb.picture.image import write_png
+        from wavecomb.picture.output import save_layers
+        from wavecomb.picture.working_space import to_rec709
 
         kind = Path(path).suffix.lower()
         if kind == ".exr":
@@ -182,7 +182,7 @@ class Picture:
 
     def file_metadata(self) -> dict[str, Any]:
         """Attributes of an EXR file: version, stage, camera, settings, times, matrices."""
-        from wavecomb.stats import picture_metadata
+        from wavecomb.run.stats import picture_metadata
 
         return {**picture_metadata(self.stats), **self.metadata}
 
@@ -289,7 +289,7 @@ def load(
         "working_space": working_space,
         "lights": lights,
     }
-    from wavecomb.isolate.probe import check, is_wanted
+    from wavecomb.run.isolate.probe import check, is_wanted
 
     if is_wanted(isolate):
         check(Path(path), options, load_limit, memory_limit)
@@ -302,7 +302,7 @@ def import_usd() -> None:
     A Ctrl-C meanwhile comes when they are loaded: their loader swallows what it raises within it,
     and leaves half a library.
     """
-    from wavecomb.progress import Interrupt
+    from wavecomb.run.progress import Interrupt
 
     with Interrupt() as interrupt:
         import wavecomb.usd  # noqa: F401
@@ -368,10 +368,10 @@ def render(
             good.
         wavecomb._core.Error: A setting is no good.
     """
-    from wavecomb.stats import make_stats
+    from wavecomb.run.stats import make_stats
 
     if isinstance(source, (str, os.PathLike)):
-        from wavecomb.isolate.probe import check, is_wanted
+        from wavecomb.run.isolate.probe import check, is_wanted
 
         if is_wanted(isolate):
             # Before this process composes anything of it.
@@ -428,7 +428,7 @@ def prepare(
     if isinstance(costs, str):
         settings["costs"] = costs
     elif costs is not None:
-        from wavecomb.costs import check_costs
+        from wavecomb.run.costs import check_costs
 
         profile = check_costs(costs)
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
@@ -451,7 +451,7 @@ def picture_of(
         scene: What was rendered, for the camera's matrices.
         aovs: Names as ``aovs.expand`` gives them.
     """
-    from wavecomb.output import scene_metadata
+    from wavecomb.picture.output import scene_metadata
 
     height, width = result.beauty.shape[:2]
     return Picture(
@@ -540,8 +540,8 @@ def _keeping(
     """Who saves checkpoints, and the state to go on from."""
     if checkpoint is None and resume is None:
         return None, None
-    from wavecomb.checkpoint import check_fits, load_checkpoint, make_header
-    from wavecomb.watcher import CheckpointSink, Watcher
+    from wavecomb.run.checkpoint import check_fits, load_checkpoint, make_header
+    from wavecomb.run.watcher import CheckpointSink, Watcher
 
     header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
     before = load_checkpoint(resume) if resume is not None else None

@@ -59,9 +59,9 @@ def machine_info() -> dict[str, Any]:
     """What this machine has for a render, as plain data."""
     from wavecomb import _core
     from wavecomb.isa import library_info
-    from wavecomb.isolate import box
-    from wavecomb.isolate.memory import machine_limit
     from wavecomb.machine import memory_bytes, usable_cores
+    from wavecomb.run.isolate import box
+    from wavecomb.run.isolate.memory import machine_limit
 
     return {
         "cores": usable_cores(),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 
 
 def usable_cores() -> int:
@@ -20,3 +21,18 @@ def memory_bytes() -> int | None:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
         return None
+
+
+def give_back_memory() -> None:
+    """Hands memory that was freed to the system."""
+    from wavecomb import _core
+
+    _core.give_back_memory()
+
+
+def temporary_folder() -> str:
+    """Where temporary files go: ``TMPDIR``, else /var/tmp, which is on a disk, else /tmp."""
+    chosen = os.environ.get("TMPDIR")
+    if chosen:
+        return chosen
+    return "/var/tmp" if os.access("/var/tmp", os.W_OK | os.X_OK) else tempfile.gettempdir()

@@ -190,7 +190,7 @@ def ply_bytes(form: str) -> bytes:
 def left_over(what: str) -> bytes:
     """What a render of ``BALL`` leaves: "ckpt", "exr" (of seed 1 or, "exr2", 2), "json"."""
     import wavecomb
-    from wavecomb.costs import save_costs
+    from wavecomb.run.costs import save_costs
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -26,8 +26,8 @@ OUTCOMES = ("rendered", "warned", "refused", "wrong")
 def read(case: Path) -> tuple[str, str]:
     """What comes of an input that is no stage, by its name (``fuzz_inputs``)."""
     import wavecomb
-    from wavecomb.costs import load_costs
-    from wavecomb.merge import merge
+    from wavecomb.picture.merge import merge
+    from wavecomb.run.costs import load_costs
     from wavecomb.scenes import SceneError
     from wavecomb.scenes.meshfile import load_dragon
 
@@ -118,8 +118,8 @@ def give_up(answers: TextIO, line: str) -> NoReturn:
 
 def main() -> None:
     """Answers until stdin ends."""
-    from wavecomb.isolate import patience, trail
-    from wavecomb.isolate.supervisor import CHATTER
+    from wavecomb.run.isolate import patience, trail
+    from wavecomb.run.isolate.supervisor import CHATTER
 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     limit = int(sys.argv[1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.usd.graph_code import INPUTS, nodes_of
+from wavecomb.usd.looks.graph_code import INPUTS, nodes_of
 
 COLUMNS = {"uv": 0, "position": 3, "local_position": 6, "normal": 9, "local_normal": 12,
            "tangent": 15, "view": 18}  # fmt: skip

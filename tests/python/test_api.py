@@ -12,10 +12,10 @@ import pytest
 from fake_core import Fake, install
 
 import wavecomb
-from wavecomb.costs import load_costs, save_costs
 from wavecomb.errors import WavecombError
-from wavecomb.image import read_image, read_layers
-from wavecomb.stats import COUNTS, MEMORY, PHASES, write_stats
+from wavecomb.picture.image import read_image, read_layers
+from wavecomb.run.costs import load_costs, save_costs
+from wavecomb.run.stats import COUNTS, MEMORY, PHASES, write_stats
 
 
 @pytest.fixture

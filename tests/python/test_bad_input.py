@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wavecomb.image import read_layers
+from wavecomb.picture.image import read_layers
 
 pytest.importorskip("wavecomb._core")
 

@@ -17,7 +17,7 @@ from bench_results import everything, runs_of, write_folder
 from wavecomb.bench.report import build
 from wavecomb.bench.report_html import nested, number, table
 from wavecomb.bench.report_markdown import LARGEST_PNG, LARGEST_SVG
-from wavecomb.image import read_image
+from wavecomb.picture.image import read_image
 
 HTML = "{http://www.w3.org/1999/xhtml}"
 

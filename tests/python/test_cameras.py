@@ -12,7 +12,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb import _core
-from wavecomb.output import fitted_window, scene_metadata
+from wavecomb.picture.output import fitted_window, scene_metadata
 from wavecomb.usd import load_stage
 
 LENS = """float focalLength = 40
@@ -233,8 +233,8 @@ def test_fingerprints_tell_cameras_apart():
 
 
 def test_a_pose_of_the_window_keeps_the_camera(tmp_path):
-    from wavecomb.gui import navigate
-    from wavecomb.gui.camera import pose_of_scene
+    from wavecomb.gui.viewport import navigate
+    from wavecomb.gui.viewport.orbit import pose_of_scene
 
     text = SKY + f'def Camera "Cam" {{ {LENS} {back(7)} token projection = "orthographic" }}'
     scene = load_stage(write(tmp_path, text)).scene

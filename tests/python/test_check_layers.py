@@ -92,3 +92,51 @@ def test_a_missing_licence_line_is_refused(tmp_path):
 
 def test_an_empty_tree_is_an_error(tmp_path):
     assert run(tmp_path).returncode == 2
+
+
+def python_tree(root: pathlib.Path, files: dict[str, str]) -> pathlib.Path:
+    for name, text in {"__init__.py": "", **files}.items():
+        path = root / "python" / "wavecomb" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tree(root, {"core/soa.h": ""})
+
+
+def test_imports_that_point_down_pass(tmp_path):
+    files = {
+        "errors.py": "",
+        "picture/__init__.py": "",
+        "picture/files.py": "from wavecomb import _core\nfrom wavecomb.errors import Error\n",
+        "cli/__init__.py": "from wavecomb.cli import render\n",
+        "cli/render.py": "import wavecomb.picture.files\nfrom wavecomb import __version__\n",
+        "__main__.py": "from wavecomb.cli import main\n",
+    }
+    result = run(python_tree(tmp_path, files))
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        "from wavecomb.a import x\n",
+        "import wavecomb.a\n",
+        "def late():\n    from wavecomb import a\n",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from wavecomb.a import X\n",
+    ],
+)
+def test_imports_in_a_circle_are_named(tmp_path, other):
+    files = {"a.py": "from wavecomb.b import y\n", "b.py": "import wavecomb.c\n", "c.py": other}
+    result = run(python_tree(tmp_path, files))
+    assert result.returncode == 1
+    assert "circle: wavecomb.a, wavecomb.b, wavecomb.c" in result.stderr
+
+
+def test_nothing_but_the_command_imports_it(tmp_path):
+    files = {
+        "cli/__init__.py": "",
+        "cli/group.py": "",
+        "run.py": "from wavecomb.cli import group\n",
+    }
+    result = run(python_tree(tmp_path, files))
+    assert result.returncode == 1
+    assert "wavecomb.run may not import wavecomb.cli" in result.stderr

@@ -16,10 +16,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 import wavecomb
-from wavecomb.checkpoint import load_checkpoint, save_checkpoint
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.image import read_layers
+from wavecomb.picture.image import read_layers
+from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
 
 _core = pytest.importorskip("wavecomb._core")
 
@@ -362,7 +362,7 @@ def test_a_timed_render_is_not_resumed_without_end(stage: Path, tmp_path: Path) 
 
 
 def test_a_disk_that_is_full_does_not_end_a_render(cornell: Any, tmp_path: Path) -> None:
-    from wavecomb.watcher import CheckpointSink, Watcher
+    from wavecomb.run.watcher import CheckpointSink, Watcher
 
     warnings: list[str] = []
     sink = CheckpointSink(tmp_path / "gone" / "a.ckpt", 0.0, {})

@@ -17,8 +17,8 @@ from click.testing import CliRunner, Result
 from fake_core import Error, Fake, install
 
 from wavecomb.cli import main
-from wavecomb.costs import SOURCES
-from wavecomb.image import read_layers, read_metadata, write_exr
+from wavecomb.picture.image import read_layers, read_metadata, write_exr
+from wavecomb.run.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 

@@ -14,11 +14,11 @@ from usd_recorder import Recorder
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.frame_names import fill, frame_text, has_place, parse_frames
-from wavecomb.sequence import Frames
+from wavecomb.run.frame_names import fill, frame_text, has_place, parse_frames
+from wavecomb.run.sequence import Frames
 from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.stock import FrameStock
-from wavecomb.usd.varying import Varying
+from wavecomb.usd.stage.shared import FrameStock
+from wavecomb.usd.stage.varying import Varying
 
 SMALL = {"size": (24, 24), "spp": 1}
 

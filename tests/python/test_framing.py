@@ -6,10 +6,10 @@ import pytest
 from pxr import Gf, Usd, UsdGeom
 
 import wavecomb
-from wavecomb.output import camera_window
-from wavecomb.usd import framing
-from wavecomb.usd.camera import Lens, frame_points
-from wavecomb.usd.group import Group
+from wavecomb.picture.output import camera_window
+from wavecomb.usd.cameras import framing
+from wavecomb.usd.cameras.camera import Lens, frame_points
+from wavecomb.usd.stage.group import Group
 
 SIZES = [(120, 120), (208, 117), (117, 208), (300, 75)]
 

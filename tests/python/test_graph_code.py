@@ -10,8 +10,8 @@ import pytest
 from graph_reference import FORMULAS, evaluate
 
 from wavecomb import _core
-from wavecomb.usd import graph_code
-from wavecomb.usd.graph_code import (
+from wavecomb.usd.looks import graph_code
+from wavecomb.usd.looks.graph_code import (
     INPUTS,
     POINT_SIZE,
     Expressions,

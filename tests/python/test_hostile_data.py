@@ -20,14 +20,14 @@ from test_usd_mtlx import GOLD, write
 
 import wavecomb
 from wavecomb import WavecombError
-from wavecomb.checkpoint import load_checkpoint, save_checkpoint
 from wavecomb.cli import main
-from wavecomb.exr import write_exr
+from wavecomb.picture.exr import write_exr
+from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
 from wavecomb.scenes import meshfile
 from wavecomb.scenes.meshfile import load_dragon
 from wavecomb.usd import LoadReport, load_stage
-from wavecomb.usd.ies import IesTable
-from wavecomb.usd.mtlx_files import MtlxError, read_document
+from wavecomb.usd.lights.ies import IesTable
+from wavecomb.usd.materialx.files import MtlxError, read_document
 
 SOON_S = 5.0
 DEEP = 20_000

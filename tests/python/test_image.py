@@ -9,8 +9,8 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from wavecomb import image
-from wavecomb.files import check_writable, replacing
+from wavecomb.picture import image
+from wavecomb.picture.files import check_writable, replacing
 
 
 @pytest.fixture

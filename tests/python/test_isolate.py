@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 from parts import only_where
 
-from wavecomb.isolate import patience, trail
+from wavecomb.run.isolate import patience, trail
 
 pytestmark = only_where(sys.platform == "linux", "isolation is for Linux")
 
-SUPERVISED = "from wavecomb.isolate import supervisor, trail; supervisor.supervise()\n"
+SUPERVISED = "from wavecomb.run.isolate import supervisor, trail; supervisor.supervise()\n"
 
 GOOD = '#usda 1.0\ndef Sphere "Ball" {}\n'
 
@@ -151,7 +151,7 @@ def test_the_command_says_where_usd_crashed(tmp_path: Path) -> None:
     code = (
         "import ctypes, sys\n"
         "from wavecomb.cli import main\n"
-        "import wavecomb.usd.stage as loader\n"
+        "import wavecomb.usd.stage.load as loader\n"
         "loader.Usd.Stage.Open = lambda *_: ctypes.string_at(0)\n"
         "main(sys.argv[1:])"
     )

@@ -18,8 +18,8 @@ import pytest
 from parts import needs
 from test_texture_limit import textured, write_image
 
-from wavecomb.checkpoint import load_checkpoint
-from wavecomb.image import read_layers
+from wavecomb.picture.image import read_layers
+from wavecomb.run.checkpoint import load_checkpoint
 
 pytestmark = needs("wavecomb._core")
 

@@ -18,9 +18,10 @@ from parts import only_where
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 from usd_recorder import Recorder
 
-from wavecomb.image import write_png
-from wavecomb.usd import load_stage, pixels
-from wavecomb.usd.pixels import Image, ReadAhead, TextureError
+from wavecomb.picture.image import write_png
+from wavecomb.usd import load_stage
+from wavecomb.usd.looks import pixels
+from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError
 
 LINUX = only_where(sys.platform == "linux", "reads /proc")
 
@@ -194,8 +195,8 @@ def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
 import json, sys
 from wavecomb import _core, api
 from wavecomb.cli.reporting import make_reporter
-from wavecomb.progress import Interrupt
-from wavecomb.watcher import Watcher
+from wavecomb.run.progress import Interrupt
+from wavecomb.run.watcher import Watcher
 loaded = api.load(sys.argv[1])
 with Interrupt(), make_reporter(None, quiet=False).rendering() as bar:
     _core.render(loaded.scene, api.make_settings((8, 8), 1), watcher=Watcher(reporter=bar))

@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner
 
 import wavecomb
-from wavecomb import cryptomatte
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.image import read_layers, read_metadata, write_exr
-from wavecomb.merge import merge
+from wavecomb.picture import cryptomatte
+from wavecomb.picture.image import read_layers, read_metadata, write_exr
+from wavecomb.picture.merge import merge
 
 _core = pytest.importorskip("wavecomb._core")
 

@@ -15,8 +15,8 @@ from click.testing import CliRunner
 from fake_core import install
 
 from wavecomb.cli import main
-from wavecomb.image import read_image
-from wavecomb.progress import Interrupt, ProgressBar, ProgressLines, speed
+from wavecomb.picture.image import read_image
+from wavecomb.run.progress import Interrupt, ProgressBar, ProgressLines, speed
 
 
 def status(done: int, **other: Any) -> dict[str, Any]:

@@ -13,10 +13,10 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.image import read_layers, read_metadata
-from wavecomb.usd.render_settings import RenderChoice, read_choices
-from wavecomb.usd.render_vars import aov_of
-from wavecomb.usd.report import LoadReport
+from wavecomb.picture.image import read_layers, read_metadata
+from wavecomb.usd.stage.render_settings import RenderChoice, read_choices
+from wavecomb.usd.stage.render_vars import aov_of
+from wavecomb.usd.stage.report import LoadReport
 
 WORLD = """
 def Camera "A" { float fStop = 2

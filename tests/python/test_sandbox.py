@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from parts import only_where
 
-from wavecomb.isolate import box, landlock, seccomp
+from wavecomb.run.isolate import box, landlock, seccomp
 
 pytestmark = only_where(sys.platform == "linux", "the sandbox is Linux's")
 with_landlock = pytest.mark.skipif(not landlock.version(), reason="this kernel has no Landlock")
@@ -21,8 +21,8 @@ with_seccomp = pytest.mark.skipif(not seccomp.is_known(), reason="this kernel ha
 START = """
 import json, os, signal, socket, subprocess, sys, threading
 from pathlib import Path
-from wavecomb.isolate import box, supervisor
-from wavecomb.isolate.broker import Outputs
+from wavecomb.run.isolate import box, supervisor
+from wavecomb.run.isolate.broker import Outputs
 supervisor.supervise()
 place = Path(sys.argv[1])
 tried = {}
@@ -179,8 +179,8 @@ def test_the_parent_names_only_what_was_said(place: Path) -> None:
         place,
         ENTER
         + """
-from wavecomb import files
-from wavecomb.files import check_writable, replacing
+from wavecomb.picture import files
+from wavecomb.picture.files import check_writable, replacing
 def write(name):
     with replacing(place / name, durable=True) as part:
         part.write_text("a picture")
@@ -230,7 +230,7 @@ def test_what_a_killed_pair_left_goes_with_the_next(place: Path) -> None:
     child(
         place,
         ENTER
-        + "from wavecomb.files import replacing\n"
+        + "from wavecomb.picture.files import replacing\n"
         + "with replacing(place / 'out/a.exr') as part: part.write_text('x')\n",
     )
     assert sorted(os.listdir(place / "out")) == ["a.exr", "other.exr"]
@@ -322,7 +322,7 @@ def tries(deed):
     except OSError as error:
         return type(error).__name__
 def hook(event, what):
-    if event == "import" and what[0] == "wavecomb.usd.stage":
+    if event == "import" and what[0] == "wavecomb.usd.stage.load":
         os.write(said, " ".join([
             tries(lambda: open({secret!r}, "w")), tries(socket.socket),
             tries(lambda: open(os.environ["TMPDIR"] + "/x", "w")),

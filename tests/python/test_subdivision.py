@@ -11,7 +11,7 @@ from usd_recorder import load, said, write
 from wavecomb import _core
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.usd import surfaces
+from wavecomb.usd.geometry import surfaces
 
 FACE_VARYING = ("none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundaries", "all")
 

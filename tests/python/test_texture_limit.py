@@ -8,8 +8,8 @@ from usd_recorder import QUAD, Recorder, load, said, write
 
 from wavecomb import WavecombError, _core
 from wavecomb.usd import load_stage
-from wavecomb.usd.halve import halve
-from wavecomb.usd.texture_limit import pyramid_bytes
+from wavecomb.usd.looks.halve import halve
+from wavecomb.usd.looks.texture_limit import pyramid_bytes
 
 
 class NoStore:

@@ -20,10 +20,10 @@ from test_texture_limit import NoStore, textured, write_image
 
 import wavecomb
 from wavecomb import WavecombError, _core
-from wavecomb.sequence import Frames
+from wavecomb.machine import temporary_folder
+from wavecomb.run.sequence import Frames
 from wavecomb.usd import load_stage
-from wavecomb.usd.pixels import ReadAhead
-from wavecomb.usd.texture_store import texture_folder
+from wavecomb.usd.looks.pixels import ReadAhead
 
 LIMIT_MB = 2.0
 TEXTURES, SIZE = 9, 512
@@ -277,9 +277,9 @@ def test_reading_ahead_keeps_to_its_limit(tmp_path):
 
 def test_the_file_goes_where_it_is_told_to(monkeypatch, tmp_path):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    assert texture_folder() == str(tmp_path)
+    assert temporary_folder() == str(tmp_path)
     monkeypatch.delenv("TMPDIR")
-    assert Path(texture_folder()).is_dir()
+    assert Path(temporary_folder()).is_dir()
 
 
 def test_a_limit_is_a_number_above_0(stage):

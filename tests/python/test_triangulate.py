@@ -6,7 +6,7 @@ import pytest
 from usd_recorder import load
 
 from wavecomb import _core
-from wavecomb.usd import triangulate as module
+from wavecomb.usd.geometry import triangulate as module
 
 UP = np.array([0.0, 0.0, 1.0])
 

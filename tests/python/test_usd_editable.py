@@ -11,14 +11,14 @@ from pxr import Gf, Sdf, Usd
 from usd_recorder import QUAD, Recorder, write
 
 import wavecomb
-from wavecomb.image import write_png
+from wavecomb.picture.image import write_png
 from wavecomb.usd import load_stage, open_stage
-from wavecomb.usd.materialx import MODELS
-from wavecomb.usd.mtlx_inputs import definitions
-from wavecomb.usd.openpbr import layers_of
-from wavecomb.usd.parameters import light_radiance, material_parameters
-from wavecomb.usd.surface import DEFAULTS
-from wavecomb.usd.surface_values import surface_values
+from wavecomb.usd.looks.materialx_surface import MODELS
+from wavecomb.usd.looks.openpbr import layers_of
+from wavecomb.usd.looks.parameters import light_radiance, material_parameters
+from wavecomb.usd.looks.surface import DEFAULTS
+from wavecomb.usd.looks.surface_inputs import definitions
+from wavecomb.usd.looks.surface_values import surface_values
 
 MATERIAL = """
 def Material "%s" {
@@ -115,7 +115,7 @@ def test_materials_in_instances_are_named_by_the_instance(tmp_path):
 
 
 def test_textures_are_shared_until_their_file_changes(path, tmp_path, monkeypatch):
-    from wavecomb.usd import pixels
+    from wavecomb.usd.looks import pixels
 
     read = []
     real = pixels._read_file

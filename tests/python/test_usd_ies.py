@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from usd_recorder import load, said
 
-from wavecomb.usd.ies import IesError, parse_ies
+from wavecomb.usd.lights.ies import IesError, parse_ies
 
 
 def ies(vertical, horizontal, candela, kind=1, factors=(1, 1, 1), tilt="NONE"):

@@ -7,7 +7,7 @@ import pytest
 from usd_recorder import QUAD, Recorder, load, said
 
 from wavecomb.usd import load_stage
-from wavecomb.usd.light import blackbody
+from wavecomb.usd.lights.light import blackbody
 
 
 def light(tmp_path, text, header=""):
@@ -110,7 +110,7 @@ def test_oriented_dome_is_where_usd_puts_it(tmp_path):
         uniform token[] xformOpOrder = ["xformOp:rotateX:orientToStageUpAxis"] }""",
         'upAxis = "Z"',
     )
-    from wavecomb.usd.dome import Y_TO_Z
+    from wavecomb.usd.lights.dome import Y_TO_Z
 
     assert found["transform"] == pytest.approx(Y_TO_Z)
 

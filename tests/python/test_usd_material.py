@@ -444,7 +444,7 @@ def test_display_colours(tmp_path):
 
 
 def test_many_colours_become_few_materials(tmp_path):
-    from wavecomb.usd.colour import MAX_COLOURS, quantise
+    from wavecomb.usd.looks.colour import MAX_COLOURS, quantise
 
     colours = np.random.default_rng(1).random((5000, 3))
     palette, index = quantise(colours)

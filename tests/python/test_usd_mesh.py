@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from usd_recorder import QUAD, load, said
 
-from wavecomb.usd.triangulate import MeshError, clip_ears, triangulate
+from wavecomb.usd.geometry.triangulate import MeshError, clip_ears, triangulate
 
 
 def areas(points, triangles):

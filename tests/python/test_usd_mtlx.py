@@ -13,11 +13,12 @@ from parts import asset
 from pxr import Sdf, Usd, UsdShade
 from usd_recorder import Recorder
 
-from wavecomb.image import write_png
-from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
-from wavecomb.usd.diagnostics import captured
-from wavecomb.usd.mtlx_files import MAX_DEPTH, MtlxError
-from wavecomb.usd.mtlx_layer import translate
+from wavecomb.picture.image import write_png
+from wavecomb.usd import LoadReport, load_stage, open_stage
+from wavecomb.usd.materialx import references as mtlx
+from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
+from wavecomb.usd.materialx.layer import translate
+from wavecomb.usd.stage.diagnostics import captured
 
 GOLD = """<?xml version="1.0"?>
 <materialx version="1.38" colorspace="lin_rec709">

@@ -179,7 +179,7 @@ def save_pictures(name: str, a: Array, b: Array, z: Array) -> Path:
 
 def picture_of(path: Path, a: Array, b: Array, z: Array) -> None:
     """Writes a, b and z as ``save_pictures`` says."""
-    from wavecomb.image import write_png
+    from wavecomb.picture.image import write_png
 
     mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)
     scale = 0.8 / max(float(np.percentile(mean_b, 98)), 1e-6)

@@ -177,7 +177,7 @@ def save(found: Comparison, folder: Path) -> None:
     """Writes both pictures as EXR files, and side by side with z as PNG."""
     from agreement import picture_of
 
-    from wavecomb.exr import write_exr
+    from wavecomb.picture.exr import write_exr
 
     for name, batches in (("ours", found.ours), ("naive", found.naive)):
         layers = {"beauty": batches.mean(axis=0).astype(np.float32)}

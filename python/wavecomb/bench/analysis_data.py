@@ -16,7 +16,7 @@ from wavecomb.bench.columns import COLUMNS, read_rows
 from wavecomb.bench.oracle import BEST, COSTS, ORACLES
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
-from wavecomb.files import reason
+from wavecomb.picture.files import reason
 
 if TYPE_CHECKING:
     import pandas as pd

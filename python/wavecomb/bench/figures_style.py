@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.extras import needed
-from wavecomb.files import replacing
+from wavecomb.picture.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

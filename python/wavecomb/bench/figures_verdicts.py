@@ -173,7 +173,7 @@ def difference_figure(
     pictures: Sequence[tuple[str, NDArray[Any]]], golden: NDArray[Any], name: str, title: str
 ) -> Drawn:
     """Relative luminance differences to a golden picture, on one scale."""
-    from wavecomb.compare import luminance
+    from wavecomb.picture.compare import luminance
 
     reference = luminance(golden)
     maps = [

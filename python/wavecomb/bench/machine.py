@@ -57,7 +57,7 @@ def cache_bytes() -> dict[str, int]:
 
 def machine_state() -> dict[str, Any]:
     """What the figures were made on and with; nothing that names the machine or its user."""
-    from wavecomb import stats
+    from wavecomb.run import stats
 
     return {
         **stats.machine(),

@@ -18,9 +18,9 @@ from wavecomb.bench.oracle import (
 )
 from wavecomb.bench.plan import Config
 from wavecomb.bench.process import run_worker
-from wavecomb.costs import save_costs
 from wavecomb.errors import WavecombError
-from wavecomb.files import replacing
+from wavecomb.picture.files import replacing
+from wavecomb.run.costs import save_costs
 
 TRACE_SCHEMA = "wavecomb-trace/1"
 

@@ -24,7 +24,7 @@ from wavecomb.bench.report_html import (
 from wavecomb.bench.report_markdown import copy_figures, write_page
 from wavecomb.bench.report_suite import suite
 from wavecomb.bench.report_writer import Writer
-from wavecomb.files import replacing
+from wavecomb.picture.files import replacing
 
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results

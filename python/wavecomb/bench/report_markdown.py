@@ -15,7 +15,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from wavecomb.bench.report_html import Section
-from wavecomb.files import replacing
+from wavecomb.picture.files import replacing
 
 LARGEST_SVG = 150_000
 LARGEST_PNG = 120_000

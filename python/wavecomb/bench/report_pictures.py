@@ -18,7 +18,7 @@ from wavecomb.bench.figures_style import Drawn
 from wavecomb.bench.figures_verdicts import difference_figure
 from wavecomb.bench.report_html import escape, key_of
 from wavecomb.errors import WavecombError
-from wavecomb.image import write_png
+from wavecomb.picture.image import write_png
 
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results
@@ -199,7 +199,7 @@ def _read(path: Path) -> NDArray[Any]:
         if path.suffix == ".npy":
             pixels = np.load(path, allow_pickle=False)
         else:
-            from wavecomb.image import read_image
+            from wavecomb.picture.image import read_image
 
             pixels = read_image(path)
     except (OSError, ValueError) as error:

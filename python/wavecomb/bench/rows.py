@@ -10,7 +10,7 @@ from wavecomb.bench.columns import COUNTER_COLUMNS
 from wavecomb.bench.oracle import ORDERS
 from wavecomb.bench.plan import Run
 from wavecomb.bench.suite_model import Suite
-from wavecomb.stats import SORTING
+from wavecomb.run.stats import SORTING
 
 _PHASES = (
     *("generate", "order_rays", "trace", "collect", "keys", "sort", "materialize"),

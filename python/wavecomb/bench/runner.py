@@ -28,7 +28,7 @@ from wavecomb.bench.stages import check_files, generate
 from wavecomb.bench.suite_model import WAVECOMB, Suite
 from wavecomb.bench.worker import judge_picture
 from wavecomb.errors import WavecombError
-from wavecomb.progress import time_text
+from wavecomb.run.progress import time_text
 
 Say = Callable[[str], None]
 

@@ -20,7 +20,7 @@ from wavecomb.bench.suite_model import (
 )
 from wavecomb.bench.table import Table
 from wavecomb.errors import WavecombError
-from wavecomb.files import reason
+from wavecomb.picture.files import reason
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -37,7 +37,7 @@ def main() -> None:
     try:
         result = {"status": "ok", "error": "", **run(job)}
     except Exception as error:
-        from wavecomb.cli.group import describe
+        from wavecomb.run.faults import describe
 
         result = {"status": "failed", "error": " ".join(describe(error).split())}
     with os.fdopen(answer, "w", encoding="utf-8") as out:
@@ -48,8 +48,8 @@ def run(job: Job) -> dict[str, Any]:
     """Loads, warms up, renders, compares."""
     from wavecomb import api
     from wavecomb.bench.counters import Switch
-    from wavecomb.costs import load_costs
-    from wavecomb.stats import plain
+    from wavecomb.run.costs import load_costs
+    from wavecomb.run.stats import plain
 
     settings = dict(job["settings"])
     size, spp = tuple(settings.pop("size")), int(settings.pop("spp"))
@@ -83,7 +83,7 @@ def judge_picture(beauty: Any, spp: int, golden: dict[str, Any] | None) -> dict[
 
     import numpy as np
 
-    from wavecomb.compare import compare
+    from wavecomb.picture.compare import compare
 
     digest = hashlib.sha256(np.ascontiguousarray(beauty).tobytes()).hexdigest()
     result: dict[str, Any] = {"picture_sha256": digest}
@@ -102,7 +102,7 @@ def judge_picture(beauty: Any, spp: int, golden: dict[str, Any] | None) -> dict[
 def _save(path: Path, beauty: Any) -> None:
     import numpy as np
 
-    from wavecomb.files import replacing
+    from wavecomb.picture.files import replacing
 
     with replacing(path) as part:
         np.save(part, np.ascontiguousarray(beauty, dtype=np.float32))

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from wavecomb import aovs as aov_names
+from wavecomb.run import aovs as aov_names
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -87,10 +87,10 @@ class AovOptions:
 
         The names of light groups are known once a stage is loaded: those of all are not checked.
         """
-        from wavecomb import cryptomatte
-        from wavecomb.exr import check_options
-        from wavecomb.files import check_writable
-        from wavecomb.output import split_names
+        from wavecomb.picture import cryptomatte
+        from wavecomb.picture.exr import check_options
+        from wavecomb.picture.files import check_writable
+        from wavecomb.picture.output import split_names
 
         layers = [cryptomatte.LEVELS.get(name, name) for name in aovs]
         layers = [f"{name}00" if name in cryptomatte.LEVELS.values() else name for name in layers]

@@ -152,7 +152,7 @@ def _stopped_by_sigterm() -> Iterator[None]:
 def _dry_run(sitting: object) -> None:
     from wavecomb.bench.results import read_objects
     from wavecomb.bench.runner import Sitting
-    from wavecomb.progress import time_text
+    from wavecomb.run.progress import time_text
 
     assert isinstance(sitting, Sitting)
     sitting.folder.objects = read_objects(sitting.folder.runs_jsonl)

@@ -101,9 +101,9 @@ def compare_command(
     2 an error.
     """
     enter_to_read((a, b, variance_a, variance_b), (heatmap,))
-    from wavecomb.compare import compare
     from wavecomb.errors import WavecombError
-    from wavecomb.files import check_writable
+    from wavecomb.picture.compare import compare
+    from wavecomb.picture.files import check_writable
 
     testing = variance_a is not None or variance_b is not None
     if kind == "z" and not testing:
@@ -117,7 +117,7 @@ def compare_command(
         result = compare(a, b)
         measured = _measure(a, b, metrics, exposure)
         if testing:
-            from wavecomb.ztest import z_test
+            from wavecomb.picture.ztest import z_test
 
             test = z_test(
                 a, b, variance_a=variance_a, variance_b=variance_b, significance=significance
@@ -145,14 +145,14 @@ def compare_command(
 def _measure(a: str, b: str, metrics: tuple[str, ...], exposure: float) -> dict[str, float]:
     if not metrics:
         return {}
-    from wavecomb.perceptual import METRICS, measure
+    from wavecomb.picture.perceptual import METRICS, measure
 
     return {name: measure(name, a, b, exposure) for name in METRICS if name in metrics}
 
 
 def _write_map(path: str, a: str, b: str, kind: str, exposure: float, test: Any) -> None:
-    from wavecomb.heatmap import KINDS, write_heat_map, z_map
-    from wavecomb.image import write_png
+    from wavecomb.picture.heatmap import KINDS, write_heat_map, z_map
+    from wavecomb.picture.image import write_png
 
     if kind == "z":
         write_png(path, z_map(test))

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from wavecomb.cli.group import describe
 from wavecomb.cli.job import FrameShot, Job, Names, how_far, purpose_at
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.errors import WavecombError
-from wavecomb.frame_names import frame_text, has_place, parse_frames
+from wavecomb.run.faults import describe
+from wavecomb.run.frame_names import frame_text, has_place, parse_frames
 
 if TYPE_CHECKING:
     from wavecomb.api import Picture
-    from wavecomb.sequence import Frames
+    from wavecomb.run.sequence import Frames
     from wavecomb.usd import LoadReport
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -137,7 +137,7 @@ def open_frames(job: Job, source: StageOptions) -> Frames:
     from wavecomb.api import import_usd
 
     import_usd()
-    from wavecomb.sequence import Frames
+    from wavecomb.run.sequence import Frames
 
     options = source.for_load((job.settings.width, job.settings.height))
     return Frames(job.stage, threads=job.settings.threads, **options)

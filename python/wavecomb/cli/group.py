@@ -11,6 +11,8 @@ from typing import Any, NoReturn
 
 import click
 
+from wavecomb.run.faults import describe
+
 ERROR = 2
 INTERRUPTED = 130
 
@@ -50,30 +52,6 @@ class Commands(click.Group):
                 raise
             _fail(describe(error))
         sys.exit(code if isinstance(code, int) else 0)
-
-
-def describe(error: Exception) -> str:
-    """An exception as one line for a user."""
-    from wavecomb.errors import WavecombError
-
-    core = sys.modules.get("wavecomb._core")
-    if isinstance(error, WavecombError) or (core is not None and isinstance(error, core.Error)):
-        return str(error)
-    no_threads = isinstance(error, RuntimeError) and "start new thread" in str(error)
-    if isinstance(error, MemoryError) or no_threads:
-        from wavecomb.isolate.memory import describe_limit
-
-        return f"out of memory; choose a smaller --size or a simpler stage{describe_limit()}"
-    if isinstance(error, OSError):
-        if error.filename is not None and error.strerror:
-            return f"{os.fspath(error.filename)}: {error.strerror}"
-        return str(error)
-    if isinstance(error, ImportError) and (error.name or "").startswith("wavecomb._core"):
-        return f"the native module is missing or broken ({error}); `make build` makes it"
-    return (
-        f"internal: {type(error).__name__}: {error} (please report it; "
-        "WAVECOMB_DEBUG=1 shows where)"
-    )
 
 
 def print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:

@@ -40,8 +40,8 @@ def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any
     if stage is None:
         raise click.UsageError("Missing argument 'STAGE'.")
     from wavecomb.info import print_info, stage_info
-    from wavecomb.isolate import box
-    from wavecomb.isolate.broker import Outputs
+    from wavecomb.run.isolate import box
+    from wavecomb.run.isolate.broker import Outputs
 
     source = StageOptions.take(options)
     box.enter(Outputs())

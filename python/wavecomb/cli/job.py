@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 from wavecomb.cli.aovs import AovOptions
 from wavecomb.cli.options import StageOptions, stage_warnings, warn
 from wavecomb.cli.purpose import PurposeOptions
-from wavecomb.frame_names import fill
+from wavecomb.run.frame_names import fill
 
 if TYPE_CHECKING:
     from wavecomb.api import Picture
-    from wavecomb.checkpoint import Checkpoint
     from wavecomb.cli.reporting import Reporter
-    from wavecomb.sequence import Frames
+    from wavecomb.run.checkpoint import Checkpoint
+    from wavecomb.run.sequence import Frames
     from wavecomb.usd import LoadedStage, LoadReport
 
 
@@ -81,7 +81,7 @@ class Still:
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
         """Those of the picture."""
-        from wavecomb.stats import make_stats
+        from wavecomb.run.stats import make_stats
 
         return make_stats(result, stage=self._stage, loaded=self._loaded, resumed_s=resumed_s)
 
@@ -130,8 +130,8 @@ class Job:
     ) -> tuple[Picture, int | None, LoadReport]:
         """The picture, the number of the signal that stopped it, and what to say of the stage."""
         from wavecomb.api import check_memory, picture_of
-        from wavecomb.progress import Interrupt
-        from wavecomb.watcher import Watcher
+        from wavecomb.run.progress import Interrupt
+        from wavecomb.run.watcher import Watcher
 
         with self.reporter.loading(self.stage) as progress:
             loaded = shot.load(progress)
@@ -162,12 +162,12 @@ class Job:
         resumed: Checkpoint | None,
     ) -> tuple[list[Any], dict[str, Any] | None, float]:
         """Who saves checkpoints and previews; the state to go on from, and its seconds."""
-        from wavecomb.watcher import CheckpointSink, PreviewSink, Sink
+        from wavecomb.run.watcher import CheckpointSink, PreviewSink, Sink
 
         sinks: list[Sink] = []
         state, seconds = None, 0.0
         if purpose.checkpoint_file is not None:
-            from wavecomb.checkpoint import build_note, check_fits, make_header
+            from wavecomb.run.checkpoint import build_note, check_fits, make_header
 
             header = make_header(
                 loaded.scene,
@@ -197,7 +197,7 @@ class Job:
         """Writes all files of a picture; gives it as written, and their names."""
         import numpy as np
 
-        from wavecomb.stats import write_stats
+        from wavecomb.run.stats import write_stats
 
         broken = int((~np.isfinite(picture.beauty).all(axis=2)).sum())
         warn([f"{broken} pixels of the picture are not finite"] if broken else [])
@@ -224,7 +224,7 @@ def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
 
 def how_far(picture: Any) -> str:
     """How much is done, as can be said of a render without and with a fixed end."""
-    from wavecomb.stats import rendered_pixels
+    from wavecomb.run.stats import rendered_pixels
 
     stats = picture.stats
     settings = stats["settings"]

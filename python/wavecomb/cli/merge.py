@@ -41,11 +41,11 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
     setting or layer, or the same seed) are refused.
     """
     from wavecomb.errors import WavecombError
-    from wavecomb.files import check_writable
-    from wavecomb.image import write_png
-    from wavecomb.merge import merge
-    from wavecomb.output import save_layers
-    from wavecomb.working_space import to_rec709
+    from wavecomb.picture.files import check_writable
+    from wavecomb.picture.image import write_png
+    from wavecomb.picture.merge import merge
+    from wavecomb.picture.output import save_layers
+    from wavecomb.picture.working_space import to_rec709
 
     layers = AovOptions.take(options)
     enter_to_read(pictures, (output, png), split=output if layers.split else None)

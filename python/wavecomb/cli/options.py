@@ -12,7 +12,7 @@ import click
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
-    from wavecomb.usd.render_settings import RenderChoice
+    from wavecomb.usd.stage.render_settings import RenderChoice
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -49,7 +49,7 @@ def examples(*lines: str) -> str:
 
 def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> None:
     """Goes on in a child, as early as can be: little is in memory yet."""
-    from wavecomb.isolate import supervisor
+    from wavecomb.run.isolate import supervisor
 
     if not context.resilient_parsing and (
         value == "on" or (value == "auto" and supervisor.is_wise())
@@ -60,20 +60,20 @@ def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> 
 def _set_load_limit(
     context: click.Context, parameter: click.Parameter, value: float | None
 ) -> None:
-    from wavecomb.isolate import patience
+    from wavecomb.run.isolate import patience
 
     patience.limit_s = value
 
 
 def _limit_memory(context: click.Context, parameter: click.Parameter, value: float | None) -> None:
-    from wavecomb.isolate import memory
+    from wavecomb.run.isolate import memory
 
     if not context.resilient_parsing:
         memory.limit(value)
 
 
 def _ask_sandbox(context: click.Context, parameter: click.Parameter, value: str) -> None:
-    from wavecomb.isolate import box
+    from wavecomb.run.isolate import box
 
     box.ask(mode=value)
 

@@ -8,16 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions
 from wavecomb.cli.job import FrameShot, Names
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.errors import WavecombError
+from wavecomb.run import aovs as aov_names
 
 if TYPE_CHECKING:
-    from wavecomb.sequence import Frames
-    from wavecomb.usd.render_settings import RenderChoice
+    from wavecomb.run.sequence import Frames
+    from wavecomb.usd.stage.render_settings import RenderChoice
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Plan:
 
     def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
         """As ``check_place``, for a file of each layer and frame."""
-        from wavecomb.output import split_names
+        from wavecomb.picture.output import split_names
 
         for names in [self.names] if frames is None else map(self.names.at, frames):
             for file in split_names(names.output, aovs).values():

@@ -13,7 +13,7 @@ from wavecomb.cli.options import Real
 from wavecomb.errors import WavecombError
 
 if TYPE_CHECKING:
-    from wavecomb.checkpoint import Checkpoint
+    from wavecomb.run.checkpoint import Checkpoint
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -137,7 +137,7 @@ class PurposeOptions:
 
     def load(self) -> Checkpoint | None:
         """The checkpoint to resume from. Checks that no other file would be replaced by one."""
-        from wavecomb.checkpoint import check_replaceable, load_checkpoint
+        from wavecomb.run.checkpoint import check_replaceable, load_checkpoint
 
         if self.checkpoint is not None:
             check_replaceable(self.checkpoint)

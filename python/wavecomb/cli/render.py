@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from wavecomb import aovs as aov_names
 from wavecomb.cli.aovs import AovOptions, aov_options
 from wavecomb.cli.frames import check_frames, frame_options, open_frames, render_sequence
 from wavecomb.cli.job import Job, Names, Shot, Still, how_far, purpose_at
@@ -17,7 +16,8 @@ from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
 from wavecomb.cli.sandbox import enter_to_render
-from wavecomb.costs import SOURCES
+from wavecomb.run import aovs as aov_names
+from wavecomb.run.costs import SOURCES
 from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 _INTEGERS = click.IntRange(min=0)
@@ -231,7 +231,7 @@ def render_command(
     if output is not None:
         checked(Names(output, png, stats_file))
     if purpose.denoise:
-        from wavecomb.denoise import check_denoiser
+        from wavecomb.picture.denoise import check_denoiser
 
         check_denoiser()
     resumed = purpose.load()
@@ -302,7 +302,7 @@ def render_command(
 
 
 def _save_costs(costs_file: str, picture: Any) -> None:
-    from wavecomb.costs import save_costs
+    from wavecomb.run.costs import save_costs
 
     save_costs(costs_file, picture.costs)
 
@@ -312,7 +312,7 @@ def _check_outputs(
 ) -> None:
     """Everything that can be known to fail before the work begins."""
     from wavecomb.errors import WavecombError
-    from wavecomb.files import check_writable
+    from wavecomb.picture.files import check_writable
 
     outputs = [
         (names.output, "-o", ".exr"),
@@ -344,6 +344,6 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     """The profile to start from, if there is one yet."""
     if costs_file is None or not os.path.exists(costs_file):
         return None
-    from wavecomb.costs import load_costs
+    from wavecomb.run.costs import load_costs
 
     return load_costs(costs_file)

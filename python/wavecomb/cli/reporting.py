@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wavecomb.cli.summary import print_summary
-from wavecomb.progress import (
+from wavecomb.run.progress import (
     LoadProgress,
     ProgressBar,
     ProgressLines,
@@ -79,7 +79,7 @@ class Summary(Reporter):
 
     def ended(self, picture: Any, files: Sequence[str]) -> None:
         """A line."""
-        from wavecomb.progress import time_text
+        from wavecomb.run.progress import time_text
 
         seconds = picture.stats["seconds"]
         times = ", ".join(f"{name} {time_text(seconds[name])}" for name in TIMES)

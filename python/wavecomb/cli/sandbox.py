@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 
-from wavecomb.frame_names import fill, parse_frames
+from wavecomb.run.frame_names import fill, parse_frames
 
 MOST_NAMES = 100_000
 """Beyond that the folder of a sequence is allowed, not each name."""
@@ -31,8 +31,8 @@ def enter_to_render(
         split: Whether there is a picture for each layer.
         gpu: Whether denoising may use devices.
     """
-    from wavecomb.isolate import box
-    from wavecomb.isolate.broker import Outputs
+    from wavecomb.run.isolate import box
+    from wavecomb.run.isolate.broker import Outputs
 
     given = [name for name in names if name is not None]
     numbers = [] if frames is None else parse_frames(frames)
@@ -66,8 +66,8 @@ def enter_to_read(
         outputs: That it writes.
         split: One of these, of which there may be one for each layer.
     """
-    from wavecomb.isolate import box
-    from wavecomb.isolate.broker import Outputs
+    from wavecomb.run.isolate import box
+    from wavecomb.run.isolate.broker import Outputs
 
     parts: tuple[tuple[str, str, str], ...] = ()
     if split is not None:

@@ -62,7 +62,7 @@ def scene_command(name: str | None, output: str | None, list_: bool, **options: 
         return
     if name is None or output is None:
         raise click.UsageError("give a NAME and -o FILE, or --list")
-    from wavecomb.files import check_writable
+    from wavecomb.picture.files import check_writable
 
     check_writable(output)
     chosen = {key: value for key, value in options.items() if value is not None}

@@ -23,7 +23,7 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
     from rich.console import Console
     from rich.markup import escape
 
-    from wavecomb.progress import count_text, time_text
+    from wavecomb.run.progress import count_text, time_text
 
     console = Console(highlight=False, emoji=False, soft_wrap=True)
     seconds, counts = stats["seconds"], stats["counts"]
@@ -63,8 +63,8 @@ def _memory(parts: Mapping[str, int]) -> str:
 
 def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
     """Of adaptive, timed and resumed renders."""
-    from wavecomb.progress import count_text, time_text
-    from wavecomb.stats import rendered_pixels
+    from wavecomb.run.progress import count_text, time_text
+    from wavecomb.run.stats import rendered_pixels
 
     lines: list[str] = []
     settings, before = stats["settings"], stats["resumed_samples"]
@@ -84,7 +84,7 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
 
 def light_line(calibration: Mapping[str, Any]) -> str | None:
     """The lights that are chosen most often, by ``light_calibration`` of the statistics."""
-    from wavecomb.progress import count_text
+    from wavecomb.run.progress import count_text
 
     if not calibration["paths"]:
         return None
@@ -143,7 +143,7 @@ def _phases(console: Console, stats: Mapping[str, Any]) -> None:
 
 
 def _programs_and_materials(console: Console, stats: Mapping[str, Any]) -> None:
-    from wavecomb.progress import count_text
+    from wavecomb.run.progress import count_text
 
     total = max(1, stats["counts"]["records"])
     programs = sorted(stats["programs"].items(), key=lambda item: -item[1]["records"])

@@ -70,7 +70,7 @@ def run(
     """Shows the window; returns the exit code when it is closed."""
     application = make_application()
     from wavecomb.gui.main_window import MainWindow
-    from wavecomb.usd.diagnostics import Listening
+    from wavecomb.usd.stage.diagnostics import Listening
 
     window = MainWindow(setup)
     theme.apply(str(window.settings.value("theme", theme.SYSTEM)))

@@ -11,10 +11,10 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
-from wavecomb.cli.group import describe
-from wavecomb.isolate.probe import check, is_wanted
+from wavecomb.run.faults import describe
+from wavecomb.run.isolate.probe import check, is_wanted
 from wavecomb.usd import LoadedStage
-from wavecomb.usd.texture import TextureStock
+from wavecomb.usd.looks.texture import TextureStock
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,9 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     Raises:
         WavecombError: It cannot be rendered.
     """
-    from wavecomb.usd import LoadReport, load_stage, mtlx, open_editable, open_stage
-    from wavecomb.usd.diagnostics import captured
+    from wavecomb.usd import LoadReport, load_stage, open_editable, open_stage
+    from wavecomb.usd.materialx import references as mtlx
+    from wavecomb.usd.stage.diagnostics import captured
 
     source = request.source
     usd = request.usd

@@ -22,17 +22,17 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.about import make_about
 from wavecomb.gui.actions import make_action
-from wavecomb.gui.display_bar import DisplayBar
-from wavecomb.gui.inspector import Inspector
 from wavecomb.gui.menus import CHECKED, MENUS, entries
 from wavecomb.gui.messages import MessageBar
 from wavecomb.gui.panels import make_panels
-from wavecomb.gui.render_bar import RenderBar
-from wavecomb.gui.scene_panel import ScenePanel
-from wavecomb.gui.session import Session, Setup
+from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog
 from wavecomb.gui.status import StatusLine
-from wavecomb.gui.viewport import Viewport
+from wavecomb.gui.viewport.display_bar import DisplayBar
+from wavecomb.gui.viewport.inspector import Inspector
+from wavecomb.gui.viewport.render_bar import RenderBar
+from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.gui.viewport.viewport import Viewport
 
 RECENT = 10
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz")

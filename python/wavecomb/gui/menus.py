@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 from wavecomb.gui.actions import Entry, keypad
 
-if TYPE_CHECKING:
-    from wavecomb.gui.main_window import MainWindow
+Window = Any
+"""A ``main_window.MainWindow``, which has its menus from here."""
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
@@ -44,7 +44,7 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
 CHECKED = ("region",)
 
 
-def entries(window: MainWindow) -> list[Entry]:
+def entries(window: Window) -> list[Entry]:
     """All actions."""
     viewport, display, session = window.viewport, window.display, window.session
     scene = window.scene

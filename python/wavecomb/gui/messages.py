@@ -121,7 +121,7 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
 
 def fault_line(error: BaseException, report: Path | None) -> str:
     """What to say of a fault of our own."""
-    from wavecomb.cli.group import describe
+    from wavecomb.run.faults import describe
 
     core = describe(error) if isinstance(error, Exception) else str(error)
     if not core.startswith("internal:"):

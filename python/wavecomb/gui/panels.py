@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from wavecomb.gui.bench_panel import BenchPanel
-from wavecomb.gui.compare_window import CompareWindow
-from wavecomb.gui.plots_panel import PlotsPanel
-from wavecomb.gui.scene_panel import ScenePanel
-from wavecomb.gui.scheduling_panel import SchedulingPanel
-from wavecomb.gui.session import Session
+from wavecomb.gui.bench.panel import BenchPanel
+from wavecomb.gui.compare.window import CompareWindow
+from wavecomb.gui.scene.scene_panel import ScenePanel
+from wavecomb.gui.scheduling.panel import SchedulingPanel
+from wavecomb.gui.scheduling.plots_panel import PlotsPanel
+from wavecomb.gui.viewport.session import Session
 
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
 _RIGHT = Qt.DockWidgetArea.RightDockWidgetArea

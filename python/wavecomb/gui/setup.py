@@ -6,13 +6,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
-from wavecomb import aovs as aov_names
 from wavecomb.errors import WavecombError
+from wavecomb.run import aovs as aov_names
 from wavecomb.scheduling import POLICIES
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
-    from wavecomb.costs import Profile
+    from wavecomb.run.costs import Profile
     from wavecomb.scheduling import SchedulingPolicy
 
 Region = tuple[int, int, int, int]
@@ -28,7 +28,7 @@ class Setup:
         denoise: Whether frames come denoised, too.
         region: x0, y0, x1, y1 in pixels, end excluded: only these are rendered; None: all.
         own_policy: A policy in Python, in place of ``policy``.
-        profile: Costs to start from, as ``wavecomb.costs.load_costs`` reads them.
+        profile: Costs to start from, as ``wavecomb.run.costs.load_costs`` reads them.
     """
 
     width: int = 600

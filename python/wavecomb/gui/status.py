@@ -6,8 +6,8 @@ from __future__ import annotations
 from PySide6.QtWidgets import QLabel, QProgressBar, QStatusBar, QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.frames import Frame
-from wavecomb.gui.session import Session
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.widgets import named
 
 

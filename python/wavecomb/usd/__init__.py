@@ -7,10 +7,10 @@ them; ``mesh``, ``shapes``, ``light``, ``camera`` and ``instancing`` read one ki
 """
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.opening import open_editable, open_stage
-from wavecomb.usd.peek import peek_products
-from wavecomb.usd.report import Finding, LoadReport
-from wavecomb.usd.stage import LoadedStage, load_stage
+from wavecomb.usd.stage.load import LoadedStage, load_stage
+from wavecomb.usd.stage.opening import open_editable, open_stage
+from wavecomb.usd.stage.peek import peek_products
+from wavecomb.usd.stage.report import Finding, LoadReport
 
 __all__ = [
     "Finding",

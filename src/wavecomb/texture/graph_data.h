@@ -2,8 +2,8 @@
 /// Value graphs as data: flat programs over a small file of registers.
 ///
 /// A register holds one float for each lane; a vector of 2 to 4 components is as many neighbours.
-/// Python compiles the node networks of a stage to programs (wavecomb/usd/graph_code.py); here they
-/// are only run.
+/// Python compiles the node networks of a stage to programs (wavecomb/usd/looks/graph_code.py);
+/// here they are only run.
 #pragma once
 
 #include <cstdint>

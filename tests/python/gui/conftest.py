@@ -33,8 +33,8 @@ def cornell(tmp_path_factory):
 @pytest.fixture
 def new_session(qtbot):
     """Makes sessions that are ended with the test: new_session(width=96, ...)."""
-    from wavecomb.gui.session import Session
     from wavecomb.gui.setup import Setup
+    from wavecomb.gui.viewport.session import Session
 
     made = []
 

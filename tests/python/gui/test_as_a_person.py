@@ -18,8 +18,8 @@ from person import Person, screen
 from pxr import Sdf
 
 import wavecomb.usd
-from wavecomb.usd.diagnostics import captured
-from wavecomb.usd.report import LoadReport
+from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.report import LoadReport
 
 pytestmark = needs("bin:Xvfb", "bin:xdotool", "bin:openbox")
 

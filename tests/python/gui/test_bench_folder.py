@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench_results import policy_rows, write_folder
 
 from wavecomb.errors import WavecombError
-from wavecomb.gui.bench_folder import read_folder
-from wavecomb.gui.bench_page import page_html
-from wavecomb.gui.bench_suites import Choice, suite_info, suite_infos
+from wavecomb.gui.bench.folder import read_folder
+from wavecomb.gui.bench.page import page_html
+from wavecomb.gui.bench.suites import Choice, suite_info, suite_infos
 
 
 @pytest.fixture(scope="module")

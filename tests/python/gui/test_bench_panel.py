@@ -17,10 +17,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench_results import policy_rows, write_folder
 
 from wavecomb.bench.columns import Column
-from wavecomb.gui import bench_tables
-from wavecomb.gui.bench_panel import BenchPanel
-from wavecomb.gui.recent_folders import recent_folders
-from wavecomb.image import write_png
+from wavecomb.gui.bench import tables as bench_tables
+from wavecomb.gui.bench.panel import BenchPanel
+from wavecomb.gui.bench.recent_folders import recent_folders
+from wavecomb.picture.image import write_png
 
 LEFT = Qt.MouseButton.LeftButton
 TINY = """

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wavecomb.compare import compare
 from wavecomb.errors import WavecombError
-from wavecomb.gui.differences import numbers, pixel_rows, rows, verdict
-from wavecomb.gui.flip_process import FlipProcess
-from wavecomb.gui.sides import Side, common_layers, pair, problem, read_side
-from wavecomb.image import write_exr, write_png
-from wavecomb.perceptual import flip
+from wavecomb.gui.compare.differences import numbers, pixel_rows, rows, verdict
+from wavecomb.gui.compare.flip_process import FlipProcess
+from wavecomb.gui.compare.picture_sides import Side, common_layers, pair, problem, read_side
+from wavecomb.picture.compare import compare
+from wavecomb.picture.image import write_exr, write_png
+from wavecomb.picture.perceptual import flip
 
 RNG = np.random.default_rng
 

@@ -10,9 +10,9 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QTableWidget, QToolButton
 
-from wavecomb.compare import compare
-from wavecomb.gui.compare_window import CompareWindow
-from wavecomb.image import write_exr
+from wavecomb.gui.compare.window import CompareWindow
+from wavecomb.picture.compare import compare
+from wavecomb.picture.image import write_exr
 
 KEYS = Qt.Key
 LEFT = Qt.MouseButton.LeftButton

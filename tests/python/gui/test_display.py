@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from wavecomb import image
 from wavecomb.errors import WavecombError
-from wavecomb.gui import display, ocio
-from wavecomb.gui.display import Look
+from wavecomb.gui.viewport import display, ocio
+from wavecomb.gui.viewport.display import Look
+from wavecomb.picture import image
 
 
 @pytest.fixture

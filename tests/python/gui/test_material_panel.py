@@ -12,10 +12,16 @@ from PySide6.QtWidgets import QDoubleSpinBox, QLineEdit, QToolButton
 import wavecomb
 from wavecomb.gui import theme
 from wavecomb.gui.main_window import MainWindow
-from wavecomb.gui.scene_panel import ScenePanel
+from wavecomb.gui.scene.scene_panel import ScenePanel
+from wavecomb.gui.scene.stage_edits import Opinion, StageEdits
+from wavecomb.gui.scene.value_fields import (
+    ColourField,
+    DrivenField,
+    NumberField,
+    Range,
+    SwitchField,
+)
 from wavecomb.gui.setup import Setup
-from wavecomb.gui.stage_edits import Opinion, StageEdits
-from wavecomb.gui.value_fields import ColourField, DrivenField, NumberField, Range, SwitchField
 
 SIZE, SPP = 32, 1
 LOOKS = "/World/Looks"
@@ -257,8 +263,8 @@ def test_digits_are_typed_where_they_were_begun(qtbot):
     field = NumberField("x", Range(0.0, 10.0, 0.0, 1.0))
     qtbot.addWidget(field)
     field.show()
-    from wavecomb.gui.value_fields import differs
-    from wavecomb.usd.parameters import as_stored
+    from wavecomb.gui.scene.value_fields import differs
+    from wavecomb.usd.looks.parameters import as_stored
 
     def back(value):
         if differs(field.value(), as_stored(value)):
@@ -326,7 +332,7 @@ def test_what_usd_says_goes_to_the_notes(new_session, qtbot, final, tmp_path, ca
 def test_what_usd_says_on_this_thread(new_session, qtbot, final, tmp_path, capfd):
     from pxr import Tf
 
-    from wavecomb.usd.diagnostics import Listening
+    from wavecomb.usd.stage.diagnostics import Listening
 
     session = new_session(width=SIZE, height=SIZE, spp=1)
     panel = ScenePanel(session)

@@ -15,11 +15,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLineEdit, QPushButton, QSpinBox
 
 from wavecomb.gui import theme
-from wavecomb.gui.material_costs import material_costs, short_names
-from wavecomb.gui.plots import Curves
-from wavecomb.gui.plots_panel import PlotsPanel
-from wavecomb.gui.run_log import Run
-from wavecomb.stats import PHASES
+from wavecomb.gui.scene.material_costs import material_costs, short_names
+from wavecomb.gui.scheduling.plots import Curves
+from wavecomb.gui.scheduling.plots_panel import PlotsPanel
+from wavecomb.gui.scheduling.run_log import Run
+from wavecomb.run.stats import PHASES
 
 TIME, COHERENCE, MATERIALS, RUNS = range(4)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wavecomb.gui.run_log import (
+from wavecomb.gui.scheduling.run_log import (
     MAX_LOOKS,
     MAX_SERIES,
     Run,
@@ -21,8 +21,8 @@ from wavecomb.gui.run_log import (
     last_of,
     take_look,
 )
-from wavecomb.gui.run_rates import compare, compare_runs, moments, rate, t975, time_of
-from wavecomb.gui.run_table import COLUMNS, amount, as_csv, as_text, rows
+from wavecomb.gui.scheduling.run_rates import compare, compare_runs, moments, rate, t975, time_of
+from wavecomb.gui.scheduling.run_table import COLUMNS, amount, as_csv, as_text, rows
 
 PROGRAM = {"policy": "program", "lanes": 0, "roulette": "throughput"}
 MATERIAL = {**PROGRAM, "policy": "material"}

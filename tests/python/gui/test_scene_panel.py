@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QMenu, QStyle, QStyleOptionViewItem
 from scene_stage import write_stage
 
 import wavecomb
-from wavecomb.gui.scene_model import NAME, VARIANTS, VISIBILITY
-from wavecomb.gui.scene_panel import ScenePanel
-from wavecomb.gui.value_fields import DrivenField, from_display, to_display
+from wavecomb.gui.scene.scene_model import NAME, VARIANTS, VISIBILITY
+from wavecomb.gui.scene.scene_panel import ScenePanel
+from wavecomb.gui.scene.value_fields import DrivenField, from_display, to_display
 
 SIZE, SPP = 40, 2
 LEFT = Qt.MouseButton.LeftButton

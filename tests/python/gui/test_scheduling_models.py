@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from wavecomb.errors import WavecombError
-from wavecomb.gui.policy_file import describe_failure, first_line, load_policies
-from wavecomb.gui.same_picture import PictureBook, even_samples, fingerprint, picture_key
+from wavecomb.gui.compare.same_picture import PictureBook, even_samples, fingerprint, picture_key
+from wavecomb.gui.scheduling.policy_file import describe_failure, first_line, load_policies
 
 SETUP = {"width": 4, "height": 3, "seed": 0, "roulette": "throughput", "costs": "auto"}
 
@@ -138,7 +138,7 @@ def test_a_failure_in_order_names_the_line(tmp_path: Path) -> None:
 
 def test_every_policy_and_setting_is_offered() -> None:
     core: Any = pytest.importorskip("wavecomb._core")
-    from wavecomb.gui import scheduling_choices as choices
+    from wavecomb.gui.scheduling import choices
     from wavecomb.gui.setup import Setup
 
     assert list(choices.policy_choices()) == core.policies() == list(choices.POLICY_HELP)

@@ -12,9 +12,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractSpinBox, QComboBox, QPushButton, QToolButton
 
 from wavecomb import _core
-from wavecomb.gui import picture_light
-from wavecomb.gui.scheduling_choices import ORDER_CHOICES, lane_choices
-from wavecomb.gui.scheduling_panel import SchedulingPanel
+from wavecomb.gui.scheduling.choices import ORDER_CHOICES, lane_choices
+from wavecomb.gui.scheduling.panel import SchedulingPanel
+from wavecomb.gui.viewport import picture_light
 
 MINE = """
 import wavecomb
@@ -263,7 +263,7 @@ def test_costs_from_a_file(
     file.write_text("{}")
     panel.load_profile(str(file))
     assert "no cost profile" in messages[0] and session.setup.profile is None
-    from wavecomb.costs import save_costs
+    from wavecomb.run.costs import save_costs
 
     save_costs(file, {"materials": {"/World/Looks/White": 50.0}, "textures": {}})
     panel.load_profile(str(file))

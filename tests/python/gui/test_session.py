@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from wavecomb import _core
-from wavecomb.gui import navigate
-from wavecomb.gui.engine import reduced_scale
-from wavecomb.image import read_layers
+from wavecomb.gui.viewport import navigate
+from wavecomb.gui.viewport.engine import reduced_scale
+from wavecomb.picture.image import read_layers
 
 
 class Watched:

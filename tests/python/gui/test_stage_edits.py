@@ -8,9 +8,9 @@ from pxr import Sdf, Usd, UsdGeom
 
 import wavecomb
 from wavecomb.errors import WavecombError
-from wavecomb.gui.edit_layer import save_edits
-from wavecomb.gui.stage_edits import Opinion, StageEdits
-from wavecomb.gui.visibility import state
+from wavecomb.gui.scene.edit_layer import save_edits
+from wavecomb.gui.scene.stage_edits import Opinion, StageEdits
+from wavecomb.gui.scene.visibility import state
 from wavecomb.usd import load_stage, open_stage
 
 STAGE = """#usda 1.0

@@ -190,7 +190,7 @@ def test_zoom_about_the_cursor_and_back(viewport):
 
 
 def test_at_100_percent_the_screen_has_the_pixels_of_the_picture(viewport, qtbot):
-    from wavecomb import image
+    from wavecomb.picture import image
 
     viewport.set_zoom(1.0)
     viewport.repaint()

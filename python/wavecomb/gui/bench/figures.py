@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of a results folder: a list, and the chosen one as large as there is room."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QRectF, QSize, Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QImage, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtSvg import QSvgRenderer
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSplitter, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.bench.folder import Figure
+from wavecomb.gui.newest_work import Latest
+
+
+class FigureView(QWidget):
+    """A PNG or SVG, scaled to what room there is; a double click opens the file."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("figure")
+        self.setAccessibleName("Figure")
+        self.setToolTip("Double click opens the file")
+        self.image: QImage | None = None
+        self._svg: QSvgRenderer | None = None
+        self._path: Path | None = None
+        self._words = ""
+        self._reader = Latest("figure", self)
+        self._reader.done.connect(lambda key, image: self._take(image))
+        self._reader.failed.connect(lambda key, line: self.show_words(line))
+
+    def show_file(self, path: Path) -> None:
+        """Reads it off the UI thread; what is there stays until then."""
+        self._path = path
+        self._reader.want(path, lambda: _read(path))
+
+    def show_words(self, words: str) -> None:
+        """In place of a figure."""
+        self._reader.forget()
+        self.image = self._svg = None
+        self._words = words
+        self.update()
+
+    def _take(self, found: QImage | bytes) -> None:
+        self.image = self._svg = None
+        self._words = ""
+        if isinstance(found, QImage):
+            self.image = found
+        else:
+            self._svg = QSvgRenderer(found, self)
+            if not self._svg.isValid():
+                self.show_words(f"{self._path}: is no drawing that can be shown")
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        """Of a readable figure."""
+        return QSize(theme.em(40), theme.em(26))
+
+    def target(self) -> QRectF:
+        """Where the figure lies: in the middle, its shape kept, no larger than twice its size."""
+        if self.image is not None:
+            size = self.image.size()
+        elif self._svg is not None:
+            size = self._svg.defaultSize()
+        else:
+            return QRectF()
+        room = QRectF(self.rect())
+        scale = min(room.width() / size.width(), room.height() / size.height(), 2.0)
+        width, height = size.width() * scale, size.height() * scale
+        left = room.center().x() - width / 2
+        return QRectF(left, room.center().y() - height / 2, width, height)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """On white, as figures are drawn for paper."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), theme.surface())
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        target = self.target()
+        if self.image is not None:
+            painter.fillRect(target, Qt.GlobalColor.white)
+            painter.drawImage(target, self._scaled(target))
+        elif self._svg is not None:
+            painter.fillRect(target, Qt.GlobalColor.white)
+            self._svg.render(painter, target)
+        else:
+            painter.setPen(theme.dim())
+            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+            painter.drawText(self.rect(), int(flags), self._words)
+
+    def _scaled(self, target: QRectF) -> QImage:
+        """Smooth where it is much smaller: painting alone would skip pixels."""
+        assert self.image is not None
+        ratio = self.devicePixelRatioF()
+        size = QSize(round(target.width() * ratio), round(target.height() * ratio))
+        if size.width() >= self.image.width() or size.isEmpty():
+            return self.image
+        return self.image.scaled(
+            size,
+            Qt.AspectRatioMode.IgnoreAspectRatio,
+            Qt.TransformationMode.SmoothTransformation,
+        )
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Opens the file with what the desktop has for it."""
+        if self._path is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._path)))
+
+
+def _read(path: Path) -> QImage | bytes:
+    if path.suffix.lower() == ".svg":
+        return path.read_bytes()
+    image = QImage(str(path))
+    if image.isNull():
+        raise OSError(f"{path}: cannot be read as a picture")
+    return image
+
+
+class Figures(QSplitter):
+    """List and figure."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(Qt.Orientation.Horizontal, parent)
+        self.setObjectName("figures")
+        self.list = QListWidget(self)
+        self.list.setObjectName("figureList")
+        self.list.setAccessibleName("Figures")
+        self.list.setToolTip("Figures of the report")
+        self.view = FigureView(self)
+        self.addWidget(self.list)
+        self.addWidget(self.view)
+        self.setStretchFactor(1, 1)
+        self.setSizes([theme.em(14), theme.em(46)])
+        self.list.currentItemChanged.connect(lambda item, before: self._show(item))
+        self.set_figures(())
+
+    def set_figures(self, figures: Sequence[Figure]) -> None:
+        """Lists them and shows the first."""
+        self.list.clear()
+        for figure in figures:
+            item = QListWidgetItem(figure.name.replace("-", " "), self.list)
+            item.setData(Qt.ItemDataRole.UserRole, figure)
+        if figures:
+            self.list.setCurrentRow(0)
+        else:
+            self.view.show_words('No figures yet: "Make the report" draws them.')
+
+    def _show(self, item: QListWidgetItem | None) -> None:
+        figure = item.data(Qt.ItemDataRole.UserRole) if item is not None else None
+        if isinstance(figure, Figure):
+            # Qt's SVG has no clip paths and style sheets, which these drawings use.
+            path = figure.png or figure.svg
+            if path is not None:
+                self.view.show_file(path)
+                self.view.setAccessibleName(f"Figure {figure.name}")

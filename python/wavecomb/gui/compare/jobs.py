@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Computes what a comparison shows, off the UI thread: images, numbers, FLIP, the map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QImage
+
+from wavecomb.gui.compare.differences import Numbers, numbers
+from wavecomb.gui.compare.flip_process import FlipProcess
+from wavecomb.gui.compare.picture_sides import Side, pair, problem
+from wavecomb.gui.newest_work import Latest
+from wavecomb.gui.viewport.display import Legend, Look, show, to_qimage
+from wavecomb.picture import image
+from wavecomb.picture.heatmap import Kind, Scale, scale_of, z_scale
+
+
+@dataclass(frozen=True)
+class Ask:
+    """What is to be shown.
+
+    Attributes:
+        a: Or None.
+        b: The reference, or None.
+        look: Layer, exposure and view, of both.
+        kind: Of the map: a key of ``differences.MAPS``.
+    """
+
+    a: Side | None
+    b: Side | None
+    look: Look
+    kind: str
+
+    @property
+    def problem(self) -> str:
+        """Why there is no difference; "" where there is one."""
+        return problem(self.a, self.b, self.look.layer)
+
+    def pictures(self) -> tuple[Any, ...]:
+        """Equal where A and B look the same."""
+        return (*self._sides(), self.look)
+
+    def figures(self) -> tuple[Any, ...]:
+        """Equal where the numbers are the same."""
+        return (*self._sides(), self.look.layer, self.look.exposure)
+
+    def _sides(self) -> tuple[int, int]:
+        return (self.a.number if self.a else 0, self.b.number if self.b else 0)
+
+
+class Jobs(QObject):
+    """Three threads at most: pictures, figures and map, FLIP. Of each, only the newest counts.
+
+    Signals:
+        images(A, B): QImage or None.
+        numbers(Numbers): First without FLIP, then with it; None: there is nothing to compare.
+        map(QImage, Scale): The difference; None, None where there is none.
+        failed(str): One line.
+    """
+
+    images = Signal(object, object)
+    numbers = Signal(object)
+    map = Signal(object, object)
+    failed = Signal(str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._pictures = Latest("images", self)
+        self._figures = Latest("figures", self)
+        self._looks = Latest("flip", self)
+        self._map = Latest("map", self)
+        self._process = FlipProcess()
+        self._ask: Ask | None = None
+        self._shown: dict[str, object] = {}
+        self._numbers: Numbers | None = None
+        self._flip: dict[object, NDArray[np.float32] | str] = {}
+        self._pictures.done.connect(lambda key, pictures: self.images.emit(*pictures))
+        self._figures.done.connect(self._take_numbers)
+        self._looks.done.connect(self._take_flip)
+        self._map.done.connect(self._take_map)
+        for latest in (self._pictures, self._figures, self._map):
+            latest.failed.connect(lambda key, line: self.failed.emit(line))
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything is being computed."""
+        return any(w.busy for w in (self._pictures, self._figures, self._looks, self._map))
+
+    def want(self, ask: Ask) -> None:
+        """Computes what of this is not shown already."""
+        self._ask = ask
+        if self._shown.get("pictures") != ask.pictures():
+            self._shown["pictures"] = ask.pictures()
+            self._pictures.want(ask.pictures(), lambda: _images(ask))
+        if ask.problem:
+            for latest in (self._figures, self._looks, self._map):
+                latest.forget()
+            self._shown.pop("figures", None)
+            self._shown.pop("map", None)
+            self._numbers = None
+            self.numbers.emit(None)
+            self.map.emit(None, None)
+            return
+        if self._shown.get("figures") != ask.figures():
+            self._shown["figures"] = ask.figures()
+            self._figures.want(ask.figures(), lambda: (ask, _numbers(ask)))
+        self._want_map()
+
+    def close(self) -> None:
+        """Ends what runs."""
+        for latest in (self._pictures, self._figures, self._looks, self._map):
+            latest.close()
+        self._process.stop()
+        self._ask = self._numbers = None
+        self._flip.clear()
+
+    # ---- inside --------------------------------------------------------------------------------
+
+    def _take_numbers(self, key: object, result: tuple[Ask, Numbers]) -> None:
+        ask, found = result
+        before = self._numbers
+        if ask.figures() in self._flip:
+            found = self._with_flip(ask, found)
+        elif before is not None and before.flip is not None and (ask.a.live or ask.b.live):  # type: ignore[union-attr]
+            found = found.with_flip(before.flip)  # of a moment ago, until there is a newer one
+        self._numbers = found
+        self.numbers.emit(found)
+        self._want_flip(ask, high_range=False)
+        if self._ask is not None and self._ask.kind == "z":
+            self._shown.pop("map", None)
+            self._want_map()
+
+    def _want_flip(self, ask: Ask, high_range: bool) -> None:
+        key = (*ask.figures(), *(["high"] if high_range else []))
+        if key in self._flip or ask.problem:
+            return
+        self._looks.want(key, lambda: (ask, self._compute_flip(ask, high_range)))
+
+    def _compute_flip(self, ask: Ask, high_range: bool) -> NDArray[np.float32] | str:
+        try:
+            return self._process.flip(*_pair(ask), high_range, ask.look.exposure)
+        except Exception as error:
+            return str(error)
+
+    def _take_flip(self, key: object, result: tuple[Ask, NDArray[np.float32] | str]) -> None:
+        ask, found = result
+        self._flip = {k: v for k, v in list(self._flip.items())[-3:]} | {key: found}
+        if key == ask.figures() and self._numbers is not None:
+            self._numbers = self._with_flip(ask, self._numbers)
+            self.numbers.emit(self._numbers)
+        self._want_map()
+        if self._ask is not None and self._ask.figures() not in self._flip:
+            self._want_flip(self._ask, high_range=False)  # the pictures are others by now
+
+    def _with_flip(self, ask: Ask, found: Numbers) -> Numbers:
+        values = self._flip[ask.figures()]
+        if isinstance(values, str):
+            return found.with_flip(None, values)
+        return found.with_flip(float(values.mean(dtype=float)))
+
+    def _want_map(self) -> None:
+        ask = self._ask
+        if ask is None or ask.problem:
+            return
+        values = None
+        if ask.kind in ("flip-ldr", "flip-hdr"):
+            high = ask.kind == "flip-hdr"
+            found = self._flip.get((*ask.figures(), *(["high"] if high else [])))
+            if found is None:
+                self._want_flip(ask, high)
+                return
+            if isinstance(found, str):
+                self.map.emit(None, found)
+                return
+            values = found
+        test = self._numbers.test if self._numbers is not None else None
+        key = (*ask.figures(), ask.kind)
+        if self._shown.get("map") == key:
+            return
+        if ask.kind == "z" and test is None:
+            if self._numbers is not None:
+                self.map.emit(None, f"z-test: {self._numbers.test_note}")
+            return
+        self._shown["map"] = key
+        self._map.want(key, lambda: _map(ask, values, test))
+
+    def _take_map(self, key: object, result: tuple[QImage, Scale]) -> None:
+        if self._ask is not None and not self._ask.problem:
+            self.map.emit(*result)
+
+
+def _pair(ask: Ask) -> tuple[NDArray[Any], NDArray[Any]]:
+    assert ask.a is not None and ask.b is not None
+    return pair(ask.a, ask.b, ask.look.layer)
+
+
+def _numbers(ask: Ask) -> Numbers:
+    assert ask.a is not None and ask.b is not None
+    return numbers(ask.a, ask.b, ask.look.layer, ask.look.exposure)
+
+
+def _map(ask: Ask, values: NDArray[np.float32] | None, test: Any) -> tuple[QImage, Scale]:
+    if ask.kind == "z":
+        scale = z_scale(test)
+    else:
+        kind: Kind = ask.kind  # type: ignore[assignment]
+        scale = scale_of(*_pair(ask), kind, exposure=ask.look.exposure, flip_values=values)
+    return to_qimage(image.display(scale.pixels())), scale
+
+
+def _images(ask: Ask) -> tuple[QImage | None, QImage | None]:
+    """Both as they are shown; false colours have one scale for both."""
+    layers = [
+        _drawable(side.layer(ask.look.layer)) if side is not None else None
+        for side in (ask.a, ask.b)
+    ]
+    look = ask.look
+    shown = [show(layer, look) if layer is not None else None for layer in layers]
+    legends: list[Legend] = [s.legend for s in shown if s is not None and s.legend is not None]
+    if len(legends) == 2:
+        look = replace(
+            look,
+            low=min(legend.low for legend in legends),
+            high=max(legend.high for legend in legends),
+        )
+        shown = [show(layer, look) if layer is not None else None for layer in layers]
+    first, second = (s.image() if s is not None else None for s in shown)
+    return first, second
+
+
+def _drawable(layer: NDArray[Any] | None) -> NDArray[Any] | None:
+    """With as many channels as ``show`` takes: an alpha is left out, a grey picture is thrice."""
+    if layer is None:
+        return None
+    channels = layer.shape[2]
+    if channels == 1:
+        return layer[:, :, 0]
+    return layer[:, :, :3] if channels >= 3 else layer

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bar of one side of a comparison: what it shows, and where else it may come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.compare.live_pair import LiveSettings
+from wavecomb.gui.compare.picture_sides import SUFFIXES
+from wavecomb.gui.compare.source import LIVE, SideSource
+from wavecomb.gui.widgets import set_text_colour
+
+if TYPE_CHECKING:
+    from wavecomb.gui.viewport.session import Session
+
+
+class SidePicker(QWidget):
+    """Name and source of A or B.
+
+    Signals:
+        dropped(list): Paths of files that were dropped here.
+    """
+
+    dropped = Signal(list)
+
+    def __init__(self, source: SideSource, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.source = source
+        self._session = session
+        name = source.name
+        self.setObjectName(f"side{name}")
+        self.setAcceptDrops(True)
+        self._button = QToolButton(self)
+        self._button.setObjectName(f"choose{name}")
+        self._button.setText(f"{name}  ")
+        self._button.setAccessibleName(f"Choose {name}")
+        self._button.setToolTip(f"Where picture {name} is from")
+        self._button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self._button.setMenu(self._menu())
+        self._title = QLabel(self)
+        self._title.setObjectName(f"title{name}")
+        self._title.setTextFormat(Qt.TextFormat.PlainText)
+        self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._note = QLabel(self)
+        self._note.setObjectName(f"note{name}")
+        self._note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._live = LiveSettings(source, self)
+        words = QVBoxLayout()
+        words.setSpacing(0)
+        words.addWidget(self._title)
+        words.addWidget(self._note)
+        row = QHBoxLayout()
+        row.addWidget(self._button, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(words, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(row)
+        column.addWidget(self._live)
+        column.addStretch(1)
+        source.changed.connect(self._show)
+        theme.on_change(self._show)
+        self._show()
+
+    def _menu(self) -> QMenu:
+        menu = QMenu(self)
+        menu.setToolTipsVisible(True)
+        name = self.source.name
+        for key, text, tip, call in (
+            (
+                "open",
+                "Open a &file ...",
+                "EXR with any layers, PNG, .npy of a results folder",
+                self.ask,
+            ),
+            ("keep", "&Keep the viewport's picture", "As it is now", self.source.keep),
+            ("follow", "Follow the &viewport", "The picture as it goes on", self.source.follow),
+            (
+                "render",
+                "&Render with other settings",
+                "A second live render of the same stage, beside the viewport's",
+                self.render_other,
+            ),
+        ):
+            action = QAction(text, self)
+            action.setObjectName(f"{key}{name}")
+            action.setToolTip(tip)
+            action.triggered.connect(lambda checked=False, call=call: call())
+            menu.addAction(action)
+        return menu
+
+    def ask(self) -> None:
+        """A dialog for a file; it blocks nothing else."""
+        patterns = " ".join(f"*{suffix}" for suffix in SUFFIXES)
+        dialog = QFileDialog(self, f"Picture {self.source.name}", "", f"Pictures ({patterns})")
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(lambda path: self.source.open(Path(path)))
+        dialog.open()
+
+    def render_other(self) -> None:
+        """A render of its own, at first with the viewport's settings."""
+        self.source.render(self._session.setup)
+
+    def _show(self) -> None:
+        side, source = self.source.side, self.source
+        waiting = {"viewport": "viewport", LIVE: "live: rendering"}
+        title = side.name if side is not None else waiting.get(source.kind, "nothing yet")
+        note = side.note if side is not None else "open or drop a picture, or take the viewport's"
+        self._title.setText(title)
+        self._title.setToolTip(str(side.path) if side is not None and side.path else title)
+        self._note.setText(note)
+        self._note.setToolTip(note)
+        set_text_colour(self._note, theme.dim())
+        self._live.setVisible(source.live is not None)
+        self._live.show_setup()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Files are welcome."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Takes them."""
+        paths = [url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile()]
+        if paths:
+            event.acceptProposedAction()
+            self.dropped.emit(paths)

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a side of a comparison gets its picture from: a file, the viewport, a render of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Signal
+
+from wavecomb.gui.compare.picture_sides import Side, read_side, side_of_frame
+from wavecomb.gui.newest_work import Latest
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.frames import Frame
+
+if TYPE_CHECKING:
+    from wavecomb.gui.viewport.live import Live
+    from wavecomb.gui.viewport.session import Session
+
+NONE, FILE, KEPT, VIEWPORT, LIVE = "none", "file", "kept", "viewport", "live"
+SHORT = {
+    **{"policy": "policy", "spp": "spp", "seed": "seed", "max_depth": "depth"},
+    **{"roulette": "roulette", "sampler": "sampler", "integrator": "integrator"},
+    **{"lanes": "lanes", "wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"},
+    **{"adaptive": "adaptive", "denoise": "denoise", "clamp_indirect": "clamp"},
+}
+"""Settings by which live renders are told apart, and their short names."""
+
+
+class SideSource(QObject):
+    """One side. All methods are for the UI thread; none waits.
+
+    Signals:
+        changed(): ``side`` or ``kind`` is another.
+        failed(str): One line that says what to do.
+    """
+
+    changed = Signal()
+    failed = Signal(str)
+
+    def __init__(self, name: str, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.name = name
+        self.kind = NONE
+        self.side: Side | None = None
+        self.live: Live | None = None
+        self._session = session
+        self._reader = Latest(f"read-{name}", self)
+        self._reader.done.connect(lambda key, side: self.set_side(side))
+        self._reader.failed.connect(lambda key, line: self.failed.emit(line))
+        session.frame.connect(self._on_viewport)
+
+    @property
+    def loading(self) -> bool:
+        """Whether a file is being read."""
+        return self._reader.busy
+
+    def open(self, path: Path) -> None:
+        """Reads a picture file; what is there stays until then."""
+        self._reader.want(path, lambda: read_side(path))
+
+    def set_side(self, side: Side, kind: str = FILE) -> None:
+        """Takes a picture that is there."""
+        self._release()
+        self.kind, self.side = kind, side
+        self.changed.emit()
+
+    def keep(self) -> None:
+        """The viewport's picture as it is now."""
+        frame = self._session.last_frame
+        if frame is None:
+            self.failed.emit(f"{self.name}: there is no picture to keep yet: open a stage first")
+            return
+        side = side_of_frame(frame, f"viewport, kept ({setup_text(frame.setup)})", live=False)
+        self.set_side(side, KEPT)
+
+    def follow(self) -> None:
+        """The viewport, as it goes on."""
+        self._release()
+        self.kind, self.side = VIEWPORT, None
+        frame = self._session.last_frame
+        if frame is not None:
+            self._on_viewport(frame)
+        self.changed.emit()
+
+    def render(self, setup: Setup) -> None:
+        """A render of its own of the stage that is open, with these settings."""
+        if self._session.stage is None:
+            self.failed.emit(f"{self.name}: there is no stage to render: open one first")
+            return
+        self._release()
+        self.kind, self.side = LIVE, None
+        self.live = self._session.twin(setup)
+        self.live.frame.connect(self._on_live)
+        self.live.failed.connect(self.failed)
+        if self._session.state == "paused":
+            self.live.pause()
+        self.changed.emit()
+
+    def change(self, **values: Any) -> None:
+        """Changes settings of the render of its own."""
+        if self.live is not None and self.live.change(**values):
+            self.changed.emit()
+
+    def exchange(self, other: SideSource) -> None:
+        """Gives each the other's picture."""
+        for mine, theirs in ((self, other), (other, self)):
+            if mine.live is not None:
+                mine.live.frame.disconnect(mine._on_live)
+                mine.live.failed.disconnect(mine.failed)
+                mine.live.frame.connect(theirs._on_live)
+                mine.live.failed.connect(theirs.failed)
+        self.kind, other.kind = other.kind, self.kind
+        self.side, other.side = other.side, self.side
+        self.live, other.live = other.live, self.live
+        self.changed.emit()
+        other.changed.emit()
+
+    def close(self) -> None:
+        """Ends what runs."""
+        self._reader.close()
+        self._release()
+        self.side = None
+
+    # ---- inside --------------------------------------------------------------------------------
+
+    def _release(self) -> None:
+        self._reader.forget()
+        live, self.live = self.live, None
+        if live is not None:
+            live.frame.disconnect(self._on_live)
+            self._session.drop_twin(live)
+
+    def _on_viewport(self, frame: Frame) -> None:
+        if self.kind == VIEWPORT:
+            self.side = side_of_frame(frame, f"viewport ({setup_text(frame.setup)})", live=True)
+            self.changed.emit()
+
+    def _on_live(self, frame: Frame) -> None:
+        name = f"live ({setup_text(frame.setup, self._session.setup)})"
+        self.side = side_of_frame(frame, name, live=True)
+        self.changed.emit()
+
+
+def setup_text(setup: Setup, beside: Setup | None = None) -> str:
+    """What tells a setup from another, in short; policy and samples where nothing does."""
+    names = list(SHORT)
+    if beside is not None:
+        names = [name for name in names if getattr(setup, name) != getattr(beside, name)]
+    if beside is None or not names:
+        names = ["policy", "spp"]
+    return ", ".join(f"{SHORT[name]} {_value(getattr(setup, name))}" for name in names)
+
+
+def _value(value: Any) -> str:
+    return ("on" if value else "off") if isinstance(value, bool) else f"{value}"

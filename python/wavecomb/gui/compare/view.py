@@ -1,0 +1,335 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two pictures and their difference: side by side, wiped, flipped; zoom and pan are linked."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt, Signal
+from PySide6.QtGui import (
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.compare.layout import DIFFERENCE, THREE, WIPE, A, B, D, Layout
+from wavecomb.gui.compare.paint import paint_bar, paint_label
+from wavecomb.picture.heatmap import Scale
+
+ZOOM_STEP = 1.25
+_PAN_STEP = 0.1
+"""Of what is seen, for an arrow key."""
+
+
+class CompareView(QWidget):
+    """Draws; knows nothing of where pictures are from.
+
+    Signals:
+        hovered(x, y): The pixel under the mouse, or -1, -1.
+        flipped(which): "A" or "B" is shown now.
+        wiped(fraction): Where the line is, 0 at the left.
+        dropped(which, paths): Files were dropped on the half of A or of B.
+    """
+
+    hovered = Signal(int, int)
+    flipped = Signal(str)
+    wiped = Signal(float)
+    dropped = Signal(str, list)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("compareView")
+        self.setAccessibleName("Pictures A and B")
+        self.setToolTip(
+            "Wheel or + and -: zoom. Drag or arrows: pan. 0: whole picture, 1: pixel by pixel.\n"
+            "Wipe: drag the line, or arrows. Flip: F or Space."
+        )
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAcceptDrops(True)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(theme.em(12), theme.em(8))
+        self._layout = Layout()
+        self.wipe = 0.5
+        self.names = {A: "A", B: "B", D: "A - B"}
+        self.message = ""
+        self._images: dict[str, QImage | None] = {A: None, B: None, D: None}
+        self._scale: Scale | None = None
+        self._cursor: tuple[int, int] | None = None
+        self._drag: QPointF | None = None
+        self._wiping = False
+
+    # ---- what is shown -------------------------------------------------------------------------
+
+    def set_image(self, which: str, image: QImage | None) -> None:
+        """A, B or D (the difference)."""
+        self._images[which] = image
+        self.update()
+
+    def image(self, which: str) -> QImage | None:
+        """What ``set_image`` got."""
+        return self._images[which]
+
+    def set_scale(self, scale: Scale | None) -> None:
+        """What the colours of the difference mean."""
+        self._scale = scale
+        self.update()
+
+    def set_mode(self, mode: str) -> None:
+        """One of ``compare_layout.MODES``."""
+        self._layout.mode = mode
+        self.update()
+
+    def set_message(self, message: str) -> None:
+        """In place of the difference; "": none."""
+        self.message = message
+        self.update()
+
+    def flip(self) -> None:
+        """The other of A and B."""
+        self._layout.shown = B if self.shown == A else A
+        self.flipped.emit(self.shown)
+        self.update()
+
+    def set_wipe(self, fraction: float) -> None:
+        """Moves the line."""
+        self.wipe = min(max(fraction, 0.0), 1.0)
+        self.wiped.emit(self.wipe)
+        self.update()
+
+    def fit(self) -> None:
+        """The whole picture."""
+        self._arranged().fit()
+        self.update()
+
+    def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
+        """So many points per pixel; what is at a point of the widget stays there."""
+        self._arranged().set_zoom(zoom, at)
+        self.update()
+
+    @property
+    def mode(self) -> str:
+        """What ``set_mode`` got."""
+        return self._layout.mode
+
+    @property
+    def shown(self) -> str:
+        """A or B, of a flip."""
+        return self._layout.shown
+
+    @property
+    def zoom(self) -> float | None:
+        """Points per pixel that were asked for; None: the whole picture."""
+        return self._layout.zoom
+
+    def points_per_pixel(self) -> float:
+        """The zoom as it is."""
+        return self._arranged().points_per_pixel()
+
+    def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
+        """Column and row under a point of the widget."""
+        return self._arranged().pixel_at(at)
+
+    def target(self, number: int) -> QRectF:
+        """Where the picture of a pane lies."""
+        layout = self._arranged()
+        return layout.target(layout.panes()[number][1])
+
+    def _arranged(self) -> Layout:
+        """For the widget and the pictures as they are."""
+        layout = self._layout
+        layout.area = QRectF(self.rect())
+        there = [image for image in (self._images[A], self._images[B]) if image is not None]
+        layout.size = QSizeF(there[0].size()) if there else None
+        layout.gap = theme.em(0.3)
+        layout.bar = theme.em(3.2) if self._scale is not None else 0
+        return layout
+
+    def _panes(self) -> list[tuple[str, QRectF]]:
+        return self._arranged().panes()
+
+    def _line_x(self) -> float:
+        return self._panes()[0][1].width() * self.wipe
+
+    # ---- painting ------------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Panes, then the line of the wipe, labels and the bar of the difference."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), theme.surround())
+        for which, pane in self._panes():
+            self._paint_pane(painter, which, pane)
+        if self.mode == WIPE:
+            self._paint_wipe(painter)
+        if self._scale is not None and self.mode in (DIFFERENCE, THREE):
+            pane = self._panes()[-1][1]
+            area = QRectF(pane.left(), pane.bottom(), pane.width(), self.height() - pane.bottom())
+            paint_bar(painter, area, self._scale)
+        if self.hasFocus():
+            painter.setPen(QPen(theme.accent(), 1.0))
+            painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
+
+    def _paint_pane(self, painter: QPainter, which: str, pane: QRectF) -> None:
+        self._paint_image(painter, self._images[which], pane)
+        if which == D and self.message:
+            paint_label(painter, pane, self.message, middle=True)
+        elif self._images[which] is None:
+            paint_label(
+                painter,
+                pane,
+                f"{which}: drop a picture here" if which != D else "no difference yet",
+                middle=True,
+            )
+        if self.mode != WIPE:
+            paint_label(painter, pane, self.names[which])
+        if self._cursor is not None and len(self._panes()) > 1:
+            self._paint_cursor(painter, pane)
+
+    def _paint_image(self, painter: QPainter, image: QImage | None, pane: QRectF) -> None:
+        if image is None:
+            return
+        painter.save()
+        painter.setClipRect(pane)
+        smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+        painter.drawImage(self._arranged().target(pane, QSizeF(image.size())), image)
+        painter.restore()
+
+    def _paint_cursor(self, painter: QPainter, pane: QRectF) -> None:
+        if self._cursor is None:
+            return
+        target, scale = self._arranged().target(pane), self.points_per_pixel()
+        x, y = self._cursor
+        box = QRectF(target.left() + x * scale, target.top() + y * scale, scale, scale)
+        arm = max(theme.em(0.3), 3)
+        painter.save()
+        painter.setClipRect(pane)
+        painter.setPen(QPen(Qt.GlobalColor.white, 1.0))
+        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Difference)
+        painter.drawRect(box.adjusted(-arm, -arm, arm, arm))
+        painter.restore()
+
+    def _paint_wipe(self, painter: QPainter) -> None:
+        pane = self._panes()[0][1]
+        x = self._line_x()
+        right = QRectF(x, pane.top(), pane.width() - x, pane.height())
+        painter.save()
+        painter.setClipRect(right)
+        painter.fillRect(right, theme.surround())
+        image = self._images[B]
+        if image is not None:
+            smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+            painter.drawImage(self._arranged().target(pane, QSizeF(image.size())), image)
+        painter.restore()
+        for width, colour in ((3.0, Qt.GlobalColor.black), (1.0, Qt.GlobalColor.white)):
+            painter.setPen(QPen(colour, width))
+            painter.drawLine(QPointF(x, pane.top()), QPointF(x, pane.bottom()))
+        paint_label(painter, QRectF(pane.left(), pane.top(), x, pane.height()), self.names[A])
+        paint_label(painter, right, self.names[B], right=True)
+
+    # ---- events --------------------------------------------------------------------------------
+
+    def _pan(self, dx: float, dy: float) -> None:
+        self._arranged().pan(dx, dy)
+        self.update()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Takes the line of a wipe, or the picture."""
+        at = event.position()
+        left = event.button() == Qt.MouseButton.LeftButton
+        near = abs(at.x() - self._line_x()) <= max(theme.em(0.5), 6)
+        self._wiping = self.mode == WIPE and left and near
+        self._drag = at
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Drags, or tells the pixel."""
+        at = event.position()
+        if self._wiping:
+            self.set_wipe(at.x() / max(self._panes()[0][1].width(), 1.0))
+        elif self._drag is not None and event.buttons() != Qt.MouseButton.NoButton:
+            self._pan(at.x() - self._drag.x(), at.y() - self._drag.y())
+            self._drag = at
+        elif self.mode == WIPE:
+            near = abs(at.x() - self._line_x()) <= max(theme.em(0.5), 6)
+            shape = Qt.CursorShape.SplitHCursor if near else Qt.CursorShape.ArrowCursor
+            self.setCursor(shape)
+        else:
+            self.unsetCursor()
+        self._hover(self.pixel_at(at))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Lets go."""
+        self._drag, self._wiping = None, False
+
+    def leaveEvent(self, event: object) -> None:
+        """No pixel."""
+        self._hover(None)
+
+    def _hover(self, pixel: tuple[int, int] | None) -> None:
+        if pixel != self._cursor:
+            self._cursor = pixel
+            self.hovered.emit(*(pixel or (-1, -1)))
+            self.update()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zooms to the pixel under the mouse."""
+        steps = event.angleDelta().y() / 120.0
+        if steps:
+            self.set_zoom(self.points_per_pixel() * ZOOM_STEP**steps, event.position())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Zoom, pan, line, flip."""
+        key, keys = Qt.Key(event.key()), Qt.Key
+        steps = {
+            keys.Key_Left: (-1, 0),
+            keys.Key_Right: (1, 0),
+            keys.Key_Up: (0, -1),
+            keys.Key_Down: (0, 1),
+        }
+        if key in (keys.Key_F, keys.Key_Space):
+            self.flip()
+        elif key in (keys.Key_Plus, keys.Key_Equal):
+            self.set_zoom(self.points_per_pixel() * ZOOM_STEP)
+        elif key == keys.Key_Minus:
+            self.set_zoom(self.points_per_pixel() / ZOOM_STEP)
+        elif key in (keys.Key_0, keys.Key_Home):
+            self.fit()
+        elif key == keys.Key_1:
+            self.set_zoom(1.0 / self.devicePixelRatioF())
+        elif key in steps:
+            self._arrow(*steps[key], event.modifiers())
+        else:
+            super().keyPressEvent(event)
+
+    def _arrow(self, dx: int, dy: int, modifiers: Qt.KeyboardModifier) -> None:
+        if self.mode == WIPE and dx:
+            far = bool(modifiers & Qt.KeyboardModifier.ShiftModifier)
+            self.set_wipe(self.wipe + dx * (0.1 if far else 0.01))
+        else:
+            pane = self._panes()[0][1]
+            self._pan(-dx * _PAN_STEP * pane.width(), -dy * _PAN_STEP * pane.height())
+
+    def focusInEvent(self, event: object) -> None:
+        """Draws the frame."""
+        self.update()
+
+    focusOutEvent = focusInEvent
+
+    def dragEnterEvent(self, event: object) -> None:
+        """Files are welcome."""
+        if event.mimeData().hasUrls():  # type: ignore[attr-defined]
+            event.acceptProposedAction()  # type: ignore[attr-defined]
+
+    def dropEvent(self, event: object) -> None:
+        """On the left half: A."""
+        urls = event.mimeData().urls()  # type: ignore[attr-defined]
+        paths = [url.toLocalFile() for url in urls if url.isLocalFile()]
+        which = A if event.position().x() < self.width() / 2 else B  # type: ignore[attr-defined]
+        if paths:
+            event.acceptProposedAction()  # type: ignore[attr-defined]
+            self.dropped.emit(which, paths)

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the edits of a stage as a small layer over it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from pxr import Sdf, Usd
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.files import replacing
+
+_OWN = {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
+"""Of the stage's root layer: what the layer over it does not repeat."""
+
+
+def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
+    """A layer with the content of the session layer that has the stage beneath it.
+
+    Args:
+        stage: With edits in its session layer.
+        folder: Where the layer will be: the stage is named from there.
+    """
+    root = stage.GetRootLayer()
+    layer = Sdf.Layer.CreateAnonymous("edits.usda")
+    layer.TransferContent(stage.GetSessionLayer())
+    base = Path(root.realPath)
+    try:
+        name = os.path.relpath(base, folder)
+    except ValueError:  # another drive
+        name = str(base)
+    name = Path(name).as_posix()
+    layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]
+    # Up axis, units, default prim, times: USD takes them from the strongest layer only.
+    for key in root.pseudoRoot.ListInfoKeys():
+        if key not in _OWN and not layer.pseudoRoot.HasInfo(key):
+            layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))
+    return layer
+
+
+def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
+    """Writes the edits as a .usda file, whole or not at all; gives its path.
+
+    Raises:
+        WavecombError: It cannot be written, or would replace a file of the stage.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".usda", ".usd"):
+        raise WavecombError(f"{target}: edits are saved as text: give a name that ends in .usda")
+    root = stage.GetRootLayer()
+    if not root.realPath:
+        raise WavecombError("the stage is no file, so no layer can be put over it")
+    used = {Path(layer.realPath).resolve() for layer in stage.GetUsedLayers() if layer.realPath}
+    if target.resolve() in used:
+        raise WavecombError(f"{target}: is a file of the stage; give another name")
+    text = edit_layer(stage, target.resolve().parent).ExportToString()
+    try:
+        with replacing(target) as part:
+            part.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise WavecombError(str(error)) from error
+    return target

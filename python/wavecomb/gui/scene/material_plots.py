@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials of a run: what a record costs, predicted and measured, how many, and a table of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSortFilterProxyModel, Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QSpinBox,
+    QSplitter,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.scene.material_costs import ORDERS, MaterialCost, material_costs
+from wavecomb.gui.scheduling.plots import Bar, Bars, Legend
+from wavecomb.gui.scheduling.run_log import Series
+from wavecomb.gui.scheduling.run_table import amount
+from wavecomb.gui.table_model import Cell, Table, compact
+
+_HEADER = {
+    "material": "",
+    "program": "The code that lanes run together.",
+    "records": "Hits shaded.",
+    "time": "Share of the shading time of all materials.",
+    "measured": "Nanoseconds a record, over timed batches; empty where none was timed.",
+    "predicted": "Nanoseconds a record, as the next pass is scheduled by.",
+    "calibrated": "Nanoseconds a record, measured on synthetic hits before the first pass.",
+}
+
+
+def measured_colour() -> QColor:
+    """Of what was measured."""
+    return theme.series(1)
+
+
+def predicted_colour() -> QColor:
+    """Of what was predicted."""
+    return theme.series(0)
+
+
+class MaterialsTab(QWidget):
+    """Bars of the first few materials, and a table of all that can be searched and sorted."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.of = QComboBox()
+        self.of.setObjectName("materials_of")
+        self.of.setAccessibleName("Series whose materials are shown")
+        self.of.setToolTip("Of which series; of its longest run.")
+        self.of.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self.of.setMinimumContentsLength(14)
+        self.order = QComboBox()
+        self.order.setObjectName("materials_order")
+        self.order.setAccessibleName("Order of materials")
+        self.order.addItems(list(ORDERS))
+        self.order.setToolTip("\n".join(ORDERS.values()))
+        self.top = QSpinBox()
+        self.top.setObjectName("materials_top")
+        self.top.setAccessibleName("How many materials have bars")
+        self.top.setToolTip("How many materials have bars; the table has all.")
+        self.top.setRange(1, 40)
+        self.top.setValue(10)
+        self.search = QLineEdit()
+        self.search.setObjectName("materials_search")
+        self.search.setAccessibleName("Search materials")
+        self.search.setToolTip("Shows the materials whose name or program has this in it.")
+        self.search.setPlaceholderText("Search materials")
+        self.search.setClearButtonEnabled(True)
+        self.costs = Bars("material_costs", "Cost: ns per record")
+        self.records = Bars("material_records", "Records", names=False)
+        self.legend = Legend("material_legend")
+        self.legend.show_entries(
+            lambda: [("predicted", predicted_colour()), ("measured", measured_colour())]
+        )
+        self.note = QLabel()
+        self.note.setObjectName("materials_note")
+        self.note.setWordWrap(True)
+        self._rows: list[MaterialCost] = []
+        self._shown: Series | None = None
+        self._table()
+        self._lay_out()
+        self.top.valueChanged.connect(lambda count: self._draw())
+        self.search.textChanged.connect(self.proxy.setFilterFixedString)
+
+    def _table(self) -> None:
+        self.model = Table(_HEADER, (0, 1), self)
+        self.proxy = QSortFilterProxyModel(self)
+        self.proxy.setSourceModel(self.model)
+        self.proxy.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        self.proxy.setFilterKeyColumn(-1)
+        self.proxy.setFilterRole(Qt.ItemDataRole.DisplayRole)
+        self.proxy.setSortRole(Qt.ItemDataRole.UserRole)
+        self.view = QTableView()
+        self.view.setObjectName("materials_table")
+        self.view.setAccessibleName("All materials")
+        self.view.setModel(self.proxy)
+        self.view.setSortingEnabled(True)
+        self.view.sortByColumn(3, Qt.SortOrder.DescendingOrder)
+        self.view.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        compact(self.view)
+        self.view.setAlternatingRowColors(True)
+        header = self.view.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        self.view.setMinimumHeight(theme.em(6))
+
+    def _lay_out(self) -> None:
+        controls = QHBoxLayout()
+        for text, widget in (("Of", self.of), ("Sort by", self.order), ("Bars", self.top)):
+            label = QLabel(text)
+            label.setBuddy(widget)
+            controls.addWidget(label)
+            controls.addWidget(widget, 1 if widget is self.of else 0)
+        bars = QWidget()
+        grid = QVBoxLayout(bars)
+        grid.setContentsMargins(0, 0, 0, 0)
+        pair = QHBoxLayout()
+        pair.addWidget(self.costs, 3)
+        pair.addWidget(self.records, 2)
+        grid.addLayout(pair, 1)
+        grid.addWidget(self.legend)
+        below = QWidget()
+        column = QVBoxLayout(below)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.search)
+        column.addWidget(self.view, 1)
+        splitter = QSplitter(Qt.Orientation.Vertical)
+        splitter.addWidget(bars)
+        splitter.addWidget(below)
+        splitter.setStretchFactor(0, 3)
+        splitter.setStretchFactor(1, 2)
+        splitter.setChildrenCollapsible(False)
+        layout = QVBoxLayout(self)
+        layout.addLayout(controls)
+        layout.addWidget(splitter, 1)
+        layout.addWidget(self.note)
+
+    def show_series(
+        self, series: Sequence[Series], labels: Sequence[str], current: Series | None
+    ) -> None:
+        """Draws the chosen series; the current one until another is chosen."""
+        chosen = self.of.currentData()
+        follow = self.of.currentIndex() <= 0 or chosen not in series
+        blocked = self.of.blockSignals(True)
+        self.of.clear()
+        self.of.addItem("the current run", None)
+        for one, label in zip(series, labels, strict=True):
+            self.of.addItem(label, one)
+        self.of.setCurrentIndex(0 if follow else 1 + list(series).index(chosen))
+        self.of.blockSignals(blocked)
+        shown = current if follow else chosen
+        stats = {} if shown is None else (shown.run if follow else shown.best).stats
+        self._rows = material_costs(stats, self.order.currentText())
+        self._draw()
+        self._fill()
+        prediction = stats.get("cost_prediction", {})
+        text = f"{len(self._rows)} materials were shaded."
+        if prediction.get("materials"):
+            r2 = prediction["r2"]
+            worth = f"{r2:.2f}" if r2 >= 0.0 else "below 0, worse than one mean for all"
+            text += (
+                f" Prediction of the last pass: r² {worth}, mean error "
+                f"{100 * prediction['mean_error']:.0f} %, over {prediction['materials']} materials."
+            )
+        self.note.setText(text)
+
+    def _draw(self) -> None:
+        rows = self._rows[: self.top.value()]
+        costs, records = [], []
+        for i, row in enumerate(rows):
+            tip = (
+                f"{row.name} ({row.program})\nmeasured {row.measured_ns:.0f} ns, predicted "
+                f"{row.predicted_ns:.0f} ns, calibrated {row.calibrated_ns:.0f} ns\n"
+                f"{amount(row.records)} records, {100 * row.share:.1f} % of shading"
+            )
+            costs.append(Bar(i - 0.19, 0.36, 0.0, row.predicted_ns, predicted_colour(), tip))
+            costs.append(Bar(i + 0.19, 0.36, 0.0, row.measured_ns, measured_colour(), tip))
+            records.append(Bar(i, 0.7, 0.0, float(row.records), theme.series(2), tip))
+        names = [row.short for row in rows]
+        self.costs.show_bars(names, costs)
+        self.records.show_bars(names, records)
+
+    def _fill(self) -> None:
+        def ns(value: float) -> Cell:
+            return f"{value:.0f}" if value else "", value
+
+        self.model.replace(
+            [
+                (
+                    (row.short, row.name),
+                    (row.program, row.program),
+                    (amount(row.records), row.records),
+                    (f"{100 * row.share:.1f} %", row.share),
+                    ns(row.measured_ns),
+                    ns(row.predicted_ns),
+                    ns(row.calibrated_ns),
+                )
+                for row in self._rows
+            ]
+        )

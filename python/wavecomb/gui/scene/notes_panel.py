@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What loading found: not supported, wrong in the stage, chosen by the loader."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QModelIndex, QObject, QSortFilterProxyModel, Qt
+from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.headed_model import HeadedModel
+
+if TYPE_CHECKING:
+    from wavecomb.gui.viewport.session import Session
+    from wavecomb.usd import Finding, LoadedStage
+
+KIND, WHAT, PLACE = range(3)
+HEADERS = ("Kind", "What", "Where")
+UNSUPPORTED, WARNING, NOTE = "not supported", "warning", "note"
+KINDS = (UNSUPPORTED, WARNING, NOTE)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One finding at one place; place: a prim path, a file, or "" for the whole stage."""
+
+    kind: str
+    what: str
+    place: str
+
+    def line(self) -> str:
+        """As text."""
+        return f"{self.kind}: {self.what}" + (f": {self.place}" if self.place else "")
+
+
+def rows_of(stage: LoadedStage) -> list[Row]:
+    """A row for each place that the report names, and one for those that it only counts."""
+    out: list[Row] = []
+    report = stage.report
+
+    def add(kind: str, finding: Finding) -> None:
+        places = finding.all_places or [""]
+        out.extend(Row(kind, finding.what, place) for place in places)
+        more = finding.count - len(places)
+        if more > 0 and finding.all_places:
+            out.append(Row(kind, finding.what, f"({more} more)"))
+
+    for kind, findings in zip(
+        KINDS, (report.unsupported, report.warnings, report.notes), strict=True
+    ):
+        for finding in findings:
+            add(kind, finding)
+    out += [Row(WARNING, line, "") for line in stage.scene.warnings]
+    return out
+
+
+class NotesModel(HeadedModel):
+    """The rows."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(HEADERS, parent)
+        self.rows: list[Row] = []
+
+    def fill(self, rows: list[Row]) -> None:
+        """Other rows."""
+        self.beginResetModel()
+        self.rows = rows
+        self.endResetModel()
+
+    def row_count(self) -> int:
+        """Findings."""
+        return len(self.rows)
+
+    def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """As Qt has it."""
+        row = self.rows[index.row()]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return (row.kind, row.what, row.place)[index.column()]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return row.line()
+        if role == Qt.ItemDataRole.ForegroundRole and index.column() == KIND:
+            return {UNSUPPORTED: theme.error(), WARNING: theme.warning()}.get(row.kind, theme.dim())
+        return None
+
+
+class _Filter(QSortFilterProxyModel):
+    """Rows of one kind that hold a text in any column."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.kind = ""
+        self.text = ""
+
+    def set(self, kind: str, text: str) -> None:
+        """What to show; kind "": all."""
+        self.kind, self.text = kind, text.casefold()
+        self.invalidate()
+
+    def filterAcceptsRow(self, number: int, parent: Any) -> bool:
+        """As Qt has it."""
+        model = self.sourceModel()
+        assert isinstance(model, NotesModel)
+        row = model.rows[number]
+        return (not self.kind or row.kind == self.kind) and self.text in row.line().casefold()
+
+
+class NotesPanel(QWidget):
+    """The list with a filter; double click chooses the prim, Ctrl+C copies lines."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self.model = NotesModel(self)
+        self._filter = _Filter(self)
+        self._filter.setSourceModel(self.model)
+        self.kinds = QComboBox()
+        self.kinds.setObjectName("notes-kind")
+        self.kinds.setAccessibleName("Kind of finding")
+        self.kinds.setToolTip("Which findings are listed")
+        self.kinds.addItem("All", "")
+        for kind in KINDS:
+            self.kinds.addItem(kind.capitalize(), kind)
+        self.field = QLineEdit()
+        self.field.setObjectName("notes-filter")
+        self.field.setAccessibleName("Filter findings")
+        self.field.setPlaceholderText("Filter")
+        self.field.setToolTip("Shows findings that hold this text")
+        self.field.setClearButtonEnabled(True)
+        self.view = QTableView()
+        self._make_view()
+        self.count = QLabel()
+        self.count.setObjectName("notes-count")
+        top = QHBoxLayout()
+        top.addWidget(self.kinds)
+        top.addWidget(self.field, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addLayout(top)
+        layout.addWidget(self.view, 1)
+        layout.addWidget(self.count)
+        self.kinds.currentIndexChanged.connect(lambda number: self._refilter())
+        self.field.textChanged.connect(lambda text: self._refilter())
+        session.opened.connect(self.fill)
+        session.noted.connect(self.fill)
+        if session.stage is not None:
+            self.fill(session.stage)
+        self._refilter()
+
+    def _make_view(self) -> None:
+        view = self.view
+        view.setModel(self._filter)
+        view.setObjectName("notes")
+        view.setAccessibleName("What loading found")
+        view.setToolTip("Double click chooses the prim; Ctrl+C copies")
+        view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        view.setTabKeyNavigation(False)
+        view.setSortingEnabled(True)
+        view.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
+        view.setWordWrap(False)
+        view.setShowGrid(False)
+        view.setAlternatingRowColors(True)
+        view.verticalHeader().hide()
+        view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
+        header = view.horizontalHeader()
+        header.setStretchLastSection(True)
+        header.resizeSection(KIND, theme.em(6.5))
+        header.resizeSection(WHAT, theme.em(16))
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+        view.doubleClicked.connect(self._on_double_click)
+        copy = QShortcut(QKeySequence(QKeySequence.StandardKey.Copy), view)
+        copy.setContext(Qt.ShortcutContext.WidgetShortcut)
+        copy.activated.connect(self.copy)
+
+    def fill(self, stage: LoadedStage | None) -> None:
+        """Lists what was found in a stage."""
+        self.model.fill(rows_of(stage) if stage is not None else [])
+        self._refilter()
+
+    def _refilter(self) -> None:
+        self._filter.set(self.kinds.currentData(), self.field.text().strip())
+        shown, there = self._filter.rowCount(), len(self.model.rows)
+        self.count.setText(f"{shown} of {there}" if there else "nothing to say about this stage")
+
+    def _row(self, index: QModelIndex) -> Row:
+        return self.model.rows[self._filter.mapToSource(index).row()]
+
+    def _on_double_click(self, index: QModelIndex) -> None:
+        place = self._row(index).place
+        if place.startswith("/"):
+            self._session.select(place)
+
+    def copy(self) -> None:
+        """Puts the selected lines on the clipboard, all where none is selected."""
+        chosen = self.view.selectionModel().selectedRows()
+        if not chosen:
+            chosen = [self._filter.index(row, 0) for row in range(self._filter.rowCount())]
+        lines = [self._row(index).line() for index in sorted(chosen)]
+        QGuiApplication.clipboard().setText("\n".join(lines))

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The prims of a stage as a tree for a view: read where somebody looks, never as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING, Any
+
+from pxr import Sdf, Usd, UsdGeom
+from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, Qt
+from PySide6.QtGui import QFont
+
+from wavecomb.gui import theme
+from wavecomb.gui.scene.visibility import HIDDEN_ABOVE, NOT_DRAWN, VISIBLE, state, uneditable
+
+if TYPE_CHECKING:
+    from wavecomb.gui.scene.scene_edits import SceneEdits
+
+NAME, TYPE, VISIBILITY, VARIANTS = range(4)
+HEADERS = ("Name", "Type", "Visible", "Variants")
+PathRole = Qt.ItemDataRole.UserRole
+StateRole = Qt.ItemDataRole.UserRole + 1
+"""``visibility.state`` of a row, for the eye."""
+
+PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+ROOT = QModelIndex()
+
+CHUNK = 500
+"""Children that a view gets at once; it asks for more when it comes to their end."""
+
+
+class _Node:
+    """A row. Names of its children are None until they were asked for; rows are made one by one."""
+
+    __slots__ = ("made", "names", "parent", "path", "row", "shown")
+
+    def __init__(self, path: Sdf.Path, parent: _Node | None, row: int) -> None:
+        self.path = path
+        self.parent = parent
+        self.row = row
+        self.names: list[str] | None = None
+        self.shown = 0
+        self.made: dict[int, _Node] = {}
+
+
+class SceneModel(QAbstractItemModel):
+    """Columns: name, type, visibility, variants. Instances show what is in them, in italics."""
+
+    def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._edits = edits
+        self._filter: Collection[Sdf.Path] | None = None
+        self._matches: Collection[Sdf.Path] = ()
+        self._root = _Node(Sdf.Path.absoluteRootPath, None, 0)
+
+    def reset(self, matches: Collection[Sdf.Path] | None = None) -> None:
+        """Reads all again; with matches shows only those and the way to them."""
+        self.beginResetModel()
+        self._matches = matches or ()
+        self._filter = None
+        if matches is not None:
+            self._filter = {prefix for path in matches for prefix in path.GetPrefixes()}
+        self._root = _Node(Sdf.Path.absoluteRootPath, None, 0)
+        self.endResetModel()
+
+    def prim(self, index: QModelIndex) -> Usd.Prim:
+        """The prim of a row."""
+        usd = self._edits.usd
+        return usd.GetPrimAtPath(self._node(index).path) if usd is not None else Usd.Prim()
+
+    def index_of(self, path: Sdf.Path) -> QModelIndex:
+        """The row of a prim, or an invalid index where it has none."""
+        node = self._root
+        for prefix in path.GetPrefixes():
+            try:
+                row = self._names(node).index(prefix.name)
+            except ValueError:
+                return QModelIndex()
+            if row >= node.shown:
+                self._show_more(node, row + 1)
+            node = self._child(node, row)
+        return QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
+
+    def refresh(self) -> None:
+        """What rows say may have changed; the rows are the same."""
+        top = self.rowCount()
+        if top:
+            self.dataChanged.emit(self.index(0, 0), self.index(top - 1, len(HEADERS) - 1))
+
+    # ---- QAbstractItemModel --------------------------------------------------------------------
+
+    def _node(self, index: QModelIndex) -> _Node:
+        node = index.internalPointer() if index.isValid() else self._root
+        assert isinstance(node, _Node)
+        return node
+
+    def _names(self, node: _Node) -> list[str]:
+        if node.names is None:
+            usd = self._edits.usd
+            prim = usd.GetPrimAtPath(node.path) if usd is not None else None
+            names = [str(name) for name in prim.GetFilteredChildrenNames(PREDICATE)] if prim else []
+            if self._filter is not None:
+                names = [name for name in names if node.path.AppendChild(name) in self._filter]
+            node.names = names
+            node.shown = min(len(names), CHUNK)
+        return node.names
+
+    def _show_more(self, node: _Node, count: int) -> None:
+        """Lets the view have so many children."""
+        at = QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
+        self.beginInsertRows(at, node.shown, count - 1)
+        node.shown = count
+        self.endInsertRows()
+
+    def canFetchMore(self, parent: QModelIndex = ROOT) -> bool:
+        """As Qt has it."""
+        node = self._node(parent)
+        return node.shown < len(self._names(node))
+
+    def fetchMore(self, parent: QModelIndex = ROOT) -> None:
+        """As Qt has it."""
+        node = self._node(parent)
+        count = min(len(self._names(node)), node.shown + CHUNK)
+        if count > node.shown:
+            self._show_more(node, count)
+
+    def _child(self, node: _Node, row: int) -> _Node:
+        made = node.made.get(row)
+        if made is None:
+            path = node.path.AppendChild(self._names(node)[row])
+            made = node.made[row] = _Node(path, node, row)
+        return made
+
+    def index(self, row: int, column: int, parent: QModelIndex = ROOT) -> QModelIndex:
+        """As Qt has it."""
+        node = self._node(parent)
+        if not (0 <= row < len(self._names(node)) and 0 <= column < len(HEADERS)):
+            return QModelIndex()
+        return self.createIndex(row, column, self._child(node, row))
+
+    def parent(self, index: QModelIndex = ROOT) -> Any:
+        """As Qt has it."""
+        above = self._node(index).parent if index.isValid() else None
+        if above is None or above is self._root:
+            return QModelIndex()
+        return self.createIndex(above.row, NAME, above)
+
+    def hasChildren(self, parent: QModelIndex = ROOT) -> bool:
+        """As Qt has it."""
+        return parent.column() <= 0 and bool(self._names(self._node(parent)))
+
+    def rowCount(self, parent: QModelIndex = ROOT) -> int:
+        """As Qt has it."""
+        if parent.column() > 0:
+            return 0
+        node = self._node(parent)
+        self._names(node)
+        return node.shown
+
+    def columnCount(self, parent: QModelIndex = ROOT) -> int:
+        """As Qt has it."""
+        return len(HEADERS)
+
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> Any:
+        """As Qt has it."""
+        if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
+            return HEADERS[section]
+        return None
+
+    def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """As Qt has it, and ``PathRole`` and ``StateRole``."""
+        prim = self.prim(index)
+        if not prim:
+            return None
+        column = index.column()
+        if role == PathRole:
+            return str(prim.GetPath())
+        if role == StateRole:
+            return state(prim, self._edits.time)[0]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._text(prim, column)
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return self._tip(prim, column)
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            if column == VISIBILITY:
+                return state(prim, self._edits.time)[0] or "not drawn"
+            return self._text(prim, column)
+        if role == Qt.ItemDataRole.FontRole and column == NAME:
+            font = QFont()
+            font.setItalic(prim.IsInstanceProxy())
+            font.setBold(prim.GetPath() in self._matches)
+            return font
+        if role == Qt.ItemDataRole.ForegroundRole and column != VISIBILITY:
+            drawn = state(prim, self._edits.time)[0]
+            return None if drawn in (VISIBLE, NOT_DRAWN) else theme.dim()
+        return None
+
+    def _text(self, prim: Usd.Prim, column: int) -> str:
+        if column == NAME:
+            return str(prim.GetName())
+        if column == TYPE:
+            name = str(prim.GetTypeName())
+            if prim.IsInstance():
+                return f"{name} (instance)".strip()
+            if prim.IsA(UsdGeom.PointInstancer):
+                indices = UsdGeom.PointInstancer(prim).GetProtoIndicesAttr().Get(self._edits.time)
+                return f"{name} ({len(indices) if indices is not None else 0})"
+            return name
+        if column == VARIANTS and self._edits.edits is not None:
+            sets = self._edits.edits.variant_sets(prim.GetPath())
+            return ", ".join(f"{one.name}: {one.choice or '-'}" for one in sets)
+        return ""
+
+    def _tip(self, prim: Usd.Prim, column: int) -> str:
+        lines = [str(prim.GetPath())]
+        if prim.IsInstance():
+            count = len(prim.GetPrototype().GetInstances())
+            lines.append(f"one of {count} instances that share what is in them")
+        if prim.IsInstanceProxy():
+            lines.append("inside an instance: shown, and not to be edited here")
+        if column == VISIBILITY:
+            seen, by = state(prim, self._edits.time)
+            if reason := uneditable(prim):
+                lines.append(reason)
+            elif seen == HIDDEN_ABOVE:
+                lines.append(f"hidden by {by}; a click shows this prim alone of what is in it")
+            else:
+                lines.append("click to hide" if seen == VISIBLE else "click to show")
+        if column == VARIANTS and self._text(prim, VARIANTS):
+            lines.append("click to choose a variant")
+        return "\n".join(lines)
+
+
+def search(usd: Usd.Stage, text: str, step: int = 500) -> Iterator[list[Sdf.Path]]:
+    """Prims whose name or type has the text in it (with a "/": whose path), in slices.
+
+    Args:
+        usd: The stage.
+        text: Upper and lower case are the same.
+        step: Prims that are looked at for each slice, so that whoever asks can do other things.
+    """
+    wanted = text.casefold()
+    by_path = "/" in wanted
+    found: list[Sdf.Path] = []
+    types: dict[str, bool] = {}
+    for count, prim in enumerate(Usd.PrimRange.Stage(usd, PREDICATE), 1):
+        kind = prim.GetTypeName()
+        known = types.get(kind)
+        if known is None:
+            known = types[kind] = not by_path and wanted in str(kind).casefold()
+        name = str(prim.GetPath()) if by_path else prim.GetName()
+        if known or wanted in name.casefold():
+            found.append(prim.GetPath())
+        if count % step == 0:
+            yield found
+            found = []
+    yield found

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scene: tree with visibility and variants, materials, lights, and what loading found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from pxr import Sdf, UsdShade
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QTabWidget,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui.scene.lights_panel import LightsPanel
+from wavecomb.gui.scene.materials_panel import MaterialsPanel
+from wavecomb.gui.scene.notes_panel import NotesPanel
+from wavecomb.gui.scene.scene_edits import SceneEdits
+from wavecomb.gui.scene.scene_tree import SceneTree
+
+if TYPE_CHECKING:
+    from wavecomb.gui.viewport.session import Session
+    from wavecomb.usd import LoadedStage
+
+STAGE_CHOICE = "as in the stage"
+
+
+class VariantBar(QWidget):
+    """A combo for each variant set of the prim that is selected."""
+
+    def __init__(self, edits: SceneEdits) -> None:
+        super().__init__()
+        self._edits = edits
+        self._path: str | None = None
+        self.combos: dict[str, QComboBox] = {}
+        self._form = QFormLayout(self)
+        self._form.setContentsMargins(0, 0, 0, 0)
+        edits.changed.connect(self._again)
+        edits.reset.connect(lambda: self.show_prim(None))
+        self.hide()
+
+    def show_prim(self, path: str | None) -> None:
+        """Another prim."""
+        self._path = path
+        self._again()
+
+    def _again(self) -> None:
+        while self._form.rowCount():
+            self._form.removeRow(0)
+        self.combos = {}
+        prim = self._edits.prim(self._path or "")
+        editable = bool(prim) and not prim.IsInstanceProxy()
+        sets = []
+        if prim and self._edits.edits is not None:
+            sets = self._edits.edits.variant_sets(prim.GetPath())
+        for one in sets:
+            combo = QComboBox()
+            combo.setObjectName(f"variant-{one.name}")
+            combo.setAccessibleName(f"Variant {one.name}")
+            combo.setToolTip(
+                f"Variant {one.name} of {self._path}"
+                if editable
+                else "Inside an instance: choose variants of the instance itself"
+            )
+            combo.addItem(STAGE_CHOICE, None)
+            for choice in one.choices:
+                combo.addItem(choice, choice)
+            combo.setCurrentIndex(combo.findData(one.choice) if one.choice else 0)
+            combo.setEnabled(editable)
+            combo.activated.connect(partial(self._choose, one.name, combo))
+            self._form.addRow(one.name, combo)
+            self.combos[one.name] = combo
+        self.setVisible(bool(sets))
+
+    def _choose(self, name: str, combo: QComboBox, number: int) -> None:
+        if self._path is not None:
+            self._edits.select_variant(self._path, name, combo.itemData(number))
+
+
+class ScenePanel(QWidget):
+    """Tabs. What is selected here is selected in the session, and the other way round.
+
+    Signals:
+        selected(str): Prim that was chosen, in any panel or in the picture.
+        frame_wanted(): F was pressed in the tree: what is selected is to fill the picture.
+    """
+
+    selected = Signal(str)
+    frame_wanted = Signal()
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.edits = SceneEdits(session, self)
+        self.tree = SceneTree(self.edits)
+        self.variants = VariantBar(self.edits)
+        self.materials = MaterialsPanel(self.edits)
+        self.lights = LightsPanel(self.edits)
+        self.notes = NotesPanel(session)
+        self.tabs = QTabWidget()
+        self.tabs.setObjectName("scene-tabs")
+        self.tabs.setDocumentMode(True)
+        stage = QWidget()
+        column = QVBoxLayout(stage)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.tree, 1)
+        column.addWidget(self.variants)
+        for widget, name, tip in (
+            (stage, "Stage", "Prims: visibility and variants"),
+            (self.materials, "Materials", "Materials in use and their parameters"),
+            (self.lights, "Lights", "Lights: on, alone, intensity and colour"),
+            (self.notes, "Notes", "What is not supported, and other findings"),
+        ):
+            number = self.tabs.addTab(widget, name)
+            self.tabs.setTabToolTip(number, tip)
+        self._make_actions()
+        self.state = QLabel()
+        self.state.setObjectName("scene-edits")
+        bottom = QHBoxLayout()
+        for action in (self.undo_action, self.redo_action, self.save_action):
+            button = QToolButton()
+            button.setDefaultAction(action)
+            button.setAutoRaise(True)
+            bottom.addWidget(button)
+        bottom.addWidget(self.state, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.tabs, 1)
+        layout.addLayout(bottom)
+        self.tree.view.frame_wanted.connect(self.frame_wanted)
+        self.edits.changed.connect(self._on_changed)
+        session.selected.connect(self._on_selected)
+        session.opened.connect(self._on_opened)
+        session.noted.connect(lambda stage: self._count_notes())
+        self._on_changed()
+        self._count_notes()
+
+    def _make_actions(self) -> None:
+        # Without keys: the menus of the window have them.
+        self.undo_action = self._action("Undo", self.edits.undo)
+        self.redo_action = self._action("Redo", self.edits.redo)
+        self.save_action = self._action("Save edits as layer\u2026", self.ask_save)
+        self.save_action.setToolTip("Writes the edits as a small .usda file over the stage")
+
+    def _action(self, name: str, call: Callable[[], None]) -> QAction:
+        action = QAction(name, self)
+        action.setObjectName(name.rstrip("\u2026").lower().replace(" ", "-"))
+        action.triggered.connect(lambda checked=False: call())
+        return action
+
+    # ---- edits ---------------------------------------------------------------------------------
+
+    def ask_save(self) -> None:
+        """Asks where to write the edits, and writes them."""
+        stage = self.session.stage
+        start = ""
+        if stage is not None:
+            start = str(stage.stage_path.with_name(f"{stage.stage_path.stem}_edits.usda"))
+        dialog = QFileDialog(self, "Save edits as layer", start, "USD text (*.usda)")
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("usda")
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(self.edits.save)
+        dialog.open()
+
+    def _on_changed(self) -> None:
+        for action, name, what in (
+            (self.undo_action, "Undo", self.edits.can_undo()),
+            (self.redo_action, "Redo", self.edits.can_redo()),
+        ):
+            action.setEnabled(bool(what))
+            action.setToolTip(f"{name} {what}".strip())
+        lines = self.edits.lines()
+        self.save_action.setEnabled(bool(lines))
+        self.state.setText(f"{len(lines)} edited" if lines else "")
+        shown = lines[:30] + ([f"and {len(lines) - 30} more"] if len(lines) > 30 else [])
+        self.state.setToolTip("\n".join(shown))
+
+    # ---- what is selected ----------------------------------------------------------------------
+
+    def show_pick(self, hit: dict[str, Any] | None) -> None:
+        """Shows what ``Session.pick`` gave: its prim, its material, its light."""
+        self.session.select(hit.get("object") if hit else None)
+        if not hit:
+            return
+        if hit.get("material") is not None:
+            self.materials.choose_id(hit["material"])
+
+    def _on_selected(self, path: str | None) -> None:
+        plain = (path or "").partition("[")[0].rstrip("/")
+        self.variants.show_prim(plain or None)
+        prim = self.edits.prim(plain)
+        if not prim:
+            return
+        self.lights.choose(plain)
+        if prim.IsA(UsdShade.Material):
+            self.materials.choose(plain)
+        elif prim.IsA(UsdShade.Shader):
+            self.materials.choose(str(prim.GetParent().GetPath()))
+        else:
+            bound = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+            if bound:
+                self.materials.choose(str(bound.GetPath()))
+        self.selected.emit(plain)
+
+    def _on_opened(self, stage: LoadedStage | None) -> None:
+        self._count_notes()
+        self.variants.show_prim(self.variants_path())
+
+    def variants_path(self) -> str | None:
+        """The prim that variants are shown of."""
+        path = (self.session.selection or "").partition("[")[0]
+        return path if path and Sdf.Path.IsValidPathString(path) else None
+
+    def _count_notes(self) -> None:
+        count = sum(row.kind != "note" for row in self.notes.model.rows)
+        self.tabs.setTabText(
+            self.tabs.indexOf(self.notes), f"Notes ({count})" if count else "Notes"
+        )

@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Edits of a stage in its session layer: made, undone, listed and saved. Knows nothing of Qt.
+
+Contract: used by one thread, the one that owns the stage. The files of the stage are never written.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pxr import Sdf, Usd
+
+from wavecomb.errors import WavecombError
+from wavecomb.gui.scene.visibility import hide, show, uneditable
+
+Key = tuple[Sdf.Path, str]
+"""A prim and what of it: ``.NAME`` of an attribute, ``{NAME}`` of a variant set, ``!NAME`` of a
+value that no attribute of the stage holds."""
+
+MERGE_S = 0.7
+"""Changes of one thing that follow each other faster are one step of undo."""
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """What the session layer says of one thing.
+
+    Attributes:
+        value: Of the attribute, or the variant's name.
+        type_name: Of the attribute.
+    """
+
+    value: Any
+    type_name: Sdf.ValueTypeName | None = None
+
+
+@dataclass(frozen=True)
+class VariantSet:
+    """A variant set of a prim; ``choice`` is "" where none is selected."""
+
+    name: str
+    choices: tuple[str, ...]
+    choice: str
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of undo: opinions before and after, None where there is none."""
+
+    label: str
+    before: Mapping[Key, Opinion | None]
+    after: Mapping[Key, Opinion | None]
+
+    @property
+    def structural(self) -> bool:
+        """Whether the stage must be read again: visibility and variants decide what is there."""
+        return any(what == ".visibility" or what.startswith("{") for _, what in self.after)
+
+    @property
+    def prims(self) -> tuple[Sdf.Path, ...]:
+        """Prims that hold what changed."""
+        return tuple(dict.fromkeys(path for path, _ in self.after))
+
+
+@dataclass
+class StageEdits:
+    """The edits of one stage.
+
+    Attributes:
+        stage: It; edits go to its session layer.
+        time: At which its attributes are read.
+        values: What is changed and no attribute holds, by prim and parameter: it is in the picture,
+            and is not saved.
+        now: The clock, for telling drags from single changes.
+    """
+
+    stage: Usd.Stage
+    time: Usd.TimeCode
+    now: Callable[[], float] = clock.monotonic
+    values: dict[Key, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._done: list[Step] = []
+        self._undone: list[Step] = []
+        self._last = -MERGE_S
+        self._typing = self._joins = False
+
+    # ---- what there is -------------------------------------------------------------------------
+
+    def variant_sets(self, path: Sdf.Path) -> list[VariantSet]:
+        """The variant sets of a prim."""
+        prim = self.stage.GetPrimAtPath(path)
+        if not prim or not prim.HasVariantSets():
+            return []
+        sets = prim.GetVariantSets()
+        out = []
+        for name in sets.GetNames():
+            one = sets.GetVariantSet(name)
+            out.append(VariantSet(name, tuple(one.GetVariantNames()), one.GetVariantSelection()))
+        return out
+
+    def opinion(self, key: Key) -> Opinion | None:
+        """What was edited of one thing; None: nothing."""
+        path, what = key
+        if what.startswith("!"):
+            return Opinion(self.values[key]) if key in self.values else None
+        spec = self.stage.GetSessionLayer().GetPrimAtPath(path)
+        if not spec:
+            return None
+        if what.startswith("{"):
+            name = what[1:-1]
+            chosen = _selections(spec)
+            return Opinion(chosen[name]) if name in chosen else None
+        attribute = spec.attributes.get(what[1:])
+        if attribute is None or not attribute.HasInfo("default"):
+            return None
+        return Opinion(attribute.default, attribute.typeName)
+
+    def edited(self) -> list[Key]:
+        """All that is edited, in the stage's order; what is not saved last."""
+        found: list[Key] = []
+
+        def visit(path: Sdf.Path) -> None:
+            spec = layer.GetObjectAtPath(path)
+            if isinstance(spec, Sdf.AttributeSpec) and spec.HasInfo("default"):
+                found.append((path.GetPrimPath(), f".{path.name}"))
+            elif isinstance(spec, Sdf.PrimSpec) and spec.HasInfo("variantSelection"):
+                found.extend((path, f"{{{name}}}") for name in _selections(spec))
+
+        layer = self.stage.GetSessionLayer()
+        layer.Traverse(Sdf.Path.absoluteRootPath, visit)
+        return [*sorted(found), *sorted(self.values)]
+
+    def lines(self) -> list[str]:
+        """The edits, one line each."""
+        out = []
+        for key in self.edited():
+            path, what = key
+            known = self.opinion(key)
+            value = _text(known.value) if known is not None else ""
+            if what.startswith("!"):
+                out.append(
+                    f"{path} {what[1:]} = {value} (not saved: the stage has no place for it)"
+                )
+            else:
+                out.append(f"{path}{what} = {value}")
+        return out
+
+    # ---- changes -------------------------------------------------------------------------------
+
+    def set_visible(self, paths: Iterable[Sdf.Path], visible: bool) -> Step | None:
+        """Shows or hides prims, as ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible`` do.
+
+        Raises:
+            WavecombError: One is inside an instance.
+        """
+        wanted = list(paths)
+        opinions: dict[Key, Opinion | None] = {}
+        for path in wanted:
+            prim = self.stage.GetPrimAtPath(path)
+            reason = uneditable(prim)
+            if reason:
+                raise WavecombError(f"{path}: its visibility cannot be changed: {reason}")
+            hidden = {at[0]: one.value == "invisible" for at, one in opinions.items() if one}
+            for at, word in (show if visible else hide)(prim, self.time, hidden).items():
+                opinions[(at, ".visibility")] = Opinion(word, Sdf.ValueTypeNames.Token)
+        name = str(wanted[0]) if len(wanted) == 1 else f"{len(wanted)} prims"
+        return self.change(f"{'show' if visible else 'hide'} {name}", opinions)
+
+    def select_variant(self, path: Sdf.Path, name: str, choice: str | None) -> Step | None:
+        """Selects a variant; None: what the stage itself selects.
+
+        Raises:
+            WavecombError: There is no such set or variant, or the prim is inside an instance.
+        """
+        prim = self.stage.GetPrimAtPath(path)
+        if prim and (prim.IsInstanceProxy() or prim.IsInPrototype()):
+            raise WavecombError(f"{path}: is inside an instance: choose variants of the instance")
+        sets = {one.name: one for one in self.variant_sets(path)}
+        if name not in sets or (choice is not None and choice not in sets[name].choices):
+            known = ", ".join(sets[name].choices if name in sets else sets) or "none"
+            raise WavecombError(f"{path}{{{name}={choice}}}: there is no such variant, but {known}")
+        opinion = None if choice is None else Opinion(choice)
+        return self.change(f"{name} of {path}", {(path, f"{{{name}}}"): opinion})
+
+    def change(self, label: str, opinions: Mapping[Key, Opinion | None]) -> Step | None:
+        """Sets or removes (None) opinions as one step of undo; None where nothing changes.
+
+        Changes of the same things in quick succession are one step.
+        """
+        before = {key: self.opinion(key) for key in opinions}
+        step = Step(
+            label,
+            {key: old for key, old in before.items() if old != opinions[key]},
+            {key: new for key, new in opinions.items() if before[key] != new},
+        )
+        if not step.after:
+            return None
+        self._apply(step.after)
+        moment = self.now()
+        last = self._done[-1] if self._done else None
+        # A value that is taken back is a step of its own, however fast it comes.
+        drag = not step.structural and None not in step.after.values()
+        quick = moment - self._last < MERGE_S or self._joins
+        self._joins = self._typing
+        if drag and quick and last is not None and last.after.keys() == step.after.keys():
+            self._done[-1] = Step(label, last.before, step.after)
+        else:
+            self._done.append(step)
+        self._undone.clear()
+        self._last = moment
+        return step
+
+    def next_prims(self, *, undo: bool) -> tuple[Sdf.Path, ...]:
+        """Prims that ``undo`` or ``redo`` would change."""
+        steps = self._done if undo else self._undone
+        return steps[-1].prims if steps else ()
+
+    def set_typing(self, typing: bool) -> None:
+        """Between True and False all changes of one thing are one step, however slow they are."""
+        self._typing, self._joins = typing, False
+        self._last = -MERGE_S
+
+    def undo(self) -> Step | None:
+        """Takes the last step back; None where there is none. Gives what was done thereby."""
+        self._joins = False
+        if not self._done:
+            return None
+        step = self._done.pop()
+        self._undone.append(step)
+        self._apply(step.before)
+        self._last = -MERGE_S
+        return Step(f"undo {step.label}", step.after, step.before)
+
+    def redo(self) -> Step | None:
+        """Makes the step again that was taken back last."""
+        self._joins = False
+        if not self._undone:
+            return None
+        step = self._undone.pop()
+        self._done.append(step)
+        self._apply(step.after)
+        self._last = -MERGE_S
+        return step
+
+    @property
+    def undo_label(self) -> str:
+        """What ``undo`` would take back; "": nothing."""
+        return self._done[-1].label if self._done else ""
+
+    @property
+    def redo_label(self) -> str:
+        """What ``redo`` would do again; "": nothing."""
+        return self._undone[-1].label if self._undone else ""
+
+    def forget(self) -> None:
+        """Forgets all steps: the session layer was emptied by another."""
+        self._done.clear()
+        self._undone.clear()
+        self.values.clear()
+
+    def _apply(self, opinions: Mapping[Key, Opinion | None]) -> None:
+        layer = self.stage.GetSessionLayer()
+        with Sdf.ChangeBlock():
+            for (path, what), opinion in opinions.items():
+                if what.startswith("!"):
+                    if opinion is None:
+                        self.values.pop((path, what), None)
+                    else:
+                        self.values[(path, what)] = opinion.value
+                elif opinion is not None:
+                    _author(layer, path, what, opinion)
+                else:
+                    _remove(layer, path, what)
+
+
+def _selections(spec: Sdf.PrimSpec) -> dict[str, str]:
+    """Variant set -> variant, as authored here."""
+    return dict(spec.GetInfo("variantSelection")) if spec.HasInfo("variantSelection") else {}
+
+
+def _author(layer: Sdf.Layer, path: Sdf.Path, what: str, opinion: Opinion) -> None:
+    prim = Sdf.CreatePrimInLayer(layer, path)
+    if what.startswith("{"):
+        prim.variantSelections[what[1:-1]] = opinion.value
+        return
+    name = what[1:]
+    spec = prim.attributes.get(name)
+    if spec is None:
+        spec = Sdf.AttributeSpec(prim, name, opinion.type_name)
+    spec.default = opinion.value
+
+
+def _remove(layer: Sdf.Layer, path: Sdf.Path, what: str) -> None:
+    prim = layer.GetPrimAtPath(path)
+    if not prim:
+        return
+    if what.startswith("{"):
+        if what[1:-1] in _selections(prim):
+            del prim.variantSelections[what[1:-1]]
+    elif what[1:] in prim.attributes:
+        prim.RemoveProperty(prim.attributes[what[1:]])
+    layer.ScheduleRemoveIfInert(prim)
+
+
+def _text(value: Any) -> str:
+    """A value for people: numbers to four digits."""
+    if isinstance(value, str):
+        return value
+    if hasattr(value, "__len__"):
+        return f"({', '.join(_text(part) for part in value)})"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

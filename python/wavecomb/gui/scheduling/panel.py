@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scheduling panel: every choice of order and amount of work, switched while it renders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFileDialog,
+    QFormLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.scheduling import choices
+from wavecomb.gui.scheduling.policy_file import OwnPolicy, first_line, load_policies
+from wavecomb.gui.scheduling.render_rounds import Rounds
+from wavecomb.gui.scheduling.setting_controls import ChoiceBox, number_box, show_number
+from wavecomb.gui.scheduling.work_group import WorkGroup
+from wavecomb.gui.viewport.picture_light import PictureLight
+from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.run.faults import describe
+
+_POLICY_FILTER = "Python (*.py);;All files (*)"
+_PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
+
+
+class SchedulingPanel(QScrollArea):
+    """Shows and changes the session's scheduling; keeps nothing but loaded policies."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._policies: list[OwnPolicy] = []
+        self._policy_file: str | None = None
+        self._loads: dict[str, int] = {}
+        self._boxes: dict[str, ChoiceBox] = {}
+        self.light = PictureLight(session)
+        self.rounds = Rounds(session, self)
+        self._work = WorkGroup(session)
+        inner = QWidget()
+        column = QVBoxLayout(inner)
+        column.addLayout(self._presets_row())
+        column.addWidget(self._order_group())
+        column.addWidget(self._work)
+        column.addStretch(1)
+        self.setWidget(inner)
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setFrameShape(QScrollArea.Shape.NoFrame)
+        self.setObjectName("scheduling_panel")
+        self.setAccessibleName("Scheduling")
+        self.setMinimumWidth(inner.minimumSizeHint().width() + theme.em(1.2))
+        session.setup_changed.connect(self._show)
+        self.rounds.moved.connect(self._show_rounds)
+        self.rounds.ended.connect(self._end_rounds)
+        self._show(session.setup)
+
+    # ---- what it is made of ---------------------------------------------------------------------
+
+    def _presets_row(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self._preset = QComboBox()
+        self._preset.setObjectName("preset")
+        self._preset.setAccessibleName("Preset")
+        self._preset.setToolTip("Sets the whole group below.")
+        self._preset.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self._preset.setMinimumContentsLength(12)
+        self._preset.setPlaceholderText("Own choice")
+        for name, (tip, values) in choices.presets().items():
+            self._preset.addItem(name, values)
+            index = self._preset.count() - 1
+            self._preset.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
+        self._preset.activated.connect(
+            lambda index: self._session.change(**self._preset.itemData(index))
+        )
+        reset = QPushButton("Reset")
+        reset.setObjectName("reset")
+        reset.setToolTip("Sets all of this panel back to what a render does by default.")
+        reset.clicked.connect(self._reset)
+        row.addWidget(self._preset, 1)
+        row.addWidget(reset)
+        return row
+
+    def _order_group(self) -> QGroupBox:
+        group = QGroupBox("Order of work")
+        form = QFormLayout(group)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._promise = QLabel()
+        self._promise.setWordWrap(True)
+        self._promise.setObjectName("promise")
+        form.addRow(self._promise)
+        form.addRow(self.light)
+        self._try = QPushButton("Try every policy")
+        self._try.setObjectName("try_every_policy")
+        self._try.setToolTip(
+            "Renders the picture with each policy in turn and compares the bits; then goes back. "
+            "Press again to stop."
+        )
+        self._try.clicked.connect(self._try_every_policy)
+        form.addRow(self._try)
+        for choice in choices.ORDER_CHOICES:
+            box = ChoiceBox(choice, self._choose)
+            self._boxes[choice.field] = box
+            field: QWidget = box
+            if choice.field == "policy":
+                box.fill(choices.policy_choices())
+                field = self._with_buttons(
+                    box,
+                    ("load_policy", "Load…", "Load a policy of your own: a Python file that "
+                     "defines a subclass of wavecomb.SchedulingPolicy.", self._ask_policy),
+                    ("reload_policy", "↻", "Load the file again, after an edit.",
+                     self._reload_policy),
+                )  # fmt: skip
+            elif choice.field == "lanes":
+                box.fill(choices.lane_choices())
+            elif choice.field == "costs":
+                field = self._with_buttons(
+                    box,
+                    ("load_profile", "File…", "Start from the costs of an earlier render: the "
+                     "file that its --costs FILE.json wrote.", self._ask_profile),
+                )  # fmt: skip
+            form.addRow(self._labelled(choice.label, box), field)
+        self._threads = number_box(choices.THREADS, self._choose)
+        self._cost_weight = number_box(choices.COST_WEIGHT, self._choose)
+        form.insertRow(8, self._labelled("Threads", self._threads), self._threads)
+        form.addRow(self._labelled("Cost weight", self._cost_weight), self._cost_weight)
+        return group
+
+    def _labelled(self, text: str, buddy: QWidget) -> QLabel:
+        label = QLabel(text)
+        label.setBuddy(buddy)
+        label.setToolTip(buddy.toolTip())
+        return label
+
+    def _with_buttons(self, box: ChoiceBox, *buttons: tuple[str, str, str, Any]) -> QWidget:
+        field = QWidget()
+        row = QHBoxLayout(field)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(box, 1)
+        for name, text, tip, call in buttons:
+            button = QToolButton()
+            button.setObjectName(name)
+            button.setText(text)
+            button.setToolTip(tip)
+            button.setAccessibleName(tip.partition(":")[0].partition(",")[0])
+            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            button.clicked.connect(call)
+            row.addWidget(button)
+        return field
+
+    # ---- what it does ---------------------------------------------------------------------------
+
+    def _choose(self, field: str, value: Any) -> None:
+        if field == "policy":
+            own = value if isinstance(value, OwnPolicy) else None
+            values = {"own_policy": own} if own else {"own_policy": None, "policy": value}
+        elif field == "costs":
+            values = {"profile": value} if isinstance(value, dict) else {
+                "profile": None, "costs": value
+            }  # fmt: skip
+        else:
+            values = {field: value}
+        if not self._session.change(**values):
+            self._show(self._session.setup)
+
+    def _show(self, setup: Setup) -> None:
+        for field, box in self._boxes.items():
+            value = getattr(setup, field)
+            if field == "policy" and setup.own_policy is not None:
+                value = setup.own_policy
+            if field == "costs" and setup.profile is not None:
+                value = setup.profile
+            box.show_value(value)
+        for spin, field in ((self._threads, "threads"), (self._cost_weight, "cost_weight")):
+            show_number(spin, getattr(setup, field))
+        self._promise.setText(choices.promise(setup))
+        self._find("reload_policy").setEnabled(self._policy_file is not None)
+        presets = list(choices.presets().values())
+        self._preset.setCurrentIndex(
+            next(
+                (
+                    i
+                    for i, (_, values) in enumerate(presets)
+                    if all(_same(getattr(setup, name), v) for name, v in values.items())
+                ),
+                -1,
+            )
+        )
+
+    def _find(self, name: str) -> QToolButton:
+        found = self.findChild(QToolButton, name)
+        assert found is not None
+        return found
+
+    def _reset(self) -> None:
+        names = (*choices.ORDER_FIELDS, *choices.WORK_FIELDS, "own_policy", "profile")
+        self._session.change(**choices.defaults(names))
+
+    # ---- policies and profiles from files -------------------------------------------------------
+
+    def _ask_policy(self) -> None:
+        start = self._policy_file or ""
+        name, _ = QFileDialog.getOpenFileName(self, "Load a policy", start, _POLICY_FILTER)
+        if name:
+            self.load_policy(name)
+
+    def load_policy(self, path: str) -> None:
+        """Offers the policies of a Python file and chooses the first; errors become messages."""
+        try:
+            policies = load_policies(path)
+        except Exception as error:
+            self._session.failed.emit(describe(error))
+            return
+        self._policy_file = path
+        box = self._boxes["policy"]
+        for policy in policies:
+            count = self._loads[policy.name] = self._loads.get(policy.name, 0) + 1
+            # An edited policy is another one: its runs make a series of their own.
+            name = policy.name if count == 1 else f"{policy.name} {count}"
+            own = OwnPolicy(policy, path, name)
+            box.add(own, name, f"{first_line(policy)} ({Path(path).name})")
+            self._policies.append(own)
+        self._choose("policy", self._policies[-len(policies)])
+
+    def _reload_policy(self) -> None:
+        if self._policy_file is not None:
+            self.load_policy(self._policy_file)
+
+    def _ask_profile(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self, "Load costs", "", _PROFILE_FILTER)
+        if name:
+            self.load_profile(name)
+
+    def load_profile(self, path: str) -> None:
+        """Starts renders from the costs in a file; errors become messages."""
+        from wavecomb.run.costs import load_costs
+
+        try:
+            profile = load_costs(path)
+        except Exception as error:
+            self._session.failed.emit(describe(error))
+            return
+        self._boxes["costs"].add(profile, Path(path).name, f"From {path}, then measured.")
+        self._choose("costs", profile)
+
+    # ---- every policy in turn -------------------------------------------------------------------
+
+    def _try_every_policy(self) -> None:
+        if self.rounds.running:
+            self.rounds.stop()
+            return
+        now = self._session.setup
+        first = {"policy": now.policy, "own_policy": now.own_policy}
+        others = [{"policy": name, "own_policy": None} for name in choices.policy_choices()]
+        self.rounds.start([first, *(one for one in others if one != first)])
+
+    def _show_rounds(self, done: int, count: int) -> None:
+        self._try.setText(f"Trying {min(done + 1, count)} of {count}: stop")
+
+    def _end_rounds(self, whole: bool) -> None:
+        self._try.setText("Try every policy")
+
+
+def _same(a: Any, b: Any) -> bool:
+    return a is b or (type(a) is type(b) and a == b)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plots in the colours of the window: curves, bars, and legends beside them."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF
+from PySide6.QtWidgets import QApplication, QLabel, QSizePolicy, QToolTip, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.scheduling.run_table import amount
+
+pg.setConfigOptions(antialias=True)
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A rectangle of a horizontal bar chart: from ``start`` to ``end`` in row ``y``."""
+
+    y: float
+    height: float
+    start: float
+    end: float
+    colour: QColor
+    tip: str
+
+
+class AmountAxis(pg.AxisItem):
+    """Ticks as 20 k and 1.5 M."""
+
+    def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
+        """Texts of ticks."""
+        return [amount(value * scale) for value in values]
+
+
+class Plot(pg.PlotWidget):
+    """A plot without mouse traps: it follows the theme, and its data are always all in view."""
+
+    def __init__(self, name: str, title: str, parent: QWidget | None = None) -> None:
+        axes = {side: AmountAxis(side) for side in ("left", "bottom")}
+        super().__init__(parent, axisItems=axes)
+        self.setObjectName(name)
+        self.setAccessibleName(title)
+        item = self.getPlotItem()
+        item.hideButtons()
+        item.setMenuEnabled(False)
+        item.setMouseEnabled(False, False)
+        self._title = title
+        self.setMinimumSize(theme.em(12), theme.em(6))
+        theme.on_change(self.retheme)
+        self.retheme()
+
+    def retheme(self) -> None:
+        """Takes the colours of the theme."""
+        self.setBackground(theme.surface())
+        for name in ("left", "bottom"):
+            axis = self.getAxis(name)
+            axis.setPen(theme.dim())
+            axis.setTextPen(theme.text())
+            axis.setTickPen(theme.grid())
+            axis.setZValue(-1000)  # lines behind bars and curves
+        colour = theme.text().name()
+        self.getPlotItem().setTitle(html.escape(self._title), color=colour, size=_points())
+
+    def name_it(self, title: str) -> None:
+        """Another title."""
+        if title != self._title:
+            self._title = title
+            self.setAccessibleName(title)
+            self.retheme()
+
+    def wheelEvent(self, event: object) -> None:
+        """Scrolls what is around it."""
+        event.ignore()  # type: ignore[attr-defined]
+
+
+class Curves(Plot):
+    """Curves over seconds of rendering, one for each series; from zero up."""
+
+    def __init__(self, name: str, title: str) -> None:
+        super().__init__(name, title)
+        self.getAxis("left").setWidth(theme.em(3.4))
+        self.setMinimumHeight(theme.em(8))
+        self.showGrid(x=False, y=True, alpha=0.25)
+
+    def show_curves(
+        self, curves: Sequence[tuple[Sequence[float], Sequence[float], QColor, bool]]
+    ) -> None:
+        """Draws (times, values, colour, strong); strong: the one that goes on."""
+        self.clear()
+        for times, values, colour, strong in curves:
+            width = max(1.0, 0.2 * theme.em() if strong else 0.12 * theme.em())
+            few = len(times) < 3
+            self.plot(
+                list(times), list(values), pen=pg.mkPen(colour, width=width),
+                symbol="o" if few else None, symbolBrush=colour, symbolPen=None,
+                symbolSize=0.4 * theme.em(),
+            )  # fmt: skip
+        if not any(len(times) for times, *_ in curves):
+            return
+        latest = max((max(times) for times, *_ in curves if len(times)), default=1.0)
+        most = max((max(values) for _, values, *_ in curves if len(values)), default=1.0)
+        self.setXRange(0.0, latest * 1.02, padding=0.0)
+        self.setYRange(0.0, 1.08 * most if most > 0.0 else 1.0, padding=0.0)
+
+
+class Bars(Plot):
+    """Horizontal bars in rows with names; the first row is at the top."""
+
+    def __init__(self, name: str, title: str, *, names: bool = True) -> None:
+        super().__init__(name, title)
+        self._bars: list[Bar] = []
+        self._names = names
+        self.showGrid(x=True, y=False, alpha=0.25)
+        self.getViewBox().invertY(True)
+        self.getAxis("left").setStyle(tickLength=0)
+        self.scene().sigMouseMoved.connect(self._tell)
+
+    @property
+    def bars(self) -> list[Bar]:
+        """What is drawn."""
+        return self._bars
+
+    def show_bars(self, rows: Sequence[str], bars: Sequence[Bar], most: float = 0.0) -> None:
+        """Draws bars; ``most``: where the axis ends, 0: at the longest bar."""
+        self._bars = list(bars)
+        self.clear()
+        by_colour: dict[str, list[Bar]] = {}
+        for bar in bars:
+            by_colour.setdefault(bar.colour.name(), []).append(bar)
+        for colour, group in by_colour.items():
+            self.addItem(
+                pg.BarGraphItem(
+                    x0=[bar.start for bar in group], x1=[bar.end for bar in group],
+                    y=[bar.y for bar in group], height=[bar.height for bar in group],
+                    brush=QColor(colour), pen=pg.mkPen(theme.surface(), width=0.5),
+                )
+            )  # fmt: skip
+        end = most or 1.04 * max((bar.end for bar in bars), default=1.0)
+        self.setXRange(0.0, end or 1.0, padding=0.0)
+        self.setYRange(-0.6, max(len(rows) - 0.4, 0.4), padding=0.0)
+        left = self.getAxis("left")
+        if not self._names:
+            left.setTicks([[]])
+            left.setWidth(theme.em(0.5))
+            return
+        metrics = QFontMetricsF(QApplication.font())
+        room = min(0.42 * self.width(), theme.em(17.0))
+        shown = [
+            metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room - theme.em())
+            for name in rows
+        ]
+        left.setTicks([list(enumerate(shown))])
+        widest = max((metrics.horizontalAdvance(name) for name in shown), default=0.0)
+        left.setWidth(round(widest + theme.em(0.9)))
+
+    def bar_at(self, x: float, y: float) -> Bar | None:
+        """The bar at a place in data coordinates."""
+        for bar in self._bars:
+            if bar.start <= x <= bar.end and abs(y - bar.y) <= bar.height / 2:
+                return bar
+        return None
+
+    def _tell(self, position: QPointF) -> None:
+        place = self.getViewBox().mapSceneToView(position)
+        bar = self.bar_at(place.x(), place.y())
+        if bar is not None:
+            point = self.mapToGlobal(self.mapFromScene(position))
+            QToolTip.showText(point, bar.tip, self)
+        else:
+            QToolTip.hideText()
+
+
+class Legend(QLabel):
+    """Names with their colours, below a plot, so that it can lie over no bar; wraps."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.setObjectName(name)
+        self.setTextFormat(Qt.TextFormat.RichText)
+        self.setWordWrap(True)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        self._entries: Callable[[], Sequence[tuple[str, QColor]]] = lambda: ()
+        theme.on_change(self.retheme)
+
+    def show_entries(self, entries: Callable[[], Sequence[tuple[str, QColor]]]) -> None:
+        """Takes what gives (name, colour): asked again when the theme changes."""
+        self._entries = entries
+        self.retheme()
+
+    def retheme(self) -> None:
+        """Takes the colours of the theme."""
+        text = " &nbsp; ".join(
+            f'<span style="color:{colour.name()}">&#9632;</span>&nbsp;'
+            + html.escape(name).replace(" ", "&nbsp;")
+            for name, colour in self._entries()
+        )
+        if text != self.text():
+            self.setText(text)
+
+
+def _points() -> str:
+    return f"{QApplication.font().pointSizeF():.1f}pt"

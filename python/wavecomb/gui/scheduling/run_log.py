@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Statistics of live renders, kept as runs and series; no Qt.
+
+A *look* is what the counters of a render said at one moment. A *run* is one render from its start
+to the next restart: its settings held all the while. Runs of the same settings and the same
+picture are repeats and make up a *series*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from wavecomb.run.stats import COHERENCE, PHASES, SORTING
+
+FIELDS = (
+    "policy",
+    "lanes",
+    "wave_size",
+    "threads",
+    "ray_order",
+    "shadow_order",
+    "integrator",
+    "materialize",
+    "traversal",
+    "costs",
+    "cost_weight",
+    "roulette",
+    "roulette_depth",
+    "light_selection",
+    "light_weights",
+    "adaptive",
+    "noise",
+    "min_spp",
+    "time_limit",
+)
+"""Settings by which series are told apart; all but those of ``WORK`` leave the picture as it is."""
+
+WORK = (
+    "roulette", "roulette_depth", "light_selection", "light_weights", "adaptive", "noise",
+    "min_spp", "time_limit",
+)  # fmt: skip
+"""Settings that change how much is done, and with it the noise."""
+
+MAX_LOOKS = 240
+"""More are thinned out, so that a long render costs no more memory than a short one."""
+MAX_SERIES = 100
+SHORTEST_S = 0.25
+"""An abandoned run that was shorter is forgotten: it says nothing, as while orbiting."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Counters since the start of a run."""
+
+    seconds: float
+    """Of rendering, wall time."""
+    samples: int = 0
+    rays: int = 0
+    """Camera, bounce and shadow rays."""
+    records: int = 0
+    packet_lanes: int = 0
+    phases: Mapping[str, float] = field(default_factory=dict)
+    """Thread seconds by phase."""
+    coherence: Mapping[str, float] = field(default_factory=dict)
+    """Run length and homogeneities over the run so far: they come as ratios, not as counters."""
+
+
+def take_look(stats: Mapping[str, Any]) -> Look:
+    """The counters of a statistics dict (docs/statistics.md), finished or not."""
+    counts = stats.get("counts", {})
+    phases = stats.get("phases_s", {})
+    coherence = stats.get("coherence", {})
+    return Look(
+        seconds=float(stats.get("seconds", {}).get("render", 0.0)),
+        samples=int(counts.get("samples", 0)),
+        rays=int(counts.get("rays", 0)) + int(counts.get("shadow_rays", 0)),
+        records=int(counts.get("records", 0)),
+        packet_lanes=int(counts.get("packet_lanes", 0)),
+        phases={name: float(phases.get(name, 0.0)) for name in PHASES},
+        coherence={name: float(coherence.get(name, 0.0)) for name in COHERENCE},
+    )
+
+
+@dataclass
+class Run:
+    """One render: looks in order of time, the first of all zeros."""
+
+    looks: list[Look] = field(default_factory=lambda: [Look(0.0)])
+    stats: Mapping[str, Any] = field(default_factory=dict)
+    """The last statistics."""
+    finished: bool = False
+    held_s: float = 0.0
+    """Of its time it stood still, paused; no look counts that."""
+
+    @property
+    def last(self) -> Look:
+        """What the counters say now."""
+        return self.looks[-1]
+
+    def add(self, stats: Mapping[str, Any]) -> None:
+        """One more look."""
+        look = take_look(stats)
+        look = replace(look, seconds=look.seconds - self.held_s)
+        self.stats = stats
+        if look.seconds <= self.last.seconds:
+            return  # nothing has passed since the one before
+        self.looks.append(look)
+        if len(self.looks) > MAX_LOOKS:
+            self.looks = [*self.looks[:-1:2], look]
+
+    def continues(self, look: Look) -> bool:
+        """Whether a look can be a later one of this run: counters only go up."""
+        last = self.last
+        return (
+            not self.finished
+            and look.seconds - self.held_s >= last.seconds
+            and look.samples >= last.samples
+        )
+
+    def lane_utilisation(self) -> float:
+        """Records / (packets x lanes), 0 to 1; 0 before anything was shaded."""
+        return ratio(self.last.records, self.last.packet_lanes)
+
+    def shading_ns(self) -> float:
+        """Thread nanoseconds a record for order and shading: keys, sort, materialize and shade."""
+        seconds = sum(self.last.phases.get(name, 0.0) for name in (*SORTING, "shade"))
+        return 1e9 * ratio(seconds, self.last.records)
+
+    def run_length(self) -> float:
+        """Mean length of runs of one material, in records."""
+        return self.last.coherence.get("run_length", 0.0)
+
+
+@dataclass
+class Series:
+    """All runs of the same settings on the same picture."""
+
+    number: int
+    settings: Mapping[str, Any]
+    picture: Hashable
+    """What else decides how much there is to do: scene, edits, camera, size, seed ..."""
+    changed: str
+    """What is different from the series before."""
+    runs: list[Run] = field(default_factory=list)
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+    """What to set to have these settings again."""
+
+    @property
+    def run(self) -> Run:
+        """The newest."""
+        return self.runs[-1]
+
+    @property
+    def best(self) -> Run:
+        """The one to show: the longest, since that is the surest."""
+        return max(self.runs, key=lambda run: run.last.seconds)
+
+    def does_the_work_of(self, other: Series) -> bool:
+        """Whether both do the same work, so that times can be compared."""
+        return self.picture == other.picture and all(
+            self.settings.get(name) == other.settings.get(name) for name in WORK
+        )
+
+
+class RunLog:
+    """Sorts statistics into runs, and runs into series."""
+
+    def __init__(self) -> None:
+        self.series: list[Series] = []
+        self.pinned: Series | None = None
+        self._current: Series | None = None
+        self._count = 0
+
+    def add(
+        self,
+        stats: Mapping[str, Any],
+        settings: Mapping[str, Any],
+        picture: Hashable,
+        finished: bool = False,
+        recipe: Mapping[str, Any] | None = None,
+    ) -> Series:
+        """Takes one statistics dict; gives the series that it went into.
+
+        ``settings``: those of ``FIELDS`` that are known. ``finished``: the render is at its end.
+        ``recipe``: what to set to have them again.
+        """
+        known = {name: settings[name] for name in FIELDS if name in settings}
+        look = take_look(stats)
+        series = self._current
+        if series is None or series.settings != known or series.picture != picture:
+            self._end_run()
+            series = self._series_of(known, picture)
+            series.recipe = recipe or known
+            series.runs.append(Run())
+        elif not series.run.continues(look):
+            if series.run.finished and look.samples == series.run.last.samples:
+                return series  # the last statistics of a finished run, once more
+            self._end_run()
+            if series not in self.series:
+                self.series.append(series)
+            series.runs.append(Run())
+        self._current = series
+        series.run.add(stats)
+        series.run.finished = finished
+        return series
+
+    def finish(self) -> bool:
+        """The render that goes on came to its end; False where that was known."""
+        if self._current is None or self._current.run.finished:
+            return False
+        self._current.run.finished = True
+        return True
+
+    def hold(self, seconds: float) -> None:
+        """The render that goes on stood still for so long since the last look."""
+        if self._current is not None and not self._current.run.finished:
+            self._current.run.held_s += seconds
+
+    @property
+    def current(self) -> Series | None:
+        """The one that renders now, or did last."""
+        return self._current
+
+    @property
+    def base(self) -> Series | None:
+        """What others are compared with: the pinned series, else the first of this picture."""
+        if self.pinned is not None:
+            return self.pinned
+        if self._current is None:
+            return None
+        return next(
+            (one for one in self.series if one.does_the_work_of(self._current)), self._current
+        )
+
+    def pin(self, series: Series | None) -> None:
+        """Chooses what others are compared with; None: the first of the picture."""
+        self.pinned = series
+
+    def clear(self) -> None:
+        """Forgets all but the run that goes on."""
+        self.pinned = None
+        self.series = [self._current] if self._current is not None else []
+        for series in self.series:
+            series.runs = [series.run]
+            series.number, series.changed = 1, ""
+        self._count = len(self.series)
+
+    def _series_of(self, settings: Mapping[str, Any], picture: Hashable) -> Series:
+        for series in self.series:
+            if series.settings == settings and series.picture == picture:
+                return series
+        before = self._current
+        changed = ""
+        if before is not None:
+            changed = describe(differences(before.settings, settings))
+            if before.picture != picture:
+                changed = ", ".join(filter(None, ("other picture", changed)))
+        self._count += 1
+        series = Series(self._count, dict(settings), picture, changed)
+        self.series.append(series)
+        if len(self.series) > MAX_SERIES:
+            oldest = next(one for one in self.series if one is not self.pinned)
+            self.series.remove(oldest)
+        return series
+
+    def _end_run(self) -> None:
+        """Forgets the run that goes on if it was too short to mean anything."""
+        series = self._current
+        if series is None or series.run.finished or series.run.last.seconds >= SHORTEST_S:
+            return
+        series.runs.pop()
+        if not series.runs and series in self.series:
+            self.series.remove(series)
+            if self.pinned is series:
+                self.pinned = None
+
+
+def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """What of ``after`` is not as in ``before``, in the order of ``FIELDS``."""
+    return {
+        name: after[name] for name in FIELDS if name in after and before.get(name) != after[name]
+    }
+
+
+_WORDS = {
+    "lanes": "lanes",
+    "wave_size": "wave",
+    "threads": "threads",
+    "ray_order": "rays",
+    "shadow_order": "shadow rays",
+    "integrator": "",
+    "cost_weight": "cost weight",
+    "roulette_depth": "roulette from",
+    "light_selection": "lights",
+    "light_weights": "light shares",
+    "adaptive": "pixel error",
+    "min_spp": "min spp",
+    "time_limit": "seconds",
+    "policy": "",
+}
+_NUMBERS_FIRST = ("lanes", "threads")
+_AUTOMATIC = {"lanes": "widest lanes", "wave_size": "wave auto", "threads": "all threads"}
+_OFF = ("adaptive", "noise", "time_limit")
+
+
+def describe(settings: Mapping[str, Any]) -> str:
+    """Settings in few words, for labels.
+
+    >>> describe({"policy": "material", "lanes": 1, "wave_size": 0, "ray_order": "slot"})
+    'material, 1 lane, wave auto, rays slot'
+    """
+    parts = []
+    for name, value in settings.items():
+        word = _WORDS.get(name, name)
+        if value == 0 and name in _AUTOMATIC:
+            parts.append(_AUTOMATIC[name])
+        elif value == 0 and name in _OFF:
+            parts.append(f"no {word or name}")
+        elif name in _NUMBERS_FIRST:
+            parts.append(f"{value} {word[:-1] if value == 1 else word}")
+        else:
+            text = f"{value:g}" if isinstance(value, float) else str(value)
+            parts.append(f"{word} {text}".strip())
+    return ", ".join(parts)
+
+
+def labels(series: Sequence[Series]) -> list[str]:
+    """A label for each: its values of those settings that are not the same in all.
+
+    The policy leads, since that is what is compared most; series of other pictures get a number.
+    """
+    varying = [
+        name
+        for name in FIELDS
+        if len({repr(one.settings.get(name)) for one in series}) > 1 or name == "policy"
+    ]
+    texts = [
+        describe({name: one.settings[name] for name in varying if name in one.settings})
+        for one in series
+    ]
+    return [
+        text if texts.count(text) == 1 else f"{text} #{one.number}".strip()
+        for text, one in zip(texts, series, strict=True)
+    ]
+
+
+def ratio(above: float, below: float) -> float:
+    """Their quotient; 0 where there is nothing to divide by."""
+    return above / below if below > 0 else 0.0
+
+
+def last_of(series: Iterable[Series], count: int, keep: Series | None = None) -> list[Series]:
+    """The newest ``count``, among them ``keep`` (say, the pinned one) if it is there at all."""
+    every = list(series)
+    newest = every[-count:]
+    if keep is not None and keep in every and keep not in newest:
+        newest = [keep, *newest[1:]]
+    return newest

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of the last runs: pinned, compared, repeated, copied, saved."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFileDialog,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.scheduling.render_rounds import Rounds
+from wavecomb.gui.scheduling.run_log import RunLog, Series
+from wavecomb.gui.scheduling.run_rates import MIN_REPEATS, MIN_SECONDS
+from wavecomb.gui.scheduling.run_table import COLUMNS, LEFT, TIPS, Row, as_csv, as_text, rows
+from wavecomb.gui.table_model import Table, compact
+from wavecomb.gui.viewport.session import Session
+from wavecomb.picture.files import reason, replacing
+
+NOTE = (
+    f"Rates are over the whole time in which the settings held; in brackets: less than "
+    f"{MIN_SECONDS:g} s or too few looks, so that they mean nothing. Speeds are at equal samples "
+    f"of the same picture. A difference counts only when {MIN_REPEATS} repeats agree: machines "
+    "drift. For figures to publish, use wavecomb bench."
+)
+
+
+class RunsTab(QWidget):
+    """Shows a log; asks for its redrawing where it changed it.
+
+    Signals:
+        changed(): Another run was pinned, or runs were forgotten.
+    """
+
+    changed = Signal()
+
+    def __init__(self, session: Session, log: RunLog) -> None:
+        super().__init__()
+        self._session = session
+        self._log = log
+        self._rows: list[Row] = []
+        self.rounds = Rounds(session, self)
+        self.model = Table(TIPS, LEFT, self)
+        self.view = QTableView()
+        self.view.setObjectName("runs_table")
+        self.view.setAccessibleName("Runs")
+        self.view.setModel(self.model)
+        self.view.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.view.setAlternatingRowColors(True)
+        compact(self.view)
+        header = self.view.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.view.selectionModel().selectionChanged.connect(lambda *_: self._enable())
+        note = QLabel(NOTE)
+        note.setWordWrap(True)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.view, 1)
+        layout.addLayout(self._buttons())
+        layout.addWidget(note)
+        QShortcut(QKeySequence(QKeySequence.StandardKey.Copy), self.view, self.copy)
+        self.rounds.moved.connect(self._show_rounds)
+        self.rounds.ended.connect(self._end_rounds)
+        self._enable()
+
+    def _buttons(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self._made: dict[str, QPushButton] = {}
+        for name, text, tip, call in (
+            ("pin", "Pin", "Compares the others with the chosen row; again: with the first.",
+             self.pin),
+            ("repeat", "Repeat both", "Renders the settings of the base and of the chosen row (or "
+             f"the current ones) {MIN_REPEATS} times in turn, then goes back. Press again to "
+             "stop.", self.repeat),
+            ("copy", "Copy", "Copies the table as text.", self.copy),
+            ("save", "Save CSV…", "Writes all runs shown, with all settings and phases, one line "
+             "each.", self._ask_save),
+            ("clear", "Clear", "Forgets all runs but the one that goes on.", self.clear),
+        ):  # fmt: skip
+            button = QPushButton(text)
+            button.setObjectName(f"runs_{name}")
+            button.setToolTip(tip)
+            button.clicked.connect(call)
+            row.addWidget(button)
+            self._made[name] = button
+        row.addStretch(1)
+        return row
+
+    # ---- what is shown --------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Shows the log as it is."""
+        self._rows = rows(self._log)
+        colours: dict[tuple[int, int], QColor] = {}
+        for i, row in enumerate(self._rows):
+            holds = row.ratio is not None and row.ratio.holds
+            if row.ratio is not None and not holds:
+                colours.update({(i, COLUMNS.index(name)): theme.dim() for name in (
+                    "speed", "95 %", "verdict")})  # fmt: skip
+        self.model.replace(
+            [tuple((text, text) for text in row.texts) for row in self._rows],
+            bold=[i for i, row in enumerate(self._rows) if row.is_base],
+            colours=colours,
+        )
+        self._enable()
+
+    def chosen(self) -> Series | None:
+        """The series of the selected row."""
+        lines = self.view.selectionModel().selectedRows()
+        if not lines or lines[0].row() >= len(self._rows):
+            return None
+        return self._rows[lines[0].row()].series
+
+    def _enable(self) -> None:
+        chosen = self.chosen()
+        pinned = chosen is not None and chosen is self._log.pinned
+        self._made["pin"].setText("Unpin" if pinned else "Pin")
+        self._made["pin"].setEnabled(chosen is not None)
+        self._made["repeat"].setEnabled(self.rounds.running or self._pair() is not None)
+        for name in ("copy", "save", "clear"):
+            self._made[name].setEnabled(bool(self._rows))
+
+    def _pair(self) -> tuple[Series, Series] | None:
+        base, other = self._log.base, self.chosen() or self._log.current
+        if base is None or other is None or base is other:
+            return None
+        return (base, other) if base.picture == other.picture else None
+
+    # ---- what it does ---------------------------------------------------------------------------
+
+    def pin(self) -> None:
+        """Pins the chosen row, or unpins it."""
+        chosen = self.chosen()
+        self._log.pin(None if chosen is self._log.pinned else chosen)
+        self.changed.emit()
+
+    def repeat(self) -> None:
+        """Renders base and chosen in turn, or stops that."""
+        if self.rounds.running:
+            self.rounds.stop()
+            return
+        pair = self._pair()
+        if pair is not None:
+            self.rounds.start([pair[i % 2].recipe for i in range(2 * MIN_REPEATS)])
+
+    def _show_rounds(self, done: int, count: int) -> None:
+        self._made["repeat"].setText(f"Run {min(done + 1, count)} of {count}: stop")
+
+    def _end_rounds(self, whole: bool) -> None:
+        self._made["repeat"].setText("Repeat both")
+        self._enable()
+
+    def copy(self) -> None:
+        """The table as text, on the clipboard."""
+        QGuiApplication.clipboard().setText(as_text(self._rows))
+
+    def _ask_save(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(self, "Save runs", "runs.csv", "CSV (*.csv)")
+        if name:
+            self.save(name)
+
+    def save(self, path: str) -> None:
+        """Writes the runs as CSV, whole or not at all; errors become messages."""
+        text = as_csv(self._rows)
+
+        def work() -> None:
+            try:
+                with replacing(path) as part:
+                    part.write_text(text, encoding="utf-8")
+            except OSError as error:
+                raise OSError(error.errno, reason(error), path) from error
+
+        self._session.run("saving runs", work)
+
+    def clear(self) -> None:
+        """Forgets all runs but the one that goes on."""
+        self._log.clear()
+        self.changed.emit()

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Controls that show a setting and change it: no state of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QSizePolicy, QSpinBox, QWidget
+
+from wavecomb.gui.scheduling.choices import Choice, Number
+
+Changed = Callable[[str, Any], None]
+"""Called with field and value when a person chose something."""
+
+
+class _CalmWheel(QObject):
+    """Lets the wheel scroll the panel unless the control has the focus."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Passes the wheel on."""
+        is_wheel = event.type() == QEvent.Type.Wheel
+        passes = is_wheel and isinstance(watched, QWidget) and not watched.hasFocus()
+        if passes:
+            event.ignore()
+        return passes
+
+
+def calm(widget: QWidget) -> None:
+    """The wheel changes it only where it has the focus, so that scrolling restarts no render."""
+    widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    widget.installEventFilter(_CalmWheel(widget))
+
+
+class ChoiceBox(QComboBox):
+    """A setting with names to choose from; 0 is shown as "auto"."""
+
+    def __init__(self, choice: Choice, changed: Changed, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.field = choice.field
+        self._tip = choice.tip
+        self.setObjectName(choice.field)
+        self.setAccessibleName(choice.label)
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(10)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        calm(self)
+        self.fill(choice.values)
+        self.currentIndexChanged.connect(lambda index: self._retell())
+        self.activated.connect(lambda index: changed(self.field, self.itemData(index)))
+
+    def fill(self, values: Mapping[Any, str]) -> None:
+        """Offers these values."""
+        with QSignalBlocker(self):
+            self.clear()
+            for value, tip in values.items():
+                self.add(value, value_text(value), tip)
+        self._retell()
+
+    def add(self, value: Any, text: str, tip: str) -> None:
+        """Offers one more value."""
+        self.addItem(text, value)
+        self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
+
+    def show_value(self, value: Any) -> None:
+        """Shows what is set, without changing anything; a value that is not offered is added."""
+        index = self.find(value)
+        with QSignalBlocker(self):
+            if index < 0:
+                self.add(value, value_text(value), "Set elsewhere.")
+                index = self.count() - 1
+            self.setCurrentIndex(index)
+        self._retell()
+
+    def find(self, value: Any) -> int:
+        """The index of a value, -1 where it is not offered."""
+        for index in range(self.count()):
+            data = self.itemData(index)
+            if data is value or (type(data) is type(value) and data == value):
+                return index
+        return -1
+
+    def _retell(self) -> None:
+        now = self.itemData(self.currentIndex(), Qt.ItemDataRole.ToolTipRole)
+        text = f"{self._tip}\n\n{self.currentText()}: {now}" if now else self._tip
+        self.setToolTip(text)
+        self.setAccessibleDescription(text)
+
+
+def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
+    """A setting that is a number; it counts when typing is done."""
+    box: QSpinBox | QDoubleSpinBox
+    if number.decimals:
+        box = QDoubleSpinBox()
+        box.setDecimals(number.decimals)
+        box.setRange(number.least, number.most)
+        box.setSingleStep(number.step)
+    else:
+        box = QSpinBox()
+        box.setRange(int(number.least), int(number.most))
+        box.setSingleStep(int(number.step))
+        box.setGroupSeparatorShown(True)
+    box.setObjectName(number.field)
+    box.setAccessibleName(number.label)
+    box.setToolTip(number.tip + (f" 0: {number.zero}." if number.zero else ""))
+    box.setSpecialValueText(number.zero)
+    box.setSuffix(number.suffix)
+    box.setKeyboardTracking(False)
+    box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+    calm(box)
+    box.valueChanged.connect(lambda value: changed(number.field, value))
+    return box
+
+
+def show_number(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
+    """Shows what is set, without changing anything."""
+    with QSignalBlocker(box):
+        if isinstance(box, QSpinBox):
+            box.setValue(int(value))
+        else:
+            box.setValue(value)
+
+
+def value_text(value: Any) -> str:
+    """A value for people.
+
+    >>> value_text(0), value_text(65536), value_text("slot")
+    ('auto', '65\u202f536', 'slot')
+    """
+    if isinstance(value, int):
+        return "auto" if value == 0 else f"{value:,}".replace(",", "\u202f")
+    return str(value)

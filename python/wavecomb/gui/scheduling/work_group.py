@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The amount of work: roulette, choice of lights and adaptive sampling."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QWidget
+
+from wavecomb.gui.scheduling import choices
+from wavecomb.gui.scheduling.choices import Choice
+from wavecomb.gui.scheduling.setting_controls import ChoiceBox, number_box, show_number
+from wavecomb.gui.viewport.session import Session, Setup
+
+NUMBERS = (
+    choices.ROULETTE_DEPTH,
+    choices.SPP,
+    choices.PIXEL_ERROR,
+    choices.NOISE,
+    choices.MIN_SPP,
+    choices.TIME_LIMIT,
+)
+_MODE = Choice("adaptive_mode", "Adaptive", "How samples are spread.", choices.ADAPTIVE_MODES)
+_FIRST = {"adaptive": 0.02, "noise": 0.02}
+"""What a target is when it is first switched on."""
+
+
+class WorkGroup(QGroupBox):
+    """Settings that change how much is done, and so the noise."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__("Amount of work", parent)
+        self._session = session
+        self._targets = dict(_FIRST)
+        form = QFormLayout(self)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        note = QLabel("These change the noise, and not what the picture converges to.")
+        note.setWordWrap(True)
+        form.addRow(note)
+        self._roulette = ChoiceBox(choices.ROULETTE, self._choose)
+        self._lights = ChoiceBox(choices.LIGHT_SELECTION, self._choose)
+        self._weights = ChoiceBox(choices.LIGHT_WEIGHTS, self._choose)
+        self._mode = ChoiceBox(_MODE, self._choose_mode)
+        self._numbers = {number.field: number_box(number, self._choose) for number in NUMBERS}
+        labels = {number.field: number.label for number in NUMBERS}
+
+        def add(label: str, widget: QWidget) -> None:
+            text = QLabel(label)
+            text.setBuddy(widget)
+            text.setToolTip(widget.toolTip())
+            form.addRow(text, widget)
+
+        add("Roulette", self._roulette)
+        add(labels["roulette_depth"], self._numbers["roulette_depth"])
+        add("Lights", self._lights)
+        add("Light shares", self._weights)
+        add("Adaptive", self._mode)
+        for field in ("adaptive", "noise", "min_spp", "spp", "time_limit"):
+            add(labels[field], self._numbers[field])
+        session.setup_changed.connect(self._show)
+        self._show(session.setup)
+
+    def _choose(self, field: str, value: Any) -> None:
+        if not self._session.change(**{field: value}):
+            self._show(self._session.setup)
+
+    def _choose_mode(self, field: str, mode: str) -> None:
+        values: dict[str, Any] = {
+            "adaptive": self._targets["adaptive"] if mode == "pixel" else 0.0,
+            "noise": self._targets["noise"] if mode == "noise" else 0.0,
+        }
+        setup = self._session.setup
+        if mode != "off" and setup.spp < setup.min_spp:
+            values["min_spp"] = setup.spp  # or the core refuses it
+        if not self._session.change(**values):
+            self._show(setup)
+
+    def _show(self, setup: Setup) -> None:
+        self._roulette.show_value(setup.roulette)
+        self._lights.show_value(setup.light_selection)
+        self._weights.show_value(setup.light_weights)
+        self._mode.show_value(mode_of(setup))
+        for field in _FIRST:
+            if getattr(setup, field):
+                self._targets[field] = getattr(setup, field)
+        is_adaptive = bool(setup.adaptive or setup.noise)
+        for field, box in self._numbers.items():
+            show_number(box, self._targets.get(field) or getattr(setup, field))
+        self._numbers["roulette_depth"].setEnabled(setup.roulette != "off")
+        self._numbers["adaptive"].setEnabled(bool(setup.adaptive))
+        self._numbers["noise"].setEnabled(bool(setup.noise))
+        self._numbers["min_spp"].setEnabled(is_adaptive)
+
+
+def mode_of(setup: Setup) -> str:
+    """Which of the two targets is set; the core takes one of them."""
+    return "pixel" if setup.adaptive else "noise" if setup.noise else "off"

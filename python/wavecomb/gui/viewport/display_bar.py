@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the picture is shown: layer, exposure, view, range of false colours, zoom."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QLabel,
+    QSizePolicy,
+    QSlider,
+    QToolBar,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.viewport import display, ocio
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.gui.viewport.viewport import Viewport
+from wavecomb.gui.widgets import caption, choice, named, real, set_quietly
+from wavecomb.run import aovs as aov_names
+
+EXPOSURE = 10.0
+"""Stops, to both sides."""
+_TITLES = {
+    "beauty": "Beauty",
+    "denoised": "Denoised",
+    "albedo": "Albedo",
+    "normal": "Normal",
+    "depth": "Depth",
+    "direct": "Direct light",
+    "indirect": "Indirect light",
+    "emission": "Emission",
+    "cost": "Cost per pixel",
+    "samples": "Samples",
+    "error": "Error",
+    "variance": "Variance",
+    "position": "Position",
+    "uv": "Texture coordinates",
+    "material_id": "Materials",
+    "instance_id": "Instances",
+    "crypto_object": "Objects (Cryptomatte)",
+    "crypto_material": "Materials (Cryptomatte)",
+    "crypto_asset": "Assets (Cryptomatte)",
+}
+_ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
+
+
+class DisplayBar(QToolBar):
+    """Controls of what the viewport shows. Choosing a layer that is not kept restarts the render.
+
+    Attributes:
+        layer: Which layer.
+        exposure: In stops.
+        view: Tone mapping.
+    """
+
+    def __init__(self, session: Session, viewport: Viewport, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("display")
+        self._session, self._viewport = session, viewport
+        self._denoising = session.setup.denoise
+        self.layer = choice(
+            "display.layer",
+            "Layer",
+            "Which layer is shown; one that is not kept yet starts the render again",
+            [],
+            lambda text: self.choose_layer(self.layer.currentData()),
+        )
+        self._fill_layers(())
+        self.exposure = real(
+            "display.exposure",
+            "Exposure",
+            "Stops: each doubles the light.  [ and ] change it, \\ resets it",
+            -EXPOSURE, EXPOSURE, 0.25, 0.0, self.set_exposure,
+        )  # fmt: skip
+        self.exposure.setSuffix(" EV")
+        self.slider = named(
+            QSlider(Qt.Orientation.Horizontal), "display.exposure_slider", "Exposure slider",
+            "Exposure in stops",
+        )  # fmt: skip
+        self.slider.setRange(round(-EXPOSURE * 20), round(EXPOSURE * 20))
+        self.slider.setPageStep(20)
+        self.slider.setMinimumWidth(theme.em(3))
+        self.slider.valueChanged.connect(lambda value: self.set_exposure(value / 20))
+        self.view = choice(
+            "display.view",
+            "View",
+            "How light becomes colour: Linear (as `wavecomb render --png`), Neutral (highlights "
+            "rolled off), or a view of OpenColorIO; $OCIO chooses the configuration",
+            display.views(),
+            self.set_view,
+        )
+        for box, letters in ((self.layer, 10), (self.view, 8)):
+            box.setSizeAdjustPolicy(
+                QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            )
+            box.setMinimumContentsLength(letters)
+            box.view().setTextElideMode(Qt.TextElideMode.ElideNone)
+        self.automatic = named(
+            QCheckBox("Auto range"), "display.auto", "Automatic range",
+            "False colours from the picture's least to its greatest value",
+        )  # fmt: skip
+        self.automatic.setChecked(True)
+        self.automatic.toggled.connect(self._range_changed)
+        self.low = self._bound("display.low", "Least value of the false colours")
+        self.high = self._bound("display.high", "Greatest value of the false colours")
+        self.zoom = choice(
+            "display.zoom",
+            "Zoom",
+            "Device pixels a pixel; Ctrl+wheel zooms, right drag shifts the picture",
+            _ZOOMS,
+            self._zoom_chosen,
+        )
+        self.zoom.setEditable(False)
+        self._lay_out()
+        viewport.zoom_changed.connect(self._zoom_changed)
+        viewport.shown.connect(self._shown)
+        session.setup_changed.connect(self._setup_changed)
+        session.frame.connect(self._refresh)
+        if session.setup.denoise:
+            self._apply(layer="denoised")
+            self.layer.setCurrentIndex(self.layer.findData("denoised"))
+        self._update_range()
+
+    def _bound(self, name: str, title: str) -> QDoubleSpinBox:
+        def changed(value: float) -> None:
+            self._range_changed()
+
+        return real(name, title, title, -1e9, 1e9, 0.1, 0.0, changed, decimals=4)
+
+    def _lay_out(self) -> None:
+        self._to = QLabel(" to ")
+        self._stops = caption(" &Exposure ", self.exposure)
+        gap = QWidget()
+        gap.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._places = {
+            widget: self.addWidget(widget)
+            for widget in (
+                self.layer, self._stops, self.slider, self.exposure,
+                self.view, self.automatic, self.low, self._to, self.high, gap, self.zoom,
+            )
+        }  # fmt: skip
+
+    # ---- layers ----------------------------------------------------------------------------------
+
+    def _fill_layers(self, further: tuple[str, ...]) -> None:
+        names = ["beauty", "denoised", *(n for n in _TITLES if n not in ("beauty", "denoised"))]
+        names += [name for name in further if name not in names]
+        if [self.layer.itemData(i) for i in range(self.layer.count())] == names:
+            return
+        current = self._viewport.look.layer
+        self.layer.clear()
+        for name in names:
+            title = _TITLES.get(name, name.removeprefix("light_") + " (light group)")
+            self.layer.addItem(title, name)
+        self.layer.setCurrentIndex(max(self.layer.findData(current), 0))
+
+    def choose_layer(self, name: str) -> None:
+        """Shows a layer; asks the render for it where it is not kept."""
+        setup = self._session.setup
+        if not self._ask_for(name, setup):
+            self.layer.setCurrentIndex(max(self.layer.findData(self._viewport.look.layer), 0))
+            return
+        self.layer.setCurrentIndex(self.layer.findData(name))
+        self._apply(layer=name, low=None, high=None)
+        self.automatic.setChecked(True)
+        self._update_range()
+
+    def _ask_for(self, name: str, setup: Setup) -> bool:
+        if name == "beauty" or name in setup.aovs:
+            return True
+        if name == "denoised":
+            return setup.denoise or self._session.change(denoise=True)
+        return self._session.change(aovs=(*setup.aovs, name))
+
+    def step_layer(self, by: int) -> None:
+        """The next layer that is there already, or the one before."""
+        frame = self._session.last_frame
+        if frame is None:
+            return
+        names = [n for n in frame.names() if self.layer.findData(n) >= 0]
+        current = self._viewport.look.layer
+        at = names.index(current) if current in names else 0
+        self.choose_layer(names[(at + by) % len(names)])
+
+    def _setup_changed(self, setup: Setup) -> None:
+        """Denoising switched on or off changes what is shown of the beauty."""
+        shown = self._viewport.look.layer
+        if setup.denoise and not self._denoising and shown == "beauty":
+            self.choose_layer("denoised")
+        elif not setup.denoise and shown == "denoised":
+            self.choose_layer("beauty")
+        self._denoising = setup.denoise
+
+    def _refresh(self, frame: Frame | None) -> None:
+        scene = self._session.scene
+        groups = tuple(aov_names.LIGHT + g for g in scene.light_groups) if scene is not None else ()
+        self._fill_layers(groups if len(groups) > 1 else ())
+
+    # ---- exposure and view -----------------------------------------------------------------------
+
+    def set_exposure(self, stops: float) -> None:
+        """In stops."""
+        stops = min(max(stops, -EXPOSURE), EXPOSURE)
+        set_quietly(self.exposure, stops)
+        self.slider.blockSignals(True)
+        self.slider.setValue(round(stops * 20))
+        self.slider.blockSignals(False)
+        self._apply(exposure=stops)
+
+    def set_view(self, name: str) -> None:
+        """Tone mapping; one that is not there is passed over."""
+        index = self.view.findText(name)
+        if index >= 0:
+            self.view.setCurrentIndex(index)
+            self._apply(view=name)
+
+    def _apply(self, **values: Any) -> None:
+        look = replace(self._viewport.look, **values)
+        if look != self._viewport.look:
+            self._viewport.set_look(look)
+
+    # ---- false colours ---------------------------------------------------------------------------
+
+    def _range_changed(self) -> None:
+        if self.automatic.isChecked():
+            self._apply(low=None, high=None)
+        else:
+            self._apply(low=self.low.value(), high=self.high.value())
+        self._update_range()
+
+    def _update_range(self) -> None:
+        light = display.is_light(self._viewport.look.layer)
+        coloured = self._viewport.look.layer in display.SCALARS
+        for widget in (self._stops, self.exposure, self.slider, self.view):
+            self._places[widget].setVisible(light)
+        self._places[self.automatic].setVisible(coloured)
+        for widget in (self.low, self._to, self.high):
+            self._places[widget].setVisible(coloured and not self.automatic.isChecked())
+
+    def _shown(self, frame: Frame, look: display.Look) -> None:
+        legend = self._viewport.legend()
+        if legend is not None and self.automatic.isChecked():
+            set_quietly(self.low, legend.low)
+            set_quietly(self.high, legend.high)
+
+    # ---- zoom ------------------------------------------------------------------------------------
+
+    def _zoom_chosen(self, text: str) -> None:
+        self._viewport.set_zoom(None if text == "Fit" else float(text.split()[0]) / 100.0)
+
+    def _zoom_changed(self, zoom: float) -> None:
+        text = "Fit" if self._viewport.is_fitted() else f"{zoom * 100.0:.0f} %"
+        for i in range(self.zoom.count() - 1, len(_ZOOMS) - 1, -1):
+            self.zoom.removeItem(i)
+        if self.zoom.findText(text) < 0:
+            self.zoom.addItem(text)
+        self.zoom.setCurrentText(text)
+
+    # ---- kept between runs -----------------------------------------------------------------------
+
+    def restore(self, settings: QSettings) -> None:
+        """View and exposure of the last time."""
+        self.set_view(str(settings.value("display/view", display.LINEAR)))
+        if (problem := ocio.problem()) is not None:
+            self._session.warned.emit(problem)
+
+    def keep(self, settings: QSettings) -> None:
+        """For the next time."""
+        settings.setValue("display/view", self._viewport.look.view)

@@ -1,0 +1,382 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The thread that renders: takes the newest task, ends the running one, hands out frames.
+
+Knows nothing of Qt. A task first gives a reduced picture, where the whole one would take long,
+and then the whole one, pass by pass.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.frames import Frame, enlarged, layers_of_result, layers_of_snapshot
+from wavecomb.run.faults import describe
+
+if TYPE_CHECKING:
+    from wavecomb._core import Renderer, Result, Snapshot
+    from wavecomb.usd import LoadedStage
+
+SCALES = (1, 2, 3, 4, 6, 8, 12)
+MOVING_S = 1 / 15
+"""Aim for a picture while something moves."""
+QUICK_S = 0.15
+"""A whole pass that takes longer than this has a reduced picture before it."""
+LOOK_S = 0.05
+STATISTICS_S = 0.5
+
+
+@dataclass
+class Edit:
+    """Changes to a scene, to be made together; later ones win."""
+
+    camera: dict[str, Any] | None = None
+    materials: dict[int, dict[str, Any]] = field(default_factory=dict)
+    lights: dict[int, dict[str, Any]] = field(default_factory=dict)
+
+    def add(self, other: Edit) -> None:
+        """Takes in a later edit."""
+        self.camera = other.camera or self.camera
+        for mine, others in ((self.materials, other.materials), (self.lights, other.lights)):
+            for index, values in others.items():
+                mine[index] = {**mine.get(index, {}), **values}
+
+    def __bool__(self) -> bool:
+        return bool(self.camera or self.materials or self.lights)
+
+
+@dataclass
+class Task:
+    """What to render next.
+
+    Attributes:
+        setup: Checked.
+        version: That its frames carry.
+        edit: To be made first.
+        moving: Only a reduced picture is wanted.
+        loaded: For statistics.
+        renderer: To use from now on; None: the one there is.
+    """
+
+    setup: Setup
+    version: int
+    edit: Edit = field(default_factory=Edit)
+    moving: bool = False
+    loaded: LoadedStage | None = None
+    renderer: Callable[[], Renderer] | None = None
+
+
+class Listener(Protocol):
+    """Called on the render thread."""
+
+    def on_frame(self, frame: Frame) -> None:
+        """A picture."""
+
+    def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
+        """Figures so far, docs/statistics.md, of the task with that version."""
+
+    def on_failed(self, message: str) -> None:
+        """One line; the task is given up."""
+
+    def on_ready(self, renderer: Renderer) -> None:
+        """There is a new renderer."""
+
+
+class Engine:
+    """Owns the render thread and the renderer."""
+
+    def __init__(self, listener: Listener) -> None:
+        self._listener = listener
+        self._condition = threading.Condition()
+        self._task: Task | None = None
+        self._renderer: Renderer | None = None
+        self._loaded: LoadedStage | None = None
+        self._superseded = False
+        self._working = False
+        self._closing = False
+        self._going = threading.Event()
+        self._going.set()
+        self._rate = 0.0
+        self._overhead = 0.01
+        self._thread = threading.Thread(target=self._run, name="wavecomb-render", daemon=True)
+        self._thread.start()
+
+    # ---- from any thread -----------------------------------------------------------------------
+
+    def submit(self, task: Task) -> None:
+        """Ends what runs and begins this; edits of a task that was not begun yet are kept."""
+        with self._condition:
+            before = self._task
+            if before is not None and task.renderer is None:
+                before.edit.add(task.edit)
+                task.edit = before.edit
+                task.renderer, task.loaded = before.renderer, task.loaded or before.loaded
+            self._task = task
+            self._end_running()
+            self._condition.notify_all()
+
+    def stop(self) -> None:
+        """Ends what runs; its picture is kept."""
+        with self._condition:
+            if self._task is not None:
+                self._task.moving = True  # its edits are made, a reduced picture is enough
+            self._end_running()
+
+    def _end_running(self) -> None:
+        self._superseded = True
+        if self._renderer is not None:
+            self._renderer.stop()
+
+    def pause(self) -> None:
+        """The render stands still from its next look on."""
+        self._going.clear()
+
+    def resume(self) -> None:
+        """Goes on."""
+        self._going.set()
+
+    def is_busy(self) -> bool:
+        """Whether a task is under way or waits."""
+        with self._condition:
+            return self._working or self._task is not None
+
+    @property
+    def paused(self) -> bool:
+        """Whether pause() was called last."""
+        return not self._going.is_set()
+
+    def close(self) -> None:
+        """Ends the thread."""
+        with self._condition:
+            self._closing = True
+            self._task = None
+            self._end_running()
+            self._condition.notify_all()
+        self._thread.join()
+        self._renderer = None
+        self._loaded = None
+
+    # ---- the thread ----------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._working = False
+                while self._task is None and not self._closing:
+                    self._condition.wait()
+                if self._closing:
+                    return
+                task, self._task = self._task, None
+                self._superseded = False
+                self._working = True
+            assert task is not None
+            try:
+                self._do(task)
+            except Exception as error:
+                self._listener.on_failed(describe(error))
+
+    def _do(self, task: Task) -> None:
+        if task.renderer is not None:
+            self._renderer, self._rate = None, 0.0
+            self._loaded = task.loaded
+            self._renderer = task.renderer()
+            self._listener.on_ready(self._renderer)
+        renderer = self._renderer
+        if renderer is None:
+            return
+        if task.edit:
+            _apply(renderer, task.edit)
+        scale = self._scale_for(task)
+        preview: Frame | None = None
+        if scale > 1 or task.moving:
+            preview = self._preview(renderer, task, scale)
+        if not task.moving and not self._superseded:
+            self._whole(renderer, task, preview)
+
+    def _scale_for(self, task: Task) -> int:
+        pixels = task.setup.width * task.setup.height
+        if task.setup.region is not None:
+            x0, y0, x1, y1 = task.setup.region
+            pixels = max(1, (x1 - x0) * (y1 - y0))
+        limit = MOVING_S if task.moving else QUICK_S
+        return reduced_scale(pixels, self._rate, self._overhead, limit)
+
+    def _preview(self, renderer: Renderer, task: Task, scale: int) -> Frame | None:
+        settings = task.setup.settings(scale, preview=True)
+        start = time.perf_counter()
+        result = renderer.render(settings, watcher=_Stopper(self), interval=LOOK_S)
+        if result.cancelled:
+            return None
+        self._learn(time.perf_counter() - start, int(result.samples.sum()))
+        done = {"samples_done": int(result.samples.sum()), "passes": 1, "preview": True}
+        frame = Frame(
+            result.beauty, layers_of_result(result), None, done, task.version, scale, False,
+            task.setup,
+        )  # fmt: skip
+        self._listener.on_frame(frame)
+        return frame
+
+    def _learn(self, seconds: float, samples: int) -> None:
+        """Samples a second, of short renders; slower news count at once, faster ones by halves."""
+        rate = samples / max(seconds - self._overhead, 1e-4)
+        self._rate = rate if self._rate == 0.0 else min(rate, 0.5 * (rate + self._rate))
+
+    def _whole(self, renderer: Renderer, task: Task, preview: Frame | None) -> None:
+        watch = _Watch(self, task, preview)
+        setup = task.setup
+        result = renderer.render(
+            setup.settings(), policy=setup.own_policy, costs=setup.profile, watcher=watch,
+            interval=LOOK_S,
+        )  # fmt: skip
+        if self._superseded and self._task is not None:
+            return
+        statistics = self._statistics(result)
+        self._listener.on_statistics(statistics, task.version)
+        if not result.samples.any():
+            return
+        self._listener.on_frame(self._last_frame(renderer, task, preview, result, statistics))
+
+    def _statistics(self, source: Any) -> dict[str, Any]:
+        from wavecomb.run.stats import make_stats
+
+        stage = str(self._loaded.stage_path) if self._loaded is not None else None
+        return make_stats(source, stage=stage, loaded=self._loaded)
+
+    def _last_frame(
+        self,
+        renderer: Renderer,
+        task: Task,
+        preview: Frame | None,
+        result: Result,
+        statistics: dict[str, Any],
+    ) -> Frame:
+        from wavecomb.api import picture_of
+
+        aovs = task.setup.aovs
+        picture = picture_of(result, statistics, scene=renderer.scene, aovs=aovs)
+        done = int(result.samples.sum())
+        total = done if not result.cancelled else task.setup.spp * result.samples.size
+        status = {
+            "samples_done": done,
+            "samples_total": total,
+            "passes": statistics["passes"],
+            "rays": statistics["counts"]["rays"] + statistics["counts"]["shadow_rays"],
+            "seconds": statistics["seconds"]["render"],
+            "error": statistics["error"],
+            "cancelled": result.cancelled,
+        }
+        beauty = filled(result.beauty, result.samples, preview)
+        layers = layers_of_result(result)
+        return Frame(
+            beauty, layers, None, status, task.version, 1, True, task.setup, picture
+        )  # fmt: skip
+
+
+def _apply(renderer: Renderer, edit: Edit) -> None:
+    renderer.edit(camera=edit.camera, materials=edit.materials, lights=edit.lights)
+
+
+def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> int:
+    """The least reduction by which one sample a pixel is expected within ``limit`` seconds.
+
+    Args:
+        pixels: Of the whole picture.
+        rate: Samples a second; 0: not known.
+        overhead: Of any render, seconds.
+        limit: Seconds.
+
+    >>> reduced_scale(1_000_000, 2_000_000.0, 0.01, 0.06)
+    4
+    """
+    if rate <= 0.0:
+        rate = 300_000.0
+    for scale in SCALES:
+        if overhead + pixels / scale**2 / rate <= limit:
+            return scale
+    return SCALES[-1]
+
+
+def filled(beauty: Any, samples: Any, preview: Frame | None) -> Any:
+    """The beauty with what a reduced picture shows where there are no samples."""
+    if preview is None:
+        return beauty
+    holes = samples == 0
+    if not holes.any():
+        return beauty
+    height, width = samples.shape
+    return np.where(holes[:, :, None], enlarged(preview.beauty, width, height), beauty)
+
+
+class _Stopper:
+    """Ends a render that is not wanted any more."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+
+    def progress(self, status: Mapping[str, Any]) -> str | None:
+        """Asks for a stop, or for nothing."""
+        return "stop" if self._engine._superseded else None
+
+    def snapshot(self, snapshot: Snapshot) -> None:
+        """Nobody asked for it."""
+
+
+class _Watch:
+    """What the core asks while it renders: takes frames, stands still, stops."""
+
+    def __init__(self, engine: Engine, task: Task, preview: Frame | None) -> None:
+        self._engine = engine
+        self._task = task
+        self._preview = preview
+        self._next = 0.0
+        self._next_statistics = time.perf_counter() + 0.25
+        self._begun = time.perf_counter()
+
+    def progress(self, status: Mapping[str, Any]) -> str | None:
+        """Asks for a stop or a snapshot, or for nothing."""
+        engine = self._engine
+        if engine._superseded:
+            return "stop"
+        if engine.paused or time.perf_counter() >= self._next:
+            return "snapshot" if status["samples_done"] else None
+        return None
+
+    def snapshot(self, snapshot: Snapshot) -> None:
+        """Hands out a frame, and stands still while the engine is paused."""
+        if snapshot.finished or self._engine._superseded:
+            return
+        start = time.perf_counter()
+        self._send(snapshot)
+        now = time.perf_counter()
+        # Looking costs a tenth at most, unless that were rarer than once a second.
+        pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
+        self._next = now + min(pause, 1.0)
+        while self._engine.paused and not self._engine._superseded:
+            self._engine._going.wait(0.02)
+
+    def _send(self, snapshot: Snapshot) -> None:
+        layers = layers_of_snapshot(snapshot, self._task.setup.layers())
+        beauty = filled(snapshot.beauty(), layers["samples"], self._preview)
+        status = {**snapshot.status, "paused": self._engine.paused}
+        frame = Frame(beauty, layers, None, status, self._task.version, 1, False, self._task.setup)
+        self._engine._listener.on_frame(frame)
+        now = time.perf_counter()
+        if now >= self._next_statistics or self._engine.paused:
+            self._next_statistics = now + STATISTICS_S
+            statistics = self._engine._statistics(_SoFar(snapshot))
+            self._engine._listener.on_statistics(statistics, self._task.version)
+
+
+class _SoFar:
+    """A snapshot as ``make_stats`` takes results."""
+
+    cancelled = False
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self.stats = snapshot.stats

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of one pixel: values of the layers, what is seen there, what it cost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QHeaderView,
+    QPushButton,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.session import Session
+
+_LATER_MS = 30
+_SEEN = (
+    ("object", "prim"),
+    ("material_name", "material"),
+    ("light", "light"),
+    ("instance", "instance"),
+    ("asset", "asset"),
+    ("distance", "distance"),
+    ("position", "position"),
+    ("normal", "normal"),
+    ("uv", "uv"),
+)
+
+
+def value_text(value: Any) -> str:
+    """A number, several, or a name, for people.
+
+    >>> value_text(0.25), value_text((1.0, 0.5, 2e-7)), value_text(3)
+    ('0.25', '1  0.5  2e-07', '3')
+    """
+    if isinstance(value, str):
+        return value
+    numbers = np.asarray(value).reshape(-1)
+    if numbers.dtype.kind in "iub":
+        return "  ".join(str(int(n)) for n in numbers)
+    return "  ".join(f"{float(n):.4g}" for n in numbers)
+
+
+def pixel_rows(frame: Frame, x: int, y: int) -> list[tuple[str, str]]:
+    """Names and values of all layers of a frame at a pixel of the full-size picture."""
+    column, row = frame.pixel(x, y)
+    rows = []
+    for name in frame.names():
+        array = frame.layer(name)
+        if array is not None:
+            rows.append((name, value_text(array[row, column])))
+    return rows
+
+
+def seen_rows(hit: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """Names and values of what ``Session.pick`` gave."""
+    if hit is None:
+        return [("prim", "nothing")]
+    return [(label, value_text(hit[key])) for key, label in _SEEN if hit.get(key) is not None]
+
+
+class Inspector(QWidget):
+    """Follows the cursor over the viewport, or stays at the pixel that was clicked."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("inspector")
+        self._session = session
+        self._pixel: tuple[int, int] | None = None
+        self.tree = QTreeWidget()
+        self.tree.setObjectName("inspector.values")
+        self.tree.setAccessibleName("Pixel values")
+        self.tree.setColumnCount(2)
+        self.tree.setHeaderHidden(True)
+        self.tree.setAlternatingRowColors(True)
+        self.tree.setUniformRowHeights(True)
+        self.tree.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        header = self.tree.header()
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        self.follow = QCheckBox("Follow the cursor")
+        self.follow.setObjectName("inspector.follow")
+        self.follow.setToolTip("Off: values stay those of the pixel that was clicked last")
+        self.follow.setAccessibleName("Follow the cursor")
+        self.follow.setChecked(True)
+        self.copy = QPushButton("Copy")
+        self.copy.setObjectName("inspector.copy")
+        self.copy.setToolTip("Put these values on the clipboard as text")
+        self.copy.setAccessibleName("Copy the values")
+        self.copy.clicked.connect(self._copy)
+        layout = QVBoxLayout(self)
+        margin = theme.em(0.3)
+        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.addWidget(self.tree, 1)
+        layout.addWidget(self.follow)
+        layout.addWidget(self.copy)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(_LATER_MS)
+        self._timer.timeout.connect(self._fill)
+        session.frame.connect(lambda frame: self._soon())
+
+    def hover(self, pixel: tuple[int, int] | None) -> None:
+        """The cursor is over this pixel."""
+        if self.follow.isChecked() and pixel is not None:
+            self._pixel = pixel
+            self._soon()
+
+    def pick(self, pixel: tuple[int, int]) -> None:
+        """This pixel was clicked."""
+        self._pixel = pixel
+        self._soon()
+
+    def _soon(self) -> None:
+        if not self._timer.isActive():
+            self._timer.start()
+
+    def rows(self) -> list[tuple[str, str]]:
+        """What is shown, group by group."""
+        return [
+            (item.text(0), item.text(1))
+            for i in range(self.tree.topLevelItemCount())
+            if (group := self.tree.topLevelItem(i)) is not None
+            for item in [group.child(k) for k in range(group.childCount())]
+        ]
+
+    def _fill(self) -> None:
+        frame = self._session.last_frame
+        if frame is None or self._pixel is None:
+            return
+        setup = frame.setup
+        x, y = min(self._pixel[0], setup.width - 1), min(self._pixel[1], setup.height - 1)
+        hit = self._session.pick(x + 0.5, y + 0.5)
+        groups = [
+            (f"pixel {x}, {y}", pixel_rows(frame, x, y)),
+            ("seen there", seen_rows(hit)),
+        ]
+        if self.tree.topLevelItemCount() != len(groups):
+            self.tree.clear()
+            for title, _ in groups:
+                top = QTreeWidgetItem([title, ""])
+                self.tree.addTopLevelItem(top)
+                top.setFirstColumnSpanned(True)
+                top.setExpanded(True)
+        for i, (title, rows) in enumerate(groups):
+            group: Any = self.tree.topLevelItem(i)
+            group.setText(0, title)
+            while group.childCount() > len(rows):
+                group.takeChild(group.childCount() - 1)
+            while group.childCount() < len(rows):
+                group.addChild(QTreeWidgetItem())
+            for k, (name, text) in enumerate(rows):
+                item = group.child(k)
+                item.setText(0, name)
+                item.setText(1, text)
+                item.setToolTip(1, text)
+
+    def _copy(self) -> None:
+        lines = [f"{name}\t{text}" for name, text in self.rows()]
+        QApplication.clipboard().setText("\n".join(lines))

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A live render on the UI's side: frames of the newest version only, edits while it runs."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.denoiser import Denoiser
+from wavecomb.gui.viewport.engine import Edit, Engine, Task
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.run.faults import describe
+
+if TYPE_CHECKING:
+    from wavecomb._core import Renderer
+    from wavecomb.usd import LoadedStage
+
+SETTLE_MS = 200
+"""After the last movement, the whole picture begins."""
+BURST_S = 0.15
+"""Edits that follow each other faster are a drag: reduced pictures while it lasts."""
+WAIT_S = 0.4
+"""So long may a moving picture take before the next edit ends it."""
+
+IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "stopped", "finished"
+
+
+class Live(QObject):
+    """One live render with its own settings. All methods are for the UI thread; none waits.
+
+    Attributes:
+        setup: Settings.
+        last_frame: What ``frame`` gave last.
+        version: Of scene and settings.
+        oldest: Frames of a version below this must not come to the screen any more.
+        state: What ``state_changed`` gave last.
+        renderer: The core's, or None.
+
+    Signals:
+        frame(Frame): A newer picture, of the newest version.
+        statistics(dict): docs/statistics.md, about twice a second while it renders.
+        setup_changed(Setup): Settings were changed.
+        edited(int): The scene or the settings were changed: the new version.
+        state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
+        failed(str), warned(str): One line.
+    """
+
+    frame = Signal(object)
+    statistics = Signal(object)
+    setup_changed = Signal(object)
+    edited = Signal(int)
+    state_changed = Signal(str)
+    failed = Signal(str)
+    warned = Signal(str)
+    _wake = Signal()
+
+    def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.setup = setup or Setup()
+        self.last_frame: Frame | None = None
+        self.version = 0
+        self.oldest = 0
+        self.state = IDLE
+        self.renderer: Renderer | None = None
+        self._numbers = itertools.count(1)
+        self._post: dict[str, Callable[[], None]] = {}
+        self._lock = threading.Lock()
+        self._pending = Edit()
+        self._moving = False
+        self._awaiting = False
+        self._submitted = 0.0
+        self._wake.connect(self._receive, Qt.ConnectionType.QueuedConnection)
+        self._settle = QTimer(self)
+        self._settle.setSingleShot(True)
+        self._settle.setInterval(SETTLE_MS)
+        self._settle.timeout.connect(self.settle)
+        self._engine = Engine(self)
+        self._denoiser = Denoiser(self._on_denoised, self.on_warned)
+
+    # ---- what widgets call ---------------------------------------------------------------------
+
+    def begin(self, make: Callable[[], Renderer], loaded: LoadedStage | None, edit: Edit) -> None:
+        """A new scene; ``make`` is called on the render thread."""
+        self._pending = Edit()
+        self._moving = False
+        self.renderer = None
+        self._submit(Task(self.setup, 0, edit, False, loaded, make))
+
+    def change(self, **values: Any) -> bool:
+        """Changes fields of the setup and restarts; a value that is no good is told by ``failed``.
+
+        Returns:
+            Whether it was changed.
+        """
+        try:
+            new = self.setup.changed(**values)
+            restart = (
+                self.setup.settings().to_dict() != new.settings().to_dict()
+                or new.own_policy is not self.setup.own_policy
+                or new.profile != self.setup.profile
+            )
+        except Exception as error:
+            self.failed.emit(describe(error))
+            return False
+        old, self.setup = self.setup, new
+        if new != old:
+            self.setup_changed.emit(new)
+        if restart:
+            self.restart()
+        elif new != old and self.last_frame is not None:
+            self._show(replace(self.last_frame, setup=new))
+        return True
+
+    def edit(self, edit: Edit, *, moving: bool = False) -> None:
+        """Changes the scene and restarts.
+
+        Args:
+            edit: What.
+            moving: More of the like follows: reduced pictures until ``settle``, or until nothing
+                came for a while.
+        """
+        self._pending.add(edit)
+        now = time.perf_counter()
+        self._moving = moving or now - self._submitted < BURST_S
+        if self._moving:
+            self._settle.start()
+            if self._awaiting and now - self._submitted < WAIT_S:
+                return  # the picture under way is shown first, or nothing ever would be
+        self._flush()
+
+    def settle(self) -> None:
+        """The movement has ended: the whole picture."""
+        self._settle.stop()
+        if self._moving:
+            self._moving = False
+            self._flush()
+
+    def restart(self) -> None:
+        """Begins again from the first sample."""
+        self._flush()
+
+    def pause(self) -> None:
+        """The render stands still; what is shown stays."""
+        if self.state == RENDERING:
+            self._engine.pause()
+            self._set_state(PAUSED)
+
+    def resume(self) -> None:
+        """Goes on, or begins again where the render was stopped."""
+        if self.state == PAUSED:
+            self._engine.resume()
+            self._set_state(RENDERING)
+        elif self.state == STOPPED:
+            self.restart()
+
+    def stop(self) -> None:
+        """Ends the render; the picture stays."""
+        self._settle.stop()
+        if self.state in (RENDERING, PAUSED):
+            self._set_state(STOPPED)
+            self._engine.stop()
+            self._engine.resume()
+
+    def shutdown(self) -> None:
+        """Ends the threads; takes some 10 ms."""
+        self._settle.stop()
+        self._engine.close()
+        self._denoiser.close()
+        self._post.clear()
+        self.renderer = None
+        self._set_state(IDLE)
+
+    # ---- inside --------------------------------------------------------------------------------
+
+    def _flush(self) -> None:
+        edit, self._pending = self._pending, Edit()
+        self._submit(Task(self.setup, 0, edit, self._moving))
+
+    def _submit(self, task: Task) -> None:
+        self.version = task.version = next(self._numbers)
+        # While something moves the last picture may still be on its way to the screen.
+        last = self.last_frame.version if self.last_frame is not None else self.version
+        self.oldest = last if task.moving else self.version
+        self._awaiting, self._submitted = True, time.perf_counter()
+        if self.state == PAUSED:
+            self._engine.resume()
+        self._engine.submit(task)
+        self._set_state(RENDERING)
+        self.edited.emit(self.version)
+
+    def _set_state(self, state: str) -> None:
+        if state != self.state:
+            self.state = state
+            self.state_changed.emit(state)
+
+    def _receive(self) -> None:
+        """On the UI thread: the newest of each kind of news."""
+        with self._lock:
+            post, self._post = self._post, {}
+        for news in post.values():
+            news()
+
+    def _send(self, kind: str, news: Callable[[], None]) -> None:
+        with self._lock:
+            first = not self._post
+            self._post.pop(kind, None)
+            self._post[kind] = news
+        if first:
+            self._wake.emit()
+
+    # ---- Listener, on the render thread --------------------------------------------------------
+
+    def on_frame(self, frame: Frame) -> None:
+        """A picture."""
+        self._send("frame", lambda: self._take(frame))
+
+    def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
+        """Figures; those of an older version would be taken for the newer one's."""
+
+        def take() -> None:
+            if version == self.version:
+                self.statistics.emit(statistics)
+
+        self._send("statistics", take)
+
+    def on_failed(self, message: str) -> None:
+        """An error."""
+        self._send(f"failed {message}", lambda: self._fail(message))
+
+    def on_warned(self, message: str) -> None:
+        """A warning."""
+        self._send(f"warned {message}", lambda: self.warned.emit(message))
+
+    def on_ready(self, renderer: Renderer) -> None:
+        """The renderer of a new scene."""
+        self._send("ready", lambda: setattr(self, "renderer", renderer))
+
+    def _fail(self, message: str) -> None:
+        self._awaiting = False
+        self._set_state(STOPPED)
+        self.failed.emit(message)
+
+    def _take(self, frame: Frame) -> None:
+        if frame.version != self.version:
+            return
+        self._awaiting = False
+        last = self.last_frame
+        if last is not None and last.version == frame.version and last.scale == frame.scale:
+            frame = replace(frame, denoised=last.denoised)
+        self._show(frame)
+        if frame.final and self.state == RENDERING:
+            self._set_state(FINISHED)
+        if self.setup.denoise and not self._moving:
+            self._denoiser.want(frame)
+        if self._moving and self._pending:
+            self._flush()
+
+    def _show(self, frame: Frame) -> None:
+        self.last_frame = frame
+        self.frame.emit(frame)
+
+    def _on_denoised(self, frame: Frame, denoised: Any) -> None:
+        self._send("denoised", lambda: self._take_denoised(frame, denoised))
+
+    def _take_denoised(self, frame: Frame, denoised: Any) -> None:
+        last = self.last_frame
+        if last is None or (last.version, last.scale) != (frame.version, frame.scale):
+            return
+        if self.setup.denoise:
+            self._show(replace(last, denoised=denoised))

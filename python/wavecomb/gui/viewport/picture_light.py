@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The light that says whether the picture has stayed the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import shiboken6
+from PySide6.QtCore import QPointF, QSize, Qt, QThreadPool
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.compare.picture_revision import PictureRevision
+from wavecomb.gui.compare.same_picture import (
+    PictureBook,
+    Verdict,
+    even_samples,
+    fingerprint,
+    picture_key,
+)
+from wavecomb.gui.scheduling.choices import scheduling_of
+from wavecomb.gui.viewport.session import Frame, Session
+
+WAITING = "Waits until each pixel has the samples asked for"
+
+
+class PictureLight(QWidget):
+    """Compares the bits of each finished picture with those of the settings before.
+
+    Pictures are compared where every pixel has the same number of samples, or at the end of an
+    adaptive render. Bits are hashed on another thread.
+    """
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._revision = PictureRevision(session, self)
+        self.book = PictureBook()
+        self.verdict = Verdict("none", "No picture yet")
+        self._last: Any = None
+        self._dot = _Dot()
+        self._text = QLabel()
+        self._text.setWordWrap(True)
+        self._text.setObjectName("same_picture_text")
+        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._dot, 0, Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self._text, 1)
+        self.setObjectName("same_picture")
+        self.setAccessibleName("Same picture")
+        self.setToolTip(
+            "Compares the bits of each finished picture with those of the one before it that had "
+            "the same scene, camera and samples, but another scheduling."
+        )
+        session.frame.connect(self._take)
+        session.edited.connect(self._wait)
+        theme.on_change(self._retell)
+        self._retell()
+
+    def _wait(self, version: int) -> None:
+        if self._session.stage is not None:
+            self._show(Verdict("waiting", WAITING))
+
+    def _take(self, frame: Frame) -> None:
+        samples = frame.layers.get("samples")
+        if frame.scale != 1 or samples is None or frame.status.get("preview"):
+            return
+        region = frame.setup.region
+        beauty = frame.beauty
+        if region is not None:
+            x0, y0, x1, y1 = region
+            beauty, samples = beauty[y0:y1, x0:x1], samples[y0:y1, x0:x1]
+        place: Any = even_samples(samples)
+        whole = frame.final and not frame.status.get("cancelled")
+        if not place and not whole:
+            return
+        if not place:
+            place = f"to the end, {frame.setup.spp} at most"
+        key = picture_key(vars(frame.setup), self._revision.value())
+        mine = (frame.version, place)
+        if mine == self._last:
+            return
+        self._last = mine
+        settings = scheduling_of(frame.setup)
+
+        def work() -> None:
+            mark = fingerprint(beauty) + fingerprint(samples)
+            self._session.later(lambda: self._tell(key, place, mark, settings, frame.version))
+
+        if key is None:
+            self._tell(key, place, "", settings, frame.version)
+        else:
+            QThreadPool.globalInstance().start(work)
+
+    def _tell(
+        self, key: Any, place: Any, mark: str, settings: dict[str, Any], version: int
+    ) -> None:
+        if not shiboken6.isValid(self):
+            return
+        verdict = self.book.add(key, place, mark, settings)
+        # More samples that nobody had before take back nothing of what fewer have shown.
+        weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
+        if verdict.kind == "different" or (version == self._session.version and not weaker):
+            self._show(verdict)
+
+    def _show(self, verdict: Verdict) -> None:
+        self.verdict = verdict
+        self._retell()
+
+    def _retell(self) -> None:
+        kind = self.verdict.kind
+        colour = {
+            "same": QColor("#2ea36a"),
+            "different": theme.error(),
+        }.get(kind, theme.dim())
+        self._dot.show_colour(colour, kind in ("same", "different"))
+        more = f" ({self.book.checked} checked)" if kind == "same" else ""
+        self._text.setText(self.verdict.text + more)
+        self.setAccessibleDescription(self._text.text())
+
+
+class _Dot(QWidget):
+    def __init__(self) -> None:
+        super().__init__()
+        self._colour, self._filled = QColor(), False
+
+    def show_colour(self, colour: QColor, filled: bool) -> None:
+        self._colour, self._filled = colour, filled
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(theme.em(), theme.em())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        pen = painter.pen()
+        pen.setColor(self._colour)
+        pen.setWidthF(theme.em() / 10)
+        painter.setPen(pen)
+        if self._filled:
+            painter.setBrush(self._colour)
+        radius = 0.33 * theme.em()
+        painter.drawEllipse(QPointF(theme.em() / 2, theme.em() / 2), radius, radius)

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture in a widget: zoom, shift, device pixels, a grid between large ones."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRect, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.viewport.display import Legend
+from wavecomb.gui.viewport.legend import paint_legend
+
+LEAST_ZOOM, MOST_ZOOM = 1 / 16, 64.0
+GRID_ZOOM = 10.0
+"""Device pixels a pixel from which lines are drawn between pixels."""
+
+
+class PictureView(QWidget):
+    """Shows an image of a given size in pixels; one with fewer is stretched to that size.
+
+    Signals:
+        zoom_changed(float): Device pixels a pixel.
+    """
+
+    zoom_changed = Signal(float)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._image: QImage | None = None
+        self._legend: Legend | None = None
+        self._size = QSize(1, 1)
+        self._zoom: float | None = None
+        self._shift = QPointF(0.0, 0.0)
+        self.setMinimumSize(theme.em(12), theme.em(9))
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+
+    def set_picture(self, image: QImage | None, size: QSize, legend: Legend | None = None) -> None:
+        """What to show.
+
+        Args:
+            image: None: nothing.
+            size: Of the picture, pixels; the image may be smaller.
+            legend: Of false colours.
+        """
+        self._image, self._legend = image, legend
+        if size != self._size:
+            self._size = size
+            self._keep_inside()
+            self.zoom_changed.emit(self.zoom())
+        self.update()
+
+    def image(self) -> QImage | None:
+        """What is shown."""
+        return self._image
+
+    def legend(self) -> Legend | None:
+        """Of the false colours that are shown."""
+        return self._legend
+
+    # ---- where the picture is ------------------------------------------------------------------
+
+    def zoom(self) -> float:
+        """Device pixels a pixel."""
+        return self._fitting() if self._zoom is None else self._zoom
+
+    def is_fitted(self) -> bool:
+        """Whether the whole picture is shown as large as there is room."""
+        return self._zoom is None
+
+    def set_zoom(self, zoom: float | None, about: QPointF | None = None) -> None:
+        """Sets device pixels a pixel; None: as large as there is room.
+
+        Args:
+            zoom: Kept within limits.
+            about: Point of the widget that stays; None: its centre.
+        """
+        place = about if about is not None else QPointF(self.rect().center())
+        before = self.to_picture(place)
+        self._zoom = None if zoom is None else min(max(zoom, LEAST_ZOOM), MOST_ZOOM)
+        if zoom is None:
+            self._shift = QPointF(0.0, 0.0)
+        else:
+            self._shift += place - self.from_picture(before)
+        self._keep_inside()
+        self.zoom_changed.emit(self.zoom())
+        self.update()
+
+    def shift(self, by: QPointF) -> None:
+        """Moves the picture by device-independent pixels."""
+        if self._zoom is None:
+            self._zoom = self._fitting()
+        self._shift += by
+        self._keep_inside()
+        self.update()
+
+    def picture_rect(self) -> QRectF:
+        """Of the whole picture in the widget."""
+        k = self.zoom() / self.devicePixelRatioF()
+        wide, high = self._size.width() * k, self._size.height() * k
+        middle = QPointF(self.width() / 2, self.height() / 2) + self._shift
+        corner = middle - QPointF(wide / 2, high / 2)
+        ratio = self.devicePixelRatioF()
+        # On the grid of device pixels, so that 100 % is exactly that.
+        x, y = round(corner.x() * ratio) / ratio, round(corner.y() * ratio) / ratio
+        return QRectF(x, y, wide, high)
+
+    def to_picture(self, place: QPointF) -> QPointF:
+        """A point of the widget in pixels of the picture."""
+        rect = self.picture_rect()
+        return QPointF(
+            (place.x() - rect.x()) / rect.width() * self._size.width(),
+            (place.y() - rect.y()) / rect.height() * self._size.height(),
+        )
+
+    def from_picture(self, place: QPointF) -> QPointF:
+        """A point of the picture in the widget."""
+        rect = self.picture_rect()
+        return QPointF(
+            rect.x() + place.x() / self._size.width() * rect.width(),
+            rect.y() + place.y() / self._size.height() * rect.height(),
+        )
+
+    def _fitting(self) -> float:
+        ratio = self.devicePixelRatioF()
+        room = (
+            self.width() * ratio / self._size.width(),
+            self.height() * ratio / self._size.height(),
+        )
+        return max(min(room), LEAST_ZOOM)
+
+    def _keep_inside(self) -> None:
+        """At least a bit of the picture stays in view."""
+        k = self.zoom() / self.devicePixelRatioF()
+        for get, put, size, own in (
+            (self._shift.x, self._shift.setX, self._size.width(), self.width()),
+            (self._shift.y, self._shift.setY, self._size.height(), self.height()),
+        ):
+            most = 0.5 * (size * k + own) - min(40.0, 0.5 * own)
+            put(min(max(get(), -most), most))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """The picture keeps its place."""
+        super().resizeEvent(event)
+        self._keep_inside()
+        self.zoom_changed.emit(self.zoom())
+
+    # ---- painting ------------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Surround, picture, grid, what subclasses lay over it, legend."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), theme.surround())
+        if self._image is not None:
+            rect = self.picture_rect()
+            reduced = self._image.width() < self._size.width()
+            smooth = reduced or self.zoom() < 1.0
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+            painter.drawImage(rect, self._image)
+            if self.zoom() >= GRID_ZOOM:
+                self._paint_grid(painter, event.rect())
+        self.paint_over(painter)
+        if self._image is not None and self._legend is not None:
+            paint_legend(painter, self.rect(), self._legend, self.font())
+        painter.end()
+
+    def paint_over(self, painter: QPainter) -> None:
+        """For subclasses: over the picture."""
+
+    def _paint_grid(self, painter: QPainter, dirty: QRect) -> None:
+        area = self.picture_rect().intersected(QRectF(dirty))
+        first, last = self.to_picture(area.topLeft()), self.to_picture(area.bottomRight())
+        pen = QPen(QColor(128, 128, 128, 110))
+        pen.setCosmetic(True)
+        painter.setPen(pen)
+        for column in range(int(first.x()), int(last.x()) + 2):
+            x = self.from_picture(QPointF(column, 0)).x()
+            painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
+        for row in range(int(first.y()), int(last.y()) + 2):
+            y = self.from_picture(QPointF(0, row)).y()
+            painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))

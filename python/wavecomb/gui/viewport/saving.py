@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames as the files that `wavecomb render` writes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.api import Picture
+from wavecomb.errors import WavecombError
+from wavecomb.gui.scheduling.own_policies import develop_frame
+from wavecomb.gui.viewport.denoiser import denoised_frame
+from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.picture.image import Transfer, write_png_codes
+from wavecomb.picture.output import scene_metadata
+
+if TYPE_CHECKING:
+    from wavecomb._core import Scene
+    from wavecomb.usd import LoadedStage
+
+_NAMED = ("albedo", "normal", "depth", "samples", "error", "variance")
+
+
+def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> Picture:
+    """What `wavecomb.render` would return, of a frame as it is."""
+    if frame.picture is not None:
+        return replace(frame.picture, denoised=frame.denoised)
+    stats: dict[str, Any] = {
+        "cancelled": True,
+        "settings": frame.setup.settings().to_dict(),
+        "seconds": {"render": frame.status.get("seconds", 0.0)},
+    }
+    if loaded is not None:
+        stats |= {"stage": str(loaded.stage_path), "camera": loaded.camera_path}
+    layers = dict(frame.layers)
+    named: dict[str, Any] = {name: layers.pop(name, None) for name in _NAMED}
+    return Picture(
+        beauty=frame.beauty,
+        denoised=frame.denoised,
+        stats=stats,
+        cancelled=True,
+        aovs=layers,
+        metadata=scene_metadata(scene, frame.width, frame.height),
+        chosen=frame.setup.aovs,
+        **named,
+    )
+
+
+def save_frame(
+    frame: Frame,
+    path: str,
+    scene: Scene,
+    loaded: LoadedStage | None,
+    look: Look,
+    options: dict[str, Any],
+) -> None:
+    """Writes a frame, all layers (.exr) or what is shown (.png), whole or not at all.
+
+    Args:
+        frame: At full size.
+        path: Ends in .exr or .png.
+        scene: For the camera's matrices.
+        loaded: For the header.
+        look: Of the .png.
+        options: As ``Picture.save`` has them.
+
+    Raises:
+        OSError, ValueError: The file or an option is no good; one line.
+        WavecombError: There is only a preview yet.
+    """
+    if frame.scale != 1:
+        raise WavecombError("there is only a preview yet: save again when the picture is there")
+    if frame.setup.denoise:
+        # What is shown may be of an earlier pass.
+        frame = replace(frame, denoised=denoised_frame(frame))
+    picture = picture_of_frame(frame, scene, loaded)
+    as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)
+    if not path.lower().endswith(".png"):
+        picture.save(path, **options)
+    elif as_rendered:
+        shown = picture if look.layer == "denoised" else replace(picture, denoised=None)
+        transfer: Transfer = "clamp" if look.view == LINEAR else "neutral"
+        shown.save(path, exposure=look.exposure, tone_map=transfer)
+    else:
+        write_png_codes(path, develop_frame(frame, look).pixels)

@@ -1,0 +1,512 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The stage that is open and its live render: what all panels of the window share.
+
+Contract: lives on the UI thread; no method waits. Reading, rendering, denoising and saving happen
+on other threads, and what they have to say arrives as signals.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Qt, Signal
+
+from wavecomb.gui.loader import Loader, Request, Source, copied
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.display import Look
+from wavecomb.gui.viewport.engine import Edit
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.live import Live
+from wavecomb.gui.viewport.orbit import Pose, pose_of_scene
+from wavecomb.gui.viewport.saving import save_frame
+from wavecomb.run.faults import describe
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+    from wavecomb._core import Renderer, Scene
+    from wavecomb.usd import LoadedStage, LoadReport
+
+__all__ = ["Frame", "Live", "Pose", "Session", "Setup"]
+
+RenderedBy = Callable[["Scene", int], "Renderer"]
+
+
+class Session(QObject):
+    """A stage and its live render.
+
+    Signals:
+        opened(LoadedStage): A stage was read, or read again after a change of what is in it.
+        closing(): The USD stage is about to be read again from the disk: let go of its prims.
+        frame(Frame): A picture, of the newest version only; an exact one has ``final``.
+        statistics(dict): docs/statistics.md, about twice a second while it renders.
+        setup_changed(Setup): Settings were changed.
+        edited(int): The new version, after every change.
+        state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
+        busy(str): What goes on beside rendering; "": nothing.
+        failed(str): One line that says what to do.
+        warned(str): One line.
+        camera_changed(Pose): The camera moved, or another was chosen.
+        selected(str | None): Path of the prim that was chosen, in the picture or elsewhere.
+        saved(str): A file was written.
+        noted(LoadedStage): Its report says more than before.
+
+    Attributes:
+        stage: What was read, or None.
+        usd: The stage as USD has it, or None; edits go to its session layer, then ``rebuild``.
+        up_axis: "X", "Y" or "Z".
+        pose: The camera, or None.
+        selection: What ``selected`` gave last.
+        material_edits: What ``edit_material`` changed, by the material's name.
+        light_edits: What ``edit_light`` changed, by the light's name and its number among those of
+            that name.
+    """
+
+    opened = Signal(object)
+    closing = Signal()
+    frame = Signal(object)
+    statistics = Signal(object)
+    setup_changed = Signal(object)
+    edited = Signal(int)
+    state_changed = Signal(str)
+    busy = Signal(str)
+    failed = Signal(str)
+    warned = Signal(str)
+    camera_changed = Signal(object)
+    selected = Signal(object)
+    saved = Signal(str)
+    noted = Signal(object)
+    _call = Signal(object)
+
+    def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.stage: LoadedStage | None = None
+        self.usd: Usd.Stage | None = None
+        self.up_axis = "Y"
+        self.pose: Pose | None = None
+        self.material_edits: dict[str, dict[str, Any]] = {}
+        self.light_edits: dict[tuple[str, int], dict[str, Any]] = {}
+        self.selection: str | None = None
+        self._live = Live(setup, self)
+        for name in ("frame", "statistics", "setup_changed", "edited", "state_changed"):
+            getattr(self._live, name).connect(getattr(self, name))
+        self._live.failed.connect(self.failed)
+        self._live.warned.connect(self.warned)
+        self._call.connect(lambda call: call(), Qt.ConnectionType.QueuedConnection)
+        self._loader = Loader(self._on_read, self._on_read_failed)
+        self._request: Request | None = None
+        self._request_wanted: Request | None = None
+        self._jobs: list[tuple[str, str]] = []
+        self._twins: list[Live] = []
+        self._closed = False
+
+    # ---- what there is -------------------------------------------------------------------------
+
+    @property
+    def setup(self) -> Setup:
+        """Settings of the live render."""
+        return self._live.setup
+
+    @property
+    def version(self) -> int:
+        """Of scene and setup; every change has a higher one."""
+        return self._live.version
+
+    @property
+    def oldest(self) -> int:
+        """Frames of a version below this must not come to the screen any more."""
+        return self._live.oldest
+
+    @property
+    def last_frame(self) -> Frame | None:
+        """What ``frame`` gave last."""
+        return self._live.last_frame
+
+    @property
+    def state(self) -> str:
+        """What ``state_changed`` gave last."""
+        return self._live.state
+
+    @property
+    def scene(self) -> Scene | None:
+        """The core's scene as edited, or None; ``Scene.material(i)`` and ``light(i)`` read it."""
+        renderer = self._live.renderer
+        if renderer is not None:
+            return renderer.scene
+        return self.stage.scene if self.stage is not None else None
+
+    @property
+    def path(self) -> Path | None:
+        """The stage's file."""
+        return self.stage.stage_path if self.stage is not None else None
+
+    @property
+    def source(self) -> Source | None:
+        """How the stage was asked for."""
+        return self._request.source if self._request is not None else None
+
+    # ---- stages --------------------------------------------------------------------------------
+
+    def open(
+        self,
+        path: str | os.PathLike[str],
+        camera: str | None = None,
+        time: float | None = None,
+        variants: Mapping[str, str] | None = None,
+        purposes: tuple[str, ...] | None = None,
+    ) -> None:
+        """Reads a stage; ``opened`` or ``failed`` follows. What is open stays until then."""
+        source = Source(Path(path), camera, time, variants, purposes)
+        self._read(Request(source, threads=self.setup.threads), f"reading {source.path.name}")
+
+    def reload(self) -> None:
+        """Reads the stage from the disk again; edits made here are dropped, the camera stays."""
+        if self._request is None or self.stage is None:
+            self.failed.emit("there is no stage to read again: open one first")
+            return
+        usd = self.usd
+        if usd is None:
+            return  # it is being read
+        usd.GetSessionLayer().Clear()
+        self.usd = None
+        self.closing.emit()
+        source = self._request.source
+        name = source.path.name
+        request = Request(source, usd, None, True, self.setup.threads)
+        self._read(request, f"reading {name} again")
+
+    def rebuild(self, reason: str) -> None:
+        """Reads the stage again after edits of the session layer of ``usd``; keeps the camera.
+
+        Args:
+            reason: What was changed, for people: "variant of /World/Car".
+        """
+        if self._request is None or self.usd is None:
+            return
+        overrides = copied(self.usd.GetSessionLayer())
+        request = Request(self._request.source, self.usd, overrides, False, self.setup.threads)
+        self._read(request, reason)
+
+    def _read(self, request: Request, what: str) -> None:
+        if request.usd is not None and self.stage is not None:
+            request = replace(request, textures=self.stage.textures)
+        request = replace(request, size=(self.setup.width, self.setup.height))
+        self._request_wanted = request
+        self._work("load", what)
+        self._loader.want(request)
+
+    def _on_read(self, request: Request, usd: Usd.Stage, loaded: LoadedStage) -> None:
+        self._call.emit(lambda: self._take(request, usd, loaded))
+
+    def _on_read_failed(self, request: Request, message: str) -> None:
+        self._call.emit(lambda: self._take_failure(request, message))
+
+    def _take(self, request: Request, usd: Usd.Stage, loaded: LoadedStage) -> None:
+        if self._closed or request is not self._request_wanted:
+            return  # a newer one is under way
+        from pxr import UsdGeom
+
+        again = request.usd is not None
+        if not again or request.fresh:
+            self.material_edits.clear()
+            self.light_edits.clear()
+        self._request, self.usd, self.stage = request, usd, loaded
+        if not again:
+            self.select(None)
+        usd.SetEditTarget(usd.GetSessionLayer())
+        self.up_axis = str(UsdGeom.GetStageUpAxis(usd))
+        read = pose_of_scene(loaded.scene.camera, loaded.camera_path)
+        kept = again and self.pose is not None and self.pose.path is None
+        if not kept:
+            if again and self.pose is not None and self.pose.path is not None:
+                read = self._pose_of(self.pose.path) or read
+            self.pose = read
+        edit = self._edits_again(loaded.scene)
+        edit.camera = self.pose.options() if self.pose is not None else None
+        threads, scene = self.setup.threads, loaded.scene
+        for live in (self._live, *self._twins):
+            live.begin(lambda: make_renderer(scene, threads), loaded, edit)
+        self._done("load")
+        self.opened.emit(loaded)
+        self.camera_changed.emit(self.pose)
+        for line in loaded.scene.warnings:
+            self.warned.emit(line)
+
+    def _take_failure(self, request: Request, message: str) -> None:
+        if self._closed or request is not self._request_wanted:
+            return
+        self._done("load")
+        if request.fresh and request.usd is not None:
+            self.usd = request.usd
+            self.opened.emit(self.stage)
+        self.failed.emit(message)
+
+    def _edits_again(self, scene: Scene) -> Edit:
+        """Edits made here, for the numbers of a scene that was read again."""
+        numbers = {name: i for i, (name, _) in enumerate(scene.materials)}
+        edit = Edit()
+        for name, values in self.material_edits.items():
+            if name in numbers:
+                edit.materials[numbers[name]] = dict(values)
+        for i in range(len(scene.lights)):
+            values = self.light_edits.get(light_key(scene, i), {})
+            if values:
+                edit.lights[i] = dict(values)
+        return edit
+
+    def note_words(self, report: LoadReport | None) -> None:
+        """Adds what USD said meanwhile to the report of the stage that is open."""
+        if report is not None and self.stage is not None:
+            self.stage.report.absorb(report)
+            self.noted.emit(self.stage)
+
+    # ---- settings, camera, materials, lights ----------------------------------------------------
+
+    def change(self, **values: Any) -> bool:
+        """Changes fields of the setup and restarts; a bad value ends in ``failed``, nothing else.
+
+        Returns:
+            Whether the setup was changed.
+        """
+        return self._live.change(**values)
+
+    def set_camera(self, pose: Pose, *, moving: bool = False) -> None:
+        """Looks from elsewhere.
+
+        Args:
+            pose: From where; its ``path`` is None unless it is a camera prim as authored.
+            moving: More follows at once: pictures are reduced until ``settle``.
+        """
+        self.pose = pose
+        self._edit(Edit(camera=pose.options()), moving)
+        self.camera_changed.emit(pose)
+
+    def settle(self) -> None:
+        """A movement has ended."""
+        for live in (self._live, *self._twins):
+            live.settle()
+
+    def use_camera(self, path: str | None) -> None:
+        """Looks through a camera prim; None: a free camera where the view is now."""
+        if self.pose is None:
+            return
+        if path is None:
+            self.pose = replace(self.pose, path=None)
+            self.camera_changed.emit(self.pose)
+            return
+        pose = self._pose_of(path)
+        if pose is None:
+            self.failed.emit(f"camera {path}: cannot be looked through; choose another")
+            return
+        self.set_camera(pose)
+
+    def _pose_of(self, path: str) -> Pose | None:
+        from pxr import Sdf, UsdGeom
+
+        from wavecomb.usd.cameras.camera import read_camera
+        from wavecomb.usd.stage.report import LoadReport
+        from wavecomb.usd.stage.times import time_code
+
+        if self.usd is None or self._request is None or not Sdf.Path.IsValidPathString(path):
+            return None
+        prim = self.usd.GetPrimAtPath(path)
+        if not prim or not prim.IsA(UsdGeom.Camera):
+            return None
+        time: Usd.TimeCode = time_code(self.usd, self._request.source.time)
+        to_world = np.array(UsdGeom.XformCache(time).GetLocalToWorldTransform(prim))
+        view = read_camera(prim, to_world, time, LoadReport())
+        return None if view is None else Pose(view.transform, path=path, **view.options)
+
+    def edit_material(self, material: int, *, moving: bool = False, **values: Any) -> None:
+        """Changes parameters of a material by number: keyword arguments of ``add_material``."""
+        if self.scene is None:
+            return
+        name = self.scene.materials[material][0]
+        self.material_edits.setdefault(name, {}).update(values)
+        self._edit(Edit(materials={material: values}), moving)
+
+    def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
+        """Changes parameters of a light by number: keyword arguments of ``add_light``."""
+        if self.scene is None:
+            return
+        self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
+        self._edit(Edit(lights={light: values}), moving)
+
+    def _edit(self, edit: Edit, moving: bool) -> None:
+        for live in (self._live, *self._twins):
+            live.edit(Edit(edit.camera, dict(edit.materials), dict(edit.lights)), moving=moving)
+
+    # ---- the render ------------------------------------------------------------------------------
+
+    def pick(self, x: float, y: float) -> dict[str, Any] | None:
+        """What is seen at (x, y) in pixels of the full-size picture; None: nothing, or no scene."""
+        renderer = self._live.renderer
+        if renderer is None:
+            return None
+        return renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
+
+    def select(self, path: str | None) -> None:
+        """Chooses a prim by its path; None: nothing."""
+        if path != self.selection:
+            self.selection = path
+            self.selected.emit(path)
+
+    def selected_bounds(self) -> NDArray[np.float64] | None:
+        """Least and greatest corner of the selected prim in world space, (2, 3), or None."""
+        if self.selection is None or self.usd is None or self._request is None:
+            return None
+        return prim_bounds(self.usd, self.selection, self._request.source.time)
+
+    def pause(self) -> None:
+        """The render and its twins stand still."""
+        for live in (self._live, *self._twins):
+            live.pause()
+
+    def resume(self) -> None:
+        """Goes on, or begins again where it was stopped; so do twins."""
+        for live in (self._live, *self._twins):
+            live.resume()
+
+    def stop(self) -> None:
+        """Ends the render; the picture stays."""
+        self._live.stop()
+
+    def restart(self) -> None:
+        """Begins again from the first sample."""
+        if self.stage is not None:
+            self._live.restart()
+
+    def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
+        """Writes all layers (.exr) or what is shown (.png); ``saved`` or ``failed`` follows.
+
+        Args:
+            path: Ends in .exr or .png.
+            look: How it is shown; None: the beauty as it is.
+            **options: As ``Picture.save`` has them.
+        """
+        frame = self.last_frame
+        if frame is None or self.scene is None:
+            self.failed.emit("there is no picture to save yet: open a stage first")
+            return
+        scene, stage, name = self.scene, self.stage, os.fspath(path)
+
+        def work() -> None:
+            save_frame(frame, name, scene, stage, look or Look(), options)
+            self._call.emit(lambda: self.saved.emit(name))
+
+        self.run(f"writing {Path(name).name}", work)
+
+    def twin(self, setup: Setup) -> Live:
+        """A second live render of the same scene and camera, with settings of its own.
+
+        It follows all edits. Give it back with ``drop_twin``.
+        """
+        live = Live(setup, self)
+        self._twins.append(live)
+        renderer = self._live.renderer
+        if renderer is not None:
+            edit = Edit(camera=self.pose.options() if self.pose is not None else None)
+            live.begin(renderer.twin, self.stage, edit)
+        return live
+
+    def drop_twin(self, live: Live) -> None:
+        """Ends a twin."""
+        if live in self._twins:
+            self._twins.remove(live)
+            live.shutdown()
+            live.deleteLater()
+
+    # ---- other threads ---------------------------------------------------------------------------
+
+    def run(self, what: str, work: Callable[[], None]) -> None:
+        """Does something on a thread; an exception ends in ``failed``.
+
+        Args:
+            what: For ``busy``: "writing a.exr".
+            work: Must touch no widget; use ``later`` for what follows.
+        """
+        key = f"{what} {id(work)}"
+
+        def body() -> None:
+            try:
+                work()
+            except Exception as error:
+                message = describe(error)
+                self.later(lambda: self.failed.emit(message))
+            self.later(lambda: self._done(key))
+
+        self._work(key, what)
+        threading.Thread(target=body, name="wavecomb-work", daemon=True).start()
+
+    def later(self, call: Callable[[], None]) -> None:
+        """Runs something on the UI thread soon; to be called from any thread."""
+        # Where the window is gone there is nobody to be told.
+        with contextlib.suppress(RuntimeError):
+            self._call.emit(call)
+
+    def _work(self, key: str, what: str) -> None:
+        self._jobs = [job for job in self._jobs if job[0] != key] + [(key, what)]
+        self.busy.emit(what)
+
+    def _done(self, key: str) -> None:
+        self._jobs = [job for job in self._jobs if job[0] != key]
+        self.busy.emit(self._jobs[-1][1] if self._jobs else "")
+
+    def shutdown(self) -> None:
+        """Ends all threads."""
+        if self._closed:
+            return
+        self._closed = True
+        for live in (*self._twins, self._live):
+            live.shutdown()
+        self._twins.clear()
+        self._loader.close()
+        self.stage = self.usd = None
+
+
+def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.float64] | None:
+    """World bounds of a prim, (2, 3); None where it has none.
+
+    Args:
+        usd: The stage.
+        path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
+            "/World/Forest".
+        time: Time code; None: the stage's start.
+    """
+    from pxr import Sdf, UsdGeom
+
+    from wavecomb.usd.stage.times import time_code
+
+    plain = path.partition("[")[0]
+    if not Sdf.Path.IsValidPathString(plain):
+        return None
+    prim = usd.GetPrimAtPath(plain)
+    if not prim:
+        return None
+    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+    box = UsdGeom.BBoxCache(time_code(usd, time), purposes).ComputeWorldBound(prim)
+    aligned = box.ComputeAlignedRange()
+    if aligned.IsEmpty():
+        return None
+    return np.array([aligned.GetMin(), aligned.GetMax()], np.float64)
+
+
+def light_key(scene: Scene, index: int) -> tuple[str, int]:
+    """A light by its name and its number among those of that name."""
+    names = [name for name, _ in scene.lights[: index + 1]]
+    return names[-1], names.count(names[-1]) - 1
+
+
+def make_renderer(scene: Scene, threads: int) -> Renderer:
+    """The core's renderer."""
+    from wavecomb import _core
+
+    return _core.Renderer(scene, threads)

@@ -1,0 +1,411 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The live picture, and the hand that moves its camera."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+
+import numpy as np
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPen,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.scheduling.own_policies import Developer
+from wavecomb.gui.viewport import navigate
+from wavecomb.gui.viewport.display import Look, Shown
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.orbit import Pose, Vector
+from wavecomb.gui.viewport.picture_view import PictureView
+from wavecomb.gui.viewport.session import Session
+from wavecomb.usd.cameras.framing import corners
+
+ORBIT_RADIANS = 0.008
+"""Of turning for each device-independent pixel: half a turn is some 400."""
+DOLLY_STEP = 0.88
+"""Of the distance, for a notch of the wheel."""
+ZOOM_STEP = 1.25
+KEY_RADIANS = np.radians(15.0)
+CLICK_PIXELS = 4
+
+EMPTY = (
+    "Open a stage: Ctrl+O, or drop a USD file here\n\n"
+    "wavecomb scene cornell -o cornell.usda   writes one to begin with"
+)
+
+
+class Drag(Enum):
+    """What a pressed button does."""
+
+    NONE = auto()
+    ORBIT = auto()
+    PAN = auto()
+    DOLLY = auto()
+    SHIFT = auto()
+    REGION = auto()
+    PICK = auto()
+
+
+Left, Middle, Right = (
+    Qt.MouseButton.LeftButton,
+    Qt.MouseButton.MiddleButton,
+    Qt.MouseButton.RightButton,
+)
+Alt, Control, Shift = (
+    Qt.KeyboardModifier.AltModifier,
+    Qt.KeyboardModifier.ControlModifier,
+    Qt.KeyboardModifier.ShiftModifier,
+)
+
+
+def drag_of(button: Qt.MouseButton, modifiers: Qt.KeyboardModifier) -> Drag:
+    """As in Blender (middle button) and usdview (Alt)."""
+    if button == Middle:
+        if modifiers & Shift:
+            return Drag.PAN
+        return Drag.DOLLY if modifiers & Control else Drag.ORBIT
+    if modifiers & Alt:
+        return {Left: Drag.ORBIT, Right: Drag.DOLLY}.get(button, Drag.NONE)
+    return {Left: Drag.PICK, Right: Drag.SHIFT}.get(button, Drag.NONE)
+
+
+class Viewport(PictureView):
+    """Shows the frames of a session and moves its camera.
+
+    Attributes:
+        look: How frames are shown.
+        frame_shown: What is on the screen, or None.
+
+    Signals:
+        hovered(object): (x, y) of the pixel under the cursor, or None.
+        picked(object): (x, y) of a pixel that was clicked.
+        shown(Frame, Look): What is on the screen now.
+        failed(str): One line.
+        region_mode_changed(bool): Whether the next drag chooses a region.
+    """
+
+    hovered = Signal(object)
+    picked = Signal(object)
+    shown = Signal(object, object)
+    failed = Signal(str)
+    region_mode_changed = Signal(bool)
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("viewport")
+        self.setAccessibleName("Viewport")
+        self.setAccessibleDescription("The live picture; arrow keys orbit, Shift+arrows pan")
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.session = session
+        self.look = Look()
+        self.frame_shown: Frame | None = None
+        self._frame: Frame | None = None
+        self._drag = Drag.NONE
+        self._last = QPointF()
+        self._pressed = QPointF()
+        self._pivot: Vector | None = None
+        self._region_mode = False
+        self._region_from: QPointF | None = None
+        self._message = EMPTY
+        self._developer = Developer(self)
+        self._developer.ready.connect(self._developed)
+        self._developer.failed.connect(self.failed)
+        session.frame.connect(self._take)
+        session.opened.connect(lambda stage: self._forget_pivot())
+        theme.on_change(self.update)
+
+    def close_threads(self) -> None:
+        """Before the window goes."""
+        self._developer.close()
+
+    def set_look(self, look: Look) -> None:
+        """Chooses layer, exposure, view."""
+        self.look = look
+        if self._frame is not None:
+            self._developer.want(self._frame, look)
+
+    def set_message(self, message: str = EMPTY) -> None:
+        """Shown where there is no picture."""
+        self._message = message
+        self.update()
+
+    def _take(self, frame: Frame) -> None:
+        self._frame = frame
+        self._developer.want(frame, self.look)
+
+    def _developed(self, frame: Frame, look: Look, shown: Shown, image: QImage) -> None:
+        if frame.version < self.session.oldest:
+            return
+        self.frame_shown = frame
+        self.set_picture(image, QSize(frame.setup.width, frame.setup.height), shown.legend)
+        self.shown.emit(frame, look)
+
+    # ---- the camera ----------------------------------------------------------------------------
+
+    def _forget_pivot(self) -> None:
+        self._pivot = None
+
+    def pivot(self) -> Vector:
+        """What the camera turns about: what was under the cursor, or the middle of the scene."""
+        if self._pivot is None:
+            bounds = self.bounds()
+            self._pivot = 0.5 * (bounds[0] + bounds[1])
+        return self._pivot
+
+    def bounds(self) -> np.ndarray:
+        """Of the scene, (2, 3)."""
+        scene = self.session.scene
+        bounds = np.array(scene.bounds if scene is not None else [[-1.0] * 3, [1.0] * 3], float)
+        if not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
+            return np.array([[-1.0] * 3, [1.0] * 3])
+        return bounds
+
+    def outline(self) -> np.ndarray:
+        """Points (n, 3) that are to be seen where all is: what is drawn, or a box about it."""
+        stage = self.session.stage
+        if stage is not None and stage.outline is not None:
+            return stage.outline
+        return corners(self.bounds())
+
+    def aspect(self) -> float:
+        """Width / height of the picture."""
+        return self.session.setup.width / self.session.setup.height
+
+    def _aim(self, place: QPointF) -> None:
+        """What is under the cursor becomes the pivot."""
+        at = self.to_picture(place)
+        hit = self.session.pick(at.x(), at.y())
+        if hit is not None and hit.get("position") is not None:
+            self._pivot = np.array(hit["position"], float)
+
+    def _pose(self) -> Pose | None:
+        return self.session.pose
+
+    def orbit(self, yaw: float, pitch: float, *, moving: bool = False) -> None:
+        """Turns about the pivot."""
+        if (pose := self._pose()) is not None:
+            up = self.session.up_axis
+            moved = navigate.orbit(pose, self.pivot(), yaw, pitch, up)
+            self.session.set_camera(moved, moving=moving)
+
+    def pan(self, across: float, upwards: float, *, moving: bool = False) -> None:
+        """Shifts by device-independent pixels."""
+        if (pose := self._pose()) is not None:
+            depth = pose.depth_of(self.pivot())
+            if depth <= 0.0:
+                depth = float(np.linalg.norm(pose.position - self.pivot())) or 1.0
+            rect = self.picture_rect()
+            size = rect.width(), rect.height()
+            moved = navigate.pan(pose, depth, across, upwards, size)
+            self.session.set_camera(moved, moving=moving)
+
+    def dolly(self, factor: float, *, moving: bool = False) -> None:
+        """Multiplies the distance to the pivot."""
+        if (pose := self._pose()) is not None:
+            self.session.set_camera(navigate.dolly(pose, self.pivot(), factor), moving=moving)
+
+    def frame_all(self) -> None:
+        """The whole scene in the picture."""
+        self._frame_points(self.outline())
+
+    def frame_selected(self) -> None:
+        """What is selected, or all."""
+        bounds = self.session.selected_bounds()
+        self._frame_points(self.outline() if bounds is None else corners(bounds))
+
+    def _frame_points(self, points: np.ndarray) -> None:
+        if (pose := self._pose()) is not None:
+            self._pivot = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            self.session.set_camera(navigate.frame(pose, points, self.aspect()))
+
+    def view_from(self, name: str) -> None:
+        """From a side: front, back, right, left, top, bottom."""
+        if (pose := self._pose()) is not None:
+            points = self.outline()
+            self._pivot = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            up = self.session.up_axis
+            self.session.set_camera(navigate.view(pose, name, points, up, self.aspect()))
+
+    def view_opposite(self) -> None:
+        """From the other side."""
+        if (pose := self._pose()) is not None:
+            up = self.session.up_axis
+            self.session.set_camera(navigate.opposite(pose, self.pivot(), up))
+
+    # ---- the region ----------------------------------------------------------------------------
+
+    def set_region_mode(self, on: bool) -> None:
+        """Whether the next drag with the left button chooses what is rendered."""
+        if on == self._region_mode:
+            return
+        self._region_mode = on
+        self._region_from = None
+        self.setCursor(Qt.CursorShape.CrossCursor if on else Qt.CursorShape.ArrowCursor)
+        self.region_mode_changed.emit(on)
+        self.update()
+
+    def _region_of(self, end: QPointF) -> tuple[int, int, int, int] | None:
+        assert self._region_from is not None
+        a, b = self.to_picture(self._region_from), self.to_picture(end)
+        setup = self.session.setup
+        x0, x1 = sorted((a.x(), b.x()))
+        y0, y1 = sorted((a.y(), b.y()))
+        left, right = max(0, int(np.floor(x0))), min(setup.width, int(np.ceil(x1)))
+        top, bottom = max(0, int(np.floor(y0))), min(setup.height, int(np.ceil(y1)))
+        if right - left < 2 or bottom - top < 2:
+            return None
+        return left, top, right, bottom
+
+    def clear_region(self) -> None:
+        """The whole picture again."""
+        self.set_region_mode(False)
+        if self.session.setup.region is not None:
+            self.session.change(region=None)
+
+    # ---- events --------------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Begins a drag."""
+        if self._drag is not Drag.NONE:
+            return
+        place = event.position()
+        drag = drag_of(event.button(), event.modifiers())
+        if self._region_mode and event.button() == Left:
+            drag, self._region_from = Drag.REGION, place
+        self._drag, self._last, self._pressed = drag, place, place
+        if drag in (Drag.ORBIT, Drag.PAN, Drag.DOLLY):
+            self._aim(place)
+        event.accept()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Goes on with a drag, or tells what is under the cursor."""
+        place = event.position()
+        by = place - self._last
+        self._last = place
+        if self._drag is Drag.ORBIT:
+            self.orbit(-by.x() * ORBIT_RADIANS, by.y() * ORBIT_RADIANS, moving=True)
+        elif self._drag is Drag.PAN:
+            self.pan(by.x(), -by.y(), moving=True)
+        elif self._drag is Drag.DOLLY:
+            self.dolly(1.01 ** (by.y() - by.x()), moving=True)
+        elif self._drag is Drag.SHIFT:
+            self.shift(by)
+        elif self._drag is Drag.REGION:
+            self.update()
+        self._tell_hover(place)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Ends a drag."""
+        drag, self._drag = self._drag, Drag.NONE
+        place = event.position()
+        if drag in (Drag.ORBIT, Drag.PAN, Drag.DOLLY):
+            self.session.settle()
+        elif drag is Drag.REGION:
+            region = self._region_of(place)
+            self.set_region_mode(False)
+            if region is not None:
+                self.session.change(region=region)
+        elif drag is Drag.PICK and (place - self._pressed).manhattanLength() <= CLICK_PIXELS:
+            self._click(place)
+        event.accept()
+
+    def _click(self, place: QPointF) -> None:
+        at = self.to_picture(place)
+        hit = self.session.pick(at.x(), at.y())
+        self.session.select(hit.get("object") if hit is not None else None)
+        if (pixel := self._pixel(place)) is not None:
+            self.picked.emit(pixel)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Dollies towards what is under the cursor; with Ctrl zooms the picture."""
+        notches = event.angleDelta().y() / 120.0
+        if notches:
+            if event.modifiers() & Control:
+                self.set_zoom(self.zoom() * ZOOM_STEP**notches, event.position())
+            else:
+                self._aim(event.position())
+                self.dolly(DOLLY_STEP**notches, moving=True)
+        event.accept()
+
+    def leaveEvent(self, event: object) -> None:
+        """No pixel is under the cursor."""
+        self.hovered.emit(None)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrows orbit or pan, page keys dolly, Escape leaves the region mode."""
+        key, shift = event.key(), bool(event.modifiers() & Shift)
+        step = float(KEY_RADIANS)
+        ways = {
+            Qt.Key.Key_Left: (-1, 0),
+            Qt.Key.Key_Right: (1, 0),
+            Qt.Key.Key_Up: (0, 1),
+            Qt.Key.Key_Down: (0, -1),
+        }
+        if key in ways:
+            x, y = ways[Qt.Key(key)]
+            if shift:
+                self.pan(-x * self.width() / 10, -y * self.width() / 10)
+            else:
+                self.orbit(x * step, y * step)
+        elif key == Qt.Key.Key_PageUp:
+            self.dolly(DOLLY_STEP)
+        elif key == Qt.Key.Key_PageDown:
+            self.dolly(1.0 / DOLLY_STEP)
+        elif key == Qt.Key.Key_Escape and self._region_mode:
+            self._drag = Drag.NONE
+            self.set_region_mode(False)
+        else:
+            super().keyPressEvent(event)
+
+    def _pixel(self, place: QPointF) -> tuple[int, int] | None:
+        at = self.to_picture(place)
+        x, y = int(np.floor(at.x())), int(np.floor(at.y()))
+        setup = self.session.setup
+        return (x, y) if 0 <= x < setup.width and 0 <= y < setup.height else None
+
+    def _tell_hover(self, place: QPointF) -> None:
+        self.hovered.emit(self._pixel(place))
+
+    # ---- painting ------------------------------------------------------------------------------
+
+    def paint_over(self, painter: QPainter) -> None:
+        """The region, and what to do where there is no picture."""
+        if self.image() is None:
+            painter.setPen(QColor("#d8d8d8"))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._message)
+            return
+        if self._region_mode and self._drag is Drag.REGION and self._region_from is not None:
+            self._paint_box(painter, QRectF(self._region_from, self._last).normalized(), True)
+        region = self.session.setup.region
+        if region is not None:
+            x0, y0, x1, y1 = region
+            corners = self.from_picture(QPointF(x0, y0)), self.from_picture(QPointF(x1, y1))
+            self._paint_box(painter, QRectF(*corners), False)
+
+    def _paint_box(self, painter: QPainter, box: QRectF, filled: bool) -> None:
+        painter.setBrush(QColor(255, 255, 255, 30) if filled else Qt.BrushStyle.NoBrush)
+        for colour, style in (
+            (QColor(0, 0, 0, 200), Qt.PenStyle.SolidLine),
+            (QColor("#ff9a3c"), Qt.PenStyle.DashLine),
+        ):
+            pen = QPen(colour, 1.0, style)
+            pen.setCosmetic(True)
+            painter.setPen(pen)
+            painter.drawRect(box)
+
+    def sizeHint(self) -> QSize:
+        """Roomy."""
+        return QSize(theme.em(50), theme.em(34))
+
+    def global_of(self, x: float, y: float) -> QPoint:
+        """Where a point of the picture is in the widget, whole pixels."""
+        return self.from_picture(QPointF(x, y)).toPoint()

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""OpenEXR files of many layers, by OpenImageIO: channel names, types, compression, attributes.
+
+Arrays are (height, width) or (height, width, channels), row 0 at the top. Errors are OSError (the
+file), WavecombError (options) or ValueError (the arrays), one line that names the file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.cryptomatte import is_crypto
+from wavecomb.picture.files import one_line, replacing
+
+Compression = Literal["none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"]
+COMPRESSIONS: tuple[str, ...] = get_args(Compression)
+_LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
+MAX_TILE = 4096
+
+_HALF_MAX = 65504.0
+_SUFFIXES = {
+    "beauty": "RGB",
+    "albedo": "RGB",
+    "normal": "XYZ",
+    "depth": "Z",
+    "position": "XYZ",
+    "uv": "UV",
+    "variance": "RGB",
+    "guide_albedo": "RGB",
+    "guide_normal": "XYZ",
+}
+_COLOURS = (
+    "beauty",
+    "albedo",
+    "normal",
+    "emission",
+    "direct",
+    "indirect",
+    "denoised",
+    "guide_albedo",
+    "guide_normal",
+)
+"""Layers that are half where halves are asked for, with all that begin with "light_"."""
+_EXACT = ("position", "material_id", "instance_id")
+BAND = 64
+"""Rows that are made ready and written at once: four blocks of an EXR file."""
+
+LAYER_ORDER = tuple(_SUFFIXES)
+"""Layers that have letters of their own for their channels, in the order of a file."""
+
+
+def channel_names(layer: str, channels: int) -> list[str]:
+    """Channel names of a layer in an EXR file: beauty is R, G, B; albedo is albedo.R and so on.
+
+    >>> channel_names("normal", 3)
+    ['normal.X', 'normal.Y', 'normal.Z']
+    >>> channel_names("samples", 1)
+    ['samples']
+    """
+    prefix = "" if layer == "beauty" else f"{layer}."
+    letters = _SUFFIXES.get(layer, "")
+    if len(letters) == channels:
+        return [prefix + letter for letter in letters]
+    if channels == 1:
+        return [layer]
+    if channels in (3, 4):
+        return [prefix + letter for letter in "RGBA"[:channels]]
+    return [f"{layer}.{k}" for k in range(channels)]
+
+
+def is_exact(layer: str) -> bool:
+    """Whether a lossy compression would spoil a layer.
+
+    Of ids it makes others. Positions far from 0 go out of its range: dwaa takes any channel called
+    Y for a brightness.
+    """
+    return is_crypto(layer) or layer in _EXACT
+
+
+def write_exr(
+    path: str | os.PathLike[str],
+    layers: Mapping[str, NDArray[Any]],
+    *,
+    half: bool = False,
+    compression: Compression = "zip",
+    tile: int = 0,
+    metadata: Mapping[str, Any] | None = None,
+    called: str | os.PathLike[str] | None = None,
+) -> None:
+    """Writes an OpenEXR file with one part; whole or not at all.
+
+    Args:
+        path: Ends in .exr.
+        layers: Name -> (height, width) or (height, width, channels); "beauty" becomes R, G, B.
+        half: 16 bit colours and normals; all else stays 32 bit. Finite values beyond the range of
+            a half are clamped to it.
+        compression: Of OpenEXR. Those that lose something (pxr24, b44, dwaa ...) are refused for
+            layers of ids and positions.
+        tile: Edge of square tiles, pixels, a multiple of 16; 0: scanlines.
+        metadata: Attributes of the file: str, int, float, or (4, 4) arrays. "Software" is set if
+            it is not given.
+        called: The file in messages, where ``path`` is to be renamed to it.
+    """
+    name = os.fspath(path if called is None else called)
+    if Path(name).suffix.lower() != ".exr":
+        raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
+    if not layers:
+        raise ValueError(f"{name}: there is nothing to write")
+    check_options(name, layers, compression, tile)
+    planes: list[NDArray[Any]] = []
+    halves: list[bool] = []
+    names: list[str] = []
+    for layer, pixels in layers.items():
+        plane = np.asarray(pixels)
+        plane = plane[:, :, None] if plane.ndim == 2 else plane
+        if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0].shape[:2]):
+            raise ValueError(f"{name}: layer {layer!r} has the shape {np.shape(pixels)}")
+        planes.append(plane)
+        halves.append(half and (layer in _COLOURS or layer.startswith("light_")))
+        names += channel_names(layer, plane.shape[2])
+    spec = _spec(planes, halves, names, tile)
+    spec.attribute("compression", compression)
+    for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
+        _attribute(spec, key, value)
+    both = list(zip(planes, halves, strict=True))
+    bands = (
+        np.concatenate([_values(plane[rows], as_half) for plane, as_half in both], axis=2)
+        for rows in bands_of(spec.height, tile or BAND)
+    )
+    write_bands(path, spec, bands, called=name)
+
+
+def check_options(name: str, layers: Any, compression: str, tile: int) -> None:
+    """Raises WavecombError for options that a file with these layers cannot have."""
+    if compression not in COMPRESSIONS:
+        raise WavecombError(
+            f"{name}: compression {compression!r} is none of {', '.join(COMPRESSIONS)}"
+        )
+    if tile % 16 != 0 or not 0 <= tile <= MAX_TILE:
+        raise WavecombError(
+            f"{name}: tiles of {tile} pixels: must be a multiple of 16 up to {MAX_TILE}"
+        )
+    exact = [layer for layer in layers if is_exact(layer)]
+    if compression in _LOSSY and exact:
+        raise WavecombError(
+            f"{name}: compression {compression} would spoil {exact[0]}; use zip, zips or piz, or "
+            "write one file for each AOV"
+        )
+
+
+def _spec(planes: list[NDArray[Any]], halves: list[bool], names: list[str], tile: int) -> Any:
+    import OpenImageIO as oiio
+
+    height, width = planes[0].shape[:2]
+    spec = oiio.ImageSpec(width, height, len(names), "float")
+    spec.channelnames = tuple(names)
+    spec.channelformats = tuple(
+        oiio.TypeDesc("half" if as_half else "float")
+        for plane, as_half in zip(planes, halves, strict=True)
+        for _ in range(plane.shape[2])
+    )
+    spec.tile_width = spec.tile_height = tile
+    spec.tile_depth = 1 if tile else 0
+    return spec
+
+
+def _attribute(spec: Any, key: str, value: Any) -> None:
+    """Sets an attribute; (4, 4) becomes a matrix of floats, (n,) as many floats."""
+    import OpenImageIO as oiio
+
+    if np.ndim(value) == 2:
+        spec.attribute(key, oiio.TypeMatrix44, tuple(float(v) for v in np.ravel(value)))
+    elif np.ndim(value) == 1:
+        spec.attribute(key, f"float[{len(value)}]", tuple(float(v) for v in value))
+    else:
+        spec.attribute(key, value)
+
+
+def bands_of(height: int, rows: int = BAND) -> Iterator[slice]:
+    """The rows of a picture, a band at a time, so that nothing of its size is held twice."""
+    return (slice(row, min(row + rows, height)) for row in range(0, height, rows))
+
+
+def write_bands(
+    path: str | os.PathLike[str],
+    spec: Any,
+    bands: Iterator[NDArray[Any]],
+    *,
+    called: str | None = None,
+) -> None:
+    """Writes a picture, given a band of rows at a time from the top; of tiles, a row of them."""
+    import OpenImageIO as oiio
+
+    name = called or os.fspath(path)
+    with replacing(path) as part:
+        output = oiio.ImageOutput.create(str(part))
+        if output is None:
+            raise OSError(f"{name}: no writer for this kind: {one_line(oiio.geterror(), name)}")
+        ok, row = output.open(str(part), spec), 0
+        while ok and (pixels := next(bands, None)) is not None:
+            end = row + len(pixels)
+            if spec.tile_width:
+                ok = output.write_tiles(0, spec.width, row, end, 0, 1, pixels)
+            else:
+                ok = output.write_scanlines(row, end, 0, pixels)
+            row = end
+        problem = output.geterror()
+        if not (output.close() and ok):
+            problem = problem or output.geterror()
+            raise OSError(f"{name}: cannot be written: {one_line(problem, str(part))}")
+
+
+def _values(rows: NDArray[Any], as_half: bool) -> NDArray[np.float32]:
+    values = np.asarray(rows, dtype=np.float32)
+    if as_half:
+        clamped = np.clip(values, -_HALF_MAX, _HALF_MAX)
+        values = np.where(np.isfinite(values), clamped, values)
+    return values

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of where two pictures differ, with a title and a colour bar."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.picture.colour_maps import colour_map, signed_colour_map
+from wavecomb.picture.compare import colour_pair, luminance
+
+if TYPE_CHECKING:
+    from wavecomb.picture.compare import Source
+    from wavecomb.picture.ztest import ZTest
+
+Kind = Literal["absolute", "signed", "flip-ldr", "flip-hdr"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+DECADES = 4
+Z_RANGE = 5.0
+LEAST_WIDTH = 340
+"""Of the whole in pixels, so that title and numbers fit; a narrower picture has black beside it."""
+
+_NOT_FINITE = (0.0, 1.0, 1.0)
+_BAR_HEIGHT = 58
+_MARGIN = 8
+_TEXT_SIZE = 13
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Differences on a scale of colours.
+
+    Attributes:
+        title: Quantity and unit, for people.
+        colours: (count, 3).
+        ticks: Position along the bar, from 0 to 1, and label.
+        position: Of every pixel along the bar, (height, width); NaN: black.
+        finite: False where a pixel of A or B is not finite: cyan. None: all are.
+    """
+
+    title: str
+    colours: NDArray[np.float32]
+    ticks: Sequence[tuple[float, str]]
+    position: NDArray[np.float64]
+    finite: NDArray[np.bool_] | None = None
+
+    def pixels(self) -> NDArray[np.float32]:
+        """The colour of every pixel, linear Rec.709, (height, width, 3)."""
+        last = len(self.colours) - 1
+        known = ~np.isnan(self.position)
+        along = np.clip(np.where(known, self.position, 0.0), 0.0, 1.0)
+        colours = self.colours[(along * last + 0.5).astype(np.intp)]
+        colours[~known] = 0.0
+        if self.finite is not None:
+            colours[~self.finite] = _NOT_FINITE
+        return colours
+
+
+def heat_map(
+    a: Source, b: Source, kind: Kind = "absolute", *, exposure: float = 0.0
+) -> NDArray[np.float32]:
+    """Differences of picture A to the reference B as colours, with title and colour bar below.
+
+    - "absolute": of luminance, on a logarithmic scale from the largest down over four decades;
+      smaller ones have the darkest colour.
+    - "signed": of luminance, the same scale to both sides: orange where A is brighter, blue where
+      it is darker, black from four decades below the largest.
+    - "flip-ldr", "flip-hdr": FLIP from 0 to 1; ``perceptual.flip`` says what it is.
+
+    Equal pixels are black, pixels with a NaN or an infinity are cyan.
+
+    Returns:
+        Linear Rec.709, (height + bar, width, 3), at least ``LEAST_WIDTH`` wide.
+    """
+    return _draw(scale_of(a, b, kind, exposure=exposure))
+
+
+def scale_of(
+    a: Source,
+    b: Source,
+    kind: Kind = "absolute",
+    *,
+    exposure: float = 0.0,
+    flip_values: NDArray[np.float32] | None = None,
+) -> Scale:
+    """What ``heat_map`` draws, without its bar.
+
+    Args:
+        a: Picture.
+        b: Reference.
+        kind: As ``heat_map`` has it.
+        exposure: Likewise.
+        flip_values: Of ``perceptual.flip``, where they are known already.
+    """
+    pixels_a, pixels_b = colour_pair(a, b)
+    finite = np.isfinite(pixels_a).all(axis=2) & np.isfinite(pixels_b).all(axis=2)
+    if kind in ("flip-ldr", "flip-hdr"):
+        from wavecomb.picture.perceptual import flip
+
+        values = flip_values
+        if values is None:
+            values = flip(a, b, high_range=kind == "flip-hdr", exposure=exposure)
+        return replace(_linear(values, kind), finite=finite)
+    kept = finite[:, :, None]
+    wide_a = np.where(kept, pixels_a, 0).astype(np.float64)
+    difference = luminance(wide_a - np.where(kept, pixels_b, 0))
+    found = _signed(difference) if kind == "signed" else _absolute(difference)
+    return replace(found, finite=finite)
+
+
+def z_map(test: ZTest) -> NDArray[np.float32]:
+    """Deviates of a z-test from -5 to 5 standard errors, the largest of a pixel's channels."""
+    return _draw(z_scale(test))
+
+
+def z_scale(test: ZTest) -> Scale:
+    """What ``z_map`` draws, without its bar."""
+    channel = np.abs(test.z_pixels).argmax(axis=2)[:, :, None]
+    z = np.take_along_axis(test.z_pixels, channel, axis=2)[:, :, 0]
+    ticks = [(0.5 + 0.5 * value / Z_RANGE, _number(value)) for value in (-5, -2.5, 0, 2.5, 5)]
+    position = np.where(z == 0.0, np.nan, 0.5 + 0.5 * z / Z_RANGE)
+    return Scale("A - B in standard errors (z)", signed_colour_map(), ticks, position)
+
+
+def write_heat_map(
+    path: str | os.PathLike[str],
+    a: Source,
+    b: Source,
+    kind: Kind = "absolute",
+    *,
+    exposure: float = 0.0,
+) -> None:
+    """Writes ``heat_map`` as a PNG file."""
+    from wavecomb.picture.image import write_png
+
+    write_png(path, heat_map(a, b, kind, exposure=exposure))
+
+
+def _absolute(difference: NDArray[np.float64]) -> Scale:
+    size = np.abs(difference)
+    peak = float(size.max())
+    title = "|A - B|, linear luminance"
+    if peak == 0.0:
+        return Scale(title, colour_map(), [(1.0, "0")], np.full(size.shape, np.nan))
+    ticks = [(k / DECADES, f"{peak * 10.0 ** (k - DECADES):.1e}") for k in range(DECADES + 1)]
+    position = np.where(size > 0.0, _decades(size, peak), np.nan)
+    return Scale(title, colour_map(), ticks, position)
+
+
+def _signed(difference: NDArray[np.float64]) -> Scale:
+    size = np.abs(difference)
+    peak = float(size.max())
+    title = "A - B, linear luminance"
+    if peak == 0.0:
+        return Scale(title, signed_colour_map(), [(0.5, "0")], np.full(size.shape, np.nan))
+    position = 0.5 + 0.5 * np.sign(difference) * _decades(size, peak)
+    ticks = [(0.5, "0")]
+    for k in (2, 4):
+        label = f"{peak * 10.0 ** (k - DECADES):.1e}"
+        ticks += [(0.5 - 0.5 * k / DECADES, "-" + label), (0.5 + 0.5 * k / DECADES, "+" + label)]
+    return Scale(title, signed_colour_map(), ticks, np.where(size > 0.0, position, np.nan))
+
+
+def _linear(values: NDArray[Any], kind: str) -> Scale:
+    title = f"{kind.upper()} (0 looks equal, 1 is the most)"
+    ticks = [(t, _number(t)) for t in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    position = np.where(values > 0.0, values.astype(np.float64), np.nan)
+    return Scale(title, colour_map(), ticks, position)
+
+
+def _decades(size: NDArray[np.float64], peak: float) -> NDArray[np.float64]:
+    """1 at the peak, 0 from four decades below it."""
+    with np.errstate(divide="ignore"):
+        return np.clip(1.0 + np.log10(size / peak) / DECADES, 0.0, 1.0)
+
+
+def _draw(scale: Scale) -> NDArray[np.float32]:
+    colours = scale.pixels()
+    height, width = colours.shape[:2]
+    result = np.zeros((height + _BAR_HEIGHT, max(width, LEAST_WIDTH), 3), np.float32)
+    result[:height, :width] = colours
+    result[height:] = _bar(result.shape[1], scale)
+    return result
+
+
+def _bar(width: int, scale: Scale) -> NDArray[np.float32]:
+    """Title, colour ramp, and a tick with a number for as many values as fit."""
+    import OpenImageIO as oiio
+
+    length = width - 2 * _MARGIN
+    bar = np.zeros((_BAR_HEIGHT, width, 3), np.float32)
+    ramp = np.linspace(0, len(scale.colours) - 1, length).astype(np.intp)
+    bar[22:36, _MARGIN : _MARGIN + length] = scale.colours[ramp]
+    places = [(_MARGIN + round((length - 1) * t), label) for t, label in scale.ticks]
+    for middle, _ in places:
+        bar[36:39, middle] = 1.0
+    canvas = oiio.ImageBuf(np.ascontiguousarray(bar))
+
+    def write(x: int, y: int, text: str) -> None:
+        oiio.ImageBufAlgo.render_text(canvas, x, y, text, _TEXT_SIZE, "", (1.0, 1.0, 1.0))
+
+    write(_MARGIN, 16, scale.title)
+    end = -1
+    for middle, label in sorted(places):
+        extent = oiio.ImageBufAlgo.text_size(label, _TEXT_SIZE).width
+        left = min(max(middle - extent // 2, 2), width - extent - 2)
+        if left > end:
+            write(left, 52, label)
+            end = left + extent + 6
+    return np.asarray(canvas.get_pixels(oiio.FLOAT), np.float32).reshape(bar.shape)
+
+
+def _number(value: float) -> str:
+    return f"{value:g}"

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures in and out of files, by OpenImageIO.
+
+Arrays are (height, width, channels), row 0 at the top.
+
+Errors are OSError (the file) or ValueError (the arrays), one line that names the file.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.machine import memory_bytes
+from wavecomb.picture.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
+from wavecomb.picture.files import one_line, problem_of
+
+__all__ = [
+    "channel_names",
+    "display",
+    "linear_from_srgb",
+    "read_image",
+    "read_layers",
+    "read_metadata",
+    "srgb_from_linear",
+    "write_exr",
+    "write_png",
+]
+
+Array = NDArray[np.float32]
+Transfer = Literal["clamp", "neutral"]
+
+_HALF_MAX = 65504.0
+_NAN_COLOUR = (255, 0, 255)
+
+
+def write_png(
+    path: str | os.PathLike[str],
+    rgb: NDArray[Any],
+    *,
+    exposure: float = 0.0,
+    tone_map: Transfer = "clamp",
+) -> None:
+    """Writes an 8-bit sRGB picture; whole or not at all.
+
+    Args:
+        path: Ends in .png.
+        rgb: Linear Rec.709, (height, width, 3).
+        exposure: In stops: the picture is multiplied by 2^exposure first.
+        tone_map: "clamp" cuts at 1; "neutral" rolls highlights off towards white. See ``display``.
+    """
+    name = os.fspath(path)
+    if Path(name).suffix.lower() != ".png":
+        raise ValueError(f"{name}: the name of a PNG file must end in .png")
+    linear = _colours(rgb)
+    bands = (
+        display(linear[rows], exposure=exposure, tone_map=tone_map)
+        for rows in bands_of(linear.shape[0])
+    )
+    write_bands(name, _png_spec(linear), bands)
+
+
+def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> None:
+    """Writes 8-bit sRGB codes, (height, width, 3), as they are; whole or not at all."""
+    name = os.fspath(path)
+    pixels = _colours(codes)
+    write_bands(name, _png_spec(pixels), (pixels[rows] for rows in bands_of(pixels.shape[0])))
+
+
+def _png_spec(pixels: NDArray[Any]) -> Any:
+    import OpenImageIO as oiio
+
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, "uint8")
+    spec.attribute("oiio:ColorSpace", "sRGB")
+    spec.attribute("Software", "Wavecomb")
+    return spec
+
+
+def _colours(rgb: NDArray[Any]) -> NDArray[Any]:
+    pixels = np.asarray(rgb)
+    if pixels.ndim != 3 or pixels.shape[2] != 3:
+        raise ValueError(f"a colour picture has the shape (height, width, 3), not {pixels.shape}")
+    return pixels
+
+
+def display(
+    rgb: NDArray[Any], *, exposure: float = 0.0, tone_map: Transfer = "clamp"
+) -> NDArray[np.uint8]:
+    """Linear Rec.709 -> 8-bit sRGB.
+
+    Pixels with a NaN become magenta, so that they are seen; infinities are clamped.
+    """
+    linear = _colours(rgb).astype(np.float32, copy=False)
+    broken = np.isnan(linear).any(axis=2)
+    linear = np.nan_to_num(linear, nan=0.0, posinf=_HALF_MAX, neginf=0.0)
+    linear = np.clip(linear * np.float32(2.0**exposure), 0.0, np.float32(1e30))
+    if tone_map == "neutral":
+        linear = _neutral(linear)
+    elif tone_map != "clamp":
+        raise ValueError(f"tone map {tone_map!r} is none of clamp, neutral")
+    encoded = srgb_from_linear(np.clip(linear, 0.0, 1.0))
+    pixels: NDArray[np.uint8] = np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
+    pixels[broken] = _NAN_COLOUR
+    return pixels
+
+
+def _neutral(rgb: Array) -> Array:
+    """Khronos PBR Neutral: colours below 0.76 keep hue and value, highlights go towards white.
+
+    https://github.com/KhronosGroup/ToneMapping, "PBR Neutral", equations of its reference.
+    """
+    start, desaturation, f90 = 0.8 - 0.04, 0.15, 0.04
+    low = rgb.min(axis=2, keepdims=True)
+    offset = np.where(low < 2 * f90, low - low * low / (4 * f90), f90)
+    rgb = rgb - offset
+    peak = rgb.max(axis=2, keepdims=True)
+    d = 1.0 - start
+    new_peak = 1.0 - d * d / (np.maximum(peak, start) + d - start)
+    g = 1.0 - 1.0 / (desaturation * (np.maximum(peak, start) - new_peak) + 1.0)
+    scaled = rgb * (new_peak / np.maximum(peak, 1e-6))
+    rolled = scaled * (1.0 - g) + new_peak * g
+    return np.where(peak < start, rgb, rolled).astype(np.float32)
+
+
+def srgb_from_linear(linear: Array) -> Array:
+    """The sRGB transfer function (IEC 61966-2-1), for values in [0, 1]."""
+    high = 1.055 * np.power(np.maximum(linear, 0.0031308), np.float32(1 / 2.4)) - 0.055
+    return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)
+
+
+def linear_from_srgb(encoded: Array) -> Array:
+    """The inverse of ``srgb_from_linear``."""
+    high = np.power((np.maximum(encoded, 0.04045) + 0.055) / 1.055, np.float32(2.4))
+    return np.where(encoded <= 0.04045, encoded / 12.92, high).astype(np.float32)
+
+
+def read_image(path: str | os.PathLike[str]) -> Array:
+    """Reads a picture of any format: float32 (height, width, channels), linear.
+
+    Files of whole numbers (PNG, JPEG ...) are taken to be sRGB and are made linear, alpha not.
+    """
+    return _read(path)[0]
+
+
+def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
+    """Reads a picture by layers, as ``write_exr`` names them: {"beauty": (h, w, 3), ...}.
+
+    A layer is the part of a channel's name before the last dot. R, G, B, A and Y without a dot are
+    "beauty"; any other channel without a dot is a layer of its own.
+    """
+    pixels, names = _read(path)
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        layer, dot, _ = name.rpartition(".")
+        if not dot:
+            layer = "beauty" if name in {"R", "G", "B", "A", "Y"} else name
+        groups.setdefault(layer, []).append(k)
+    order = {letter: k for k, letter in enumerate(["R", "G", "B", "A"])}
+    for ids in groups.values():
+        ids.sort(key=lambda k: order.get(names[k].rpartition(".")[2], len(order)))
+    known = list(LAYER_ORDER)
+    names_in_order = sorted(groups, key=lambda name: known.index(name) if name in known else 99)
+    return {name: np.ascontiguousarray(pixels[:, :, groups[name]]) for name in names_in_order}
+
+
+def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of a picture file."""
+    source = _open(os.fspath(path))
+    values = {attribute.name: attribute.value for attribute in source.spec().extra_attribs}
+    source.close()
+    return values
+
+
+def _open(name: str) -> Any:
+    import OpenImageIO as oiio
+
+    if not Path(name).exists():
+        raise FileNotFoundError(f"{name}: no such file")
+    if Path(name).is_dir():
+        raise IsADirectoryError(f"{name}: is a folder, not a picture")
+    hints = oiio.ImageSpec()
+    hints.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(name, hints)
+    if source is None:
+        raise OSError(f"{name}: cannot be read as a picture: {one_line(problem_of(oiio), name)}")
+    return source
+
+
+def _check_size(name: str, spec: Any) -> None:
+    """Raises OSError for a picture that this machine has no memory for, or that has no pixels."""
+    if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
+        raise OSError(f"{name}: has no pixels, or several in depth")
+    # As floats, again by layers, and what the library holds meanwhile.
+    needed = 3 * 4 * spec.width * spec.height * spec.nchannels
+    there = memory_bytes()
+    if there is not None and needed > there:
+        raise OSError(
+            f"{name}: says that it has {spec.width} x {spec.height} pixels with {spec.nchannels} "
+            f"channels, which takes {needed / 2**30:.0f} GiB; this machine has "
+            f"{there / 2**30:.0f}"
+        )
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
+    import OpenImageIO as oiio
+
+    name = os.fspath(path)
+    source = _open(name)
+    try:
+        spec = source.spec()
+        _check_size(name, spec)
+        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+        if pixels is None:
+            raise OSError(f"{name}: is damaged: {one_line(problem_of(source), name)}")
+        names = list(spec.channelnames)
+        encoded = spec.format.basetype not in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+        alpha = spec.alpha_channel
+    finally:
+        source.close()
+    image = np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, spec.nchannels)
+    if encoded:
+        colour = [k for k in range(spec.nchannels) if k != alpha]
+        image[:, :, colour] = linear_from_srgb(image[:, :, colour])
+    return image, names

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Adds pictures of one stage that were rendered with different seeds."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture import cryptomatte
+from wavecomb.picture.image import read_layers, read_metadata
+
+SAME_SETTINGS = (
+    "width",
+    "height",
+    "max_depth",
+    "sampler",
+    "filter",
+    "filter_width",
+    "roulette",
+    "roulette_depth",
+    "clamp_indirect",
+    "fresnel",
+    "cosine_sampling",
+)
+"""Settings that decide what a picture tends to; the rest may differ."""
+SUMS = ("samples", "cost")
+NEAREST = ("position", "uv", "material_id", "instance_id")
+"""Layers of one sample: those of the first picture are kept."""
+SQUARED = ("variance",)
+"""Variances of means: they add up with the squares of the weights."""
+SPREAD = ("error",)
+"""Standard errors: the roots of such."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Several pictures as one.
+
+    Attributes:
+        layers: As ``read_layers`` gives them.
+        metadata: For the header.
+        manifests: Cryptomatte level -> name -> id.
+        seeds: Of all pictures in it.
+    """
+
+    layers: dict[str, NDArray[Any]]
+    metadata: dict[str, Any]
+    manifests: dict[str, dict[str, int]] = field(default_factory=dict)
+    seeds: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A picture that is to be merged."""
+
+    name: str
+    attributes: dict[str, Any]
+    settings: dict[str, Any]
+    seeds: tuple[int, ...]
+
+
+def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
+    """Adds pictures pixel by pixel, each with the weight of its samples there.
+
+    Sample counts and costs add up. Variances and errors become those of the sum. Cryptomatte's
+    coverages are weighted like colours, and the largest are kept. A depth counts where it is
+    finite. Position, texture coordinates and ids, which are of single samples, are those of the
+    first picture that has a sample in that pixel. A denoised layer is left out.
+
+    >>> merge(["a.exr", "b.exr"]).layers["samples"].max()  # doctest: +SKIP
+    128.0
+
+    Args:
+        paths: EXR files of ``wavecomb render`` or of ``wavecomb merge``, two or more.
+
+    Raises:
+        WavecombError: They do not fit together; names the file and what differs.
+        OSError: A file cannot be read.
+    """
+    if len(paths) < 2:
+        raise WavecombError("merge needs two pictures or more")
+    sources = [_source(os.fspath(path)) for path in paths]
+    first = sources[0]
+    seeds: dict[int, str] = {}
+    for source in sources:
+        _check_fit(first, source)
+        for seed in source.seeds:
+            if seed in seeds:
+                raise WavecombError(
+                    f"{source.name}: has seed {seed}, as {seeds[seed]} has: the same samples twice "
+                    "are no better; render it with another --seed"
+                )
+            seeds[seed] = source.name
+    sums: dict[str, NDArray[Any]] = {}
+    pairs: dict[str, list[NDArray[Any]]] = {}
+    names: dict[str, dict[str, int]] = {}
+    shapes: dict[str, tuple[int, ...]] = {}
+    for source in sources:
+        layers = read_layers(source.name)
+        layers.pop("denoised", None)  # it is the sum that is to be denoised
+        _check_shapes(source, layers, shapes)
+        _check_layers(first.name, sums, source.name, layers, pairs)
+        _add(sums, pairs, layers)
+        try:
+            manifests = cryptomatte.manifests(source.attributes)
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            raise WavecombError(f"{source.name}: a Cryptomatte manifest in it is damaged") from None
+        for level, manifest in manifests.items():
+            names.setdefault(level, {}).update(manifest)
+    all_seeds = tuple(seeds)
+    return Merged(_means(sums, pairs), _metadata(sources, all_seeds), names, all_seeds)
+
+
+def _source(name: str) -> _Source:
+    """Reads what a picture says of itself."""
+    attributes = read_metadata(name)
+    try:
+        settings = json.loads(str(attributes["wavecomb:settings"]))
+        seeds = json.loads(str(attributes.get("wavecomb:seeds", f"[{settings['seed']}]")))
+        if not isinstance(settings, dict) or not isinstance(seeds, list):
+            raise TypeError
+        return _Source(name, attributes, settings, tuple(int(seed) for seed in seeds))
+    except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
+        raise WavecombError(
+            f"{name}: does not say what settings made it; merge takes EXR files of wavecomb render"
+        ) from None
+
+
+def _check_fit(first: _Source, other: _Source) -> None:
+    """Raises WavecombError where two pictures are not of one thing."""
+
+    def refuse(what: str, a: Any, b: Any) -> None:
+        raise WavecombError(f"{other.name}: {what} is {b}, that of {first.name} is {a}")
+
+    for key in SAME_SETTINGS:
+        a, b = first.settings.get(key), other.settings.get(key)
+        if a != b:
+            refuse(key, a, b)
+    for key, what in (("wavecomb:stage", "the stage"), ("wavecomb:camera", "the camera")):
+        a, b = (str(source.attributes.get(key, "")) for source in (first, other))
+        if os.path.basename(a) != os.path.basename(b):
+            refuse(what, a or "unknown", b or "unknown")
+    scenes: list[Any] = [source.attributes.get("wavecomb:scene") for source in (first, other)]
+    if not np.array_equal(*scenes):  # what a file says may be an array
+        raise WavecombError(
+            f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
+            "camera or frame"
+        )
+
+
+def _check_shapes(
+    source: _Source, layers: dict[str, NDArray[Any]], shapes: dict[str, tuple[int, ...]]
+) -> None:
+    """Raises WavecombError where layers have not the size that the file says, or other channels.
+
+    ``shapes`` are those of the pictures before; what is new is added.
+    """
+    size = source.settings.get("height"), source.settings.get("width")
+    for name, layer in layers.items():
+        channels = layer.shape[2]
+        good = layer.shape[:2] == size and shapes.setdefault(name, layer.shape) == layer.shape
+        if name == "samples":
+            good = good and channels == 1
+        if cryptomatte.is_crypto(name):
+            good = good and channels == 4
+        if not good:
+            raise WavecombError(
+                f"{source.name}: its layer {name} is {layer.shape[1]} x {layer.shape[0]} with "
+                f"{channels} channels, which does not fit its settings or the other pictures"
+            )
+
+
+def _check_layers(
+    first: str,
+    sums: dict[str, NDArray[Any]],
+    name: str,
+    layers: dict[str, NDArray[Any]],
+    pairs: dict[str, list[NDArray[Any]]],
+) -> None:
+    if "samples" not in layers or "beauty" not in layers:
+        raise WavecombError(
+            f"{name}: has no layer {'samples' if 'beauty' in layers else 'beauty'}, which merging "
+            "needs; render with --aov samples"
+        )
+    if not sums:
+        return
+    there = {layer for layer in layers if not cryptomatte.is_crypto(layer)}
+    there |= set(cryptomatte.gather(layers))
+    known = {layer for layer in sums if not layer.startswith("_")} | set(pairs)
+    for layer in sorted(there ^ known):
+        lacking = name if layer in known else first
+        raise WavecombError(f"{lacking}: has no layer {layer}, which the other picture has")
+
+
+def _add(
+    sums: dict[str, NDArray[Any]],
+    pairs: dict[str, list[NDArray[Any]]],
+    layers: dict[str, NDArray[Any]],
+) -> None:
+    """Adds the layers of one picture to the weighted sums."""
+    samples = layers["samples"].astype(np.float64)
+    for level, ranks in cryptomatte.gather(layers).items():
+        weighted = ranks.copy()
+        weighted[:, :, 1::2] *= samples.astype(np.float32)
+        pairs.setdefault(level, []).append(weighted)
+    had = sums["samples"] > 0 if sums else np.zeros(samples.shape, bool)
+    for name, layer in layers.items():
+        if cryptomatte.is_crypto(name):
+            continue
+        if name in NEAREST:
+            sums[name] = np.where(had, sums[name], layer) if name in sums else layer
+            continue
+        # A pixel without samples may hold anything.
+        values = np.where(samples > 0, layer, 0).astype(np.float64)
+        if name in SQUARED:
+            values = values * samples**2
+        elif name in SPREAD:
+            values = (values * samples) ** 2
+        elif name == "depth":
+            hit = np.isfinite(values)
+            values = np.where(hit, values, 0) * samples
+            sums["_hits"] = sums.get("_hits", 0) + np.where(hit, samples, 0)
+        elif name not in SUMS:
+            values = values * samples
+        sums[name] = sums[name] + values if name in sums else values
+
+
+def _means(
+    sums: dict[str, NDArray[Any]], pairs: dict[str, list[NDArray[Any]]]
+) -> dict[str, NDArray[Any]]:
+    samples = sums["samples"]
+    weight = 1.0 / np.maximum(samples, 1.0)
+    out: dict[str, NDArray[Any]] = {}
+    for name, values in sums.items():
+        if name == "_hits":
+            continue
+        if name in SQUARED:
+            values = values * weight**2
+        elif name in SPREAD:
+            values = np.sqrt(values) * weight
+        elif name == "depth":
+            hits = sums["_hits"]
+            values = np.where(hits > 0, values / np.maximum(hits, 1.0), np.inf)
+        elif name not in SUMS and name not in NEAREST:
+            values = values * weight
+        out[name] = values.astype(np.float32)
+    for level, weighted in pairs.items():
+        out.update(cryptomatte.layers(level, _merge_ranks(weighted, samples)))
+    return out
+
+
+def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Adds the counts of equal ids and keeps the largest; one row of pixels at a time."""
+    height, width = samples.shape[:2]
+    ranks = weighted[0].shape[2] // 2
+    out = np.zeros((height, width, 2 * ranks), np.float32)
+    for y in range(height):
+        row = np.concatenate([one[y] for one in weighted], axis=1)
+        ids = np.ascontiguousarray(row[:, 0::2]).view(np.uint32)
+        same = ids[:, :, None] == ids[:, None, :]
+        counts = (same * row[:, None, 1::2].astype(np.float64)).sum(axis=2)
+        # The first of those with one id stands for all.
+        repeated = (same & np.tri(ids.shape[1], k=-1, dtype=bool)).any(axis=2)
+        counts[repeated] = 0
+        order = np.lexsort((ids, -counts), axis=1)[:, :ranks]
+        best = np.take_along_axis(counts, order, axis=1)
+        chosen = np.where(best > 0, np.take_along_axis(ids, order, axis=1), 0).astype(np.uint32)
+        out[y, :, 0::2] = chosen.view(np.float32)
+        out[y, :, 1::2] = best / np.maximum(samples[y], 1.0)
+    return out
+
+
+def _metadata(sources: list[_Source], seeds: tuple[int, ...]) -> dict[str, Any]:
+    """The first picture's, with what the sum is."""
+    first = sources[0]
+    kept = ("Software", "worldToCamera", "worldToNDC", "chromaticities")
+    metadata = {
+        key: value
+        for key, value in first.attributes.items()
+        if key in kept or key.startswith("wavecomb:")
+    }
+    for key in ("worldToCamera", "worldToNDC"):
+        if key in metadata:
+            matrix = np.asarray(metadata.pop(key))
+            if matrix.size == 16 and matrix.dtype.kind == "f":
+                metadata[key] = matrix.reshape(4, 4)
+    seconds = [source.attributes.get("wavecomb:render_seconds", 0.0) for source in sources]
+    known = [float(value) for value in seconds if isinstance(value, (int, float))]
+    metadata["wavecomb:render_seconds"] = sum(known)
+    metadata["wavecomb:seeds"] = json.dumps(list(seeds))
+    return metadata

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checkpoints: all that a render needs to go on as if nothing had stopped it.
+
+A file is a NumPy archive (.npz, not compressed): ``header``, JSON as bytes, and the arrays of a
+``Snapshot.state()``. It is written beside its name and renamed when it is on the disk, so that
+whatever happens there is a whole one; the archive's checksums find damage.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.archive import ArchiveError, read_archive
+from wavecomb.picture.files import replacing
+from wavecomb.run import aovs as aov_names
+from wavecomb.run.stats import plain
+from wavecomb.version import version
+
+if TYPE_CHECKING:
+    from wavecomb._core import Scene, Settings
+
+FORMAT = 1
+_KIND = "wavecomb-checkpoint"
+
+_HOW = (
+    "threads",
+    "wave_size",
+    "lanes",
+    "traversal",
+    "policy",
+    "materialize",
+    "ray_order",
+    "shadow_order",
+    "cost_weight",
+    "progressive",
+)
+"""Settings that say how a picture is computed and never change it."""
+
+_OPTIONS = {"width": "size", "height": "size", "filter_width": "filter-width"}
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What a file holds."""
+
+    path: str
+    header: dict[str, Any]
+    state: dict[str, Any]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Of the render, those of the picture only: see ``picture_settings``."""
+        return dict(self.header["settings"])
+
+    @property
+    def source(self) -> dict[str, Any]:
+        """How the stage was loaded: camera, frame, purposes, variants."""
+        return dict(self.header["source"])
+
+    @property
+    def aovs(self) -> tuple[str, ...]:
+        """AOVs of the picture, as ``aovs.expand`` gives them."""
+        return tuple(self.header["aovs"])
+
+    @property
+    def seconds(self) -> float:
+        """Rendered so far, in all runs."""
+        return float(self.header["seconds"])
+
+
+def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings that decide over the picture.
+
+    A time limit does not: it decides how much of it there is.
+    """
+    chosen = {name: value for name, value in settings.items() if name not in _HOW}
+    del chosen["time_limit"]
+    if chosen["roulette"] != "cost-aware":
+        del chosen["costs"]
+    if not (chosen["adaptive"] or chosen["noise"]):
+        del chosen["min_spp"]
+    return chosen
+
+
+def make_header(
+    scene: Scene,
+    settings: Settings,
+    *,
+    stage: str | None,
+    source: Mapping[str, Any],
+    aovs: Sequence[str],
+) -> dict[str, Any]:
+    """What is the same for all checkpoints of a render."""
+    from wavecomb import _core
+
+    return {
+        "kind": _KIND,
+        "format": FORMAT,
+        "version": version(),
+        "library": _core.build_info()["library"],
+        "stage": stage,
+        "source": plain(source),
+        "aovs": list(aovs),
+        "settings": plain(picture_settings(settings.to_dict())),
+        "scene": _fingerprint(scene, settings),
+    }
+
+
+def _fingerprint(scene: Scene, settings: Settings) -> dict[str, str]:
+    """That of what shows in the picture: names do in a Cryptomatte only."""
+    parts = dict(scene.fingerprint())
+    if not any(name.startswith("crypto_") for name in settings.aovs):
+        parts.pop("names", None)
+    return parts
+
+
+def save_checkpoint(
+    path: str | os.PathLike[str], header: Mapping[str, Any], state: Mapping[str, Any]
+) -> None:
+    """Writes a file: on the disk and whole when it has its name."""
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in state.items()}
+    arrays["header"] = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
+    with replacing(path, durable=True) as part, part.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
+    """Reads a file.
+
+    Raises:
+        OSError: It cannot be read.
+        WavecombError: It is no checkpoint, damaged, or of another format.
+    """
+    name = os.fspath(path)
+    if not Path(name).exists():
+        raise FileNotFoundError(f"{name}: no such file; a render with --checkpoint makes one")
+    try:
+        header, state = read_archive(name)
+        if not isinstance(header, dict) or header.get("kind") != _KIND:
+            raise ArchiveError("it is of another kind")
+        if header.get("format") != FORMAT:
+            raise WavecombError(
+                f"{name}: is a checkpoint of format {header.get('format')}, by Wavecomb "
+                f"{header.get('version')}; this is {version()}, which reads format {FORMAT}: "
+                "resume with that version, or start anew"
+            )
+        _check_header(header)
+        state["pass.target"] = _check_state(state)
+    except ArchiveError as error:
+        raise WavecombError(f"{name}: is no checkpoint, or is damaged; start anew") from error
+    return Checkpoint(name, header, state)
+
+
+_PARTS: dict[str, tuple[type, ...]] = {
+    "version": (str,),
+    "library": (str,),
+    "stage": (str, type(None)),
+    "source": (dict,),
+    "aovs": (list,),
+    "settings": (dict,),
+    "scene": (dict,),
+    "seconds": (int, float),
+}
+
+
+def _check_header(header: dict[str, Any]) -> None:
+    """Raises ArchiveError unless all parts are there, and of their types."""
+    for key, types in _PARTS.items():
+        if not isinstance(header.get(key, ()), types):
+            raise ArchiveError(f"its {key} is no good")
+    texts = [*header["aovs"], *header["scene"].values()]
+    if not all(isinstance(text, str) for text in texts):
+        raise ArchiveError("its names are no text")
+    if not 0 <= header["seconds"] < math.inf:
+        raise ArchiveError("its seconds are no time")
+    from wavecomb import _core
+
+    settings = header["settings"]
+    known = picture_settings(
+        {**_core.Settings().to_dict(), "roulette": "cost-aware", "adaptive": 1.0}
+    )
+    if not settings.keys() <= known.keys() or not {"width", "height", "spp"} <= settings.keys():
+        raise ArchiveError("it has settings that are not known")
+    try:
+        aov_names.expand(header["aovs"])
+        _core.Settings(**settings).check()
+    except (TypeError, ValueError, OverflowError, RuntimeError, WavecombError) as error:
+        raise ArchiveError(f"its settings are no good: {error}") from error
+
+
+def _check_state(state: dict[str, Any]) -> int:
+    """The pass that was under way; raises ArchiveError unless arrays are as they are saved."""
+    if not {"pass.target", "pass.active"} <= state.keys():
+        raise ArchiveError("it lacks a part")
+    target = state["pass.target"]
+    if target.shape != () or target.dtype.kind not in "iu" or not 0 <= int(target) < 1 << 32:
+        raise ArchiveError("its pass is no number")
+    for name, array in state.items():
+        if name != "pass.target" and (array.dtype != np.uint8 or array.ndim != 1):
+            raise ArchiveError(f"its {name} is no row of bytes")
+    return int(target)
+
+
+def check_replaceable(path: str | os.PathLike[str]) -> None:
+    """Raises WavecombError where a checkpoint would replace a file that is none."""
+    target = Path(path)
+    if not target.is_file() or target.stat().st_size == 0:
+        return
+    try:
+        load_checkpoint(target)
+    except WavecombError:
+        raise WavecombError(
+            f"{os.fspath(path)}: is there and is no checkpoint; give --checkpoint another name"
+        ) from None
+
+
+def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
+    """Raises WavecombError that names the difference unless a render can go on from a checkpoint.
+
+    Args:
+        checkpoint: Of the file.
+        header: Of the render that is to go on.
+    """
+    name, old = checkpoint.path, checkpoint.header
+    parts = [part for part, key in header["scene"].items() if old["scene"].get(part) != key]
+    if parts:
+        what = ", ".join(parts[:-1]) + " and " * (len(parts) > 1) + parts[-1]
+        raise WavecombError(
+            f"{name}: was made of {old['stage'] or 'a scene'} when it looked otherwise: "
+            f"{what} differ{'s' * (len(parts) == 1)}; give the stage as it was, or start anew"
+        )
+    before, now = dict(old["settings"]), dict(header["settings"])
+    _take_more_samples(checkpoint, before, now)
+    for key in {**before, **now}:
+        if before.get(key) == now.get(key):
+            continue
+        option = _OPTIONS.get(key, key).replace("_", "-")
+        if option == "size":
+            was, given = (f"{s['width']} x {s['height']}" for s in (before, now))
+        else:
+            was, given = (_shown(s.get(key)) for s in (before, now))
+        raise WavecombError(
+            f"{name}: was made with {option} {was}, and this render has {given}; "
+            "give that, or start anew"
+        )
+
+
+def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
+    """A warning where another build made the checkpoint: right, but not bit for bit."""
+    for key in ("version", "library"):
+        if checkpoint.header[key] != header[key]:
+            return (
+                f"{checkpoint.path}: was made by another build ({key} "
+                f"{checkpoint.header[key]}, now {header[key]}); the picture may differ in last bits"
+            )
+    return None
+
+
+def _take_more_samples(checkpoint: Checkpoint, before: dict[str, Any], now: dict[str, Any]) -> None:
+    """A render that is not adaptive may go on to another number of samples."""
+    if before.get("adaptive") or before.get("noise"):
+        return
+    if now["spp"] >= checkpoint.state["pass.target"]:
+        before["spp"] = now["spp"]
+
+
+def _shown(value: Any) -> str:
+    return "none" if value is None else str(value)

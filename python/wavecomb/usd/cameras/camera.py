@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The camera: one of the stage's, or one that frames what there is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom, UsdRender
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.output import fitted_window
+from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
+from wavecomb.usd.geometry.shutter import Motion
+from wavecomb.usd.looks.network import number, pair, word
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.search import every
+
+Matrix = NDArray[np.float64]
+
+_TENTH = 0.1
+"""Focal length and aperture are in tenths of a scene unit."""
+
+ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
+"""Window of a latlong camera: all directions."""
+
+MAX_STOPS = 60.0
+MAX_EXPOSURE = 1e12
+"""Beyond these an exposure is taken for a mistake."""
+
+MAX_CLIP_PLANES = 16
+
+_FRAME_TAN = 0.4
+"""Half the opening of the default camera, on the plane z = -1."""
+
+
+PROJECTIONS = ("perspective", "orthographic", "latlong")
+CONFORMS = (
+    "expandAperture",
+    "cropAperture",
+    "adjustApertureWidth",
+    "adjustApertureHeight",
+    "adjustPixelAspectRatio",
+)
+"""UsdRender's aspectRatioConformPolicy."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Arguments of ``SceneBuilder.set_camera``."""
+
+    transform: Matrix
+    options: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Lens:
+    """What is chosen beside a camera, by options and render settings.
+
+    Attributes:
+        projection: One of ``PROJECTIONS``; None: the camera's.
+        exposure: Whether the camera's exposure multiplies light.
+        depth_of_field: Whether its lens blurs what is out of focus.
+        conform: What gives way where the shapes of aperture and picture differ.
+        pixel_aspect: Width of a pixel / its height.
+    """
+
+    projection: str | None = None
+    exposure: bool = True
+    depth_of_field: bool = True
+    conform: str = CONFORMS[0]
+    pixel_aspect: float = 1.0
+
+    def options(self) -> dict[str, Any]:
+        """Of ``View``, where they are not the default."""
+        out: dict[str, Any] = {}
+        if self.conform != CONFORMS[0]:
+            out["conform"] = self.conform
+        if self.pixel_aspect != 1.0:
+            out["pixel_aspect"] = self.pixel_aspect
+        return out
+
+
+def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
+    """The camera asked for, else the render settings', else the stage's first.
+
+    Raises:
+        WavecombError: The camera asked for is none.
+    """
+    if wanted is not None:
+        return _named(stage, wanted)
+    settings = UsdRender.Settings.GetStageRenderSettings(stage)
+    candidates = [settings.GetPrim()] if settings else []
+    render = stage.GetPrimAtPath("/Render")
+    if render:
+        candidates += [p for p in render.GetChildren() if p.IsA(UsdRender.Settings)]
+    for prim in candidates:
+        for target in UsdRender.Settings(prim).GetCameraRel().GetForwardedTargets():
+            camera = stage.GetPrimAtPath(target)
+            if camera and camera.IsA(UsdGeom.Camera):
+                return camera
+    for prim in Usd.PrimRange.Stage(stage):
+        if prim.GetTypeName() == "Camera":
+            return prim
+    return next(every(stage, _is_camera), None)
+
+
+def _is_camera(prim: Usd.Prim) -> bool:
+    return bool(prim.IsA(UsdGeom.Camera))
+
+
+MAX_CAMERAS = 1000
+"""Cameras that are listed; instances may multiply them."""
+
+
+def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
+    """The cameras of the stage, those inside instances too, in the stage's order."""
+    return list(islice(every(stage, _is_camera), MAX_CAMERAS))
+
+
+def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:
+    """A camera by path, or by name where that is unique."""
+    if Sdf.Path.IsValidPathString(wanted) and wanted.startswith("/"):
+        prim = stage.GetPrimAtPath(wanted)
+        if prim and prim.IsA(UsdGeom.Camera):
+            return prim
+    cameras = all_cameras(stage)
+    by_name = [p for p in cameras if p.GetName() == wanted]
+    if len(by_name) == 1:
+        return by_name[0]
+    known = ", ".join(str(p.GetPath()) for p in cameras[:8]) or "none"
+    raise WavecombError(f"no camera {wanted}; the stage has: {known}")
+
+
+def read_camera(
+    prim: Usd.Prim,
+    to_world: Matrix,
+    time: Usd.TimeCode,
+    report: LoadReport,
+    lens: Lens = Lens(),
+) -> View | None:
+    """The view of a camera prim; None, and a warning, where it cannot be used.
+
+    Args:
+        prim: A UsdGeomCamera.
+        to_world: (4, 4), row vectors.
+        time: Of evaluation.
+        report: For what is odd.
+        lens: What is chosen beside it.
+    """
+    camera = UsdGeom.Camera(prim)
+    path = prim.GetPath()
+    frame = _rigid(to_world)
+    focal = number(camera.GetFocalLengthAttr().Get(time), 50.0)
+    wide = number(camera.GetHorizontalApertureAttr().Get(time), 20.955)
+    high = number(camera.GetVerticalApertureAttr().Get(time), 15.2908)
+    if frame is None or focal <= 0 or wide <= 0 or high <= 0:
+        report.warn("camera left out: its transform, focal length or aperture is no good", path)
+        return None
+    x = number(camera.GetHorizontalApertureOffsetAttr().Get(time), 0.0)
+    y = number(camera.GetVerticalApertureOffsetAttr().Get(time), 0.0)
+    edges = (x - wide / 2, x + wide / 2, y - high / 2, y + high / 2)
+    projection = lens.projection or word(camera.GetProjectionAttr().Get(time), PROJECTIONS[0])
+    if projection not in PROJECTIONS:
+        report.warn(f"camera has the projection {projection}: drawn in perspective", path)
+        projection = PROJECTIONS[0]
+    options: dict[str, Any] = {"window": tuple(v / focal for v in edges), **lens.options()}
+    if projection != PROJECTIONS[0]:
+        options["projection"] = projection
+    if projection == "orthographic":
+        options["window"] = tuple(_TENTH * v for v in edges)
+    elif projection == "latlong":
+        options["window"] = ALL_ROUND
+    if lens.exposure and (scale := _exposure_scale(camera, time, report)) != 1.0:
+        options["exposure"] = scale
+    near, far = pair(camera.GetClippingRangeAttr().Get(time), (0.0, 0.0))
+    if 0 <= near < far:
+        options |= {"near_clip": near, "far_clip": min(far, 1e30)}
+    if planes := _clip_planes(camera, time, report):
+        options["clip_planes"] = planes
+    stop = number(camera.GetFStopAttr().Get(time), 0.0)
+    focus = number(camera.GetFocusDistanceAttr().Get(time), 0.0)
+    if not lens.depth_of_field or projection == "latlong":
+        pass
+    elif stop > 0 and focus > 0:
+        options |= {"lens_radius": _TENTH * focal / (2.0 * stop), "focus_distance": focus}
+    elif stop > 0:
+        report.warn("camera has fStop but no focusDistance: drawn without depth of field", path)
+    return View(frame, options)
+
+
+def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport) -> float:
+    """What a camera multiplies light by: ``UsdGeomCamera::ComputeLinearExposureScale``."""
+    prim = camera.GetPrim()
+
+    def value(name: str, default: float) -> float:
+        attribute = prim.GetAttribute(name)
+        return number(attribute.Get(time), default) if attribute else default
+
+    stops = value("exposure", 0.0)
+    iso, seconds = value("exposure:iso", 100.0), value("exposure:time", 1.0)
+    stop, response = value("exposure:fStop", 1.0), value("exposure:responsivity", 1.0)
+    if min(iso, seconds, response) < 0 or stop <= 0 or abs(stops) > MAX_STOPS:
+        report.warn("camera exposure left out: a value of it is no good", prim.GetPath())
+        return 1.0
+    scale = 2.0**stops * seconds * iso / 100.0 * response / (stop * stop)
+    if not scale <= MAX_EXPOSURE:
+        report.warn("camera exposure left out: it is too large", prim.GetPath())
+        return 1.0
+    return scale
+
+
+def _clip_planes(
+    camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport
+) -> list[tuple[float, ...]]:
+    """Clipping planes (a, b, c, d) in the camera's space; those that are no good are left out."""
+    found = []
+    for plane in camera.GetClippingPlanesAttr().Get(time) or ():
+        numbers = tuple(map(float, plane))
+        if np.isfinite(numbers).all() and any(numbers[:3]):
+            found.append(numbers)
+        else:
+            report.warn("clipping plane of a camera left out: it is none", camera.GetPath())
+    if len(found) > MAX_CLIP_PLANES:
+        report.warn(f"camera has more than {MAX_CLIP_PLANES} clipping planes", camera.GetPath())
+    return found[:MAX_CLIP_PLANES]
+
+
+def camera_motion(prim: Usd.Prim, motion: Motion | None) -> Matrix | None:
+    """Transforms (s, 4, 4) of a camera at equal steps over the shutter; None: it stands still."""
+    if motion is None:
+        return None
+    frames: list[Matrix | None] = []
+
+    def frame(time: float) -> Matrix:
+        world = np.array(motion.xforms(time).GetLocalToWorldTransform(prim))
+        frames.append(_rigid(world))
+        return world if frames[-1] is None else frames[-1]
+
+    steps = motion.steps(frame)
+    return None if any(f is None for f in frames) else steps
+
+
+def _rigid(to_world: Matrix) -> Matrix | None:
+    """A camera's transform without scale; None where it has no inverse."""
+    out = np.array(to_world, np.float64)
+    lengths = np.linalg.norm(out[:3, :3], axis=1)
+    if not np.isfinite(out).all() or lengths.min() <= 0:
+        return None
+    out[:3, :3] /= lengths[:, None]
+    return None if abs(np.linalg.det(out[:3, :3])) < 1e-6 else out
+
+
+def _frame_axes(up_axis: str) -> Matrix:
+    """Right, up and back of the default camera.
+
+    It is half right of the front, a little above; the front is +Z, or -Y where Z is up.
+    """
+    up = np.array({"X": (1.0, 0, 0), "Z": (0, 0, 1.0)}.get(up_axis, (0, 1.0, 0)))
+    front = {"X": (0, 0, 1.0), "Z": (0, -1.0, 0)}.get(up_axis, (0, 0, 1.0))
+    side = np.cross(up, front)
+    back = np.asarray(front) + 0.6 * side + 0.42 * up
+    back /= np.linalg.norm(back)
+    right = np.cross(up, back)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(back, right), back])
+
+
+def _frame_half(lens: Lens, size: tuple[int, int]) -> tuple[float, float]:
+    """Half of what the default camera's picture shows of the plane z = -1."""
+    t = _FRAME_TAN
+    x0, x1, y0, y1 = fitted_window((-t, t, -t, t), *size, lens.conform, lens.pixel_aspect)
+    return 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+
+
+def frame_planes(up_axis: str, lens: Lens, size: tuple[int, int]) -> Matrix:
+    """Directions (4, 3) in which ``frame_points`` asks how far points reach; likewise."""
+    flat = lens.projection == "orthographic"
+    return planes(_frame_axes(up_axis), None if flat else _frame_half(lens, size))
+
+
+def frame_points(
+    points: NDArray[np.float64] | None,
+    up_axis: str,
+    lens: Lens = Lens(),
+    size: tuple[int, int] = (1, 1),
+) -> View:
+    """A three-quarter view that points (n, 3) fill; None: of the origin.
+
+    Args:
+        points: Of what is drawn, as ``framing.outline`` gives them.
+        up_axis: "X", "Y" or "Z".
+        lens: What is chosen of the camera.
+        size: Width and height of the picture, for its shape.
+    """
+    if points is None or len(points) == 0:
+        points = corners(np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]))
+    axes, half, t = _frame_axes(up_axis), _frame_half(lens, size), _FRAME_TAN
+    back = axes[2]
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    frame = np.eye(4)
+    frame[:3, :3] = axes
+    options: dict[str, Any] = dict(lens.options())
+    if lens.projection == "orthographic":
+        extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+        place, scale = fit_flat(points, axes, half)
+        frame[3, :3] = place + extent * back
+        t *= scale
+        options |= {"near_clip": 1e-4 * extent, "projection": lens.projection}
+    else:
+        frame[3, :3] = fit(points, axes, half)
+        options["near_clip"] = 1e-4 * float((frame[3, :3] - middle) @ back)
+    options["window"] = (-t, t, -t, t)
+    if lens.projection == "latlong":
+        options |= {"window": ALL_ROUND, "projection": lens.projection}
+    return View(frame, options)

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Primvars that materials read, as attributes of meshes in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.usd.geometry.curves import CurveArrays
+from wavecomb.usd.geometry.mesh import MeshArrays
+from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, fitting, spread
+
+MAX_WIDTH = 4
+"""Components of an attribute."""
+
+Attributes = dict[str, tuple[str, NDArray[np.float32]]]
+"""Name -> (rate, values (k, c)), as ``SceneBuilder.add_mesh`` takes them."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A primvar that a material of a mesh reads and that fits the mesh.
+
+    Attributes:
+        primvar: As authored, finite.
+        width: Components that are read.
+    """
+
+    primvar: Primvar
+    width: int
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is the same everywhere."""
+        values = self.primvar.values[:, : self.width]
+        return len(values) == 1 or bool((values == values[0]).all())
+
+    @property
+    def first(self) -> NDArray[np.float32]:
+        """(width,) The first value, which is all of them where it is constant."""
+        return self.primvar.values[0, : self.width]
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """(width,) Of all values."""
+        return np.asarray(self.primvar.values[:, : self.width].mean(axis=0, dtype=np.float64))
+
+    @property
+    def highest(self) -> float:
+        """The largest of all components."""
+        return float(self.primvar.values[:, : self.width].max())
+
+
+def check_fit(primvar: Primvar, mesh: MeshArrays | CurveArrays, width: int) -> None:
+    """Sees whether a primvar fits a gprim.
+
+    Raises:
+        PrimvarError: It does not.
+    """
+    if isinstance(mesh, CurveArrays):
+        mesh.topology.fit(primvar, width)
+    elif mesh.topology is not None:
+        fitting(primvar, mesh.topology, width)
+    elif primvar.values.shape[1] < width:
+        raise PrimvarError(f"primvar {primvar.name!r} has too few components")
+
+
+def on_shape(
+    wanted: Mapping[str, Wanted], mesh: MeshArrays | CurveArrays, mirrored: bool
+) -> Attributes:
+    """Primvars on the triangles of a mesh, on segments of curves or on points.
+
+    ``mirrored``: the triangles of the mesh are those of its topology the other way round.
+    """
+    return {name: _on_shape(one, mesh, mirrored) for name, one in wanted.items()}
+
+
+def _on_shape(
+    wanted: Wanted, mesh: MeshArrays | CurveArrays, mirrored: bool
+) -> tuple[str, NDArray[np.float32]]:
+    primvar, width = wanted.primvar, wanted.width
+    if wanted.is_constant or mesh.topology is None:
+        return "constant", _packed(primvar.values[:1], width)
+    if isinstance(mesh, CurveArrays):
+        values, kind = mesh.topology.fit(primvar, width)
+        first, last = mesh.topology.ends(values, kind)
+        if mesh.segments is None or kind == "uniform":
+            return "primitive", _packed(first, width)
+        return "end", _packed(np.stack([first, last], axis=1), width)
+    if primvar.interpolation == "uniform":
+        values = fitting(primvar, mesh.topology, width)
+        return "primitive", _packed(values[mesh.topology.face_ids()], width)
+    values, rate = spread(primvar, mesh.topology, width)
+    if rate == "corner" and mirrored:
+        values = values[:, ::-1]
+    return rate, _packed(values, width)
+
+
+class RefinedAttributes:
+    """Primvars of a cage on the triangles that are made of it."""
+
+    def __init__(self, wanted: Mapping[str, Wanted]) -> None:
+        self._wanted = wanted
+        self._refined = [
+            name
+            for name, one in wanted.items()
+            if not one.is_constant and one.primvar.interpolation != "uniform"
+        ]
+
+    def described(self, cage: Any, level: int) -> list[dict[str, Any]]:
+        """Those that have to be refined, as ``SceneBuilder.make_surfaces`` takes primvars."""
+        chosen = [self._wanted[name] for name in self._refined]
+        if level > 0:
+            return [cage.primvar(one.primvar, one.width) for one in chosen]
+        out = []
+        for one in chosen:
+            values, at = spread(one.primvar, cage.topology, one.width)
+            kind = "vertex" if at == "vertex" else "faceVarying"
+            packed = _packed(values, one.width)
+            out.append({"interpolation": kind, "values": packed, "width": one.width})
+        return out
+
+    def of(self, refined: Mapping[str, Any]) -> Attributes:
+        """All of them, for what ``SceneBuilder.make_surfaces`` made."""
+        out: Attributes = dict(zip(self._refined, refined["primvars"], strict=True))
+        for name, one in self._wanted.items():
+            if name in out:
+                continue
+            values = one.primvar.values
+            if one.is_constant:
+                out[name] = "constant", _packed(values[:1], one.width)
+            else:
+                out[name] = "primitive", _packed(values[refined["faces"]], one.width)
+        return out
+
+
+def _packed(values: NDArray[Any], width: int) -> NDArray[np.float32]:
+    """Values as (k, width) float32 in rows."""
+    cut = np.asarray(values)[..., :width]
+    return np.ascontiguousarray(cut.reshape(-1, width), np.float32)

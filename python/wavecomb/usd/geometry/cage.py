@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The polygons that a subdivision surface is made from, and its rules."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Usd
+
+from wavecomb.usd.geometry.primvar import Primvar, as_array, as_integers
+from wavecomb.usd.geometry.triangulate import Topology
+from wavecomb.usd.looks.network import word
+from wavecomb.usd.stage.report import LoadReport
+
+SCHEMES = ("catmullClark", "loop", "bilinear")
+_BOUNDARIES = ("none", "edgeOnly", "edgeAndCorner")
+_FACE_VARYING = ("none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundaries", "all")
+_TRIANGLES = ("catmullClark", "smooth")
+_INFINITE = 10.0
+"""UsdGeomMesh::SHARPNESS_INFINITE."""
+
+Ints = NDArray[np.int32]
+Floats = NDArray[np.float32]
+
+
+@dataclass
+class Cage:
+    """A mesh as authored, in its own space.
+
+    Attributes:
+        points: (n, 3).
+        counts: (faces,) corners of each face.
+        indices: (corners,) points.
+        matrix: From its space to its group's.
+        left_handed: Its faces are clockwise from outside.
+        scheme: One of ``SCHEMES``, or "none": polygons, to be displaced only.
+        rules: What ``SceneBuilder.make_surfaces`` takes of boundary, creases, corners and holes.
+        uvs: Texture coordinates.
+        topology: Its triangles as polygons.
+        smooth: Whether polygons have normals at all.
+        steps: Points and matrices at equal steps over the shutter; none: it keeps its shape.
+    """
+
+    points: Floats
+    counts: Ints
+    indices: Ints
+    matrix: Gf.Matrix4d
+    left_handed: bool
+    scheme: str
+    rules: dict[str, Any]
+    uvs: Primvar | None
+    topology: Topology
+    smooth: bool = True
+    steps: Sequence[tuple[Floats, Gf.Matrix4d]] = ()
+
+    def triangles_at(self, level: int) -> int:
+        """Triangles that ``level`` steps of subdivision make."""
+        if level == 0:
+            return self.topology.count
+        if self.scheme == "loop":
+            return len(self.counts) * 4**level
+        return 2 * len(self.indices) * int(4 ** (level - 1))
+
+    def over_shutter(self, description: dict[str, Any]) -> list[dict[str, Any]]:
+        """A description for ``SceneBuilder.make_surfaces`` as one for each step."""
+        if not self.steps:
+            return [description]
+        return [description | {"points": p, "matrix": np.array(m)} for p, m in self.steps]
+
+    def primvar(self, primvar: Primvar, width: int) -> dict[str, Any]:
+        """A primvar as ``SceneBuilder.make_surfaces`` takes it; one that fits (``spread`` says)."""
+        from wavecomb import _core
+
+        values = np.nan_to_num(
+            np.asarray(primvar.values[:, :width], np.float32), nan=0.0, posinf=0.0, neginf=0.0
+        )
+        kind, index = primvar.interpolation, primvar.index
+        if kind == "constant":
+            kind, values = "varying", np.repeat(values[:1], len(self.points), axis=0)
+        elif kind == "uniform":
+            kind = "faceVarying"
+            corners = np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
+        elif kind == "faceVarying" and index is not None:
+            # As authored: corners with different indices are apart even if their values agree.
+            corners, table = index, np.zeros((int(index.max()) + 1, values.shape[1]), np.float32)
+            table[index] = values
+            values = table
+        elif kind == "faceVarying":
+            values = np.ascontiguousarray(values)
+            corners, values = _core.weld_corners(self.indices, len(self.points), values)
+        out = {"interpolation": kind, "values": np.ascontiguousarray(values), "width": width}
+        return out | {"indices": corners} if kind == "faceVarying" else out
+
+
+def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[str, Any]:
+    """Boundary rules, creases, corners and holes of a UsdGeomMesh."""
+    get, path = prim.GetAttribute, prim.GetPath()
+
+    def token(name: str, known: Sequence[str], default: str) -> str:
+        value = get(name).Get(time)
+        if value is None or word(value) in known:
+            return word(value) or default
+        report.warn(f"{name} {value!r} is none of {', '.join(known)}: {default}", path)
+        return default
+
+    def numbers(name: str) -> Floats:
+        array = as_array(get(name).Get(time))
+        if array is None:
+            return np.empty(0, np.float32)
+        values = np.nan_to_num(array[:, 0].astype(np.float32), posinf=_INFINITE)
+        return np.clip(values, 0.0, _INFINITE).astype(np.float32)
+
+    rules: dict[str, Any] = {
+        "boundary": token("interpolateBoundary", _BOUNDARIES, "edgeAndCorner"),
+        "face_varying": token("faceVaryingLinearInterpolation", _FACE_VARYING, "cornersPlus1"),
+        "smooth_triangles": token("triangleSubdivisionRule", _TRIANGLES, "catmullClark")
+        == "smooth",
+    }
+    if get("holeIndices").HasAuthoredValue():
+        rules["holes"] = as_integers(get("holeIndices").Get(time))
+    if get("creaseIndices").HasAuthoredValue():
+        edges = crease_pairs(
+            as_integers(get("creaseIndices").Get(time)),
+            as_integers(get("creaseLengths").Get(time)),
+            numbers("creaseSharpnesses"),
+        )
+        if edges is None:
+            report.warn("creases whose lengths do not fit: ignored", path)
+        else:
+            rules["crease_edges"], rules["crease_sharpness"] = edges
+    if get("cornerIndices").HasAuthoredValue():
+        corners, sharpness = (
+            as_integers(get("cornerIndices").Get(time)),
+            numbers("cornerSharpnesses"),
+        )
+        if len(corners) == len(sharpness):
+            rules["corner_vertices"], rules["corner_sharpness"] = corners, sharpness
+        else:
+            report.warn("corners without a sharpness each: ignored", path)
+    return rules
+
+
+def crease_pairs(
+    indices: Ints, lengths: Ints, sharpness: Floats
+) -> tuple[NDArray[np.int32], Floats] | None:
+    """Edges (k, 2) of creases and the sharpness of each, (k,); None where the lengths do not fit.
+
+    Args:
+        indices: Points of all creases, one after the other.
+        lengths: How many points each has.
+        sharpness: One for each crease or for each edge.
+    """
+    if len(lengths) == 0 or lengths.min() < 2 or lengths.sum(dtype=np.int64) != len(indices):
+        return None
+    last = np.zeros(len(indices), bool)
+    last[np.cumsum(lengths) - 1] = True
+    first = np.flatnonzero(~last)
+    if len(sharpness) == len(lengths):
+        sharpness = np.repeat(sharpness, lengths - 1)
+    elif len(sharpness) != len(first):
+        return None
+    edges = np.stack([indices[first], indices[first + 1]], axis=1)
+    return np.ascontiguousarray(edges, np.int32), np.ascontiguousarray(sharpness, np.float32)

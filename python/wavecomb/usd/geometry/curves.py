@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdGeomBasisCurves as arrays for the core."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Usd
+
+from wavecomb.usd.geometry.deforming import points_at, points_now, step_times
+from wavecomb.usd.geometry.mesh import (
+    IDENTITY,
+    UV_NAMES,
+    bake,
+    bake_normals,
+    check_matrix,
+    extent,
+    find_primvar,
+)
+from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, as_array, read_primvar
+from wavecomb.usd.geometry.shutter import Motion
+from wavecomb.usd.geometry.strands import Strands, lay_out
+from wavecomb.usd.geometry.triangulate import MeshError
+from wavecomb.usd.stage.report import LoadReport
+
+Array = NDArray[np.float32]
+
+BASES = ("bezier", "bspline", "catmullRom")
+WRAPS = ("nonperiodic", "periodic", "pinned")
+
+
+@dataclass
+class CurveArrays:
+    """Curves or points in their group's space.
+
+    Attributes:
+        kind: linear-tube, cubic-tube, linear-ribbon or cubic-ribbon; sphere for points.
+        positions: (n, 3) control points or points, or (s, n, 3) at s steps over the shutter.
+        segments: (m,) as ``SceneBuilder.add_curves`` takes them; None for points.
+        radii: (n,).
+        normals: (n, 3) of ribbons, or (s, n, 3).
+        uvs: (m, 2, 2) at both ends of segments; (n, 2) for points; None: none wanted.
+        bounds: (2, 3).
+        topology: What primvars of the prim are spread over.
+    """
+
+    kind: str
+    positions: Array
+    segments: NDArray[np.uint32] | None
+    radii: Array
+    normals: Array | None
+    uvs: Array | None
+    bounds: Array
+    topology: Strands
+
+
+def uniform_scale(matrix: Gf.Matrix4d) -> float | None:
+    """The factor of a transform that scales all directions alike; None for others."""
+    if matrix == IDENTITY:
+        return 1.0
+    linear = np.array(matrix)[:3, :3]
+    product = linear @ linear.T
+    square = float(np.trace(product)) / 3.0
+    if not np.allclose(product, square * np.eye(3), rtol=0.0, atol=1e-4 * square):
+        return None
+    return float(np.sqrt(square))
+
+
+class CurveReader:
+    """Reads curves of one stage."""
+
+    def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
+        self.time = time
+        self.report = report
+
+    def curves(
+        self,
+        prim: Usd.Prim,
+        matrix: Gf.Matrix4d,
+        uv_names: Sequence[str],
+        inherited: Sequence[Any] = (),
+    ) -> CurveArrays | None:
+        """Curves in their group's space; None where there are none.
+
+        Args:
+            prim: A UsdGeomBasisCurves.
+            matrix: From the prim to its group, with a ``uniform_scale``.
+            uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
+            inherited: Primvars of its ancestors.
+
+        Raises:
+            MeshError: They cannot be drawn.
+        """
+        check_matrix(matrix)
+        points = read_points(prim, self.time)
+        counts = as_array(prim.GetAttribute("curveVertexCounts").Get(self.time))
+        if points is None or counts is None or len(counts) == 0:
+            return None
+        strands = self._layout(prim, counts[:, 0].astype(np.intp), len(points))
+        if strands is None:
+            return None
+        positions = strands.controls(points, "vertex")
+        if matrix != IDENTITY:
+            positions = bake(positions, matrix)
+        widths, kind = read_widths(prim, strands, self.time, self.report)
+        scale = 0.5 * (uniform_scale(matrix) or 1.0)
+        radii = np.maximum(strands.controls(widths, kind)[:, 0] * np.float32(scale), 0)
+        bounds = thick_extent(positions, radii)
+        normals = self.normals(prim, strands)
+        if normals is not None and matrix != IDENTITY:
+            normals = bake_normals(normals, matrix)
+        shape = ("cubic-" if strands.cubic else "linear-") + (
+            "tube" if normals is None else "ribbon"
+        )
+        uvs = self._uvs(prim, strands, uv_names, inherited) if uv_names else None
+        return CurveArrays(
+            shape, positions, strands.segment_words(), radii, normals, uvs, bounds, strands
+        )
+
+    def _layout(self, prim: Usd.Prim, counts: NDArray[np.intp], points: int) -> Strands | None:
+        if (counts < 0).any() or int(counts.sum()) != points:
+            raise MeshError(
+                f"curveVertexCounts ask for {int(counts.sum())} points, and there are {points}"
+            )
+        basis = self._token(prim, "type", ("cubic", "linear"))
+        if basis == "cubic":
+            basis = self._token(prim, "basis", BASES)
+        strands = lay_out(counts, basis, self._token(prim, "wrap", WRAPS))
+        bad = len(counts) - len(strands.kept)
+        if bad:
+            what = f"curves left out: their number of points does not fit {basis} {strands.wrap}"
+            self.report.warn(what, prim.GetPath(), bad)
+        return strands if len(strands.kept) else None
+
+    def _token(self, prim: Usd.Prim, name: str, known: tuple[str, ...]) -> str:
+        value = str(prim.GetAttribute(name).Get(self.time) or known[0])
+        if value not in known:
+            raise MeshError(f"its {name} is {value!r}; there are {', '.join(known)}")
+        return value
+
+    def normals(self, prim: Usd.Prim, strands: Strands) -> Array | None:
+        """At control points, for ribbons; None for tubes."""
+        primvar = authored(prim, "normals", self.time)
+        if primvar is None:
+            return None
+        try:
+            values, kind = strands.fit(primvar, 3)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: drawn as tubes", prim.GetPath())
+            return None
+        normals = strands.controls(values, kind)
+        length = np.einsum("ij,ij->i", normals, normals)
+        # Written so that NaN fails too.
+        if not (float(length.min(initial=1.0)) > 0 and float(length.max(initial=0.0)) < 1e30):
+            what = "normals of length zero or not finite: curves drawn as tubes"
+            self.report.warn(what, prim.GetPath())
+            return None
+        return normals
+
+    def _uvs(
+        self, prim: Usd.Prim, strands: Strands, names: Sequence[str], inherited: Sequence[Any]
+    ) -> Array:
+        """At both ends of segments: authored, else u along the curve and v 0."""
+        found = read_uvs(prim, strands, names, inherited, self.time, self.report)
+        if found is None:
+            values = np.zeros((strands.sizes["varying"], 2))
+            size = strands.segments + (0 if strands.periodic else 1)
+            owner = np.repeat(np.arange(len(size)), size)
+            at = np.arange(len(owner)) - (np.cumsum(size) - size)[owner]
+            values[:, 0] = at / strands.segments[owner]
+            first, last = strands.ends(values, "varying")
+            if strands.periodic:
+                last[np.cumsum(strands.segments) - 1, 0] = 1.0
+        else:
+            first, last = strands.ends(*found)
+        return np.ascontiguousarray(np.stack([first, last], axis=1), np.float32)
+
+
+def over_shutter(
+    prim: Usd.Prim, shape: CurveArrays, matrix: Gf.Matrix4d, motion: Motion, report: LoadReport
+) -> CurveArrays:
+    """Curves or points that were read at the frame, where they are at the steps of the shutter.
+
+    Widths and texture coordinates are those of the frame.
+
+    Args:
+        prim: Whose points change.
+        shape: Its arrays at the frame.
+        matrix: From the prim to its group.
+        motion: While the shutter is open.
+        report: For what is odd.
+    """
+    times = step_times(prim, None, motion)
+    found = points_at(prim, None, times, motion.frame, report)
+    layout = shape.topology
+    if found is None or len(found[0]) != layout.sizes["vertex"]:
+        return shape
+    if all(np.array_equal(points, found[0]) for points in found):
+        return shape
+    steps, normals = [], []
+    for points, time in zip(found, times, strict=True):
+        controls = points if shape.segments is None else layout.controls(points, "vertex")
+        steps.append(bake(controls, matrix))
+        if shape.normals is not None:
+            then = CurveReader(Usd.TimeCode(time), LoadReport()).normals(prim, layout)
+            normals.append(shape.normals if then is None else bake_normals(then, matrix))
+    positions = np.stack(steps)
+    bounds = thick_extent(positions.reshape(-1, 3), shape.radii)
+    together = np.stack(normals) if normals else None
+    return replace(shape, positions=positions, normals=together, bounds=bounds)
+
+
+def thick_extent(positions: Array, radii: Array) -> Array:
+    """Bounds (2, 3) of curves or points with the largest of the radii around them."""
+    reach = float(radii.max(initial=0.0))
+    return extent(positions) + np.array([[-reach], [reach]], np.float32)
+
+
+def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
+    """Points (n, 3) of a prim; None where there are none.
+
+    Raises:
+        MeshError: They are no points.
+    """
+    points = as_array(points_now(prim, time))
+    if points is None or len(points) == 0:
+        return None
+    if points.shape[1] != 3:
+        raise MeshError("points are not triples")
+    return np.ascontiguousarray(points, np.float32)
+
+
+def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
+    """``primvars:name``, else the attribute ``name``; None where neither has values."""
+    primvar = None
+    with contextlib.suppress(PrimvarError):
+        primvar = read_primvar(prim, name, time)
+    if primvar is None:
+        attribute = prim.GetAttribute(name)
+        if not attribute or not attribute.HasAuthoredValue():
+            return None
+        values = as_array(attribute.Get(time))
+        if values is None:
+            return None
+        primvar = Primvar(values, attribute.GetMetadata("interpolation") or "vertex", name)
+    return primvar if len(primvar.values) else None
+
+
+def read_widths(
+    prim: Usd.Prim, strands: Strands, time: Usd.TimeCode, report: LoadReport
+) -> tuple[NDArray[Any], str]:
+    """Widths (n, 1) and their interpolation; 1 where none fit."""
+    one = np.ones((1, 1))
+    primvar = authored(prim, "widths", time)
+    if primvar is None:
+        report.note("curves or points without widths: drawn 1 wide", prim.GetPath())
+        return one, "constant"
+    try:
+        widths, kind = strands.fit(primvar, 1)
+    except PrimvarError as error:
+        report.warn(f"{error}: drawn 1 wide", prim.GetPath())
+        return one, "constant"
+    bad = ~((widths >= 0) & (widths < 1e18))
+    if bad.any():
+        what = "widths that are negative or not finite: set to 0"
+        report.warn(what, prim.GetPath(), int(bad.sum()))
+        widths = np.where(bad, 0, widths)
+    return widths, kind
+
+
+def read_uvs(
+    prim: Usd.Prim,
+    strands: Strands,
+    names: Sequence[str],
+    inherited: Sequence[Any],
+    time: Usd.TimeCode,
+    report: LoadReport,
+) -> tuple[NDArray[Any], str] | None:
+    """Texture coordinates (n, 2) and their interpolation; None where there are none that fit."""
+    try:
+        found = (find_primvar(prim, name, inherited, time) for name in names)
+        primvar = next((p for p in found if p is not None), None)
+        if primvar is None:
+            if names is not UV_NAMES:
+                what = f"no primvar {names[0]!r} for the textures of curves: made up"
+                report.warn(what, prim.GetPath())
+            return None
+        values, kind = strands.fit(primvar, 2)
+    except PrimvarError as error:
+        report.warn(f"{error}: ignored", prim.GetPath())
+        return None
+    if not np.isfinite(values).all():
+        report.warn("texture coordinates that are not finite: set to 0", prim.GetPath())
+        values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+    return values, kind

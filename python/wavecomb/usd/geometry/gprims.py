@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads gprims of every kind into arrays, and hands those to the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from pxr import Usd
+
+from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
+from wavecomb.usd.geometry.deforming import deforms
+from wavecomb.usd.geometry.mesh import UV_NAMES, MeshArrays, MeshReader
+from wavecomb.usd.geometry.points import PointReader
+from wavecomb.usd.geometry.shutter import Motion
+from wavecomb.usd.geometry.skeleton import Skeletons
+from wavecomb.usd.geometry.surfaces import Surfaces
+from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.shared import MeshStock
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+
+class GprimReader:
+    """Reads the gprims of one stage at one time."""
+
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        report: LoadReport,
+        surfaces: Surfaces,
+        skeletons: Skeletons,
+        motion: Motion | None = None,
+        stock: MeshStock | None = None,
+    ) -> None:
+        """Reads at ``time``.
+
+        Args:
+            time: The frame.
+            report: For what is odd.
+            surfaces: Say what is subdivided or displaced.
+            skeletons: Deform what is bound to them.
+            motion: Shapes are taken over its shutter; None: at ``time`` only.
+            stock: Arrays to take from and leave there.
+        """
+        self.time = time
+        self.report = report
+        self.surfaces = surfaces
+        self.skeletons = skeletons
+        self.motion = motion
+        self.stock = stock
+
+    def deforms(self, kind: str, prim: Usd.Prim) -> bool:
+        """Whether the shape of a gprim may change while the shutter is open."""
+        return self.motion is not None and self._changes(kind, prim)
+
+    def _changes(self, kind: str, prim: Usd.Prim) -> bool:
+        """Whether the shape of a gprim may change over time."""
+        return kind != "shape" and deforms(prim, self.skeletons.of(prim))
+
+    def read(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | CurveArrays | None:
+        """The arrays of a gprim in its group's space; None where there is nothing to draw.
+
+        Those of the frame before where they are the same.
+
+        Args:
+            kind: mesh, shape, curves or points.
+            draw: The gprim.
+            names: Primvars to take texture coordinates from, the first there is.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
+
+        def read(report: LoadReport) -> MeshArrays | CurveArrays | None:
+            strands: CurveArrays | None
+            if kind in ("curves", "points"):
+                if kind == "curves":
+                    curves = CurveReader(self.time, report)
+                    strands = curves.curves(draw.prim, draw.matrix, names, draw.inherited)
+                else:
+                    points = PointReader(self.time, report)
+                    strands = points.points(draw.prim, draw.matrix, names, draw.inherited)
+                if (
+                    strands is not None
+                    and self.motion is not None
+                    and self._changes(kind, draw.prim)
+                ):
+                    return over_shutter(draw.prim, strands, draw.matrix, self.motion, report)
+                return strands
+            meshes = MeshReader(
+                self.time, report, self.surfaces.subdivide, self.skeletons, self.motion
+            )
+            if kind == "shape":
+                return meshes.shape(draw.prim, draw.matrix)
+            mesh = meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
+            if mesh is not None and self.deforms(kind, draw.prim):
+                return meshes.over_shutter(draw.prim, mesh, draw.matrix, draw.track)
+            return mesh
+
+        if self.stock is None or self._changes(kind, draw.prim):
+            return read(self.report)
+        options = (tuple(names), names is UV_NAMES, displaced)
+        return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
+
+
+def add_shape(
+    builder: _core.SceneBuilder, shape: MeshArrays | CurveArrays, options: dict[str, Any]
+) -> int:
+    """Adds arrays to the scene; gives their number there.
+
+    ``options``: Keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` all take.
+    """
+    if isinstance(shape, MeshArrays):
+        return builder.add_mesh(
+            shape.positions, shape.triangles, normals=shape.normals, uvs=shape.uvs, **options
+        )
+    if shape.segments is None:
+        return builder.add_points(shape.positions, shape.radii, uvs=shape.uvs, **options)
+    return builder.add_curves(
+        shape.kind,
+        shape.positions,
+        shape.segments,
+        shape.radii,
+        normals=shape.normals,
+        uvs=shape.uvs,
+        **options,
+    )

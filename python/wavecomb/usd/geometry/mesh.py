@@ -1,0 +1,473 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdGeomMesh and implicit shapes as arrays for the core."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd
+
+from wavecomb.usd.geometry.cage import SCHEMES, Cage, crease_pairs, read_rules
+from wavecomb.usd.geometry.deforming import matrix_at, points_at, points_now, step_times
+from wavecomb.usd.geometry.normals import smooth_normals
+from wavecomb.usd.geometry.primvar import (
+    Primvar,
+    PrimvarError,
+    as_array,
+    as_integers,
+    authored_names,
+    from_attribute,
+    read_primvar,
+    spread,
+)
+from wavecomb.usd.geometry.shapes import read_shape
+from wavecomb.usd.geometry.shutter import Motion, Track
+from wavecomb.usd.geometry.skeleton import Skeletons, Skin, SkinError, skinned_points
+from wavecomb.usd.geometry.triangulate import MeshError, Topology, triangulate
+from wavecomb.usd.looks.network import word
+from wavecomb.usd.stage.report import LoadReport
+
+Array = NDArray[np.float32]
+
+IDENTITY = Gf.Matrix4d(1.0)
+
+LIMIT = 1e18
+"""Coordinates beyond this are taken for a mistake (Embree's own limit is 1.8e18)."""
+
+UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
+"""Texture coordinates that are looked for where no material says which."""
+
+SHARP = 1.0
+"""Crease sharpness from which an edge of polygons is drawn as an edge."""
+
+_CHUNK = 1 << 18
+
+
+@dataclass
+class MeshArrays:
+    """A mesh in its group's space.
+
+    Attributes:
+        positions: (n, 3), or (s, n, 3) at s steps over the shutter.
+        triangles: (m, 3), counter-clockwise from outside.
+        normals: (n, 3), (m, 3, 3) or None; at each step where there are some.
+        uvs: (n, 2), (m, 3, 2) or None.
+        bounds: (2, 3) lowest and highest coordinates.
+        topology: Where the triangles come from; None for implicit shapes.
+        cage: What can be subdivided or displaced once the view is known; None: this is all.
+    """
+
+    positions: Array
+    triangles: NDArray[np.uint32]
+    normals: Array | None
+    uvs: Array | None
+    bounds: Array
+    topology: Topology | None = None
+    cage: Cage | None = None
+
+
+def check_matrix(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform mirrors.
+
+    Raises:
+        MeshError: It has no inverse or is not finite.
+    """
+    det = matrix.GetDeterminant3()
+    if not abs(det) > 1e-6:
+        volume = 1.0
+        for row in range(3):
+            volume *= matrix.GetRow3(row).GetLength()
+        if not abs(det) > 1e-9 * volume:
+            raise MeshError("its transform has no inverse")
+    return bool(det < 0)
+
+
+def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
+    """Points (n, 3) under a transform, in double precision: a float32 copy."""
+    m = np.array(matrix)
+    linear, offset = m[:3, :3], m[3, :3]
+    if len(points) <= _CHUNK:
+        return (points @ linear + offset).astype(np.float32)
+    out = np.empty((len(points), 3), np.float32)
+    for first in range(0, len(points), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        out[part] = points[part] @ linear + offset
+    return out
+
+
+def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
+    """Normals (..., 3) under the inverse transpose of a transform, unit length."""
+    linear = np.array(matrix.GetInverse())[:3, :3].T
+    flat = normals.reshape(-1, 3)
+    out = np.empty(flat.shape, np.float32)
+    for first in range(0, len(flat), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        turned = flat[part] @ linear
+        length = np.sqrt(np.einsum("ij,ij->i", turned, turned))
+        out[part] = turned / np.where(length > 0, length, 1)[:, None]
+    return out.reshape(normals.shape)
+
+
+def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | None:
+    """Its subdivisionScheme; ``names``: of what is authored."""
+    if "subdivisionScheme" not in names:
+        return "catmullClark"
+    return word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
+
+
+def _moves_only(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform is a translation."""
+    return bool(matrix.ExtractRotationMatrix() == _NO_TURN)
+
+
+_NORMALS = ("primvars:normals", "normals")
+
+_NO_TURN = Gf.Matrix3d(1.0)
+
+
+def extent(positions: Array) -> Array:
+    """Bounds (2, 3) of points.
+
+    Raises:
+        MeshError: A point is not finite or absurdly far away.
+    """
+    bounds = np.empty((2, 3), np.float32)
+    np.minimum.reduce(positions, axis=0, out=bounds[0])
+    np.maximum.reduce(positions, axis=0, out=bounds[1])
+    # Written so that NaN fails too.
+    if not (bounds[0].min() > -LIMIT and bounds[1].max() < LIMIT):
+        raise MeshError("a point is not finite or absurdly far away")
+    return bounds
+
+
+class MeshReader:
+    """Reads meshes and shapes of one stage."""
+
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        report: LoadReport,
+        subdivide: bool = True,
+        skeletons: Skeletons | None = None,
+        motion: Motion | None = None,
+    ) -> None:
+        """Reads at ``time``.
+
+        Args:
+            time: The frame.
+            report: For what is odd.
+            subdivide: Subdivision meshes get a cage, and their authored normals do not count.
+            skeletons: Deform what is bound to them.
+            motion: Shapes are taken over its shutter; None: at ``time`` only.
+        """
+        self.time = time
+        self.report = report
+        self.subdivide = subdivide
+        self.skeletons = skeletons
+        self.motion = motion
+
+    def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> MeshArrays:
+        """An implicit shape, in its group's space."""
+        mirrored = check_matrix(matrix)
+        shape = read_shape(prim, self.time)
+        if shape is None or len(shape.triangles) == 0:
+            raise MeshError("no faces")
+        positions = bake(shape.positions, matrix)
+        triangles = shape.triangles[:, ::-1] if mirrored else shape.triangles
+        return MeshArrays(
+            positions,
+            np.ascontiguousarray(triangles),
+            bake_normals(shape.normals, matrix),
+            shape.uvs,
+            extent(positions),
+        )
+
+    def mesh(
+        self,
+        prim: Usd.Prim,
+        matrix: Gf.Matrix4d,
+        uv_names: Sequence[str],
+        inherited: Sequence[Any] = (),
+        displaced: bool = False,
+    ) -> MeshArrays | None:
+        """A mesh in its group's space, as polygons; None where it is empty.
+
+        Args:
+            prim: A UsdGeomMesh.
+            matrix: From the mesh to its group.
+            uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
+            inherited: Primvars of its ancestors.
+            displaced: Its points will be moved.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        get, time = prim.GetAttribute, self.time
+        mirrored = check_matrix(matrix)
+        skin = self._skin(prim)
+        names = authored_names(prim)
+        value = points_now(prim, time) if "velocities" in names else get("points").Get(time)
+        points = as_array(value)
+        if skin is not None and points is not None and len(points):
+            points = skinned_points(skin, value, time)
+        counts = as_integers(get("faceVertexCounts").Get(time))
+        if points is None or len(points) == 0 or len(counts) == 0:
+            return None
+        if points.shape[1] != 3:
+            raise MeshError("points are not triples")
+        points = np.ascontiguousarray(points, np.float32)
+        indices = as_integers(get("faceVertexIndices").Get(time))
+        holes = as_integers(get("holeIndices").Get(time)) if "holeIndices" in names else None
+        flip = "orientation" in names and word(get("orientation").Get(time)) == "leftHanded"
+        positions = points if matrix == IDENTITY else bake(points, matrix)
+        bounds = extent(positions)
+        topology = triangulate(points, counts, indices, holes, flip)
+        if topology.hurried:
+            what = "a face crosses itself too often to be split with care; its triangles overlap"
+            self.report.warn(what, prim.GetPath())
+        scheme = _scheme(prim, names, time)
+        subdivided = self.subdivide and scheme in SCHEMES
+        normals = self._normals(prim, points, topology, scheme, names)
+        primvar = self._coordinates(prim, topology, uv_names, inherited) if uv_names else None
+        uvs, primvar = self._uvs(prim, topology, primvar)
+        if normals is not None and not _moves_only(matrix):
+            normals = bake_normals(normals, matrix)
+        cage = None
+        if subdivided or displaced:
+            rules = read_rules(prim, time, self.report) if subdivided else {}
+            kind = str(scheme) if subdivided else "none"
+            cage = Cage(
+                points, counts, indices, matrix, flip, kind, rules, primvar, topology,
+                normals is not None,
+            )  # fmt: skip
+        triangles = topology.triangles
+        if mirrored:
+            triangles = np.ascontiguousarray(triangles[:, ::-1])
+            normals, uvs = _reverse(normals), _reverse(uvs)
+        return MeshArrays(positions, triangles, normals, uvs, bounds, topology, cage)
+
+    def over_shutter(
+        self, prim: Usd.Prim, mesh: MeshArrays, matrix: Gf.Matrix4d, track: Track | None
+    ) -> MeshArrays:
+        """A mesh that was read by ``mesh``, with its shape at the steps of the shutter.
+
+        Args:
+            prim: A UsdGeomMesh that ``deforms``.
+            mesh: Its arrays at the frame.
+            matrix: From the mesh to its group.
+            track: In place of ``matrix`` where that changes.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        motion, topology, skin = self.motion, mesh.topology, self._skin(prim)
+        if motion is None or topology is None:
+            return mesh
+        times = step_times(prim, skin, motion)
+        shapes = points_at(prim, skin, times, motion.frame, self.report)
+        if shapes is None or len(shapes[0]) != len(mesh.positions):
+            return mesh
+        matrices = [matrix_at(track, matrix, time) for time in times]
+        if track is None and all(np.array_equal(shape, shapes[0]) for shape in shapes):
+            return mesh
+        mirrored = check_matrix(matrix)
+        scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
+        positions = np.stack([bake(p, m) for p, m in zip(shapes, matrices, strict=True)])
+        normals: list[Array] = []
+        names = authored_names(prim)
+        for points, to_group, time in zip(shapes, matrices, times, strict=True):
+            if mesh.normals is None:
+                break
+            then = MeshReader(Usd.TimeCode(time), LoadReport(), self.subdivide, self.skeletons)
+            found = then._normals(prim, points, topology, scheme, names)
+            if found is not None:
+                found = bake_normals(found, to_group)
+                normals.append(_reverse(found) if mirrored else found)
+        if mesh.normals is not None and {n.shape for n in normals} != {mesh.normals.shape}:
+            normals = [mesh.normals] * len(times)
+        return replace(
+            mesh,
+            positions=positions,
+            normals=np.stack(normals) if normals else None,
+            bounds=extent(positions.reshape(-1, 3)),
+            cage=mesh.cage and replace(mesh.cage, steps=list(zip(shapes, matrices, strict=True))),
+        )
+
+    def _skin(self, prim: Usd.Prim) -> Skin | None:
+        return None if self.skeletons is None else self.skeletons.of(prim)
+
+    def _normals(
+        self,
+        prim: Usd.Prim,
+        points: Array,
+        topology: Topology,
+        scheme: str | None,
+        names: frozenset[str],
+    ) -> Array | None:
+        """(n, 3), (m, 3, 3), or None for flat: authored, else smooth for subdivision surfaces.
+
+        Authored ones do not count for meshes that are subdivided, as UsdGeomMesh says.
+        """
+        if scheme not in SCHEMES:
+            if scheme not in (None, "none"):
+                what = f"subdivisionScheme {scheme!r} is none of {', '.join(SCHEMES)}: polygons"
+                self.report.warn(what, prim.GetPath())
+            return self._authored_normals(prim, points, topology, names)
+        authored = None if self.subdivide else self._authored_normals(prim, points, topology, names)
+        if authored is not None or scheme == "bilinear":
+            return authored
+        return smooth_normals(points, topology, self._creases(prim, topology, names))
+
+    def _creases(
+        self, prim: Usd.Prim, topology: Topology, names: frozenset[str]
+    ) -> NDArray[np.int64] | None:
+        get, time = prim.GetAttribute, self.time
+        if "creaseIndices" not in names:
+            return None
+        indices = as_integers(get("creaseIndices").Get(time))
+        lengths = as_integers(get("creaseLengths").Get(time))
+        sharpness = as_array(get("creaseSharpnesses").Get(time))
+        inside = (indices >= 0) & (indices < topology.point_count)
+        if sharpness is None or not inside.all():
+            if not self.subdivide:  # else said of the surface
+                what = "creases that name no points of the mesh: ignored"
+                self.report.warn(what, prim.GetPath())
+            return None
+        creases = crease_pairs(indices, lengths, sharpness[:, 0])
+        return None if creases is None else creases[0][creases[1] >= SHARP].astype(np.int64)
+
+    def _authored_normals(
+        self, prim: Usd.Prim, points: Array, topology: Topology, names: frozenset[str]
+    ) -> Array | None:
+        """primvars:normals, else normals; None where there are none that fit."""
+        if names.isdisjoint(_NORMALS):
+            return None
+        try:
+            primvar = read_primvar(prim, "normals", self.time)
+            if primvar is None:
+                attribute = prim.GetAttribute("normals")
+                if not attribute.HasAuthoredValue():
+                    return None
+                values = as_array(attribute.Get(self.time))
+                if values is None or len(values) == 0:
+                    return None
+                kind = attribute.GetMetadata("interpolation") or "vertex"
+                primvar = Primvar(values, kind, "normals")
+            primvar = self._skinned_normals(prim, primvar, topology)
+            normals, at = spread(primvar, topology, 3)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", prim.GetPath())
+            return None
+        flat = normals.reshape(-1, 3)
+        lengths = np.einsum("ij,ij->i", flat, flat)
+        # Written so that NaN fails too.
+        if not float(np.maximum.reduce(lengths, axis=None, initial=0.0)) < 1e30:
+            self.report.warn("normals that are not finite: ignored", prim.GetPath())
+            return None
+        if at == "constant":
+            normals = np.repeat(normals, len(points), axis=0)
+        elif float(np.minimum.reduce(lengths, axis=None, initial=1.0)) <= 0.0:
+            self.report.warn("normals of length zero: replaced by smooth ones", prim.GetPath())
+            smooth = smooth_normals(points, topology)
+            if at == "corner":
+                smooth = smooth[topology.triangles]
+            normals = np.where(lengths.reshape(*normals.shape[:-1], 1) > 0, normals, smooth)
+        return np.ascontiguousarray(normals, np.float32)
+
+    def _skinned_normals(self, prim: Usd.Prim, primvar: Primvar, topology: Topology) -> Primvar:
+        """Authored normals under the mesh's skin; of points and of corners only."""
+        skin = self._skin(prim)
+        corners = topology.indices if primvar.interpolation == "faceVarying" else None
+        wanted = topology.point_count if corners is None else len(corners)
+        kinds = ("vertex", "varying", "faceVarying")
+        if skin is None or primvar.interpolation not in kinds or len(primvar.values) != wanted:
+            return primvar
+        try:
+            authored = np.asarray(primvar.values[:, :3], np.float64)
+            values = skin.normals(authored, corners, topology.point_count, self.time)
+        except SkinError:
+            return primvar
+        return replace(primvar, values=values)
+
+    def _coordinates(
+        self,
+        prim: Usd.Prim,
+        topology: Topology,
+        names: Sequence[str],
+        inherited: Sequence[Any],
+    ) -> Primvar | None:
+        """The primvar to take texture coordinates from; all at (0, 0) where it is not there."""
+        try:
+            primvar = next(
+                (p for p in (self._find(prim, name, inherited) for name in names) if p), None
+            )
+            if primvar is None:
+                primvar = self._any_coordinates(prim)
+                if primvar is None and names is not UV_NAMES:
+                    what = f"no primvar {names[0]!r} for its textures: all at (0, 0)"
+                    self.report.warn(what, prim.GetPath())
+                    zeros = np.zeros((topology.point_count, 2), np.float32)
+                    return Primvar(zeros, "vertex", names[0])
+                if primvar is not None and names is not UV_NAMES:
+                    what = f"no primvar {names[0]!r}: used {primvar.name!r} in its place"
+                    self.report.warn(what, prim.GetPath())
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", prim.GetPath())
+            return None
+        return primvar
+
+    def _uvs(
+        self, prim: Usd.Prim, topology: Topology, primvar: Primvar | None
+    ) -> tuple[Array | None, Primvar | None]:
+        """(n, 2), (m, 3, 2) or None, and the primvar where it is of use."""
+        if primvar is None:
+            return None, None
+        try:
+            uvs, at = spread(primvar, topology, 2)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", prim.GetPath())
+            return None, None
+        if not np.isfinite(uvs).all():
+            self.report.warn("texture coordinates that are not finite: set to 0", prim.GetPath())
+            uvs = np.nan_to_num(uvs, nan=0.0, posinf=0.0, neginf=0.0)
+        if at == "constant":
+            uvs = np.repeat(uvs, topology.point_count, axis=0)
+        return uvs, primvar
+
+    def _find(self, prim: Usd.Prim, name: str, inherited: Sequence[Any]) -> Primvar | None:
+        return find_primvar(prim, name, inherited, self.time)
+
+    def _any_coordinates(self, prim: Usd.Prim) -> Primvar | None:
+        """The first primvar whose type says texture coordinates."""
+        for attribute in prim.GetAuthoredAttributes():
+            name = attribute.GetName()
+            coordinates = attribute.GetTypeName() == Sdf.ValueTypeNames.TexCoord2fArray
+            if coordinates and name.startswith("primvars:"):
+                found = from_attribute(attribute, name[len("primvars:") :], self.time)
+                if found is not None:
+                    return found
+        return None
+
+
+def find_primvar(
+    prim: Usd.Prim, name: str, inherited: Sequence[Any], time: Usd.TimeCode
+) -> Primvar | None:
+    """A primvar of a prim, else the constant one that it inherits."""
+    own = read_primvar(prim, name, time)
+    if own is not None or not inherited:
+        return own
+    for primvar in inherited:
+        if primvar.GetPrimvarName() == name:
+            return from_attribute(primvar.GetAttr(), name, time)
+    return None
+
+
+def _reverse(values: Any) -> Any:
+    """Values (m, 3, c) with the corners of each triangle reversed; others as they are."""
+    if values is None or values.ndim != 3:
+        return values
+    return np.ascontiguousarray(values[:, ::-1])

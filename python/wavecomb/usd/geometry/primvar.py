@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Primvars as arrays, in every interpolation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd
+
+from wavecomb.usd.geometry.triangulate import Topology
+
+
+class PrimvarError(ValueError):
+    """A primvar that does not fit its mesh; says why in a few words."""
+
+
+@dataclass(frozen=True)
+class Primvar:
+    """Values of a primvar.
+
+    Attributes:
+        values: (k, c), with indices already applied.
+        interpolation: constant, uniform, varying, vertex or faceVarying.
+        name: As authored.
+        index: (k,) Which authored value each came from; None where no indices are authored.
+    """
+
+    values: NDArray[Any]
+    interpolation: str
+    name: str
+    index: NDArray[np.int32] | None = None
+
+
+def as_array(value: Any) -> NDArray[Any] | None:
+    """A VtArray, vector or number as (k, c) without a copy where there is none to make."""
+    if value is None:
+        return None
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        return None
+    if array.dtype.kind not in "fiub":
+        return None
+    if array.ndim == 0:
+        return array.reshape(1, 1)
+    if array.ndim == 1:
+        is_list = getattr(type(value), "_isVtArray", False)
+        return array.reshape(-1, 1) if is_list else array.reshape(1, -1)
+    return array if array.ndim == 2 else None
+
+
+def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
+    """The whole numbers of a value (k,); none where it holds anything else."""
+    array = as_array(value)
+    if array is None or array.dtype.kind not in "iu":
+        return np.empty(0, dtype)
+    return np.ascontiguousarray(array[:, 0], dtype)
+
+
+def authored_names(prim: Usd.Prim) -> frozenset[str]:
+    """Properties that a prim has opinions of: to ask each attribute takes USD as long as this."""
+    return frozenset(prim.GetAuthoredPropertyNames())
+
+
+def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> Primvar | None:
+    """A primvar with its indices applied, or None where it has no value.
+
+    Raises:
+        PrimvarError: Its indices are out of range.
+    """
+    values = as_array(attribute.Get(time))
+    if values is None:
+        return None
+    interpolation = attribute.GetMetadata("interpolation") or "constant"
+    kept: NDArray[np.int32] | None = None
+    companion = attribute.GetPrim().GetAttribute(attribute.GetName() + ":indices")
+    if companion and companion.HasAuthoredValue():
+        index = np.asarray(companion.Get(time))
+        if index.ndim == 1 and index.dtype.kind in "iu":
+            if len(index) and (index.min() < 0 or index.max() >= len(values)):
+                raise PrimvarError(f"indices of primvar {name!r} are out of range")
+            values, kept = values[index], np.ascontiguousarray(index, np.int32)
+    return Primvar(values, interpolation, name, kept)
+
+
+def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
+    """The primvar ``name`` authored on a prim itself, or None."""
+    attribute = prim.GetAttribute("primvars:" + name)
+    if not attribute or not attribute.HasAuthoredValue():
+        return None
+    return from_attribute(attribute, name, time)
+
+
+def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:
+    """Values (k, width) of a primvar that fits a mesh; more components are cut.
+
+    Raises:
+        PrimvarError: The number of values or components does not fit.
+    """
+    values, kind = primvar.values, primvar.interpolation
+    if values.shape[1] < width:
+        raise PrimvarError(f"primvar {primvar.name!r} has too few components")
+    values = np.ascontiguousarray(values[:, :width], np.float32)
+    wanted = {
+        "constant": 1,
+        "uniform": topology.face_count,
+        "varying": topology.point_count,
+        "vertex": topology.point_count,
+        "faceVarying": len(topology.indices),
+    }.get(kind)
+    if wanted is None:
+        raise PrimvarError(f"primvar {primvar.name!r} has unknown interpolation {kind!r}")
+    if len(values) != wanted:
+        raise PrimvarError(f"primvar {primvar.name!r} ({kind}) has the wrong number of values")
+    return values
+
+
+def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np.float32], str]:
+    """A primvar on triangles: ((n, c), "vertex"), ((m, 3, c), "corner") or ((1, c), "constant").
+
+    Args:
+        primvar: As read.
+        topology: Of its mesh.
+        width: Components wanted, c; more are cut.
+
+    Raises:
+        PrimvarError: The number of values or components does not fit.
+    """
+    values, kind = fitting(primvar, topology, width), primvar.interpolation
+    if kind == "constant":
+        return values, "constant"
+    if kind in ("vertex", "varying"):
+        return values, "vertex"
+    if kind == "uniform":
+        per_face = values[topology.face_ids()]
+        return np.repeat(per_face[:, None], 3, axis=1), "corner"
+    welded = _weld(values, topology)
+    if welded is not None:
+        return welded, "vertex"
+    if topology.corners is None:
+        return values.reshape(-1, 3, width), "corner"
+    return np.ascontiguousarray(values[topology.corners]), "corner"
+
+
+def _weld(values: NDArray[np.float32], topology: Topology) -> NDArray[np.float32] | None:
+    """Face-varying values (corners, c) as values per point, where all corners of each agree."""
+    indices = topology.indices
+    probe = slice(0, 64)
+    per_point = np.zeros((topology.point_count, values.shape[1]), np.float32)
+    per_point[indices[probe]] = values[probe]
+    if not np.array_equal(per_point[indices[probe]], values[probe]):
+        return None
+    per_point[indices] = values
+    return per_point if np.array_equal(per_point[indices], values) else None

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdSkel: meshes that skeletons and blend shapes deform."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from wavecomb.usd.geometry.primvar import as_array
+from wavecomb.usd.stage.report import LoadReport
+
+Array = NDArray[Any]
+
+_PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+
+
+class Skin:
+    """How one mesh is deformed."""
+
+    def __init__(
+        self, skeleton: UsdSkel.SkeletonQuery, query: UsdSkel.SkinningQuery, report: LoadReport
+    ) -> None:
+        self.skeleton = skeleton
+        self.query = query
+        self.report = report
+        self.prim: Usd.Prim = query.GetPrim()
+        self._shapes = None
+        if query.HasBlendShapes():
+            self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(self.prim))
+
+    def varies(self) -> bool:
+        """Whether its animation, or the way from skeleton to mesh, may change over time."""
+        animation = self.skeleton.GetAnimQuery()
+        if animation and (
+            animation.JointTransformsMightBeTimeVarying()
+            or animation.BlendShapeWeightsMightBeTimeVarying()
+        ):
+            return True
+        here, there = _moving_above(self.prim), _moving_above(self.skeleton.GetPrim())
+        return self.query.HasJointInfluences() and here != there
+
+    def samples(self, interval: Gf.Interval) -> set[float]:
+        """Time codes of the animation's samples."""
+        animation = self.skeleton.GetAnimQuery()
+        if not animation:
+            return set()
+        return {
+            *animation.GetJointTransformTimeSamplesInInterval(interval),
+            *animation.GetBlendShapeWeightTimeSamplesInInterval(interval),
+        }
+
+    def transforms(self, time: float) -> Array:
+        """(k, 4, 4) of the joints: how far straight lines go is seen by them."""
+        found = self.skeleton.ComputeSkinningTransforms(Usd.TimeCode(time))
+        return np.zeros((1, 4, 4)) if found is None else np.array(found)
+
+    def points(self, points: Any, time: Usd.TimeCode) -> Array:
+        """Points (n, 3) of the mesh in its own space, deformed.
+
+        Raises:
+            SkinError: The skinning data does not fit the mesh.
+        """
+        deformed = Vt.Vec3fArray(points)
+        self._blend(deformed, time)
+        if not self.query.HasJointInfluences():
+            return np.array(deformed, np.float32)
+        joints = self._joints(time)
+        if not self.query.ComputeSkinnedPoints(joints, deformed, time):
+            raise SkinError("joint influences that do not fit")
+        return (_under(np.asarray(deformed), self._to_mesh(time))).astype(np.float32)
+
+    def normals(
+        self, normals: Array, corners: Array | None, count: int, time: Usd.TimeCode
+    ) -> Array:
+        """Normals of ``count`` points, or of corners (points ``corners``), likewise; (n, 3).
+
+        Blended linearly whatever the method: what is left of that after normalising is small.
+
+        Raises:
+            SkinError: The skinning data does not fit the mesh.
+        """
+        if not self.query.HasJointInfluences():
+            return normals
+        influences = self.query.ComputeVaryingJointInfluences(count)
+        if influences is None or len(influences[0]) % count:
+            raise SkinError("joint influences that do not fit")
+        index, weight = (np.asarray(part).reshape(count, -1) for part in influences)
+        each = index.shape[1]
+        if corners is not None:
+            index, weight = index[corners], weight[corners]
+        bind = self.query.GetGeomBindTransform(time)
+        turns = np.array([_normal_matrix(bind * m) for m in self._ordered(self._joints(time))])
+        if index.min(initial=0) < 0 or index.max(initial=0) >= len(turns):
+            raise SkinError("joint influences that do not fit")
+        turned = np.zeros(normals.shape)
+        for k in range(each):
+            turned += weight[:, k, None] * np.einsum("ni,nij->nj", normals, turns[index[:, k]])
+        turned = turned @ _normal_matrix(self._to_mesh(time))
+        length = np.sqrt(np.einsum("ij,ij->i", turned, turned))
+        return (turned / np.where(length > 0, length, 1)[:, None]).astype(np.float32)
+
+    def _ordered(self, joints: Any) -> list[Gf.Matrix4d]:
+        """Transforms of the skeleton's joints in the order of the mesh's."""
+        own = self.query.GetJointOrder()
+        if not own:
+            return list(joints)
+        place = {name: i for i, name in enumerate(self.skeleton.GetJointOrder())}
+        still = Gf.Matrix4d(1.0)
+        return [joints[place[name]] if name in place else still for name in own]
+
+    def _joints(self, time: Usd.TimeCode) -> Any:
+        joints = self.skeleton.ComputeSkinningTransforms(time)
+        if joints is None:
+            raise SkinError("a skeleton without a pose")
+        return joints
+
+    def _blend(self, points: Any, time: Usd.TimeCode) -> None:
+        """Adds blend shapes to points in place."""
+        animation, mapper = self.skeleton.GetAnimQuery(), self.query.GetBlendShapeMapper()
+        if self._shapes is None or not animation or mapper is None:
+            return
+        weights = animation.ComputeBlendShapeWeights(time)
+        if weights is None:
+            return
+        parts = self._shapes.ComputeSubShapeWeights(mapper.Remap(weights))
+        indices = self._shapes.ComputeBlendShapePointIndices()
+        offsets = self._shapes.ComputeSubShapePointOffsets()
+        if not self._shapes.ComputeDeformedPoints(*parts, indices, offsets, points):
+            raise SkinError("blend shapes that do not fit")
+
+    def _to_mesh(self, time: Usd.TimeCode) -> Gf.Matrix4d:
+        """From the skeleton's space to the mesh's."""
+        xforms = UsdGeom.XformCache(time)
+        inverse = xforms.GetLocalToWorldTransform(self.prim).GetInverse()
+        return xforms.GetLocalToWorldTransform(self.skeleton.GetPrim()) * inverse
+
+
+MOST_APART = 100_000
+"""Instances that are read one by one; instances in instances may multiply them."""
+
+
+class SkinError(ValueError):
+    """Skinning data that does not fit; says why in a few words."""
+
+
+class Skeletons:
+    """The skins of a stage, found as its skeletal roots are met."""
+
+    def __init__(self, report: LoadReport) -> None:
+        self.report = report
+        self._cache = UsdSkel.Cache()
+        self._roots: set[Sdf.Path] = set()
+        self._skins: dict[Sdf.Path, Skin] = {}
+        self._holding: set[Sdf.Path] | None = None
+        self._apart = 0
+
+    def enter(self, prim: Usd.Prim) -> None:
+        """Looks for what is bound to skeletons below a SkelRoot."""
+        if prim.GetPath() in self._roots:
+            return
+        root = UsdSkel.Root(prim)
+        self._roots.add(prim.GetPath())
+        if not self._cache.Populate(root, _PROXIES):
+            return
+        for binding in self._cache.ComputeSkelBindings(root, _PROXIES) or ():
+            skeleton = self._cache.GetSkelQuery(binding.GetSkeleton())
+            for query in binding.GetSkinningTargets():
+                if skeleton and (query.HasJointInfluences() or query.HasBlendShapes()):
+                    skin = Skin(skeleton, query, self.report)
+                    self._skins[query.GetPrim().GetPath()] = skin
+
+    def of(self, prim: Usd.Prim) -> Skin | None:
+        """The skin of a mesh; None where nothing deforms it."""
+        return self._skins.get(prim.GetPath()) if self._skins else None
+
+    def keeps_apart(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
+        """Whether an instance cannot share its prototype: its animation may be its own."""
+        # The prototype's own prim has no type: that is the instance's.
+        apart = (
+            instance.GetTypeName() == "SkelRoot"
+            or prototype.GetPath() in self._holders(prototype.GetStage())
+            or (bool(self._roots) and self._is_below_root(instance.GetPath()))
+        )
+        if not apart:
+            return False
+        self._apart += 1
+        if self._apart > MOST_APART:
+            what = f"more than {MOST_APART} instances with skeletons: the rest as the first of each"
+            self.report.warn(what, instance.GetPath())
+            return False
+        return True
+
+    def _is_below_root(self, path: Sdf.Path) -> bool:
+        return any(above in self._roots for above in path.GetPrefixes())
+
+    def _holders(self, stage: Usd.Stage) -> set[Sdf.Path]:
+        """Prototypes with a SkelRoot in them, or in what is instanced there."""
+        if self._holding is None:
+            users: dict[Sdf.Path, list[Sdf.Path]] = {}
+            waiting: list[Sdf.Path] = []
+            for prototype in stage.GetPrototypes():
+                path = prototype.GetPath()
+                for prim in Usd.PrimRange(prototype):
+                    if prim.GetTypeName() == "SkelRoot":
+                        waiting.append(path)
+                    if prim.IsInstance():
+                        users.setdefault(prim.GetPrototype().GetPath(), []).append(path)
+            self._holding = set()
+            while waiting:
+                path = waiting.pop()
+                if path not in self._holding:
+                    self._holding.add(path)
+                    waiting += users.get(path, ())
+        return self._holding
+
+
+def skinned_points(skin: Skin, points: Any, time: Usd.TimeCode) -> Any:
+    """Points of a mesh as its skin has them; as they are, and a warning, where it cannot."""
+    try:
+        return skin.points(points, time)
+    except SkinError as error:
+        what = f"{error}: drawn in rest pose"
+        skin.report.warn(what, skin.prim.GetPath())
+        return as_array(points)
+
+
+def _moving_above(prim: Usd.Prim) -> set[Sdf.Path]:
+    """Prims from a prim up whose transforms may change over time."""
+    moving: set[Sdf.Path] = set()
+    while prim:
+        xformable = UsdGeom.Xformable(prim)
+        if xformable and xformable.TransformMightBeTimeVarying():
+            moving.add(prim.GetPath())
+        prim = prim.GetParent()
+    return moving
+
+
+def _under(points: Array, matrix: Gf.Matrix4d) -> Array:
+    m = np.array(matrix)
+    moved: Array = points @ m[:3, :3] + m[3, :3]
+    return moved
+
+
+def _normal_matrix(matrix: Gf.Matrix4d) -> Array:
+    """(3, 3) for row vectors of normals: the inverse transpose."""
+    linear = np.array(matrix)[:3, :3]
+    if abs(np.linalg.det(linear)) < 1e-12:
+        return np.eye(3)
+    return np.asarray(np.linalg.inv(linear).T)

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Curves of one prim as Bezier segments, all at once.
+
+Every basis and wrap becomes runs of Bezier control points (or of points of lines) that neighbouring
+segments share, so that the core knows one kind of cubic. The change of basis is exact but for
+rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.usd.geometry.primvar import Primvar, PrimvarError
+
+Array = NDArray[np.float32]
+Index = NDArray[np.intp]
+
+GOES_ON_BEFORE = 0x80000000
+GOES_ON_AFTER = 0x40000000
+"""Flags of a segment: its curve goes on beyond its first (last) point."""
+
+_TO_BEZIER: dict[str, NDArray[np.float64]] = {
+    "bspline": np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
+    "catmullRom": np.array([[0, 6, 0, 0], [-1, 6, 1, 0], [0, 1, 6, -1], [0, 0, 6, 0]]) / 6.0,
+}
+"""Rows: Bezier control points of a segment from the four authored points about it."""
+
+
+def _runs(counts: Index) -> tuple[Index, Index]:
+    """For runs of so many things each: which run each thing is of, and its place in the run."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    starts = np.cumsum(counts) - counts
+    return owner, np.arange(len(owner)) - starts[owner]
+
+
+@dataclass(frozen=True)
+class Strands:
+    """How the curves of a prim are laid out, as authored and as Bezier segments.
+
+    Curves without a segment are not among the k here.
+
+    Attributes:
+        basis: linear, bezier, bspline or catmullRom.
+        wrap: nonperiodic, periodic or pinned.
+        kept: (k,) which of the prim's curves.
+        counts: (k,) authored points of each curve.
+        starts: (k,) the first of them.
+        segments: (k,) segments of each curve.
+        varying_starts: (k,) the first of each curve's values of interpolation varying.
+        sizes: How many values each interpolation has.
+    """
+
+    basis: str
+    wrap: str
+    kept: Index
+    counts: Index
+    starts: Index
+    segments: Index
+    varying_starts: Index
+    sizes: dict[str, int]
+
+    @property
+    def cubic(self) -> bool:
+        """Whether segments have four control points."""
+        return self.basis != "linear"
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the curves are closed."""
+        return self.wrap == "periodic"
+
+    @property
+    def count(self) -> int:
+        """Segments of all curves."""
+        return int(self.segments.sum())
+
+    @property
+    def point_count(self) -> int:
+        """Points of the prim."""
+        return self.sizes["vertex"]
+
+    def segment_words(self) -> NDArray[np.uint32]:
+        """(count,) first control point of each segment, with flags."""
+        step, lead = (3 if self.cubic else 1), (1 if self.periodic else 0)
+        sizes = step * self.segments + 1 + 2 * lead
+        base = np.cumsum(sizes) - sizes + lead
+        curve, at = _runs(self.segments)
+        words = (base[curve] + step * at).astype(np.uint32)
+        words[(at > 0) | self.periodic] |= np.uint32(GOES_ON_BEFORE)
+        words[(at < self.segments[curve] - 1) | self.periodic] |= np.uint32(GOES_ON_AFTER)
+        return words
+
+    def controls(self, values: NDArray[Any], kind: str) -> Array:
+        """Values (n, c) of an interpolation as float32 at every control point.
+
+        Args:
+            values: As authored for the whole prim; ``sizes[kind]`` of them.
+            kind: constant, uniform, varying or vertex.
+        """
+        if kind == "vertex" and self.wrap == "nonperiodic" and self.basis in ("linear", "bezier"):
+            if int(self.counts.sum()) == len(values):
+                return np.ascontiguousarray(values, np.float32)
+            owner, at = _runs(self.counts)
+            return np.ascontiguousarray(values[self.starts[owner] + at], np.float32)
+        if kind == "vertex":
+            points = self._bezier(values)
+        else:
+            first, last = self.ends(values, kind)
+            points = (
+                [first, first + (last - first) / 3.0, first + (last - first) * (2.0 / 3.0), last]
+                if self.cubic
+                else [first, last]
+            )
+        return self._pack(points)
+
+    def ends(
+        self, values: NDArray[Any], kind: str
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Values (n, c) of an interpolation at the first and last point of each segment."""
+        values = np.asarray(values, np.float64)
+        curve, at = _runs(self.segments)
+        if kind == "constant":
+            first = last = np.repeat(values[:1], len(curve), axis=0)
+        elif kind == "uniform":
+            first = last = values[self.kept[curve]]
+        elif kind == "varying":
+            size = self.segments + (0 if self.periodic else 1)
+            base = self.varying_starts[curve]
+            first, last = values[base + at], values[base + (at + 1) % size[curve]]
+        else:
+            points = self._bezier(values)
+            first, last = points[0], points[-1]
+        return first, last
+
+    def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
+        """Values of a primvar, (n, width), and the interpolation that their number fits.
+
+        Raises:
+            PrimvarError: It fits none.
+        """
+        values, kind = primvar.values, primvar.interpolation
+        if values.shape[1] < width:
+            raise PrimvarError(f"primvar {primvar.name!r} has too few components")
+        values = values[:, :width]
+        if kind == "faceVarying":
+            kind = "varying"
+        if len(values) == self.sizes.get(kind):
+            return values, kind
+        # One value without a word on its interpolation is common, and can only be meant for all.
+        if len(values) == 1:
+            return values, "constant"
+        raise PrimvarError(
+            f"{primvar.name} ({kind}) has {len(values)} values where "
+            f"{self.sizes.get(kind, 0)} are needed"
+        )
+
+    def _bezier(self, values: NDArray[Any]) -> list[NDArray[np.float64]]:
+        """Values per authored point as control points 0 to 3 (1) of each segment, (count, c)."""
+        curve, at = _runs(self.segments)
+        start, size = self.starts[curve], self.counts[curve]
+        step = 3 if self.basis == "bezier" else 1
+        shift = step * at - (1 if self.wrap == "pinned" and step == 1 and self.cubic else 0)
+
+        def point(k: int) -> NDArray[np.float64]:
+            i = shift + k
+            if self.periodic:
+                return np.asarray(values[start + i % size], np.float64)
+            out = np.asarray(values[start + np.clip(i, 0, size - 1)], np.float64)
+            # Pinned curves get a point before the first and behind the last, by reflection, so
+            # that they reach their ends.
+            for outside, end, inner in ((i < 0, 0, 1), (i >= size, size - 1, size - 2)):
+                where = np.flatnonzero(outside)
+                if len(where):
+                    a = start[where] + (end if isinstance(end, int) else end[where])
+                    b = start[where] + (inner if isinstance(inner, int) else inner[where])
+                    out[where] = 2.0 * np.asarray(values[a], np.float64) - values[b]
+            return out
+
+        points = [point(k) for k in range(4 if self.cubic else 2)]
+        if self.basis not in _TO_BEZIER:
+            return points
+        return [
+            sum((w * p for w, p in zip(row, points, strict=True) if w), np.zeros_like(points[0]))
+            for row in _TO_BEZIER[self.basis]
+        ]
+
+    def _pack(self, points: list[NDArray[np.float64]]) -> Array:
+        """Control points of segments as runs that neighbours share.
+
+        Closed curves have one more at either end.
+        """
+        step, lead = len(points) - 1, (1 if self.periodic else 0)
+        sizes = step * self.segments + 1 + 2 * lead
+        base = np.cumsum(sizes) - sizes + lead
+        curve, at = _runs(self.segments)
+        out = np.empty((int(sizes.sum()), points[0].shape[1]), np.float32)
+        for k in range(step):
+            out[base[curve] + step * at + k] = points[k]
+        last = np.cumsum(self.segments) - 1
+        first = last - self.segments + 1
+        end = base + step * self.segments
+        out[end] = points[step][last]
+        if lead:
+            out[end] = points[0][first]  # the same point, and the same bits
+            out[base - 1] = points[step - 1][last]
+            out[end + 1] = points[1][first]
+        return out
+
+
+def lay_out(counts: Index, basis: str, wrap: str) -> Strands:
+    """The layout of curves of ``counts`` points each."""
+    if basis == "linear":
+        segments = np.where(counts >= 2, counts - (0 if wrap == "periodic" else 1), 0)
+        if wrap == "periodic":
+            segments = np.where(counts >= 3, segments, 0)
+    elif basis == "bezier":
+        if wrap == "periodic":
+            segments = np.where((counts >= 3) & (counts % 3 == 0), counts // 3, 0)
+        else:
+            segments = np.where((counts >= 4) & (counts % 3 == 1), counts // 3, 0)
+    elif wrap == "periodic":
+        segments = np.where(counts >= 3, counts, 0)
+    elif wrap == "pinned":
+        segments = np.where(counts >= 2, counts - 1, 0)
+    else:
+        segments = np.maximum(counts - 3, 0)
+    kept = np.flatnonzero(segments > 0)
+    varying = np.where(segments > 0, segments + (0 if wrap == "periodic" else 1), 0)
+    return Strands(
+        basis=basis,
+        wrap=wrap,
+        kept=kept,
+        counts=counts[kept],
+        starts=(np.cumsum(counts) - counts)[kept],
+        segments=segments[kept],
+        varying_starts=(np.cumsum(varying) - varying)[kept],
+        sizes={
+            "constant": 1,
+            "uniform": len(counts),
+            "varying": int(varying.sum()),
+            "vertex": int(counts.sum()),
+        },
+    )
+
+
+def lay_out_points(count: int) -> Strands:
+    """Points as if they were curves of one segment, for primvars."""
+    every = np.arange(count)
+    one = np.ones(count, np.intp)
+    sizes = {"constant": 1, "varying": count, "vertex": count}
+    return Strands("linear", "periodic", every, one, every, one, every, sizes)

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""IES profiles: luminaire data by ANSI/IES LM-63."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+Floats = NDArray[np.float64]
+
+MOST_BYTES = 1 << 26
+"""Larger files are no profiles."""
+_MOST_VALUES = 1 << 24
+_WORDS = re.compile(r"[^\s,]+")
+_TYPES = {1: "C", 2: "B", 3: "A"}
+
+
+class IesError(ValueError):
+    """What is wrong with a file, in a few words."""
+
+
+@dataclass(frozen=True)
+class IesProfile:
+    """Candela over directions, expanded to the whole circle.
+
+    Attributes:
+        vertical: (v,), degrees from the luminaire's axis, in [0, 180], ascending.
+        horizontal: (h,), degrees around it, from 0 to 360; or 0 alone: alike all around.
+        candela: (h, v).
+    """
+
+    vertical: Floats
+    horizontal: Floats
+    candela: Floats
+
+
+def parse_ies(text: str) -> IesProfile:
+    """The profile of an LM-63 file (1986 to 2019): photometry of type C, B or A.
+
+    Candela are multiplied by the file's own multiplier, its ballast factor and its ballast-lamp
+    factor. ``TILT=INCLUDE`` is read over: it tells of lamps that hang askew. Raises IesError.
+    """
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT")), None)
+    if at is None:
+        raise IesError("it has no TILT line")
+    tilt = lines[at].partition("=")[2].strip().upper()
+    numbers = _numbers(" ".join(lines[at + 1 :]))
+    if tilt == "INCLUDE":
+        _take(numbers, 1, "tilt")
+        pairs = _count(numbers, "tilt angles")
+        _take(numbers, 2 * pairs, "tilt")
+    elif tilt != "NONE":
+        raise IesError(f"its tilt is in another file ({tilt or 'no name'}), which is not read")
+    _, _, factor = _take(numbers, 3, "head")
+    rows, columns = _count(numbers, "vertical angles"), _count(numbers, "horizontal angles")
+    kind = _TYPES.get(int(_take(numbers, 1, "head")[0]))
+    if kind is None:
+        raise IesError("its photometric type is none of 1, 2 and 3")
+    _, _, _, _, ballast, lamp, _ = _take(numbers, 7, "head")
+    if rows * columns > _MOST_VALUES:
+        raise IesError(f"it says that it has {rows} x {columns} values")
+    vertical = _ascending(_take(numbers, rows, "vertical angles"), "vertical")
+    horizontal = _ascending(_take(numbers, columns, "horizontal angles"), "horizontal")
+    candela = _take(numbers, rows * columns, "candela").reshape(columns, rows)
+    candela = np.maximum(candela * (factor * ballast * lamp), 0.0)
+    if not (candela < 1e30).all():
+        raise IesError("it has values that are not finite")
+    if kind == "C":
+        profile = _expand_c(vertical, horizontal, candela)
+    else:
+        profile = _resample(vertical, horizontal, candela, kind)
+    low, high = profile.vertical[0], profile.vertical[-1]
+    if len(profile.vertical) < 2 or not 0 <= low < high <= 180:
+        raise IesError("its vertical angles do not span a part of 0 to 180 degrees")
+    return profile
+
+
+def _numbers(text: str) -> Iterator[float]:
+    for match in _WORDS.finditer(text):  # one at a time: a list of all would be 20 times the text
+        word = match[0]
+        try:
+            yield float(word)
+        except ValueError:
+            raise IesError(f"{word[:20]!r} is no number") from None
+
+
+def _take(numbers: Iterator[float], n: int, what: str) -> Floats:
+    values = np.fromiter(itertools.islice(numbers, n), np.float64)
+    if len(values) < n:
+        raise IesError(f"it ends within its {what}")
+    return values
+
+
+def _count(numbers: Iterator[float], what: str) -> int:
+    n = _take(numbers, 1, "head")[0]
+    if not 0 < n <= _MOST_VALUES or n != int(n):
+        raise IesError(f"it says that it has {n:g} {what}")
+    return int(n)
+
+
+def _ascending(angles: Floats, what: str) -> Floats:
+    if not (np.isfinite(angles).all() and (np.diff(angles) >= 0).all()):
+        raise IesError(f"its {what} angles do not ascend")
+    return angles
+
+
+def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfile:
+    """Type C, by the symmetry that the range of horizontal angles tells of."""
+    first, last = horizontal[0], horizontal[-1]
+    if len(horizontal) == 1:
+        return IesProfile(vertical, np.zeros(1), candela)
+
+    def mirrored(about: float) -> None:
+        nonlocal horizontal, candela
+        inner = slice(-2, None, -1)  # all but the plane of symmetry itself
+        horizontal = np.append(horizontal, 2 * about - horizontal[inner])
+        candela = np.append(candela, candela[inner], axis=0)
+
+    if (first, last) == (90, 270):  # phi and 180 - phi are alike
+        both = np.append(horizontal, (180 - horizontal) % 360)
+        horizontal, rows = np.unique(both, return_index=True)
+        candela = np.append(candela, candela, axis=0)[rows]
+        if horizontal[0] > 0:
+            part = horizontal[0] / (horizontal[0] + 360 - horizontal[-1])
+            seam = candela[0] * (1 - part) + candela[-1] * part
+            horizontal = np.append(0.0, horizontal)
+            candela = np.append(seam[None], candela, axis=0)
+    elif first != 0:
+        raise IesError(f"its horizontal angles begin at {first:g} degrees, which is not known")
+    elif last == 90:
+        mirrored(90)
+        mirrored(180)
+    elif last == 180:
+        mirrored(180)
+    elif last < 180:
+        raise IesError(f"its horizontal angles end at {last:g} degrees, which is not known")
+    if horizontal[-1] > 360:
+        raise IesError("its horizontal angles go beyond 360 degrees")
+    if horizontal[-1] < 360:
+        horizontal = np.append(horizontal, 360.0)
+        candela = np.append(candela, candela[:1], axis=0)
+    return IesProfile(vertical, horizontal, candela)
+
+
+def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) -> IesProfile:
+    """Types A and B at each degree of type C.
+
+    The axis of type A's poles is upright, that of type B's level. With x to the side, y up and z
+    along the luminaire's axis, the horizontal angle H and the vertical one V of a direction are
+        A: tan H = x / z, sin V = y        B: sin H = x, tan V = y / z.
+    """
+    if horizontal[0] == 0 and horizontal[-1] > 0:  # both sides alike
+        horizontal = np.append(-horizontal[:0:-1], horizontal)
+        candela = np.append(candela[:0:-1], candela, axis=0)
+    if horizontal[0] < -90 or horizontal[-1] > 90 or vertical[0] < -90 or vertical[-1] > 90:
+        raise IesError(f"its angles are no pairs of type {kind} (-90 to 90 degrees)")
+    theta, phi = np.arange(181.0), np.arange(361.0)
+    t, p = np.radians(theta)[None, :], np.radians(phi)[:, None]
+    x, y = np.sin(t) * np.cos(p), np.sin(t) * np.sin(p)
+    z = np.broadcast_to(np.cos(t), x.shape)
+    if kind == "A":
+        h, v = np.degrees(np.arctan2(x, z)), np.degrees(np.arcsin(np.clip(y, -1, 1)))
+    else:
+        h, v = np.degrees(np.arcsin(np.clip(x, -1, 1))), np.degrees(np.arctan2(y, z))
+    rounding = 1e-9
+    inside = (v >= vertical[0] - rounding) & (v <= vertical[-1] + rounding)
+    inside &= (np.abs(h) <= 90 + rounding) & (z >= -rounding)
+    if len(horizontal) > 1:
+        inside &= (h >= horizontal[0] - rounding) & (h <= horizontal[-1] + rounding)
+
+    def between(angles: Floats, x: Floats) -> tuple[NDArray[np.intp], Floats]:
+        if len(angles) == 1:
+            return np.zeros(x.shape, np.intp), np.zeros(x.shape)
+        i = np.clip(np.searchsorted(angles, x, "right") - 1, 0, len(angles) - 2)
+        width = angles[i + 1] - angles[i]
+        part = np.where(width > 0, (x - angles[i]) / np.where(width > 0, width, 1), 0.0)
+        return i, np.clip(part, 0, 1)
+
+    i, a = between(horizontal, h)
+    j, b = between(vertical, v)
+    i1, j1 = np.minimum(i + 1, len(horizontal) - 1), np.minimum(j + 1, len(vertical) - 1)
+    near = candela[i, j] * (1 - b) + candela[i, j1] * b
+    far = candela[i1, j] * (1 - b) + candela[i1, j1] * b
+    values = np.where(inside, near * (1 - a) + far * a, 0.0)
+    values[-1] = values[0]
+    return IesProfile(theta, phi, values)
+
+
+class IesTable:
+    """Adds profiles to the scene, each file once."""
+
+    def __init__(self, builder: _core.SceneBuilder, report: LoadReport) -> None:
+        self._builder = builder
+        self._report = report
+        self._found: dict[str, int | IesError] = {}
+
+    def add(self, path: str, prim: object) -> int | None:
+        """The number of a file's profile; None and a warning where it cannot be read."""
+        if path not in self._found:
+            self._found[path] = self._read(path)
+        found = self._found[path]
+        if isinstance(found, IesError):
+            what = f"IES profile {path} cannot be read ({found}): the light is drawn without it"
+            self._report.warn(what, prim)
+            return None
+        return found
+
+    def _read(self, path: str) -> int | IesError:
+        try:
+            if not os.path.isfile(path) and os.path.exists(path):
+                raise IesError("it is no regular file")
+            if os.path.getsize(path) > MOST_BYTES:
+                raise IesError("it is too large")
+            with open(path, encoding="latin-1") as file:
+                profile = parse_ies(file.read(MOST_BYTES))
+        except IesError as error:
+            return error
+        except (OSError, ValueError, MemoryError) as error:
+            return IesError(getattr(error, "strerror", None) or str(error) or "out of memory")
+        return self._builder.add_ies(
+            profile.vertical.tolist(),
+            profile.horizontal.tolist(),
+            np.ascontiguousarray(profile.candela, np.float32),
+        )

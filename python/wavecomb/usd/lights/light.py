@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdLux lights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Usd
+
+from wavecomb.picture.working_space import from_rec709
+from wavecomb.usd.lights.dome import DomeReader
+from wavecomb.usd.lights.ies import IesTable
+from wavecomb.usd.lights.links import LinkTable
+from wavecomb.usd.looks.colour_space import linear_colour, space_of
+from wavecomb.usd.looks.network import colour, number
+from wavecomb.usd.looks.pixels import Image
+from wavecomb.usd.looks.texture import UDIM, TextureTable, asset_file, tile_files
+from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.report import LoadReport
+
+KINDS = {
+    "RectLight": "rect",
+    "DiskLight": "disk",
+    "SphereLight": "sphere",
+    "CylinderLight": "cylinder",
+    "DistantLight": "distant",
+    "DomeLight": "dome",
+    "DomeLight_1": "dome",
+}
+"""Lights that are drawn, by prim type."""
+
+LIGHT_SHAPES = ("visible", "hidden")
+"""Whether rays meet the shapes of lights."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light as ``SceneBuilder.add_light`` takes it, before its transform is known in full.
+
+    Attributes:
+        kind: rect, disk, sphere, cylinder, distant or dome.
+        options: Keyword arguments.
+        local: (4, 4) applied before the prim's transform.
+    """
+
+    kind: str
+    options: dict[str, Any]
+    local: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+
+
+def blackbody(kelvin: float) -> tuple[float, float, float]:
+    """Linear Rec. 709 colour of a black body, of the luminance of (1, 1, 1).
+
+    That of ``Gf.Color``, Krystek's approximation of the Planckian locus from 1000 to 15000 K, which
+    OpenUSD's Embree delegate uses: what is beyond is taken for the nearest end.
+    ``UsdLux.BlackbodyTemperatureAsRgb``, a table that ends at 10000 K, is within 0.002 of it from
+    2000 K on. Components that Rec. 709 cannot hold (blue below 1900 K) are 0.
+    """
+    found = Gf.Color(Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709))
+    found.SetFromPlanckianLocus(min(max(kelvin, 1000.0), 15000.0), 1.0)
+    rgb = found.GetRGB()
+    luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+    r, g, b = (max(float(c) / luminance, 0.0) for c in rgb)
+    return (r, g, b)
+
+
+class LightReader:
+    """Reads the lights of one stage."""
+
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        up_axis: str,
+        textures: TextureTable | None,
+        groups: LightGroups,
+        report: LoadReport,
+        profiles: IesTable | None = None,
+        hidden: bool = False,
+        links: LinkTable | None = None,
+    ) -> None:
+        """``textures``, ``profiles``, ``links``: None: lights are read without theirs.
+
+        ``hidden``: no ray meets their shapes.
+        """
+        self.time = time
+        self.textures = textures
+        self.groups = groups
+        self.report = report
+        self.profiles = profiles
+        self.hidden = hidden
+        self.links = links
+        self.domes = DomeReader(time, up_axis, textures, report)
+
+    def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
+        """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
+        kind = KINDS[str(prim.GetTypeName())]
+        options = self._common(prim, kind)
+        if group := self.groups.of(prim):
+            options["group"] = group
+        normalize = bool(self._get(prim, "normalize", False))
+        local = np.eye(4)
+        if kind == "rect":
+            options["width"] = abs(number(self._get(prim, "width", 1.0), 1.0))
+            options["height"] = abs(number(self._get(prim, "height", 1.0), 1.0))
+            options["texture"] = self._texture(prim)
+        elif kind == "disk":
+            options["radius"] = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        elif kind == "sphere":
+            self._sphere(prim, options, normalize, scale)
+            normalize = normalize and options["radius"] > 0
+        elif kind == "cylinder":
+            normalize = self._cylinder(prim, options, normalize)
+        elif kind == "distant":
+            options["angle"] = min(max(number(self._get(prim, "angle", 0.53), 0.53), 0.0), 360.0)
+        else:
+            options["texture"] = self._texture(prim)
+            local = self.domes.pole(prim)
+            portals = self.domes.portals(prim, local)
+            if portals is not None:
+                options["portals"] = portals
+            normalize = False
+        options["normalize"] = normalize
+        if self.hidden and kind not in ("distant", "dome"):
+            options["visible"] = False
+        return Light(kind, options, local)
+
+    def read_mesh(self, prim: Usd.Prim) -> dict[str, Any]:
+        """The light of a mesh that is one, as ``SceneBuilder.add_mesh_light`` takes it."""
+        options = self._common(prim, "mesh")
+        options["normalize"] = bool(self._get(prim, "normalize", False))
+        return options
+
+    def _common(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
+        """Options that lights of all kinds have."""
+        self._say_unsupported(prim)
+        radiance = self._colour(prim)
+        if not all(0 <= value < 1e30 for value in radiance):
+            self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
+            radiance = (0.0, 0.0, 0.0)
+        options: dict[str, Any] = {"name": self.report.place(prim.GetPath()), "color": radiance}
+        self._shaping(prim, kind, options)
+        for name, option in (("lightLink", "light_link"), ("shadowLink", "shadow_link")):
+            linked = self.links.set_of(prim, name) if self.links else None
+            if linked is not None:
+                options[option] = linked
+        if self.links and not self._get(prim, "shadow:enable", True):
+            options["shadow_link"] = self.links.nothing()
+        for name in ("diffuse", "specular"):
+            factor = number(self._get(prim, name, 1.0), 1.0)
+            if factor != 1.0:
+                options[name] = max(factor, 0.0)
+        return options
+
+    def _get(self, prim: Usd.Prim, name: str, default: Any) -> Any:
+        attribute = prim.GetAttribute(f"inputs:{name}")
+        if not attribute:
+            return default
+        if attribute.HasAuthoredConnections():
+            self.report.missing(f"light input {name} from a shader", prim.GetPath())
+        value = attribute.Get(self.time)
+        return default if value is None else value
+
+    def _colour(self, prim: Usd.Prim) -> tuple[float, float, float]:
+        """Colour * intensity * 2^exposure * colour temperature."""
+        # What is not finite stays so, and is warned of.
+        bad = math.nan
+        authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
+        try:
+            base = linear_colour(base, prim.GetAttribute("inputs:color"))
+        except ValueError as error:
+            self.report.missing(f"{error} (read as linear)", prim.GetPath())
+        exposure = min(number(self._get(prim, "exposure", 0.0), bad), 200.0)
+        power = number(self._get(prim, "intensity", 1.0), bad) * 2.0**exposure
+        tint = (1.0, 1.0, 1.0)
+        if self._get(prim, "enableColorTemperature", False):
+            kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
+            tint = blackbody(kelvin)
+        rgb = [float(c * t * power) for c, t in zip(base, tint, strict=True)]
+        working = "rec709" if self.textures is None else self.textures.working
+        r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
+        if min(authored) >= 0:  # what the working space cannot hold is at its edge
+            r, g, b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
+        return (r, g, b)
+
+    def _sphere(
+        self, prim: Usd.Prim, options: dict[str, Any], normalize: bool, scale: float
+    ) -> None:
+        """Radius; a point light gets the radiant intensity that the sphere would have."""
+        radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        point = prim.GetAttribute("treatAsPoint")
+        if radius > 0 and not (point and point.Get(self.time)):
+            options["radius"] = radius
+            return
+        # Radiance L over the disk pi r^2 that is seen; normalized, L / (4 pi r^2).
+        area = 0.25 if normalize or radius == 0 else math.pi * (scale * radius) ** 2
+        options["radius"] = 0.0
+        options["color"] = tuple(area * value for value in options["color"])
+        if radius == 0 and not normalize:
+            self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
+
+    def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
+        """Length and radius; whether it is normalized. A thin one stands for a line."""
+        length = abs(number(self._get(prim, "length", 1.0), 1.0))
+        radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        if radius == 0 and length > 0:
+            self.report.note(
+                "cylinder light of radius 0: taken for a thin one, normalized", prim.GetPath()
+            )
+            radius, normalize = 1e-3 * length, True
+        options["length"], options["radius"] = length, radius
+        return normalize
+
+    def _shaping(self, prim: Usd.Prim, kind: str, options: dict[str, Any]) -> None:
+        """UsdLuxShapingAPI: where it is not applied its attributes are not there."""
+
+        def read(name: str, default: float) -> float:
+            return number(self._get(prim, f"shaping:{name}", default), default)
+
+        shaping: dict[str, Any] = {}
+        focus = read("focus", 0.0)
+        if focus > 0:
+            tint = colour(self._get(prim, "shaping:focusTint", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
+            shaping["focus"] = focus
+            shaping["focus_tint"] = tuple(min(max(float(c), 0.0), 1e6) for c in tint)
+        angle = read("cone:angle", 180.0)
+        if angle < 180:
+            shaping["cone_angle"] = max(angle, 0.0)
+            shaping["cone_softness"] = min(max(read("cone:softness", 0.0), 0.0), 1.0)
+        if path := self._profile_file(prim):
+            profile = self.profiles.add(path, prim.GetPath()) if self.profiles else None
+            if profile is not None:
+                shaping["ies"] = profile
+                shaping["ies_angle_scale"] = read("ies:angleScale", 0.0)
+                shaping["ies_normalize"] = bool(self._get(prim, "shaping:ies:normalize", False))
+        if kind != "dome":
+            options.update(shaping)
+        elif "focus" in shaping or "ies" in shaping or angle < 90:
+            self.report.missing(f"shaping of {prim.GetTypeName()}s", prim.GetPath())
+
+    def _profile_file(self, prim: Usd.Prim) -> str:
+        attribute = prim.GetAttribute("inputs:shaping:ies:file")
+        value = attribute.Get(self.time) if attribute else None
+        return asset_file(value, attribute) if value is not None else ""
+
+    def _texture(self, prim: Usd.Prim) -> int | None:
+        attribute = prim.GetAttribute("inputs:texture:file")
+        value = attribute.Get(self.time) if attribute else None
+        path = asset_file(value, attribute) if value is not None else ""
+        if UDIM in path:
+            self.report.missing("UDIM textures of lights (first tile used)", prim.GetPath())
+            path = next((file for _, file in tile_files(path)), path)
+        if not path or self.textures is None:
+            return None
+        image = self.textures.image(path, prim.GetPath())
+        if image is None:
+            return None
+        tag = space_of(attribute) or "auto"
+        rect = prim.GetTypeName() == "RectLight"
+        if not rect and isinstance(image, Image):
+            made = self.domes.resampled(prim, path, image, tag)
+            if made is not None:
+                return made
+        wraps = ("clamp", "clamp") if rect else ("repeat", "clamp")
+        return self.textures.add(path, image, tag, *wraps, is_colour=True)
+
+    def _say_unsupported(self, prim: Usd.Prim) -> None:
+        path = prim.GetPath()
+
+        filters = prim.GetRelationship("light:filters")
+        if filters and filters.HasAuthoredTargets():
+            self.report.missing("light filters", path)
+        tint = colour(self._get(prim, "shadow:color", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
+        if any(tint) or number(self._get(prim, "shadow:distance", -1.0), -1.0) >= 0:
+            self.report.missing("colour and distance of shadows", path)

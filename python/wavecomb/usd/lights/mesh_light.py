@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes that are lights: UsdLuxMeshLightAPI, and UsdLuxLightAPI on a mesh or an implicit shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pxr import Sdf, UsdLux
+
+from wavecomb.usd.lights.light import LightReader
+from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.looks.material import MaterialTable
+from wavecomb.usd.looks.network import word
+from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+NO_RESPONSE = "noMaterialResponse"
+SYNC_MODES = ("materialGlowTintsLight", "independent", NO_RESPONSE)
+"""Values of ``light:materialSyncMode``."""
+
+
+@dataclass(frozen=True)
+class MeshLight:
+    """A light of the scene for the triangles of one gprim.
+
+    Attributes:
+        number: As ``add_mesh`` takes it.
+        material: To wear in place of what is bound; None: that.
+        is_sampled_only: Paths that meet it by a bounce get nothing of its light.
+    """
+
+    number: int
+    material: int | None
+    is_sampled_only: bool
+
+
+class MeshLights:
+    """Adds the mesh lights of one stage.
+
+    Attributes:
+        any: Whether there is one.
+    """
+
+    def __init__(
+        self,
+        builder: _core.SceneBuilder,
+        lights: LightReader,
+        materials: MaterialTable,
+        report: LoadReport,
+    ) -> None:
+        self.any = False
+        self._builder = builder
+        self._lights = lights
+        self._materials = materials
+        self._report = report
+
+    def of(self, draw: Draw, kind: str) -> MeshLight | None:
+        """The light that a gprim of some kind (mesh, shape, curves, points) is; None: it is none.
+
+        ``draw``: With its matrix to its group.
+        """
+        if not draw.prim.HasAPI(UsdLux.LightAPI):
+            return None
+        path = draw.prim.GetPath()
+        if kind not in ("mesh", "shape"):
+            self._report.missing(f"{kind} as lights (they shine by their material alone)", path)
+            return None
+        sync = word(draw.prim.GetAttribute("light:materialSyncMode").Get(), NO_RESPONSE)
+        if sync not in SYNC_MODES:
+            self._report.warn(f"unknown light:materialSyncMode {sync}: {NO_RESPONSE}", path)
+            sync = NO_RESPONSE
+        options = self._lights.read_mesh(draw.prim)
+        material = None
+        if sync == NO_RESPONSE:
+            material = self._lamp(self._lights.hidden)
+            options["visible"] = not self._lights.hidden
+        number = self._builder.add_mesh_light(np.array(draw.matrix), sync, **options)
+        self.any = True
+        self._report.tally("mesh lights")
+        kept = {"diffuse", "specular", "shadow_link"} & options.keys()
+        return MeshLight(number, material, sync == "independent" or bool(kept))
+
+    def say_moving(self, path: Sdf.Path) -> None:
+        """Says what is not done for a light that moves and is found by light sampling alone."""
+        what = "multipliers, shadow linking and the sync mode independent of moving mesh lights"
+        self._report.missing(what, path)
+
+    def _lamp(self, hidden: bool) -> int:
+        """The material of a mesh that has no response: radiance 1, tinted in the core."""
+        parameters = {"emission": (1.0, 1.0, 1.0)}
+        if not hidden:
+            return self._materials.add(Surface("mesh light", "emissive", parameters))
+        unseen = {**parameters, "opacity": 0.0, "presence": True}
+        return self._materials.add(Surface("mesh light, hidden", "emissive", unseen))

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials of a mesh, bound, of its subsets or of its display colour, and what they read of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdShade
+
+from wavecomb.usd.geometry.attributes import MAX_WIDTH, Wanted, check_fit
+from wavecomb.usd.geometry.curves import CurveArrays
+from wavecomb.usd.geometry.mesh import MeshArrays, find_primvar
+from wavecomb.usd.geometry.primvar import PrimvarError, as_integers
+from wavecomb.usd.geometry.shutter import Track
+from wavecomb.usd.geometry.triangulate import Topology
+from wavecomb.usd.looks.graph_bind import asks_for, bound
+from wavecomb.usd.looks.graph_code import PARAMETERS, GraphTooLarge
+from wavecomb.usd.looks.material import DEFAULT_COLOUR, MaterialTable
+from wavecomb.usd.looks.network import colour, number
+from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface
+from wavecomb.usd.stage.report import LoadReport
+
+FaceIds = NDArray[np.uint32]
+
+
+@dataclass
+class Draw:
+    """A gprim to draw.
+
+    Attributes:
+        prim: Mesh, implicit shape, curves or points.
+        matrix: From it to its group.
+        inherited: Constant primvars of its ancestors.
+        subsets: GeomSubset prims that bind materials.
+        material: Bound to it.
+        subset_materials: Bound to each subset.
+        track: In place of ``matrix`` where that changes while the shutter is open.
+    """
+
+    prim: Usd.Prim
+    matrix: Gf.Matrix4d
+    inherited: Sequence[Any] = ()
+    subsets: Sequence[Usd.Prim] = ()
+    material: UsdShade.Material | None = None
+    subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
+    track: Track | None = None
+
+
+@dataclass
+class Worn:
+    """What a gprim wears.
+
+    Attributes:
+        material: Of all that has none of its own.
+        by_face: One for each face of the prim where they differ.
+        reads: Primvars that its materials read, by name.
+    """
+
+    material: int
+    by_face: FaceIds | None = None
+    reads: dict[str, Wanted] = field(default_factory=dict)
+
+
+class Assigner:
+    """Gives meshes their materials."""
+
+    def __init__(self, table: MaterialTable, time: Usd.TimeCode, report: LoadReport) -> None:
+        self.table = table
+        self.time = time
+        self.report = report
+        self._bound_graphs: dict[tuple[Any, ...], tuple[Surface, Surface]] = {}
+
+    def uv_names(self, draw: Draw) -> tuple[str, ...]:
+        """Texture coordinates that the bound materials read, first use first."""
+        names: list[str] = []
+        for material in (draw.material, *draw.subset_materials):
+            if material is not None:
+                names += self.table.surface(material).uv_names
+        unique = tuple(dict.fromkeys(names))
+        if len(unique) > 1:
+            what = "several sets of texture coordinates on a mesh (first used for all)"
+            self.report.missing(what, draw.prim.GetPath())
+        return unique
+
+    def assign(self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None) -> Worn:
+        """The materials of a mesh.
+
+        Args:
+            draw: The gprim with its bindings.
+            mesh: Its arrays.
+            otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
+        """
+        primvars = _Primvars(draw, mesh, self.time, self.report)
+        if draw.material is None:
+            worn = Worn(self._display(primvars, otherwise))
+        else:
+            worn = Worn(self._bound(primvars, self.table.surface(draw.material)))
+        if draw.subsets and isinstance(mesh, MeshArrays) and mesh.topology is not None:
+            worn.by_face = self._subsets(draw, mesh.topology, worn.material, primvars)
+        worn.reads = primvars.read
+        return worn
+
+    def _subsets(
+        self, draw: Draw, topology: Topology, base: int, primvars: _Primvars
+    ) -> FaceIds | None:
+        per_face = np.full(topology.face_count, base, np.uint32)
+        bound = False
+        for subset, material in zip(draw.subsets, draw.subset_materials, strict=True):
+            if material is None:
+                continue
+            index = as_integers(subset.GetAttribute("indices").Get(self.time), np.int64)
+            inside = (index >= 0) & (index < topology.face_count)
+            if not inside.all():
+                self.report.warn("subset names faces that are not there", subset.GetPath())
+                index = index[inside]
+            per_face[index] = self._bound(primvars, self.table.surface(material))
+            bound = True
+        return per_face if bound else None
+
+    def _bound(self, primvars: _Primvars, surface: Surface) -> int:
+        """The id of a surface, with this gprim's values where it reads constant primvars."""
+        if asks_for(surface.graph):
+            surface = self._with_graph(primvars, surface)
+        varying: list[str] = []
+        brightest = primvars.highest(surface.emission_attributes())
+        for slot, name in surface.primvars.items():
+            found = primvars.find(name, 3 if slot in COLOUR_SLOTS else 1)
+            if found is None:
+                continue
+            if found.is_constant:
+                surface = surface.with_value(slot, _plain(found.first))
+                continue
+            if slot not in PARAMETERS:
+                what = f"varying primvar for {slot} (its mean is used)"
+                self.report.missing(what, primvars.path)
+                surface = surface.with_value(slot, _plain(found.mean))
+                continue
+            varying.append(slot)
+            primvars.keep(found)
+            if slot == "emission":
+                brightest = max(brightest, found.highest)
+        return self.table.add(self.table.varied(surface, tuple(varying)), brightest)
+
+    def _with_graph(self, primvars: _Primvars, surface: Surface) -> Surface:
+        """A surface whose graph reads the mesh's own space or its primvars, as it is there."""
+        graph = surface.graph
+        values: dict[str, tuple[float, ...]] = {}
+        varying: dict[str, int] = {}
+        for name in graph.primvars if graph is not None else ():
+            found = primvars.find(name, 0)
+            if found is None:
+                continue
+            if found.is_constant:
+                values[name] = tuple(float(x) for x in found.first)
+            else:
+                varying[name] = found.width
+                primvars.keep(found)
+        matrix = primvars.matrix
+        key = (id(surface), matrix.tobytes(), tuple(values.items()), tuple(varying.items()))
+        if key not in self._bound_graphs:
+            try:
+                made = bound(surface, matrix, values, varying)
+            except GraphTooLarge:
+                made = surface
+            # Holding the surface keeps its address from being used again.
+            self._bound_graphs[key] = (surface, made)
+        return self._bound_graphs[key][1]
+
+    def _display(self, primvars: _Primvars, otherwise: int | None) -> int:
+        """The id for displayColor and displayOpacity."""
+        colours = primvars.find("displayColor", 3)
+        if colours is None:
+            return self.table.plain() if otherwise is None else otherwise
+        opacities = primvars.find("displayOpacity", 1)
+        opacity = 1.0
+        if opacities is not None and opacities.is_constant:
+            opacity = min(max(number(float(opacities.first[0]), 1.0), 0.0), 1.0)
+        varying = []
+        for slot, found in (("base_color", colours), ("opacity", opacities)):
+            if found is not None and not found.is_constant:
+                varying.append(slot)
+                primvars.keep(found)
+        shown = colour(colours.first, DEFAULT_COLOUR) if colours.is_constant else DEFAULT_COLOUR
+        return self.table.plain(shown, opacity, tuple(varying))
+
+
+class _Primvars:
+    """Finds primvars of a gprim, each once, and tells what is wrong with them."""
+
+    def __init__(
+        self, draw: Draw, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
+    ) -> None:
+        self.read: dict[str, Wanted] = {}
+        self._draw = draw
+        self._mesh = mesh
+        self._time = time
+        self._report = report
+        self._found: dict[tuple[str, int], Wanted | None] = {}
+
+    @property
+    def path(self) -> Sdf.Path:
+        """Of the gprim."""
+        return self._draw.prim.GetPath()
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(4, 4) From the gprim to its group."""
+        return np.array(self._draw.matrix, np.float64)
+
+    def find(self, name: str, width: int) -> Wanted | None:
+        """A primvar of at least so many components; None where there is none that fits.
+
+        ``width``: 0: as many as it has, at most ``MAX_WIDTH``.
+        """
+        key = name, width
+        if key not in self._found:
+            try:
+                self._found[key] = self._look(name, width)
+            except PrimvarError as error:
+                self._report.warn(f"{error}: ignored", self.path)
+                self._found[key] = None
+        return self._found[key]
+
+    def highest(self, names: Iterable[str]) -> float:
+        """The largest component of some that are read at hits; 0 of none."""
+        return max((self.read[name].highest for name in names if name in self.read), default=0.0)
+
+    def keep(self, wanted: Wanted) -> None:
+        """Notes that a material reads it at hits."""
+        name = wanted.primvar.name
+        known = self.read.get(name)
+        if known is None or known.width < wanted.width:
+            self.read[name] = wanted
+
+    def _look(self, name: str, width: int) -> Wanted | None:
+        primvar = find_primvar(self._draw.prim, name, self._draw.inherited, self._time)
+        if primvar is None or len(primvar.values) == 0:
+            return None
+        if self._mesh.topology is None:  # an implicit shape
+            primvar = replace(primvar, values=primvar.values[:1], interpolation="constant")
+        check_fit(primvar, self._mesh, width)
+        values = np.asarray(primvar.values[:, :MAX_WIDTH], np.float32)
+        if not np.isfinite(values).all():
+            what = f"primvar {name!r} with values that are not finite: set to 0"
+            self._report.warn(what, self.path)
+            values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        return Wanted(replace(primvar, values=values), width or values.shape[1])
+
+
+def _plain(values: Iterable[Any]) -> Any:
+    numbers = tuple(float(v) for v in values)
+    return numbers if len(numbers) > 1 else numbers[0]

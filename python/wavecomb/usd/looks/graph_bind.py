@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Value graphs on one mesh: its primvars and its place in the group take their places in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.usd.looks.graph_code import (
+    PRIMVAR,
+    Expressions,
+    Node,
+    Value,
+    is_constant,
+    numbers,
+    substituted,
+)
+from wavecomb.usd.looks.graph_surface import graphs_of, plain_use
+from wavecomb.usd.looks.surface import SLOTS, SurfaceGraph
+
+if TYPE_CHECKING:
+    from wavecomb.usd.looks.surface import Surface
+
+_LOCAL = ("local_position", "local_normal")
+
+
+def bound(
+    surface: Surface,
+    matrix: NDArray[np.float64],
+    primvars: Mapping[str, Sequence[float]],
+    attributes: Mapping[str, int] = MappingProxyType({}),
+) -> Surface:
+    """The surface as a mesh wears it.
+
+    Args:
+        surface: With a graph that asks for the object's space, or for primvars.
+        matrix: From the mesh to its group, 4 x 4, for row vectors.
+        primvars: Values of primvars that are one for the whole mesh.
+        attributes: Primvars that vary over it, with how many components.
+    """
+    graph = surface.graph
+    if graph is None:
+        return surface
+    make = Expressions()
+    turned: dict[str, Value] = {}
+    if not np.array_equal(matrix, np.eye(4)):
+        turned = _in_object_space(make, matrix)
+
+    def replaced(node: Node, operands: tuple[Value, ...]) -> Value | None:
+        if node.code == PRIMVAR:
+            name = graph.primvars[node.number]
+            if name in attributes:
+                width = attributes[name]
+                return make.attribute(name, width, operands[0])[: node.width]
+            value = primvars.get(name)
+            return None if value is None else numbers(*value)[: node.width]
+        return turned.get(node.name) if node.code == "input" else None
+
+    parameters: dict[str, Any] = dict(surface.parameters)
+    layers = dict(parameters.get("openpbr", {}))
+    textures, left = dict(surface.textures), {}
+    for parameter, open_value in graph.outputs:
+        value = substituted(make, open_value, replaced)
+        use = plain_use(value, len(value) == 3) if parameter in SLOTS else None
+        plain = value if len(value) > 1 else value[0]
+        if use is not None:
+            textures[parameter] = use
+        elif is_constant(value) and parameter in layers:
+            layers[parameter] = plain
+        elif is_constant(value) and parameter in (*SLOTS, "ior") and parameter != "normal":
+            parameters[parameter] = plain
+        else:
+            left[parameter] = value
+    if layers:
+        parameters["openpbr"] = layers
+    return replace(
+        surface, parameters=parameters, textures=textures, graph=graphs_of(left, graph.primvars)
+    )
+
+
+def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str, Value]:
+    """The group's position and normal, brought to the mesh's own space."""
+    inverse = np.linalg.pinv(matrix)
+
+    def mapped(vector: Value, rows: NDArray[Any]) -> Value:
+        total: Value = numbers(0.0, 0.0, 0.0)
+        for part, row in zip(vector, rows, strict=True):
+            total = make.op("add", total, make.op("multiply", (part,) * 3, numbers(*row)))
+        return total
+
+    position = make.op(
+        "add", mapped(make.input(_LOCAL[0]), inverse[:3, :3]), numbers(*inverse[3, :3])
+    )
+    normal = mapped(make.input(_LOCAL[1]), matrix[:3, :3].T)
+    length = make.op("sqrt", make.op("dot", normal, normal))
+    return {_LOCAL[0]: position, _LOCAL[1]: make.op("divide", normal, length)}
+
+
+def asks_for(graph: SurfaceGraph | None) -> bool:
+    """Whether a graph is another on each mesh."""
+    return graph is not None and (bool(graph.primvars) or graph.in_object_space)

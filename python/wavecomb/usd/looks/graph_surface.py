@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What drives the parameters of a surface: constants, plain textures, or a value graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from pxr import UsdShade
+
+from wavecomb.usd.looks.graph_call import BASE, COLOUR, COLOURS, NORMAL, NUMBER
+from wavecomb.usd.looks.graph_code import (
+    PARAMETERS,
+    POINT_SIZE,
+    PRIMVAR,
+    Expressions,
+    Graph,
+    GraphTooLarge,
+    Node,
+    Part,
+    Value,
+    assemble,
+    fit,
+    is_constant,
+    linear,
+    nodes_of,
+    substituted,
+)
+from wavecomb.usd.looks.graph_images import uv_matrix
+from wavecomb.usd.looks.graph_network import Networks
+from wavecomb.usd.looks.surface import COLOUR_SLOTS, SLOTS, SurfaceGraph
+
+_SAMPLES = 8
+"""Points along each axis of the texture at which a graph is looked at for what it comes to."""
+
+
+def sampled(value: Value) -> Any:
+    """A value at some points of the texture (n, components), textures taken for white."""
+    points = np.zeros((_SAMPLES * _SAMPLES, POINT_SIZE), np.float32)
+    steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    points[:, 0], points[:, 1] = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    points[:, [3, 4, 6, 7]] = np.tile(points[:, :2], 2)
+    points[:, [11, 14, 15, 20]] = 1.0
+    ready = substituted(Expressions(), value, _as_it_is)
+    return assemble(dict(enumerate(ready))).run(points)
+
+
+def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
+    """A texture use that gives a value: texel * scale + bias at affine coordinates; else None."""
+    found = [linear(part, lambda node: node.code == "image") for part in value]
+    if any(one is None or len(one[0]) != 1 for one in found):
+        return None
+    leaves: list[tuple[Node, int]] = []
+    scale, bias = [], []
+    for one in found:
+        assert one is not None
+        ((leaf, k),) = one[0].items()
+        leaves.append(leaf)
+        scale.append(k)
+        bias.append(one[1])
+    node, first = leaves[0]
+    channels = [component for _, component in leaves]
+    if any(other is not node for other, _ in leaves):
+        return None
+    matrix = uv_matrix(node.operands[0])
+    if matrix is None or node.image is None:
+        return None
+    alike = len(set(zip(channels, scale, bias, strict=True))) == 1
+    if alike:
+        scale, bias = [scale[0]] * 3, [bias[0]] * 3
+    elif channels != [0, 1, 2] or not wide:
+        return None
+    alpha = (scale[0], bias[0]) if alike and first == 3 else (1.0, 0.0)
+    return {
+        "texture": node.image[0],
+        "channel": "rgba"[first] if alike else "rgb",
+        "scale": (*scale, alpha[0]),
+        "bias": (*bias, alpha[1]),
+        "uv": matrix,
+    }
+
+
+class Drivers:
+    """Collects what drives the parameters of one surface."""
+
+    def __init__(self, networks: Networks) -> None:
+        self.networks = networks
+        self.slots: dict[str, dict[str, Any]] = {}
+        self._outputs: dict[str, Value] = {}
+        self._converted: Networks | None = None
+
+    @property
+    def uv_names(self) -> tuple[str, ...]:
+        """Primvars of texture coordinates that are read, first use first."""
+        return tuple(dict.fromkeys(self.networks.uv_names))
+
+    def value(self, shader: UsdShade.Shader, name: str, parameter: str) -> Value | None:
+        """What feeds an input that is to drive a parameter; None where nothing does.
+
+        Constants are as authored; what varies is in the working space.
+        """
+        return self._read(parameter, lambda networks, kind: networks.input(shader, name, kind))
+
+    def output(self, shader: UsdShade.Shader, output: str, parameter: str) -> Value | None:
+        """What a node's output gives, likewise."""
+        return self._read(parameter, lambda networks, kind: networks.node(shader, output, kind))
+
+    def _read(self, parameter: str, read: Callable[[Networks, str], Value | None]) -> Value | None:
+        kind = kind_of(parameter)
+        value = read(self.networks, kind)
+        if value is None or is_constant(value) or kind not in COLOURS:
+            return value
+        if self.networks.textures.working == "rec709":
+            return value
+        if self._converted is None:
+            self._converted = self.networks.in_working_space()
+        return read(self._converted, kind)
+
+    def scaled(self, value: Value, by: Value) -> Value:
+        """A product; of constants in double precision."""
+        if is_constant(value) and is_constant(by):
+            factors = by * len(value) if len(by) == 1 else by
+            return tuple(
+                float(a) * float(b)  # type: ignore[arg-type]
+                for a, b in zip(value, factors, strict=True)
+            )
+        return self.networks.make.op("multiply", value, by)
+
+    def put(self, parameter: str, value: Value) -> tuple[float, ...] | None:
+        """Lets a value drive a parameter; gives it back where it is a constant."""
+        width = PARAMETERS[parameter][1]
+        value = fit(value, width)
+        if is_constant(value):
+            return tuple(float(part) for part in value)  # type: ignore[arg-type]
+        use = plain_use(value, width == 3) if parameter in SLOTS else None
+        if use is not None:
+            self.slots[parameter] = use
+        else:
+            self._outputs[parameter] = value
+        return None
+
+    def graph(self) -> SurfaceGraph | None:
+        """The graphs of what neither constants nor textures drive; None where that is nothing.
+
+        Where a graph is too large, parameters are left out of it, the last one first, and said.
+        """
+        left = dict(self._outputs)
+        while left:
+            try:
+                return graphs_of(left, tuple(self.networks.primvars))
+            except GraphTooLarge as error:
+                name, _ = left.popitem()
+                what = f"shading network too large for {name} ({error}): left out"
+                self.networks.report.missing(what, self.networks.material.GetPath())
+        return None
+
+
+def graphs_of(outputs: Mapping[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
+    """The graphs that drive parameters, primvars at their defaults; None for no parameter.
+
+    Raises:
+        GraphTooLarge: There is no room for them.
+    """
+    if not outputs:
+        return None
+    make = Expressions()
+    ready = {name: substituted(make, v, _as_it_is) for name, v in outputs.items()}
+    whole = _of(ready)
+    opacity = _of({"opacity": ready["opacity"]}) if "opacity" in ready else None
+    emission = _of({"emission": ready["emission"]}) if "emission" in ready else None
+    seen = float(sampled(ready["emission"]).max()) if emission else 0.0
+    nodes = nodes_of([part for value in outputs.values() for part in value])
+    wanted = {node.number for node in nodes if node.code == PRIMVAR}
+    local = any(node.name.startswith("local_") for node in nodes)
+    names = primvars if wanted else ()
+    return SurfaceGraph(
+        whole, opacity, emission, seen, names, local, tuple(sorted(outputs.items()))
+    )
+
+
+def _as_it_is(_node: Node, _operands: tuple[Value, ...]) -> Value | None:
+    return None
+
+
+def kind_of(parameter: str) -> str:
+    """What values of a parameter are."""
+    if parameter == "base_color":
+        return BASE
+    if parameter == "normal":
+        return NORMAL
+    return COLOUR if parameter in COLOUR_SLOTS or parameter.endswith("_color") else NUMBER
+
+
+def _of(outputs: Mapping[str, Value]) -> Graph:
+    parts: dict[int, Part] = {}
+    for parameter, value in outputs.items():
+        first, _ = PARAMETERS[parameter]
+        parts |= {first + i: part for i, part in enumerate(value)}
+    return assemble(parts)

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials: which one a prim has, and its id in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Tf, Usd, UsdShade
+
+from wavecomb.picture.working_space import from_rec709
+from wavecomb.usd.looks.graph_attributes import with_attributes
+from wavecomb.usd.looks.graph_code import GraphTooLarge
+from wavecomb.usd.looks.materialx_surface import MaterialXReader, model_of
+from wavecomb.usd.looks.network import shader_id
+from wavecomb.usd.looks.openpbr import OPENPBR_COLOURS
+from wavecomb.usd.looks.preview import PreviewReader
+from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface, fallback_surface
+from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+    from wavecomb.usd.looks.graph_code import Graph
+
+INHERIT_MATERIAL = 0xFFFFFFFF
+"""Same as ``_core.INHERIT_MATERIAL``: what the instance says."""
+
+DEFAULT_COLOUR = (0.5, 0.5, 0.5)
+"""Of what has neither a material nor a display colour."""
+
+
+BINDING_PURPOSES = ("full", "preview")
+"""Purposes of bindings where render settings name none; each has all purposes after it."""
+
+PREVIEW = "preview"
+"""``surface_source`` of UsdPreviewSurface."""
+
+LAMP = 1.0
+"""Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
+
+
+def bound_materials(
+    prims: Sequence[Usd.Prim], purposes: Sequence[str] = BINDING_PURPOSES
+) -> list[UsdShade.Material | None]:
+    """The material of each prim, in bulk.
+
+    For each of ``purposes`` in turn a binding of that purpose, else one of all purposes.
+    """
+    if not prims:
+        return []
+    compute = UsdShade.MaterialBindingAPI.ComputeBoundMaterials
+    found = list(compute(prims, purposes[0])[0])
+    for purpose in purposes[1:]:
+        bare = [i for i, material in enumerate(found) if not material]
+        if bare:
+            others = compute([prims[i] for i in bare], purpose)[0]
+            for i, material in zip(bare, others, strict=True):
+                found[i] = material
+    return [material if material else None for material in found]
+
+
+def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
+    """What reads the surface of a material, and its shader.
+
+    ``PREVIEW``, or a shading model of MaterialX; "" where nothing does.
+    """
+    shader = material.ComputeSurfaceSource()[0]
+    # Where a material comes in both forms, the preview is the one for who knows no MaterialX.
+    for candidate in (material.ComputeSurfaceSource("mtlx")[0], shader):
+        name = shader_id(candidate)
+        if name.startswith(("ND_UsdPreviewSurface", "UsdPreviewSurface")):
+            return PREVIEW, candidate
+        if model := model_of(name):
+            return model, candidate
+    return "", shader
+
+
+class BindingScan:
+    """Finds bindings on a prim or above that act on what is inside an instance."""
+
+    def __init__(self) -> None:
+        self._cache: dict[Sdf.Path, tuple[bool, bool]] = {}
+
+    def above(self, prim: Usd.Prim) -> tuple[bool, bool]:
+        """(a direct binding stronger than descendants, a collection binding) here or above."""
+        above: list[Usd.Prim] = []
+        while prim and not prim.IsPseudoRoot() and prim.GetPath() not in self._cache:
+            above.append(prim)
+            prim = prim.GetParent()
+        nothing = (False, False)
+        strong, collection = self._cache.get(prim.GetPath(), nothing) if prim else nothing
+        for prim in reversed(above):
+            for name in prim.GetAuthoredPropertyNames():
+                if name.startswith("material:binding"):
+                    if name.startswith("material:binding:collection"):
+                        collection = True
+                    strength = prim.GetRelationship(name).GetMetadata("bindMaterialAs")
+                    strong = strong or strength == UsdShade.Tokens.strongerThanDescendants
+            self._cache[prim.GetPath()] = (strong, collection)
+        return strong, collection
+
+
+class MaterialTable:
+    """Adds materials to the scene, equal ones once."""
+
+    def __init__(
+        self,
+        builder: _core.SceneBuilder,
+        textures: TextureTable,
+        time: Usd.TimeCode,
+        report: LoadReport,
+        apart: bool = False,
+    ) -> None:
+        """``apart``: those of different prims stay apart even where they are equal."""
+        self._apart = apart
+        self._names: list[str] = []
+        self._builder = builder
+        self._textures = textures
+        self.time = time
+        self._report = report
+        self._surfaces: dict[Sdf.Path, Surface] = {}
+        self._ids: dict[str, int] = {}
+        self._graph_ids: dict[Graph, int] = {}
+        self._surface_ids: dict[int, tuple[Surface, int]] = {}
+        self._varied: dict[tuple[int, tuple[str, ...]], tuple[Surface, Surface]] = {}
+        self._plain: dict[tuple[Any, ...], int] = {}
+        self.glows = False
+        """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
+        self._emitting: set[int] = set()
+
+    def expect(self, material: UsdShade.Material) -> None:
+        """Starts what takes long for a material that will be used: reading its images."""
+        if material.GetPath() not in self._surfaces:
+            self._textures.expect(material.GetPrim(), self.time)
+
+    def surface(self, material: UsdShade.Material) -> Surface:
+        """The surface of a bound material."""
+        path = material.GetPath()
+        surface = self._surfaces.get(path)
+        if surface is None:
+            try:
+                surface = self._convert(material)
+            except (Tf.ErrorException, RecursionError):
+                self._report.warn("material network cannot be read: drawn grey", path)
+                surface = fallback_surface(DEFAULT_COLOUR, name=str(path))
+            if str(path).startswith("/__Prototype_"):
+                surface = replace(surface, name=self._report.place(path))
+            self._surfaces[path] = surface
+            self._report.tally("materials")
+        return surface
+
+    def add(self, surface: Surface, brightest: float = 0.0) -> int:
+        """Material id of a surface.
+
+        ``brightest``: highest emission that primvars give it.
+        """
+        number = self._add(surface)
+        if brightest > 0:
+            self._emitting.add(number)
+            self.glows = self.glows or brightest >= LAMP
+        return number
+
+    def varied(self, surface: Surface, slots: tuple[str, ...]) -> Surface:
+        """A surface whose slots read their primvars at hits."""
+        if not slots:
+            return surface
+        known = self._varied.get((id(surface), slots))
+        if known is not None:
+            return known[1]
+        try:
+            varied = with_attributes(surface, slots, self._textures.working)
+        except GraphTooLarge as error:
+            what = f"shading network too large for primvars ({error}): left out"
+            self._report.missing(what, surface.name)
+            varied = surface
+        # Holding the surface keeps its address from being used again.
+        self._varied[id(surface), slots] = surface, varied
+        return varied
+
+    def _add(self, surface: Surface) -> int:
+        known = self._surface_ids.get(id(surface))
+        if known is not None:
+            return known[1]
+        key = surface.key() + (surface.name if self._apart else "")
+        number = self._ids.get(key)
+        if number is None:
+            brightest = surface.brightest()
+            parameters = self._in_working_space(surface.parameters)
+            self.glows = self.glows or brightest >= LAMP
+            number = self._builder.add_material(
+                surface.program,
+                name=surface.name,
+                **parameters,
+                textures=surface.textures,
+                **self._graphs_of(surface),
+            )
+            self._ids[key] = number
+            self._names.append(surface.name)
+            if brightest > 0:
+                self._emitting.add(number)
+        # Holding the surface keeps its address from being used again.
+        self._surface_ids[id(surface)] = (surface, number)
+        return number
+
+    def _graphs_of(self, surface: Surface) -> dict[str, Any]:
+        """Ids of a surface's graphs, equal ones once."""
+        if surface.graph is None:
+            return {}
+        graphs = {
+            "graph": surface.graph.whole,
+            "opacity_graph": surface.graph.opacity,
+            "emission_graph": surface.graph.emission,
+        }
+        for graph in graphs.values():
+            if graph is not None and graph not in self._graph_ids:
+                self._graph_ids[graph] = self._builder.add_graph(
+                    graph.ops, graph.constants, graph.images, graph.outputs, graph.names
+                )
+        return {name: self._graph_ids[g] for name, g in graphs.items() if g is not None}
+
+    def _in_working_space(self, parameters: dict[str, Any]) -> dict[str, Any]:
+        """Parameters whose colours are those of the working space."""
+        working = self._textures.working
+        if working == "rec709":
+            return parameters
+
+        def converted(values: dict[str, Any], colours: Iterable[str]) -> dict[str, Any]:
+            there = {
+                name: tuple(float(x) for x in from_rec709(np.array(values[name]), working))
+                for name in colours
+                if name in values
+            }
+            return {**values, **there}
+
+        parameters = converted(parameters, COLOUR_SLOTS)
+        if "openpbr" in parameters:
+            parameters["openpbr"] = converted(parameters["openpbr"], OPENPBR_COLOURS)
+        return parameters
+
+    def paths(self) -> tuple[str, ...]:
+        """Prim of each material by id, "" of display colours."""
+        return tuple(name if name.startswith("/") else "" for name in self._names)
+
+    def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
+        """Whether a mesh with this material, or with these of its faces, emits anything."""
+        if faces is None or not self._emitting:
+            return material in self._emitting
+        return bool(np.isin(faces, list(self._emitting)).any())
+
+    def plain(
+        self,
+        colour: Iterable[float] = DEFAULT_COLOUR,
+        opacity: float = 1.0,
+        varying: tuple[str, ...] = (),
+    ) -> int:
+        """Material id of a display colour.
+
+        ``varying``: which of base_color and opacity primvars give at hits.
+        """
+        r, g, b = (max(float(value), 0.0) for value in colour)
+        key = (r, g, b, float(opacity), *varying)
+        number = self._plain.get(key)
+        if number is None:
+            surface = fallback_surface((r, g, b), float(opacity), varying=varying)
+            number = self._plain[key] = self.add(self.varied(surface, varying))
+        return number
+
+    def _convert(self, material: UsdShade.Material) -> Surface:
+        prim = material.GetPrim()
+        kind, shader = surface_source(material)
+        if kind == PREVIEW:
+            return PreviewReader(prim, self.time, self._textures, self._report).read(shader)
+        if kind:
+            reader = MaterialXReader(prim, self.time, self._textures, self._report)
+            return reader.read(shader, kind)
+        what = shader_id(shader) or shader_id(material.ComputeSurfaceSource("mtlx")[0])
+        if what:
+            self._report.missing(f"surface shader {what} (drawn grey)", prim.GetPath())
+        elif not material.GetSurfaceOutputs():
+            self._report.warn("material without a surface: drawn grey", prim.GetPath())
+        else:
+            self._report.warn("material whose surface leads nowhere: drawn grey", prim.GetPath())
+        return fallback_surface(DEFAULT_COLOUR, name=str(prim.GetPath()))

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the parameters of materials and lights come from: for programs that let people change them.
+
+``wavecomb.usd.looks.material`` reads surfaces; here each constant of one is traced to the attribute
+that holds it, so that a change can be written back.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from wavecomb.usd.geometry.mesh import IDENTITY
+from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.lights.light import LightReader
+from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical, linear_colour, space_of
+from wavecomb.usd.looks.material import PREVIEW, surface_source
+from wavecomb.usd.looks.network import Source, colour, number, shader_id, source_of, value_of
+from wavecomb.usd.looks.preview import INPUTS, USES, constant, program_of
+from wavecomb.usd.looks.surface import COLOUR_SLOTS
+from wavecomb.usd.looks.surface_inputs import COLOUR, SWITCH, InputDefinition, definitions
+from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.report import LoadReport
+
+IN_INSTANCE = "it is inside an instance, where USD takes no opinions"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a material.
+
+    Attributes:
+        slot: Keyword argument of ``SceneBuilder.add_material``; of MaterialX the shader's input.
+        value: As the loader reads it: a number, three, or a bool; None where it is driven.
+        attribute: To author for another value, there already or not; None: there is none.
+        type_name: Of that attribute.
+        driven_by: What else gives the value: "texture marble.png", "primvar displayColor"; "" of a
+            constant.
+        reason: Why there is no attribute to author; "" where there is.
+        definition: What MaterialX says of the input; None of UsdPreviewSurface.
+    """
+
+    slot: str
+    value: Any = None
+    attribute: Sdf.Path | None = None
+    type_name: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
+    driven_by: str = ""
+    reason: str = ""
+    definition: InputDefinition | None = None
+
+    def authored(self, value: Any) -> Any:
+        """What the attribute must hold for the parameter to be so."""
+        if isinstance(value, bool):
+            return value if self.type_name == Sdf.ValueTypeNames.Bool else int(value)
+        if isinstance(value, (tuple, list)):
+            return self.type_name.type.pythonClass(*(float(v) for v in value))
+        if _is_triple(self.type_name):
+            return self.type_name.type.pythonClass(*[float(value)] * 3)
+        return as_stored(float(value))
+
+
+def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
+    """Parameters of a material by slot, in the order of a panel; empty where it has no surface."""
+    material = UsdShade.Material(prim)
+    kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
+    if not kind:
+        return {}
+    tracer = _Tracer(prim, shader, time)
+    if kind != PREVIEW:
+        return tracer.materialx(kind)
+    return tracer.preview(program_of(prim, time, LoadReport()))
+
+
+class _Tracer:
+    """Traces the inputs of one surface shader."""
+
+    def __init__(self, prim: Usd.Prim, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
+        self._prim = prim
+        self._shader = shader
+        self._time = time
+
+    def preview(self, program: str) -> dict[str, Parameter]:
+        """Of a UsdPreviewSurface."""
+        wanted = USES.get(program)
+        out: dict[str, Parameter] = {}
+        for name, (slot, default) in INPUTS.items():
+            if slot == "normal" or (wanted is not None and slot not in wanted):
+                continue
+            if slot == "base_color" and program == "dielectric":
+                default = (1.0, 1.0, 1.0)
+            out[slot] = self._input(slot, name, default)
+        for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
+            attribute = self._prim.GetAttribute(key)
+            if program == "metal" and attribute and attribute.HasAuthoredValue():
+                black = (0.0, 0.0, 0.0)
+                value = colour(attribute.Get(self._time), black)
+                path, usual = attribute.GetPath(), Sdf.ValueTypeNames.Color3f
+                out[slot] = self._constant(slot, value, path, attribute, usual)
+        return out
+
+    def materialx(self, model_name: str) -> dict[str, Parameter]:
+        """Of a MaterialX surface: its own inputs, of those that Wavecomb reads."""
+        known = definitions(model_name, shader_id(self._shader))
+        return {name: self._own_input(one) for name, one in known.items()}
+
+    def _own_input(self, definition: InputDefinition) -> Parameter:
+        name, default = definition.name, definition.default
+        source = source_of(self._shader, name, self._time)
+        if source is not None and not source.is_value:
+            return Parameter(name, driven_by=self._driver(source), definition=definition)
+        attribute = None if source is None else source.attribute
+        value = default if source is None else source.value
+        if definition.kind == SWITCH:
+            value = bool(number(value, default))
+        elif definition.kind == COLOUR:
+            value = colour(value, default)
+        else:
+            value = number(value, default)
+        types = Sdf.ValueTypeNames
+        usual = {"color3": types.Color3f, "boolean": types.Bool}.get(
+            definition.type_name, types.Float
+        )
+        return replace(
+            self._constant(name, value, self._path_of(name, attribute), attribute, usual),
+            definition=definition,
+        )
+
+    def _path_of(self, name: str, attribute: Usd.Attribute | None) -> Sdf.Path:
+        """The attribute that an input's value is in, or would be."""
+        own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
+        return own if attribute is None else attribute.GetPath()
+
+    def _input(self, slot: str, name: str, default: Any) -> Parameter:
+        source = source_of(self._shader, name, self._time)
+        if source is not None and not source.is_value:
+            return Parameter(slot, driven_by=self._driver(source))
+        attribute = None if source is None else source.attribute
+        value = constant(slot, default if source is None else source.value, default)
+        space = space_of(attribute) if slot in COLOUR_SLOTS else ""
+        if space and canonical(space) not in (LINEAR, RAW):
+            with contextlib.suppress(ValueError):  # the loader says that it does not know it
+                value = linear_colour(value, attribute)
+            return Parameter(slot, value, reason=f"it is in the colour space {space}")
+        wide = slot in COLOUR_SLOTS
+        usual = Sdf.ValueTypeNames.Color3f if wide else Sdf.ValueTypeNames.Float
+        return self._constant(slot, value, self._path_of(name, attribute), attribute, usual)
+
+    def _constant(
+        self,
+        slot: str,
+        value: Any,
+        path: Sdf.Path,
+        attribute: Usd.Attribute | None,
+        usual: Sdf.ValueTypeName,
+    ) -> Parameter:
+        """A parameter whose value is that of an attribute, or would be one of the usual type."""
+        if self._prim.IsInstanceProxy() or self._prim.IsInPrototype():
+            return Parameter(slot, value, reason=IN_INSTANCE)
+        if not path.HasPrefix(self._prim.GetPath()):
+            return Parameter(slot, value, reason=f"it comes from {path}, outside of the material")
+        if attribute is None:
+            return Parameter(slot, value, path, usual)
+        type_name = attribute.GetTypeName()
+        if _is_triple(usual) != _is_triple(type_name):
+            return Parameter(slot, value, reason=f"{path} is a {type_name}")
+        return Parameter(slot, value, path, type_name)
+
+    def _driver(self, source: Source) -> str:
+        shader = source.shader
+        identifier = shader_id(shader) if shader is not None else ""
+        if shader is None or not identifier:
+            return "a shader without info:id"
+        if identifier.startswith("UsdPrimvarReader_"):
+            return f"primvar {value_of(shader, 'varname', self._time, '')}"
+        file = value_of(shader, "file", self._time)
+        if isinstance(file, Sdf.AssetPath):
+            return f"texture {os.path.basename(file.path)}"
+        return f"node {identifier} ({shader.GetPath().name})"
+
+
+def _is_triple(type_name: Sdf.ValueTypeName) -> bool:
+    value = type_name.defaultValue
+    return hasattr(value, "__len__") and not isinstance(value, str) and len(value) == 3
+
+
+def light_radiance(
+    prim: Usd.Prim, time: Usd.TimeCode, up_axis: str
+) -> tuple[float, float, float] | None:
+    """The colour that the loader gives ``SceneBuilder.add_light`` for a light outside of instances.
+
+    None where the prim is no light that Wavecomb knows.
+    """
+    if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
+        return None
+    matrix = IDENTITY
+    xforms = UsdGeom.XformCache(time)
+    for path in prim.GetPath().GetPrefixes():
+        step = prim.GetStage().GetPrimAtPath(path)
+        if not step.IsA(UsdGeom.Xformable):
+            continue
+        own, resets = xforms.GetLocalTransformation(step)
+        if resets:
+            matrix = own
+        elif own != IDENTITY:
+            matrix = own * matrix
+    scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
+    report = LoadReport()
+    reader = LightReader(time, up_axis, None, LightGroups(report), report)
+    light = reader.read(prim, scale)
+    r, g, b = light.options["color"]
+    return (r, g, b)
+
+
+def as_stored(value: Any) -> Any:
+    """A number or colour as the core keeps it, in 32 bits; a bool as it is."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, (tuple, list)):
+        return tuple(float(np.float32(v)) for v in value)
+    return float(np.float32(value))

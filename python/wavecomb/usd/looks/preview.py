@@ -1,0 +1,398 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdPreviewSurface networks to surfaces (specification 2.6)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pxr import Usd, UsdShade
+
+from wavecomb.usd.looks.colour_space import SRGB, canonical, linear_colour, space_of
+from wavecomb.usd.looks.graph_code import PARAMETERS
+from wavecomb.usd.looks.graph_network import Networks
+from wavecomb.usd.looks.graph_surface import Drivers
+from wavecomb.usd.looks.network import (
+    MAX_DEPTH,
+    Source,
+    colour,
+    number,
+    pair,
+    shader_id,
+    source_of,
+    value_of,
+    word,
+)
+from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface
+from wavecomb.usd.looks.texture import asset_file
+
+if TYPE_CHECKING:
+    from wavecomb.usd.looks.pixels import Image
+    from wavecomb.usd.looks.texture import TextureTable, TiledImage
+    from wavecomb.usd.stage.report import LoadReport
+
+INPUTS: dict[str, tuple[str, Any]] = {
+    "diffuseColor": ("base_color", (0.18, 0.18, 0.18)),
+    "specularColor": ("specular_color", (0.0, 0.0, 0.0)),
+    "emissiveColor": ("emission", (0.0, 0.0, 0.0)),
+    "roughness": ("roughness", 0.5),
+    "metallic": ("metallic", 0.0),
+    "clearcoat": ("clearcoat", 0.0),
+    "clearcoatRoughness": ("clearcoat_roughness", 0.01),
+    "opacity": ("opacity", 1.0),
+    "normal": ("normal", (0.0, 0.0, 1.0)),
+    "ior": ("ior", 1.5),
+    "opacityThreshold": ("opacity_threshold", 0.0),
+}
+"""Input of a UsdPreviewSurface -> parameter of a program, and its default."""
+
+_UNIT = (
+    "roughness",
+    "metallic",
+    "clearcoat",
+    "clearcoat_roughness",
+    "opacity",
+    "opacity_threshold",
+)
+USES: dict[str, tuple[str, ...]] = {
+    "diffuse": ("base_color", "normal"),
+    "metal": ("base_color", "specular_color", "roughness", "normal"),
+    "dielectric": ("base_color", "roughness", "ior", "normal"),
+    "plastic": ("base_color", "roughness", "ior", "normal"),
+    "emissive": ("emission",),
+}
+"""Parameters that a program reads; principled reads all."""
+
+PROGRAMS = (*USES, "principled")
+"""What ``wavecomb:program`` may say."""
+
+MAX_EVALUATIONS = 1 << 16
+
+_WRAP_INPUTS = ("wrapS", "wrapT")
+_ONES = (1.0, 1.0, 1.0, 1.0)
+_ZEROS = (0.0, 0.0, 0.0, 0.0)
+_IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> str:
+    """The program that ``wavecomb:program`` of a material asks for, else principled."""
+    attribute = material.GetAttribute("wavecomb:program")
+    name = attribute.Get(time) if attribute else None
+    if name is None:
+        return "principled"
+    if word(name) not in PROGRAMS:
+        known = ", ".join(PROGRAMS)
+        report.warn(f"wavecomb:program {name!r} is none of {known}: principled", material.GetPath())
+        return "principled"
+    return str(name)
+
+
+def evaluations_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> int:
+    """How often ``wavecomb:evaluations`` of a material makes a hit evaluate it, else 1."""
+    attribute = material.GetAttribute("wavecomb:evaluations")
+    value = attribute.Get(time) if attribute else None
+    if value is None:
+        return 1
+    if not isinstance(value, int) or not 1 <= value <= MAX_EVALUATIONS:
+        report.warn(
+            f"wavecomb:evaluations {value!r} is no whole number from 1 to {MAX_EVALUATIONS}: 1",
+            material.GetPath(),
+        )
+        return 1
+    return value
+
+
+def constant(slot: str, value: Any, default: Any) -> Any:
+    """What an authored value gives a parameter: finite, in range."""
+    if isinstance(default, tuple):
+        return colour(value, default)
+    result = number(value, default)
+    return min(max(result, 0.0), 1.0) if slot in _UNIT else result
+
+
+class PreviewReader:
+    """Reads one UsdPreviewSurface network."""
+
+    def __init__(
+        self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
+    ) -> None:
+        self.material = material
+        self.time = time
+        self.textures = textures
+        self.report = report
+        self.drivers = Drivers(Networks(material, time, textures, report))
+        self.uv_names = self.drivers.networks.uv_names
+        self.slots = self.drivers.slots
+        self.primvars: dict[str, str] = {}
+
+    def read(self, shader: UsdShade.Shader) -> Surface:
+        """The surface of a UsdPreviewSurface shader."""
+        program = program_of(self.material, self.time, self.report)
+        wanted = USES.get(program)
+        parameters: dict[str, Any] = {}
+        for name, (slot, default) in INPUTS.items():
+            if wanted is not None and slot not in wanted:
+                continue
+            source = source_of(shader, name, self.time)
+            if source is not None:
+                value = self._input(slot, source, default)
+                if slot == "normal":
+                    self._flat_normal(value)
+                elif value is not None:
+                    parameters[slot] = value
+        if parameters.get("ior", 1.0) <= 0.0:
+            self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
+            parameters["ior"] = 1.5
+        if program == "dielectric" and "base_color" not in parameters:
+            parameters["base_color"] = (1.0, 1.0, 1.0)
+        if program == "principled":
+            workflow = value_of(shader, "useSpecularWorkflow", self.time, 0)
+            parameters["specular_workflow"] = bool(number(workflow, 0))
+            mode = value_of(shader, "opacityMode", self.time, "transparent")
+            parameters["presence"] = word(mode) == "presence"
+        for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
+            attribute = self.material.GetAttribute(key)
+            if program == "metal" and attribute and attribute.HasAuthoredValue():
+                parameters[slot] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
+        evaluations = evaluations_of(self.material, self.time, self.report)
+        if evaluations != 1:
+            parameters["evaluations"] = evaluations
+        displacement = self._displacement(shader)
+        return Surface(
+            str(self.material.GetPath()),
+            program,
+            parameters,
+            self.slots,
+            self.drivers.uv_names,
+            self.primvars,
+            displacement,
+            self.drivers.graph(),
+        )
+
+    def _flat_normal(self, value: Any) -> None:
+        """Tilts the whole surface by a constant normal, as a map of one texel."""
+        if value is None or tuple(value) == INPUTS["normal"][1]:
+            return
+        texel = np.array(value, np.float32).reshape(1, 1, 3)
+        self.slots["normal"] = {
+            "texture": self.textures.add_pixels(f"normal {tuple(value)}", texel),
+            "channel": "rgb",
+            "scale": _ONES,
+            "bias": _ZEROS,
+            "uv": (0.0,) * 6,
+        }
+
+    def _displacement(self, surface: UsdShade.Shader) -> float | dict[str, Any] | None:
+        """What the material's displacement output leads to: a length or a texture use."""
+        shader = UsdShade.Material(self.material).ComputeDisplacementSource()[0]
+        connected = shader and "UsdPreviewSurface" in shader_id(shader)
+        if shader and not connected:
+            what = f"displacement shader {shader_id(shader) or '(none)'}"
+            self.report.missing(what, self.material.GetPath())
+        source = source_of(shader if connected else surface, "displacement", self.time)
+        if source is None or (source.is_value and number(source.value, 0.0) == 0.0):
+            return None
+        if not connected:
+            what = "displacement that the material's displacement output does not lead to: ignored"
+            self.report.note(what, self.material.GetPath())
+            return None
+        value = self._input("displacement", source, 0.0)
+        texture = self.slots.pop("displacement", None)
+        if self.primvars.pop("displacement", None) is not None:
+            self.report.missing("displacement by a primvar", self.material.GetPath())
+            return None
+        return texture if texture is not None else (float(value or 0.0) or None)
+
+    def _input(self, slot: str, source: Source, default: Any) -> Any:
+        """A constant for a slot, None for its default; a texture goes to ``slots``."""
+        if source.is_value:
+            value = constant(slot, source.value, default)
+            return self._linear(value, source) if slot in COLOUR_SLOTS else value
+        shader = source.shader
+        identifier = shader_id(shader) if shader else ""
+        if shader is not None and identifier == "UsdUVTexture":
+            if slot in ("ior", "opacity_threshold"):
+                self.report.missing(f"a texture for {slot}", self.material.GetPath())
+                return default
+            return self._texture(slot, shader, source.output, default)
+        if shader is not None and identifier.startswith("UsdPrimvarReader_"):
+            name = value_of(shader, "varname", self.time, "")
+            fallback = value_of(shader, "fallback", self.time)
+            if name and slot == "normal":
+                self.report.missing("normals by a primvar of a material", self.material.GetPath())
+            elif name:
+                self.primvars[slot] = str(name)
+            return constant(slot, fallback, default)
+        if shader is not None and identifier.startswith("ND_") and slot in PARAMETERS:
+            return self._network(slot, shader, source.output, default)
+        what = identifier or "a shader without info:id"
+        self.report.missing(f"shading node {what}", self.material.GetPath())
+        return default
+
+    def _network(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
+        """A network of MaterialX's nodes: a constant, or None for what it drives."""
+        value = self.drivers.output(shader, output, slot)
+        if value is None:
+            return default
+        found = self.drivers.put(slot, value)
+        return None if found is None else constant(slot, found, default)
+
+    def _linear(self, value: Any, source: Source) -> Any:
+        """A colour in linear Rec.709, whatever its attribute holds."""
+        try:
+            return linear_colour(value, source.attribute)
+        except ValueError as error:
+            self.report.missing(f"{error} (read as linear)", self.material.GetPath())
+            return value
+
+    def _texture(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
+        """Adds a texture use; gives a constant where there is no image."""
+        time = self.time
+        scale = _four(value_of(shader, "scale", time), _ONES)
+        bias = _four(value_of(shader, "bias", time), _ZEROS)
+        file = source_of(shader, "file", time)
+        path = asset_file(file.value, file.attribute) if file is not None else ""
+        image = self.textures.image(path, shader.GetPath())
+        channel = output if output in ("rgb", "r", "g", "b", "a") else "rgb"
+        if image is None:
+            return self._fallback(slot, shader, channel, scale, bias, default)
+        if channel == "a" and image.channels in (1, 3):
+            value = scale[3] + bias[3]
+            return (value,) * 3 if isinstance(default, tuple) else value
+        if channel == "rgb" and slot not in (*COLOUR_SLOTS, "normal"):
+            channel = "r"
+        space = self._colour_space(shader, file)
+        if slot == "normal":
+            space = self._linear_normals(space, image, shader)
+            bare = scale[:3] == _ONES[:3] and bias[:3] == _ZEROS[:3]
+            if bare and image.dtype.name in ("uint8", "float16"):
+                scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
+                what = "normal map without scale and bias: read as 2 x - 1, linear"
+                self.report.note(what, shader.GetPath())
+        missing = _four(value_of(shader, "fallback", time), (0.0, 0.0, 0.0, 1.0))
+        wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
+        matrix = self._coordinates(shader)
+        if not any((*matrix[:2], *matrix[3:5])):
+            # One texel for all: its border must not be mixed in.
+            wraps = ["clamp", "clamp"]
+        self.slots[slot] = {
+            "texture": self.textures.add(
+                path, image, space, *wraps, is_colour=slot in COLOUR_SLOTS, missing=missing
+            ),
+            "channel": channel,
+            "scale": scale,
+            "bias": bias,
+            "uv": matrix,
+        }
+        return None
+
+    def _wrap(self, shader: UsdShade.Shader, name: str, of_file: str) -> str:
+        """A wrap mode, useMetadata being that of the file, else black."""
+        mode = word(value_of(shader, name, self.time), "useMetadata")
+        if mode not in ("black", "clamp", "repeat", "mirror", "useMetadata"):
+            self.report.warn(
+                f"{name} {mode!r} is no wrap mode: read as useMetadata", shader.GetPath()
+            )
+            mode = "useMetadata"
+        return of_file if mode == "useMetadata" else mode
+
+    def _linear_normals(
+        self, space: str, image: Image | TiledImage, shader: UsdShade.Shader
+    ) -> str:
+        """The colour space of a normal map, which is never sRGB, whatever the stage says."""
+        if image.automatic_srgb if space == "auto" else canonical(space) == SRGB:
+            if word(value_of(shader, "sourceColorSpace", self.time)) == "sRGB":
+                what = "normal map whose sourceColorSpace is sRGB: read as raw"
+                self.report.warn(what, shader.GetPath())
+            else:
+                what = "normal map whose sourceColorSpace is not raw: read as raw"
+                self.report.note(what, shader.GetPath())
+        return "raw"
+
+    def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
+        """By sourceColorSpace, else by the colour space of the file's attribute, else auto."""
+        space = word(value_of(shader, "sourceColorSpace", self.time))
+        if space in ("raw", "sRGB"):
+            return str(space)
+        # An explicit auto asks the file; what the stage says of it goes before a default auto.
+        return "auto" if space == "auto" else space_of(file and file.attribute) or "auto"
+
+    def _fallback(
+        self,
+        slot: str,
+        shader: UsdShade.Shader,
+        channel: str,
+        scale: tuple[float, ...],
+        bias: tuple[float, ...],
+        default: Any,
+    ) -> Any:
+        """The value that stands for an image that cannot be read."""
+        authored = value_of(shader, "fallback", self.time)
+        if authored is not None:
+            texel = _four(authored, (0.0, 0.0, 0.0, 1.0))
+            value = [t * s + b for t, s, b in zip(texel, scale, bias, strict=True)]
+            if isinstance(default, tuple):
+                return tuple(value[:3]) if channel == "rgb" else (value["rgba".index(channel)],) * 3
+            return constant(slot, value["rgba".index(channel[0])], default)
+        if slot == "base_color":
+            self.slots[slot] = {
+                "texture": self.textures.missing(),
+                "channel": "rgb",
+                "scale": _ONES,
+                "bias": _ZEROS,
+                "uv": self._coordinates(shader),
+            }
+            return None
+        return default
+
+    def _coordinates(self, shader: UsdShade.Shader) -> tuple[float, ...]:
+        """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``.
+
+        Without a connection the coordinates are constant, (0, 0) where nothing is authored.
+        """
+        matrix: tuple[float, ...] = _IDENTITY_UV
+        node, key = shader, "st"
+        for _ in range(MAX_DEPTH):
+            source = source_of(node, key, self.time)
+            if source is None or source.shader is None:
+                u, v = pair(source.value if source is not None else None, (0.0, 0.0))
+                return _compose(matrix, (0.0, 0.0, u, 0.0, 0.0, v))
+            node = source.shader
+            identifier = shader_id(node)
+            if identifier == "UsdTransform2d":
+                matrix = _compose(matrix, self._transform_2d(node))
+                key = "in"
+            elif identifier.startswith("UsdPrimvarReader_float2"):
+                self.uv_names.append(str(value_of(node, "varname", self.time, "") or "st"))
+                return matrix
+            else:
+                self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
+                self.uv_names.append("st")
+                return matrix
+        self.report.warn("texture coordinates that run in a circle", self.material.GetPath())
+        return (0.0,) * 6
+
+    def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
+        """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""
+        angle = math.radians(number(value_of(node, "rotation", self.time), 0.0))
+        sx, sy = pair(value_of(node, "scale", self.time), (1.0, 1.0))
+        tx, ty = pair(value_of(node, "translation", self.time), (0.0, 0.0))
+        c, s = math.cos(angle), math.sin(angle)
+        return (c * sx, -s * sy, tx, s * sx, c * sy, ty)
+
+
+def _four(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
+    if not hasattr(value, "__len__") or len(value) < 4:
+        return default
+    return tuple(number(value[i], default[i]) for i in range(4))
+
+
+def _compose(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[float, ...]:
+    """The 2 x 3 matrix that applies ``inner`` first."""
+    a, b, c, d, e, f = outer
+    p, q, r, s, t, u = inner
+    return (
+        a * p + b * s, a * q + b * t, a * r + b * u + c,
+        d * p + e * s, d * q + e * t, d * r + e * u + f,
+    )  # fmt: skip

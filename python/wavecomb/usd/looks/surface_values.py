@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a MaterialX material's constants come to, without reading an image: for live edits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
+
+from pxr import Tf, Usd, UsdShade
+
+from wavecomb.usd.looks.material import PREVIEW, surface_source
+from wavecomb.usd.looks.materialx_surface import MaterialXReader
+from wavecomb.usd.looks.surface import DEFAULTS, Surface
+from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.stage.report import LoadReport
+
+
+class _NoTextures:
+    """Stands for the textures of a scene: every file is there, and none is opened."""
+
+    working = "rec709"
+
+    def __init__(self) -> None:
+        self._numbers: dict[Any, int] = {}
+
+    def image(self, path: str, prim: object) -> Any:
+        """One of four channels."""
+        return SimpleNamespace(channels=4)
+
+    def add(self, *key: Any, **more: Any) -> int:
+        """A number for each use that differs."""
+        use = (key[0], *key[2:], *sorted(more.items()))
+        return self._numbers.setdefault(use, len(self._numbers))
+
+    def missing(self) -> int:
+        """The checker."""
+        return -1
+
+
+@dataclass(frozen=True)
+class SurfaceValues:
+    """A material as the core has it.
+
+    Attributes:
+        constants: Keyword arguments of ``Renderer.edit`` for it, but of what textures and graphs
+            give.
+        structure: Of what cannot be edited in a scene that there is: textures and graphs, with the
+            constants that are part of them.
+    """
+
+    constants: Mapping[str, Any]
+    structure: str
+
+
+def surface_values(
+    prim: Usd.Prim, time: Usd.TimeCode, values: Mapping[str, Any] | None = None
+) -> SurfaceValues | None:
+    """What the loader would give the core; None where the material is not of MaterialX.
+
+    Args:
+        prim: A material.
+        time: Of evaluation.
+        values: Constants of the surface shader in place of what the stage says.
+    """
+    material = UsdShade.Material(prim)
+    kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
+    if not kind or kind == PREVIEW:
+        return None
+    textures = cast(TextureTable, _NoTextures())
+    try:
+        reader = MaterialXReader(prim, time, textures, LoadReport(), values)
+        surface = reader.read(shader, kind)
+    except (Tf.ErrorException, RecursionError):  # drawn grey
+        return None
+    return SurfaceValues(_constants(surface), _structure(surface))
+
+
+def _constants(surface: Surface) -> dict[str, Any]:
+    parameters = dict(surface.parameters)
+    layers = parameters.pop("openpbr", {})
+    driven = set(surface.textures)
+    if surface.graph is not None:
+        driven |= {name for name, _ in surface.graph.outputs}
+    if "extinction" in driven or "transmission_tint" in driven:
+        driven |= {"transmission_color", "transmission_depth"}
+    every = {name: value for name, value in DEFAULTS.items() if name != "normal"}
+    every |= parameters | layers
+    return {name: value for name, value in every.items() if name not in driven}
+
+
+def _structure(surface: Surface) -> str:
+    return repr((sorted(surface.textures.items()), surface.uv_names, surface.graph))

@@ -1,0 +1,382 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Image files to texture ids, each once."""
+
+from __future__ import annotations
+
+import filecmp
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdShade
+
+from wavecomb.errors import WavecombError
+from wavecomb.machine import give_back_memory
+from wavecomb.picture.working_space import from_rec709
+from wavecomb.run.isolate import memory
+from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
+from wavecomb.usd.looks.halve import halve
+from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
+from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+_WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black"}
+
+
+UDIM = "<UDIM>"
+CURVE = "sRGB curve"
+"""In place of a space to convert from: only the transfer curve of sRGB is undone, by the core."""
+
+
+def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
+    """The file that an asset value names: resolved where it resolves, else as authored.
+
+    Of a UDIM texture its pattern, with ``<UDIM>`` in it.
+    """
+    if not isinstance(value, Sdf.AssetPath):
+        return str(value or "")
+    path = value.resolvedPath or value.path
+    if UDIM not in path and UDIM not in value.path:
+        return path
+    if UDIM in value.resolvedPath:
+        return value.resolvedPath
+    layers = attribute.GetPropertyStack() if attribute else []
+    layer = layers[0].layer if layers else None
+    return UsdShade.UdimUtils.ResolveUdimPath(value.path, layer) or value.path
+
+
+def tile_files(pattern: str) -> list[tuple[int, str]]:
+    """Tile numbers and files that are there of a UDIM pattern, 1001 to 1100."""
+    found = UsdShade.UdimUtils.ResolveUdimTilePaths(pattern, None)
+    return [(int(number), path) for path, number in found]
+
+
+def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
+    """Files that the shaders in a material name: a guess at what it will ask for."""
+    for prim in Usd.PrimRange(material, Usd.TraverseInstanceProxies()):
+        for attribute in prim.GetAuthoredAttributes():
+            if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
+                value = attribute.Get(time)
+                if value is None:
+                    continue
+                if UDIM in value.path:
+                    yield from (path for _, path in tile_files(asset_file(value, attribute)))
+                elif value.resolvedPath:
+                    yield value.resolvedPath
+
+
+def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
+    """The sRGB transfer curve of IEC 61966-2-1, encoded to linear."""
+    v = np.asarray(values, np.float32)
+    low = v / np.float32(12.92)
+    high = ((np.maximum(v, 0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
+    return np.where(v <= 0.04045, low, high).astype(np.float32)
+
+
+def checker() -> NDArray[np.uint8]:
+    """Magenta and dark squares (16, 16, 3): what a missing texture looks like."""
+    squares = (np.indices((16, 16)) // 2).sum(axis=0) % 2
+    return np.where(squares[..., None] == 0, (255, 0, 255), (40, 0, 40)).astype(np.uint8)
+
+
+Key = tuple[str, str, str, str]
+"""A plain texture: its file, the space that it is converted from, and its wrap modes."""
+
+
+@dataclass(frozen=True)
+class TiledImage:
+    """The images of a UDIM texture; what holds for all is asked of the first.
+
+    Attributes:
+        first: That of the lowest number.
+        tiles: Their files by number.
+    """
+
+    first: Image
+    tiles: tuple[tuple[int, str], ...]
+
+    @property
+    def channels(self) -> int:
+        """Channels of each pixel."""
+        return self.first.channels
+
+    @property
+    def dtype(self) -> Any:
+        """Of the pixels."""
+        return self.first.dtype
+
+    @property
+    def wraps(self) -> tuple[str, str]:
+        """Tiles do not wrap."""
+        return ("clamp", "clamp")
+
+    @property
+    def automatic_srgb(self) -> bool:
+        """As of an ``Image``."""
+        return self.first.automatic_srgb
+
+
+@dataclass(frozen=True)
+class TextureStock:
+    """The textures of a scene, for later ones to share.
+
+    Attributes:
+        scene: That holds them.
+        images: What they were made of, by file; without pixels.
+        ids: Texture ids by file and options.
+        store: What keeps them within a limit.
+    """
+
+    scene: _core.Scene
+    images: dict[str, Image]
+    ids: dict[tuple[Any, ...], int]
+    store: _core.TextureStore | None = None
+
+
+def _converts(space: str) -> bool:
+    """Whether the pixels must be made others."""
+    return space not in (RAW, CURVE)
+
+
+def stored_type(image: Image, space: str) -> Any:
+    """The type of a texture's values: that of its file, but half where 8 bits are converted."""
+    if image.dtype == np.uint8 and _converts(space):
+        return np.dtype(np.float16)
+    return image.dtype
+
+
+class TextureTable:
+    """Adds textures to the scene, equal ones once."""
+
+    def __init__(
+        self,
+        builder: _core.SceneBuilder,
+        report: LoadReport,
+        threads: int = 0,
+        reuse: TextureStock | None = None,
+        working: str = "rec709",
+        store: _core.TextureStore | None = None,
+    ) -> None:
+        """``reuse``: textures to share where their files are what they were.
+
+        ``working``: the space that colours are converted to, of ``WORKING_SPACES``. ``store``: that
+        of the builder. ``drops`` may be set to say how many of its finest levels a texture leaves
+        out.
+        """
+        self.store = store
+        self.working = working
+        self._reuse = reuse
+        self._unchanged: dict[str, Image | None] = {}
+        self._builder = builder
+        self._report = report
+        # What lies ready is memory of textures too.
+        self._ahead = ReadAhead(threads, None if store is None else store.limit_bytes // 4)
+        self._images: dict[str, Image | TextureError] = {}
+        self._ids: dict[tuple[Any, ...], int] = {}
+        self._taken: dict[str, Image] = {}
+        self.drops: dict[Key, int] = {}
+        self._twins: dict[str, str] = {}
+        self._by_size: dict[int, list[str]] = {}
+
+    def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
+        """Starts to read the images of a material that will be used."""
+        files = [self._twin(file) for file in image_files(material, time)]
+        self._ahead.want(file for file in files if self._known(file) is None)
+
+    def _known(self, path: str) -> Image | None:
+        """The image of a file as it was for the scene to share with, unless it changed."""
+        if self._reuse is None:
+            return None
+        if path not in self._unchanged:
+            image = self._reuse.images.get(path)
+            same = image is not None and image.stamp == stamp_of(path)
+            self._unchanged[path] = image if same else None
+        return self._unchanged[path]
+
+    def _twin(self, path: str) -> str:
+        """The first file asked for with the same bytes; mostly the file itself."""
+        found = self._twins.get(path)
+        if found is None:
+            found = path
+            try:
+                if os.path.isfile(path):
+                    others = self._by_size.setdefault(os.path.getsize(path), [])
+                    same = (other for other in others if filecmp.cmp(other, path, shallow=False))
+                    found = next(same, path)
+                    if found is path:
+                        others.append(path)
+            except (OSError, ValueError):
+                pass  # reading it says what is wrong
+            self._twins[path] = found
+        return found
+
+    def image(self, path: str, prim: object) -> Image | TiledImage | None:
+        """The image of a file, read once; None and a warning where that fails.
+
+        Files with the same bytes are read once for all. Of a UDIM pattern all tiles.
+        """
+        if UDIM in path:
+            tiles = tile_files(path)
+            for _, tile in tiles:
+                first = self._image(self._twin(tile), prim)
+                if first is not None:
+                    return TiledImage(first, tuple(tiles))
+            if not tiles:
+                self._report.warn(f"texture {path} cannot be read (no tile is there)", prim)
+            return None
+        return self._image(self._twin(path), prim)
+
+    def _image(self, path: str, prim: object) -> Image | None:
+        found = self._images.get(path)
+        if found is None:
+            try:
+                found = self._known(path) or self._ahead.read(path)
+            except (TextureError, MemoryError, OSError, ValueError) as error:
+                if memory.ran_out(error, int):
+                    raise
+                found = TextureError(str(error) or "out of memory")
+            self._images[path] = found
+        if isinstance(found, TextureError):
+            name = path or "(no file name)"
+            self._report.warn(f"texture {name} cannot be read ({found})", prim)
+            return None
+        return found
+
+    def add(
+        self,
+        path: str,
+        image: Image | TiledImage,
+        colour_space: str,
+        wrap_s: str,
+        wrap_t: str,
+        *,
+        is_colour: bool = False,
+        missing: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0),
+    ) -> int:
+        """Texture id of an image.
+
+        Args:
+            path: Its file, which names it.
+            image: From ``image``.
+            colour_space: auto, or a name that OpenColorIO's built-in config knows.
+            wrap_s: repeat, clamp, mirror or black; anything else is black, as UsdUVTexture says.
+            wrap_t: Likewise.
+            is_colour: Whether what is read is a colour, which is converted to the working space;
+                of anything else only an sRGB curve is undone.
+            missing: Linear colour and alpha of tiles of a UDIM texture that are not there.
+        """
+        if isinstance(image, TiledImage):
+            return self._add_tiles(path, image, colour_space, is_colour, missing)
+        path = self._twin(path)
+        space = self._space(path, image, colour_space, is_colour)
+        wraps = _WRAPS.get(wrap_s, "black"), _WRAPS.get(wrap_t, "black")
+        texture: Key = (path, space, *wraps)
+        key = (*texture, self.drops.get(texture, 0))
+        if key not in self._ids:
+            reuse = self._reuse
+            if reuse is not None and key in reuse.ids and image is self._known(path):
+                self._ids[key] = self._builder.share_texture(reuse.scene, reuse.ids[key])
+            else:
+                self._ids[key] = self._add(path, image, space, *wraps)
+            self._report.tally("textures")
+        return self._ids[key]
+
+    def _add_tiles(
+        self,
+        path: str,
+        image: TiledImage,
+        colour_space: str,
+        is_colour: bool,
+        missing: tuple[float, ...],
+    ) -> int:
+        """One texture of all tiles that can be read. In auto each is as its own file says."""
+        tiles = []
+        for number, file in image.tiles:
+            tile = self._image(self._twin(file), path)
+            if tile is not None:
+                added = self.add(file, tile, colour_space, "clamp", "clamp", is_colour=is_colour)
+                tiles.append((number, added))
+        if is_colour:
+            r, g, b = from_rec709(np.array(missing[:3]), self.working)
+            missing = (float(r), float(g), float(b), missing[3])
+        key = (path, tuple(tiles), missing)
+        if key not in self._ids:
+            self._ids[key] = self._builder.add_tiles(path, tiles, missing)
+        return self._ids[key]
+
+    def _space(self, path: str, image: Image, colour_space: str, is_colour: bool) -> str:
+        """The space to convert from, of OpenColorIO's names, or RAW (none), or CURVE."""
+        if colour_space == "auto":
+            space = SRGB if image.automatic_srgb else LINEAR
+        else:
+            known = canonical(colour_space)
+            if known is None:
+                self._report.missing(f"colour space {colour_space} (read as auto)", path)
+                return self._space(path, image, "auto", is_colour)
+            space = known
+        if space == SRGB and self.working == "rec709":
+            return CURVE
+        if not is_colour or image.channels < 3:
+            return CURVE if space == SRGB else RAW
+        return RAW if space == OCIO_NAMES[self.working] else space
+
+    def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
+        # Gone from memory once it is in the scene; a second use in another way reads it again.
+        pixels = image.take() if image.is_here else read_image(path).take()
+        srgb = space == CURVE
+        dtype = stored_type(image, space)
+        if _converts(space):
+            top = 65504.0 if dtype == np.float16 else 3.4e38
+            linear = np.clip(convert(pixels, space, self.working), -top, top)
+            pixels = np.ascontiguousarray(linear, dtype)
+        elif srgb and pixels.dtype != np.uint8:
+            colours = 3 if image.channels >= 3 else 1
+            linear = to_linear(pixels[..., :colours])
+            linear = np.concatenate([linear, pixels[..., colours:]], axis=2)
+            pixels = np.ascontiguousarray(linear, image.dtype)
+        for _ in range(self.drops.get((path, space, wrap_s, wrap_t), 0)):
+            pixels = halve(pixels, srgb)
+        if self.store is not None:
+            self.store.set_waiting(self._ahead.bytes)
+        try:
+            return self._builder.add_texture(
+                pixels, srgb=srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path
+            )
+        except ValueError as error:  # no room for it
+            raise WavecombError(str(error)) from None
+        finally:
+            if self.store is not None:
+                # Else the allocator keeps what images took.
+                del pixels
+                give_back_memory()
+
+    def missing(self) -> int:
+        """Texture id of the checker that stands for a texture that cannot be read."""
+        key = ("", "checker")
+        if key not in self._ids:
+            self._ids[key] = self._builder.add_texture(
+                checker(), srgb=False, name="missing texture"
+            )
+        return self._ids[key]
+
+    def add_pixels(self, name: str, pixels: NDArray[Any]) -> int:
+        """Texture id of generated pixels, linear Rec.709 where they are colours."""
+        return self._builder.add_texture(
+            pixels, srgb=False, wrap_s="repeat", wrap_t="clamp", name=name
+        )
+
+    def stock(self, scene: _core.Scene) -> TextureStock:
+        """What later scenes can share; scene: that was built of these textures."""
+        return TextureStock(scene, self._taken, self._ids, self.store)
+
+    def release(self) -> None:
+        """Forgets the pixels that were read."""
+        images = {path: image for path, image in self._images.items() if isinstance(image, Image)}
+        self._taken = {path: image for path, image in images.items() if not image.is_here}
+        self._images.clear()
+        self._ahead.close()

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX nodes and node graphs as prims."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pxr import Sdf
+
+from wavecomb.usd.materialx.files import Document
+from wavecomb.usd.materialx.prims import TERMINALS, Prims, child, connect, valid
+
+GRAPHS = Sdf.Path("/MaterialX/NodeGraphs")
+"""Where node graphs are, and nodes of the document that are in no graph."""
+
+
+def definition(node: Any) -> Any:
+    """The definition of a node, None where it has none: the one that fits best."""
+    found = node.getNodeDef()
+    return found if found is not None else node.getNodeDef("", True)
+
+
+def implementation(document: Document, nodedef: Any) -> Any:
+    """The node graph that a definition of the document's own stands for, else None."""
+    import MaterialX as mx
+
+    if nodedef is None or nodedef.getName() not in document.definitions:
+        return None
+    found = nodedef.getImplementation()
+    return found if found is not None and found.isA(mx.NodeGraph) else None
+
+
+def output_name(node: Any, wanted: str) -> str:
+    """The output of a node that a connection means."""
+    nodedef = definition(node)
+    names = [] if nodedef is None else [output.getName() for output in nodedef.getActiveOutputs()]
+    return wanted if wanted and (wanted in names or not names) else next(iter(names), "out")
+
+
+def output_path(graph: Sdf.Path, node: Any, wanted: str) -> Sdf.Path:
+    """The output of a node in a graph that a connection means."""
+    return _port(child(graph, node.getName()), "outputs", output_name(node, wanted))
+
+
+def _port(prim: Sdf.Path, kind: str, name: str) -> Sdf.Path:
+    return prim.AppendProperty(f"{kind}:{valid(name)}")
+
+
+def is_closed(graph: Any) -> bool:
+    """Whether no input of a node graph comes from a node outside."""
+    return not any(item.getNodeName() or item.getNodeGraphString() for item in graph.getInputs())
+
+
+class Graphs:
+    """Writes node graphs, each once."""
+
+    def __init__(self, document: Document, prims: Prims) -> None:
+        self._document = document
+        self._prims = prims
+        self._written: set[Sdf.Path] = set()
+
+    def all(self) -> None:
+        """All node graphs of the document, and the nodes beside them where there are any."""
+        for graph in self._document.graphs:
+            self.graph(graph)
+        if self._loose():
+            self.loose()
+
+    def graph(self, graph: Any) -> Sdf.Path:
+        """The prim of a node graph: named by the definition that it implements, if any."""
+        nodedef = graph.getNodeDef()
+        path = child(GRAPHS, (graph if nodedef is None else nodedef).getName())
+        if path in self._written:
+            return path
+        self._written.add(path)
+        prim = self._prims.define(path, "NodeGraph")
+        for owner in (nodedef, graph):
+            for item in [] if owner is None else owner.getActiveInputs():
+                self._give(self._prims.port(prim, "inputs", item.getName(), item.getType()), item)
+                # What feeds a graph is beside it.
+                self._join(prim, item, GRAPHS, self._document.root)
+        for node in graph.getNodes():
+            self._node(node, path, graph)
+        for output in graph.getOutputs():
+            port = self._prims.port(prim, "outputs", output.getName(), output.getType())
+            self._connect(port, output, path, graph)
+        return path
+
+    def loose(self) -> Sdf.Path:
+        """The prim above all nodes of the document that are in no graph."""
+        if GRAPHS not in self._written:
+            self._written.add(GRAPHS)
+            self._prims.define(GRAPHS)
+            for node in self._loose():
+                self._node(node, GRAPHS, self._document.root)
+        return GRAPHS
+
+    def _loose(self) -> list[Any]:
+        """Nodes of the document but for materials, and for shaders that only these use."""
+        nodes = self._document.root.getNodes()
+        used = {
+            item.getNodeName()
+            for node in nodes
+            if node.getType() != "material"
+            for item in node.getInputs()
+        }
+        return [
+            node
+            for node in nodes
+            if node.getType() != "material"
+            and (node.getType() not in TERMINALS or node.getName() in used)
+        ]
+
+    def _node(self, node: Any, graph: Sdf.Path, container: Any) -> None:
+        prim = self.instance(node, child(graph, node.getName()))
+        for item in node.getInputs():
+            port = self._prims.port(prim, "inputs", item.getName(), item.getType())
+            self._give(port, item)
+            self._join(prim, item, graph, container)
+        nodedef = definition(node)
+        for output in [] if nodedef is None else nodedef.getActiveOutputs():
+            self._prims.port(prim, "outputs", output.getName(), output.getType())
+
+    def instance(self, node: Any, path: Sdf.Path) -> Sdf.PrimSpec:
+        """The prim of a node: a shader, or the node graph that its definition stands for."""
+        nodedef = definition(node)
+        inside = implementation(self._document, nodedef)
+        if inside is not None:
+            spec = self._prims.refer(path, self.graph_of(nodedef, inside))
+            spec.typeName = "NodeGraph"
+            return spec
+        prim = self._prims.define(path, "Shader")
+        if nodedef is None:
+            self._prims.tell(node, f"MaterialX node {node.getCategory()} has no definition")
+        self._prims.identify(prim, node.getCategory() if nodedef is None else nodedef.getName())
+        return prim
+
+    def graph_of(self, nodedef: Any, inside: Any) -> Sdf.Path:
+        """The prim of the node graph that implements a definition."""
+        path = self.graph(inside)
+        prim = self._prims.define(path)
+        for item in nodedef.getActiveInputs():
+            if f"inputs:{valid(item.getName())}" not in prim.attributes:
+                self._give(self._prims.port(prim, "inputs", item.getName(), item.getType()), item)
+        return path
+
+    def _give(self, port: Sdf.AttributeSpec, item: Any) -> None:
+        makes_colour = True
+        if item.getType() == "filename":
+            owner = item.getParent()
+            makes_colour = any(
+                output.getType() in ("color3", "color4") for output in _outputs_of(owner)
+            )
+        self._prims.give(port, item, makes_colour=makes_colour)
+
+    def _join(self, prim: Sdf.PrimSpec, item: Any, graph: Sdf.Path, container: Any) -> None:
+        port = prim.attributes[f"inputs:{valid(item.getName())}"]
+        if item.getInterfaceName():
+            connect(port, _port(graph, "inputs", item.getInterfaceName()))
+        else:
+            self._connect(port, item, graph, container)
+
+    def _connect(self, port: Sdf.AttributeSpec, item: Any, graph: Sdf.Path, container: Any) -> None:
+        """Connects an input or output to what its element names in a container."""
+        source = self.source(item, graph, container)
+        if source is not None:
+            connect(port, source)
+
+    def source(self, item: Any, graph: Sdf.Path, container: Any) -> Sdf.Path | None:
+        """The output that an element of a container is fed by; ``graph``: the container's prim."""
+        wanted = item.getOutputString()
+        if item.getNodeName():
+            node = container.getNode(item.getNodeName())
+            if node is not None:
+                return output_path(graph, node, wanted)
+        elif item.getNodeGraphString():
+            other = self._document.root.getNodeGraph(item.getNodeGraphString())
+            if other is not None:
+                path = self.graph(other)
+                outputs = [output.getName() for output in other.getOutputs()]
+                return _port(path, "outputs", wanted or next(iter(outputs), "out"))
+        elif wanted:
+            output = container.getOutput(wanted)
+            if output is not None and output.getNodeName() and output is not item:
+                return self.source(output, graph, container)
+        else:
+            return None
+        self._prims.tell(item, "MaterialX connection leads nowhere (left out)")
+        return None
+
+
+def _outputs_of(element: Any) -> list[Any]:
+    """The outputs of a node, a definition or a graph."""
+    import MaterialX as mx
+
+    if element.isA(mx.Node):
+        nodedef = definition(element)
+        return [] if nodedef is None else list(nodedef.getActiveOutputs())
+    return list(element.getOutputs()) if element.isA(mx.InterfaceElement) else []

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX looks as prims: collections, materials assigned to them, variants of materials.
+
+Geometry is named below ``/MaterialX/Collections``: who references the look root in place of a model
+has these paths below that model's. Each look is a variant ``LookVariant`` of ``/ModelRoot``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pxr import Sdf, Usd, UsdShade
+
+from wavecomb.usd.materialx.files import Document
+from wavecomb.usd.materialx.materials import MATERIALS
+from wavecomb.usd.materialx.prims import Tell, child, valid
+from wavecomb.usd.materialx.values import usd_type, usd_value
+
+COLLECTIONS = Sdf.Path("/MaterialX/Collections")
+LOOKS = Sdf.Path("/MaterialX/Looks")
+MODEL = Sdf.Path("/ModelRoot")
+
+
+def write_looks(document: Document, layer: Sdf.Layer, tell: Tell) -> None:
+    """Adds the looks of a document to the layer that has its materials."""
+    looks = document.root.getLooks()
+    if not looks:
+        return
+    writer = _Looks(document.root, Usd.Stage.Open(layer), tell)
+    for collection in document.root.getCollections():
+        writer.collection(collection, ())
+    for look in looks:
+        writer.look(look, ())
+
+
+class _Looks:
+    """Writes collections and looks, each once."""
+
+    def __init__(self, root: Any, stage: Usd.Stage, tell: Tell) -> None:
+        self._root = root
+        self._stage = stage
+        self._tell = tell
+        self._collections: dict[str, str] = {}
+        self._looks: set[str] = set()
+        variants = stage.DefinePrim(MODEL).GetVariantSets().AddVariantSet("LookVariant")
+        self._variants = variants
+
+    def collection(self, element: Any, above: tuple[str, ...]) -> str:
+        """The name of a collection's instance; ``above``: those that include it."""
+        name = element.getName()
+        if name in self._collections:
+            return self._collections[name]
+        api = self._new(valid(name))
+        self._collections[name] = valid(name)
+        for other in element.getIncludeCollections():
+            if other.getName() in (*above, name):
+                self._tell(element, "MaterialX collection includes itself (left out)")
+                continue
+            inside = self.collection(other, (*above, name))
+            api.IncludePath(COLLECTIONS.AppendProperty(f"collection:{inside}"))
+        prefix = element.getActiveGeomPrefix()
+        for include, text in ((True, element.getIncludeGeom()), (False, element.getExcludeGeom())):
+            for path in self._geometry(element, prefix, text):
+                relation = api.CreateIncludesRel() if include else api.CreateExcludesRel()
+                relation.AddTarget(path)
+        return self._collections[name]
+
+    def _new(self, name: str) -> Usd.CollectionAPI:
+        return Usd.CollectionAPI.Apply(self._stage.DefinePrim(COLLECTIONS), name)
+
+    def _geometry(self, element: Any, prefix: str, text: str) -> list[Sdf.Path]:
+        """The prims that a list of geometry names, without those that are patterns."""
+        found = []
+        for word in (part.strip() for part in text.split(",")):
+            name = prefix + word
+            if not word:
+                continue
+            if Sdf.Path.IsValidPathString(name) and Sdf.Path(name).IsAbsoluteRootOrPrimPath():
+                found.append(Sdf.Path(name).ReplacePrefix(Sdf.Path.absoluteRootPath, COLLECTIONS))
+            else:
+                self._tell(element, f"MaterialX geometry {name} is no path of a prim (left out)")
+        return found
+
+    def _assigned(self, assign: Any) -> str | None:
+        """The name of the collection that a material is assigned to; None: to all of the model."""
+        if assign.getCollectionString():
+            collection = self._root.getCollection(assign.getCollectionString())
+            if collection is not None:
+                return self.collection(collection, ())
+            self._tell(assign, "MaterialX collection is not there (material not assigned)")
+            return ""
+        if not assign.getGeom():
+            return None
+        prefix = assign.getActiveGeomPrefix()
+        paths = sorted(set(self._geometry(assign, prefix, assign.getGeom())))
+        key = f"geom {','.join(map(str, paths))}"
+        if key not in self._collections:
+            count = sum(name.startswith("geom ") for name in self._collections)
+            api = self._new(f"geom_{count + 1}")
+            for path in paths:
+                api.CreateIncludesRel().AddTarget(path)
+            self._collections[key] = f"geom_{count + 1}"
+        return self._collections[key]
+
+    def look(self, look: Any, above: tuple[str, ...]) -> Sdf.Path:
+        """The prim of a look; ``above``: those that inherit it."""
+        import MaterialX as mx
+
+        name = look.getName()
+        path = child(LOOKS, name)
+        if name in self._looks:
+            return path
+        self._looks.add(name)
+        prim = self._stage.DefinePrim(path)
+        base = look.getInheritsFrom()
+        if base is not None and base.isA(mx.Look) and base.getName() not in (*above, name):
+            prim.GetReferences().AddInternalReference(self.look(base, (*above, name)))
+        assigned = [(item, self._assigned(item)) for item in look.getMaterialAssigns()]
+        if self._stage.GetPrimAtPath(COLLECTIONS):
+            prim.GetReferences().AddInternalReference(COLLECTIONS)
+        binding = UsdShade.MaterialBindingAPI.Apply(prim)
+        order = []
+        for item, collection in assigned:
+            relation = None if collection == "" else self._bind(look, item, binding, collection)
+            if relation:
+                order.append(relation.GetName())
+        if order:
+            prim.SetPropertyOrder([*order, *prim.GetPropertyOrder()])
+        self._variants.AddVariant(valid(name))
+        self._variants.SetVariantSelection(valid(name))
+        with self._variants.GetVariantEditContext():
+            self._stage.GetPrimAtPath(MODEL).GetReferences().AddInternalReference(path)
+        self._variants.ClearVariantSelection()
+        return path
+
+    def _bind(
+        self, look: Any, item: Any, binding: UsdShade.MaterialBindingAPI, collection: str | None
+    ) -> Usd.Relationship | None:
+        """Assigns a material to a collection of a look, or to all of it."""
+        material = child(MATERIALS, item.getMaterial())
+        if not self._stage.GetPrimAtPath(material):
+            self._tell(item, f"MaterialX material {item.getMaterial()} is not there (not assigned)")
+            return None
+        scope = binding.GetPath().AppendChild("Materials")
+        name = valid(item.getName())
+        while self._stage.GetPrimAtPath(scope.AppendChild(name)):
+            name += "_1"
+        prim = self._stage.DefinePrim(scope.AppendChild(name))
+        prim.GetReferences().AddInternalReference(material)
+        chosen = {v.getVariantSetString(): v.getVariantString() for v in look.getVariantAssigns()}
+        for element in item.getChildren():
+            if element.getCategory() == "variantassign":
+                chosen[element.getAttribute("variantset")] = element.getAttribute("variant")
+        for variant_set, variant in chosen.items():
+            if self._variant(material, variant_set, variant):
+                prim.GetVariantSet(valid(variant_set)).SetVariantSelection(valid(variant))
+        bound = UsdShade.Material(self._stage.GetPrimAtPath(prim.GetPath()))
+        if collection is None:
+            binding.Bind(bound)
+            return binding.GetDirectBindingRel()
+        api = Usd.CollectionAPI(binding.GetPrim(), collection)
+        binding.Bind(api, bound, name)
+        return binding.GetCollectionBindingRel(name)
+
+    def _variant(self, material: Sdf.Path, variant_set: str, variant: str) -> bool:
+        """Makes a variant of a material: other values of its inputs."""
+        found = self._root.getVariantSet(variant_set)
+        element = None if found is None else found.getVariant(variant)
+        if element is None:
+            return False
+        prim = self._stage.GetPrimAtPath(material)
+        choices = prim.GetVariantSets().AddVariantSet(valid(variant_set))
+        choices.AddVariant(valid(variant))
+        choices.SetVariantSelection(valid(variant))
+        with choices.GetVariantEditContext():
+            for item in element.getChildren():
+                kind = item.getAttribute("type")
+                usd = usd_type(kind)
+                if item.getCategory() != "input" or usd is None:
+                    continue
+                try:
+                    value = usd_value(item.getAttribute("value"), kind)
+                except ValueError as error:
+                    self._tell(item, f"MaterialX value {error} (left out)")
+                    continue
+                UsdShade.Material(prim).CreateInput(valid(item.getName()), usd).Set(value)
+        choices.ClearVariantSelection()
+        return True

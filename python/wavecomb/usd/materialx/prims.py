@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Specs of prims, inputs and outputs in a layer that stands for a MaterialX document."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pxr import Sdf, Tf
+
+from wavecomb.usd.materialx.files import image_file
+from wavecomb.usd.materialx.values import usd_type, usd_value
+from wavecomb.usd.stage.report import LoadReport
+
+Tell = Callable[[Any, str], None]
+"""Takes an element of the document and what there is to say of it."""
+
+TERMINALS = {
+    "surfaceshader": "surface",
+    "displacementshader": "displacement",
+    "volumeshader": "volume",
+    "lightshader": "light",
+}
+"""Outputs of materials by the type of shader that they are for."""
+
+_PLAIN_SPACES = ("", "none", "lin_rec709", "lin_rec709_scene")
+"""Colour spaces of values that need not be said."""
+
+
+def valid(name: str) -> str:
+    """A MaterialX name as USD can have it; namespaces are set off by two underscores."""
+    return str(Tf.MakeValidIdentifier(name.replace(":", "__")))
+
+
+def child(path: Sdf.Path, name: str) -> Sdf.Path:
+    """The path of a prim below another, by its MaterialX name."""
+    return path.AppendChild(valid(name))
+
+
+class Prims:
+    """Writes into a layer.
+
+    Attributes:
+        layer: That is written.
+        file: The document's; names of images count from it.
+        tell: Is told what cannot be translated.
+        report: Is told what was chosen.
+    """
+
+    def __init__(self, layer: Sdf.Layer, file: str, tell: Tell, report: LoadReport) -> None:
+        self.report = report
+        self.layer = layer
+        self.file = file
+        self.tell = tell
+
+    def define(self, path: Sdf.Path, kind: str = "") -> Sdf.PrimSpec:
+        """A prim of that type, there or new, and all above it."""
+        spec = Sdf.CreatePrimInLayer(self.layer, path)
+        for prefix in path.GetPrefixes():
+            self.layer.GetPrimAtPath(prefix).specifier = Sdf.SpecifierDef
+        if kind:
+            spec.typeName = kind
+        return spec
+
+    def refer(self, path: Sdf.Path, target: Sdf.Path) -> Sdf.PrimSpec:
+        """A prim that is another one of this layer; once, however often asked."""
+        spec = self.define(path)
+        reference = Sdf.Reference("", target)
+        if reference not in list(spec.referenceList.prependedItems):
+            spec.referenceList.Prepend(reference)
+        return spec
+
+    def port(self, prim: Sdf.PrimSpec, kind: str, name: str, type_name: str) -> Sdf.AttributeSpec:
+        """An input or output.
+
+        Args:
+            prim: Which gets it, unless it has it.
+            kind: "inputs" or "outputs".
+            name: Its MaterialX name.
+            type_name: Its MaterialX type.
+        """
+        full = f"{kind}:{valid(name)}"
+        known = prim.attributes.get(full)
+        if known is not None:
+            return known
+        usd = usd_type(type_name)
+        spec = Sdf.AttributeSpec(prim, full, usd or Sdf.ValueTypeNames.Token)
+        if usd is None and type_name not in TERMINALS:
+            spec.SetInfo("renderType", type_name)
+        return spec
+
+    def identify(self, prim: Sdf.PrimSpec, identifier: str) -> None:
+        """Writes ``info:id``."""
+        if "info:id" not in prim.attributes:
+            Sdf.AttributeSpec(
+                prim, "info:id", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform
+            ).default = identifier
+
+    def give(self, port: Sdf.AttributeSpec, element: Any, *, makes_colour: bool = True) -> None:
+        """Copies the value of an element to an input, with its colour space.
+
+        Args:
+            port: The input.
+            element: The MaterialX input.
+            makes_colour: Of filenames: whether colours are read from the file.
+        """
+        kind, text = element.getType(), element.getValueString()
+        if not text:
+            return
+        if port.typeName != (usd_type(kind) or Sdf.ValueTypeNames.Token):
+            self.tell(element, f"MaterialX value of type {kind} for {port.typeName} (left out)")
+            return
+        space = element.getActiveColorSpace()
+        if kind == "filename":
+            text, is_bare = image_file(element, self.file)
+            if is_bare:
+                self.report.note("MaterialX fileprefix leads nowhere (left out)", self.file)
+            # Linear Rec. 709 of a whole document says nothing of its images, to OpenUSD either.
+            is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
+            if makes_colour and is_said:
+                port.SetInfo("colorSpace", "raw" if space == "none" else space)
+        elif kind in ("color3", "color4") and space not in _PLAIN_SPACES:
+            port.SetInfo("colorSpace", space)
+        try:
+            port.default = usd_value(text, kind)
+        except ValueError as error:
+            self.tell(element, f"MaterialX value {error} (left out)")
+
+
+def connect(port: Sdf.AttributeSpec, source: Sdf.Path) -> None:
+    """Connects an input or output to another one."""
+    port.connectionPathList.explicitItems = [source]

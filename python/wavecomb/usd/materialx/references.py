@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""References, payloads and sublayers to MaterialX files, which usd-core has no reader for.
+
+USD opens no layer that is none of its own formats. So the layers that name a .mtlx file get another
+name for it, in memory only: that of a layer it was translated to. Why so is told in
+docs/decisions/materialx-layers.md.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pxr import Ar, Sdf, Tf, Usd
+
+from wavecomb.run.isolate import trail
+from wavecomb.usd.materialx.files import MtlxError
+from wavecomb.usd.materialx.layer import translate
+from wavecomb.usd.stage.report import LoadReport
+
+MAX_ROUNDS = 16
+"""Times that a stage is looked through: what one file brings may ask for others."""
+
+NAMED = re.compile(r"@([^@]*\.mtlx\]*)@", re.IGNORECASE)
+"""A MaterialX file in what USD says of a layer that it cannot open."""
+
+
+@dataclass
+class _Translation:
+    """What a file was translated to.
+
+    Attributes:
+        stamp: Of the file as it was.
+        layer: None where it cannot be read.
+        error: Why not.
+        report: What was left out or chosen.
+    """
+
+    stamp: object
+    layer: Sdf.Layer | None
+    error: str
+    report: LoadReport
+
+
+_translations: dict[str, _Translation] = {}
+"""By file. Held as long as the process: layers of open stages name what is in it."""
+
+_lock = threading.Lock()
+
+
+def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
+    """Makes a stage see the MaterialX files that its layers name.
+
+    Those layers are changed in memory, and cannot be saved from then on. What cannot be read stays
+    missing; ``tell`` says so. Costs next to nothing where no such file is missing.
+
+    Args:
+        stage: The stage.
+        everywhere: Also where variants are not selected, so that selecting them later, on whatever
+            thread, changes no layer. Looks through all layers.
+    """
+    tried: set[tuple[str, str]] = set()
+    for turn in range(MAX_ROUNDS):
+        if not (everywhere and turn == 0) and not any(True for _ in _missing(stage)):
+            return
+        with _lock, Ar.ResolverContextBinder(stage.GetPathResolverContext()):
+            changes = _changes(stage, tried)
+            if not changes:
+                return
+            with Sdf.ChangeBlock():
+                for layer, name, target in changes:
+                    layer.UpdateCompositionAssetDependency(name, target)
+                    layer.SetPermissionToSave(False)
+
+
+def reload(stage: Usd.Stage) -> None:
+    """Reads the files of a stage again that changed, MaterialX files among them."""
+    with _lock:
+        kept = [t.layer for t in _translations.values() if t.layer is not None]
+    # USD takes what has no file for empty.
+    copies = [(layer, Sdf.Layer.CreateAnonymous("kept.usda")) for layer in kept]
+    for layer, copy in copies:
+        copy.TransferContent(layer)
+    stage.Reload()
+    for layer, copy in copies:
+        if layer.empty:
+            layer.TransferContent(copy)
+    resolve(stage, everywhere=True)
+
+
+def tell(stage: Usd.Stage, report: LoadReport) -> None:
+    """Says which MaterialX files are missing from a stage, and what of others was left out."""
+    for error, named in _missing(stage):
+        known = next((t for file, t in _translations.items() if _same(file, named)), None)
+        why = known.error if known is not None and known.error else _why(named)
+        place = str(error.rootSite.path)
+        report.warn(f"MaterialX file {named} cannot be read ({why})", place)
+    if not _translations:
+        return
+    used = {layer.identifier for layer in stage.GetUsedLayers()}
+    for translation in _translations.values():
+        if translation.layer is not None and translation.layer.identifier in used:
+            report.absorb(translation.report)
+
+
+def _missing(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
+    """Errors of composition that are about MaterialX files, and these."""
+    for error in stage.GetCompositionErrors():
+        found = NAMED.search(str(error))
+        if found is not None:
+            yield error, found[1]
+
+
+def _same(file: str, named: str) -> bool:
+    return file == named or Path(file) == Path(os.path.abspath(named))
+
+
+def _why(named: str) -> str:
+    if not Ar.GetResolver().Resolve(named):
+        return "there is no such file"
+    return "the stage was opened elsewhere; give Wavecomb its file instead"
+
+
+def _changes(stage: Usd.Stage, tried: set[tuple[str, str]]) -> list[tuple[Sdf.Layer, str, str]]:
+    """What layers have to name in place of MaterialX files: (layer, name, other name)."""
+    changes = []
+    for layer in stage.GetUsedLayers(False):
+        for name in layer.GetCompositionAssetDependencies():
+            key = (layer.identifier, name)
+            if not name.lower().endswith(".mtlx") or key in tried:
+                continue
+            tried.add(key)
+            identifier = Sdf.ComputeAssetPathRelativeToLayer(layer, name)
+            file = str(Ar.GetResolver().Resolve(identifier))
+            if not file:
+                continue
+            found = _translated(file)
+            if found.layer is not None and layer.permissionToEdit:
+                changes.append((layer, name, found.layer.identifier))
+    return changes
+
+
+def _translated(file: str) -> _Translation:
+    """The layer of a file; the one there is, with new content where the file changed."""
+    stamp = _stamp(file)
+    known = _translations.get(file)
+    if known is not None and known.stamp == stamp:
+        return known
+    trail.note("translating", file)
+    try:
+        layer, report = translate(file)
+        error = ""
+    except (MtlxError, Tf.ErrorException) as reason:
+        layer, report, error = None, LoadReport(), str(reason)
+    if layer is not None and known is not None and known.layer is not None:
+        known.layer.TransferContent(layer)
+        layer = known.layer
+    _translations[file] = _Translation(stamp, layer, error, report)
+    return _translations[file]
+
+
+def _stamp(file: str) -> object:
+    """What changes with a file; of one that includes others, or is in a package, the time."""
+    outer = Ar.SplitPackageRelativePathOuter(file)[0] or file
+    try:
+        status = os.stat(outer)
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Groups of the scene while they are filled, and what acts on them from outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf
+
+from wavecomb.usd.cameras import framing
+from wavecomb.usd.lights.light import Light
+
+Matrices = NDArray[np.float64]
+
+
+@dataclass
+class Group:
+    """Meshes, lights and instances that are placed together.
+
+    Attributes:
+        number: In the scene, once something is in it.
+        bounds: (2, 3) in its own space.
+        outlines: Where what is in it reaches farthest, in its own space; see ``framing``.
+        root: Prim path that the names of what is in it begin with.
+        lights: With their transforms (4, 4) in the group.
+        children: Groups that hold lights placed in it, transforms (k, 4, 4).
+        surfaced: The same of groups that hold surfaces to be refined.
+        sampled_lamp: A mesh light in it that cannot move.
+    """
+
+    name: str
+    root: str = ""
+    number: int | None = None
+    bounds: NDArray[Any] | None = None
+    lights: list[tuple[Light, Matrices]] = field(default_factory=list)
+    children: list[tuple[Group, Matrices]] = field(default_factory=list)
+    surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
+    lit: bool = False
+    has_surfaces: bool = False
+    sampled_lamp: Sdf.Path | None = None
+    outlines: list[NDArray[np.float64]] = field(default_factory=list)
+    outlined: int = 0
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is in it that is drawn."""
+        return self.number is None
+
+    def grow(self, bounds: NDArray[Any]) -> None:
+        """Makes the bounds hold others (2, 3) too."""
+        if self.bounds is None:
+            self.bounds = np.array(bounds, np.float64)
+        else:
+            np.minimum(self.bounds[0], bounds[0], out=self.bounds[0])
+            np.maximum(self.bounds[1], bounds[1], out=self.bounds[1])
+
+    def reach(self, points: NDArray[np.float64], more: NDArray[np.float64] | None) -> None:
+        """Adds points to the outlines; ``more``: directions in which these are exact."""
+        self.outlines.append(points)
+        self.outlined += len(points)
+        if self.outlined > framing.MANY_POINTS:
+            self.outlines = [framing.outline(np.concatenate(self.outlines), more)]
+            self.outlined = len(self.outlines[0])
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What acts on a group from outside.
+
+    Attributes:
+        inside: It is placed by instances, so a mesh may leave its material to them.
+        bound: The instance brings a bound material, which goes before display colours.
+        override: A binding above is stronger than all in the group.
+        alias: (prototype, instance): bindings are looked up on the instance's proxies.
+        root: Path of the native prototype that the group comes from.
+    """
+
+    inside: bool = False
+    bound: bool = False
+    override: bool = False
+    alias: tuple[Sdf.Path, Sdf.Path] | None = None
+    root: Sdf.Path = Sdf.Path.absoluteRootPath
+
+
+def middle_of(motion: Matrices) -> Matrices:
+    """(k, 4, 4) in the middle of steps (k, s, 4, 4)."""
+    last = motion.shape[1] - 1
+    middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
+    return middle
+
+
+def placed_lights(group: Group, limit: int) -> list[tuple[Light, Matrices]]:
+    """All lights of a group and of what is placed in it, at most ``limit``."""
+    out = list(group.lights[:limit])
+    for child, transforms in group.children:
+        inner = placed_lights(child, limit)
+        for transform in transforms:
+            if len(out) >= limit:
+                return out
+            out += [(light, local @ transform) for light, local in inner]
+    return out[:limit]

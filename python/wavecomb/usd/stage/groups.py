@@ -1,0 +1,535 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts what a traversal finds into groups of the scene, and groups into groups."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
+
+from wavecomb.run.isolate import memory, patience, trail
+from wavecomb.usd.cameras import framing
+from wavecomb.usd.geometry.attributes import on_shape
+from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
+from wavecomb.usd.geometry.gprims import GprimReader, add_shape
+from wavecomb.usd.geometry.mesh import IDENTITY, UV_NAMES, MeshArrays
+from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute
+from wavecomb.usd.geometry.surfaces import Surfaces
+from wavecomb.usd.geometry.triangulate import MeshError
+from wavecomb.usd.lights.mesh_light import MeshLights
+from wavecomb.usd.looks.assign import Assigner, Draw, Worn
+from wavecomb.usd.looks.colour import quantise
+from wavecomb.usd.looks.material import (
+    DEFAULT_COLOUR,
+    INHERIT_MATERIAL,
+    BindingScan,
+    MaterialTable,
+    bound_materials,
+)
+from wavecomb.usd.looks.network import colour
+from wavecomb.usd.stage.group import Group, Matrices, Scope, middle_of
+from wavecomb.usd.stage.identity import Assets, LightGroups
+from wavecomb.usd.stage.instancing import moved_instances, read_instances, sound
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.shared import MeshStock
+from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+LoadProgress = Callable[[int, int], None]
+"""Called as progress(prims drawn, prims found so far), now and then."""
+STEP = 512
+"""Prims between calls."""
+
+_ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
+"""Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
+
+
+_WORDS = {"mesh": "mesh", "shape": "mesh", "curves": "curves", "points": "points"}
+_COUNTS = {"mesh": "meshes", "shape": "shapes", "curves": "curves", "points": "points"}
+DRAWN_COUNTS = tuple(_COUNTS.values())
+"""Counts of ``LoadReport`` for what is drawn."""
+
+
+MAX_NESTING = 100
+"""Instances in instances, each a call of ``GroupBuilder`` within another."""
+
+
+class GroupBuilder:
+    """Turns prims into groups of the scene."""
+
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        traversal: Traversal,
+        builder: _core.SceneBuilder,
+        materials: MaterialTable,
+        light_groups: LightGroups,
+        report: LoadReport,
+        surfaces: Surfaces,
+        stock: MeshStock | None = None,
+        progress: LoadProgress | None = None,
+        framed: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Makes one for a stage.
+
+        ``stock``: arrays of meshes to take from and leave there; ``progress``: is told;
+        ``framed``: directions (k, 3) in which a view asks how far the world reaches; groups keep
+        outlines for it.
+        """
+        self.stage = stage
+        self.traversal = traversal
+        self.time = traversal.time
+        self.builder = builder
+        self.materials = materials
+        self.light_groups = light_groups
+        self.report = report
+        self.surfaces = surfaces
+        self.motion = traversal.motion
+        self.gprims = GprimReader(
+            self.time, report, surfaces, traversal.skeletons, self.motion, stock
+        )
+        self.progress = progress
+        self.framed = framed
+        self.found, self.drawn = 0, 0
+        self.assigner = Assigner(materials, self.time, report)
+        self.mesh_lights = MeshLights(builder, traversal.lights, materials, report)
+        self.bindings = BindingScan()
+        self.assets = Assets()
+        self._groups: dict[Hashable, Group] = {}
+        self._building: set[Hashable] = set()
+
+    def world(self) -> Group:
+        """Reads the whole stage into group 0."""
+        group = Group("world", number=0)
+        self._fill(group, list(self.stage.GetPseudoRoot().GetChildren()), Scope(), "default")
+        return group
+
+    def _fill(
+        self,
+        group: Group,
+        roots: Sequence[Usd.Prim],
+        scope: Scope,
+        purpose: str,
+        predicate: Any = None,
+    ) -> None:
+        """Reads prims and all below them into a group."""
+        found = self.traversal.walk(roots, purpose, predicate)
+        group.lights += found.lights
+        group.lit = group.lit or bool(found.lights)
+        self._bind(found, scope)
+        self.found += len(found.draws)
+        for draw in found.draws:
+            self._draw(group, draw, scope)
+            self.drawn += 1
+            if self.progress is not None and self.drawn % STEP == 0:
+                self.progress(self.drawn, self.found)
+        self._place_instances(group, found.instances, scope)
+        for placed in found.instancers:
+            self._place_instancer(group, placed, scope)
+
+    def _bind(self, found: Gathered, scope: Scope) -> None:
+        """Looks all bindings of a group up at once."""
+        if scope.override:
+            return
+        prims = [draw.prim for draw in found.draws]
+        prims += [placed.prim for placed in found.instances]
+        prims += [subset for draw in found.draws for subset in draw.subsets]
+        if scope.alias is not None:
+            prims = [self._proxy(prim, scope.alias) for prim in prims]
+        materials = iter(bound_materials(prims, self.traversal.binding_purposes))
+        for draw in found.draws:
+            draw.material = next(materials)
+        for placed in found.instances:
+            placed.material = next(materials)
+        for draw in found.draws:
+            draw.subset_materials = [next(materials) for _ in draw.subsets]
+            # A subset without a binding of its own computes the mesh's.
+        bound = [m for draw in found.draws for m in (draw.material, *draw.subset_materials)]
+        bound += [placed.material for placed in found.instances]
+        used = {material.GetPath(): material for material in bound if material is not None}
+        for material in used.values():
+            self.materials.expect(material)
+
+    def _proxy(self, prim: Usd.Prim, alias: tuple[Sdf.Path, Sdf.Path]) -> Usd.Prim:
+        path = prim.GetPath().ReplacePrefix(*alias)
+        return self.stage.GetPrimAtPath(path) or prim
+
+    def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
+        """Adds one gprim to a group."""
+        kind = self.traversal.kind(draw.prim)
+        baked = kind == "mesh" and self.gprims.deforms(kind, draw.prim)
+        if draw.track is not None and not baked:
+            steps = draw.track.steps()
+            still = replace(draw, matrix=draw.matrix if steps is None else IDENTITY, track=None)
+            if steps is None:
+                return self._draw(group, still, scope)
+            return self._draw_alone(group, still, draw.matrix, scope, steps)
+        if kind in STRANDS.values() and uniform_scale(draw.matrix) is None:
+            own = replace(draw, matrix=IDENTITY)
+            return self._draw_alone(group, own, draw.matrix, scope)
+        if scope.override:
+            draw.subsets = ()
+        lamp = self.mesh_lights.of(draw, kind)
+        if lamp is not None and lamp.material is not None:
+            draw = replace(draw, material=None, subsets=(), subset_materials=[])
+        names = self.assigner.uv_names(draw)
+        if scope.inside and draw.material is None and not names:
+            names = UV_NAMES
+        if trail.is_expendable():
+            trail.note("reading", draw.prim.GetPath())
+        try:
+            shape = self.gprims.read(kind, draw, names)
+        except MeshError as error:
+            self.report.warn(f"{_WORDS[kind]} left out: {error}", draw.prim.GetPath())
+            return
+        except (Tf.ErrorException, MemoryError) as error:
+            if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
+                raise MemoryError from error
+            what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
+            self.report.warn(f"{_WORDS[kind]} left out: {what}", draw.prim.GetPath())
+            return
+        if shape is None:
+            what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
+            self.report.note(what, draw.prim.GetPath())
+            return
+        if lamp is not None and lamp.material is not None:
+            worn = Worn(lamp.material)
+        else:
+            worn = self._materials(draw, shape, scope)
+        material, faces = worn.material, None
+        if worn.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
+            faces = worn.by_face[shape.topology.face_ids()]
+        name = self.report.place(draw.prim.GetPath())
+        may_shine = (
+            lamp is not None
+            or material == INHERIT_MATERIAL
+            or self.materials.any_emits(material, faces)
+        )
+        options: dict[str, Any] = {
+            "face_materials": faces,
+            "material": material,
+            "attributes": on_shape(worn.reads, shape, draw.matrix.GetDeterminant3() < 0),
+            "name": name,
+            "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
+            "asset_length": self._asset_length(draw.prim, name),
+        }
+        if lamp is not None:
+            options["mesh_light"] = lamp.number
+            if lamp.is_sampled_only:
+                group.sampled_lamp = draw.prim.GetPath()
+                if kind == "mesh" and self.gprims.deforms(kind, draw.prim):
+                    self.mesh_lights.say_moving(group.sampled_lamp)
+        try:
+            number = add_shape(self.builder, shape, options)
+        except ValueError as error:
+            self.report.warn(f"{_WORDS[kind]} left out: {error}")
+            return
+        self.builder.add_to_group(self._number(group), number)
+        group.grow(shape.bounds)
+        if self.framed is not None:
+            more = self.framed if group.number == 0 else None
+            group.reach(self._outline(shape, more), more)
+        if isinstance(shape, MeshArrays) and shape.cage is not None:
+            self.surfaces.add(group, number, draw, shape, worn)
+        self.report.tally(_COUNTS[kind])
+
+    def _outline(
+        self, shape: MeshArrays | CurveArrays, more: NDArray[np.float64] | None
+    ) -> NDArray[np.float64]:
+        """Where a shape reaches farthest, in its group."""
+        points = shape.positions.reshape(-1, 3)
+        if isinstance(shape, CurveArrays):
+            radii = np.tile(shape.radii, len(points) // len(shape.radii))
+            return framing.outline_of_balls(points, radii, more)
+        smooth = None if shape.cage is None else self.surfaces.limit_points(shape.cage)
+        if smooth is not None:
+            return framing.outline(smooth, more)
+        used = np.zeros(shape.positions.shape[-2], bool)
+        used[shape.triangles] = True
+        return framing.outline(shape.positions[..., used, :].reshape(-1, 3), more)
+
+    def _draw_alone(
+        self,
+        group: Group,
+        draw: Draw,
+        matrix: Gf.Matrix4d,
+        scope: Scope,
+        steps: Matrices | None = None,
+    ) -> None:
+        """Adds a gprim as an instance of its own, placed by ``matrix``.
+
+        For what moves as a whole, by ``steps`` (s, 4, 4), and for curves or points that a transform
+        makes oval.
+        """
+        path = draw.prim.GetPath()
+        child = Group(str(path), self.report.place(path))
+        self._draw(child, draw, scope)
+        if child.empty:
+            return
+        inherit = np.array([INHERIT_MATERIAL], np.uint32)
+        motion = None if steps is None else steps[None]
+        self._add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
+
+    def _materials(self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope) -> Worn:
+        inherits = draw.material is None and scope.bound and not any(draw.subset_materials)
+        if scope.override or inherits:
+            return Worn(INHERIT_MATERIAL)
+        return self.assigner.assign(draw, mesh, INHERIT_MATERIAL if scope.inside else None)
+
+    def _asset_length(self, prim: Usd.Prim, name: str) -> int:
+        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
+        length = self.assets.length(prim)
+        return length and length + len(name) - len(str(prim.GetPath()))
+
+    def _number(self, group: Group) -> int:
+        """A group's number in the scene; made when something comes into it."""
+        if group.number is None:
+            group.number = self.builder.add_group(group.name, root=group.root)
+            self.report.tally("groups")
+        return group.number
+
+    def _group(
+        self,
+        key: Hashable,
+        name: str,
+        root: Sdf.Path,
+        roots: Sequence[Usd.Prim],
+        scope: Scope,
+        purpose: str,
+        predicate: Any = None,
+    ) -> Group | None:
+        """The group of some prims, made once; None, and a warning, where it contains itself."""
+        known = self._groups.get(key)
+        if known is not None:
+            return known
+        if key in self._building:
+            self.report.warn("prototype contains itself: left out", name)
+            return None
+        if len(self._building) == MAX_NESTING:
+            what = f"instances in instances, more than {MAX_NESTING} deep: left out"
+            self.report.warn(what, name)
+            return None
+        self._building.add(key)
+        try:
+            group = Group(name, self.report.place(root))
+            self._fill(group, roots, scope, purpose, predicate)
+        finally:
+            self._building.discard(key)
+        self._groups[key] = group
+        return group
+
+    def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
+        """Adds native instances, all of one prototype at a time."""
+        batches: dict[
+            tuple[int, int], tuple[Group, list[Any], list[int], list[Any], list[Any]]
+        ] = {}
+        for placed in instances:
+            child = self._instance_group(placed, scope)
+            if child is None:
+                continue
+            material = self._instance_material(placed, scope)
+            steps = None if placed.track is None else placed.track.steps()
+            count = 0 if steps is None else len(steps)
+            batch = batches.setdefault((id(child), count), (child, [], [], [], []))
+            batch[4].append(steps)
+            batch[1].append(np.array(placed.matrix))
+            batch[2].append(material)
+            batch[3].append(placed.prim)
+        for (_, count), (child, matrices, materials, prims, moves) in batches.items():
+            transforms = np.stack(matrices)
+            motion = np.stack(moves) if count else None
+            ids = np.array(materials, np.uint32)
+            self._add(parent, child, transforms, ids, prims, motion=motion)
+        self.report.tally("instances", len(instances))
+
+    def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
+        prim = placed.prim
+        prototype = prim.GetPrototype()
+        path = prototype.GetPath()
+        proxy = self._proxy(prim, scope.alias) if scope.alias else prim
+        strong, collections = self.bindings.above(proxy)
+        override = scope.override or (strong and not collections)
+        alias, exact = None, None
+        if not override and (collections or scope.alias is not None):
+            alias = (path, proxy.GetPath())
+            exact = self._proxy_bindings(proxy)
+        bound = placed.material is not None or (scope.bound and not override)
+        inner = Scope(True, bound and alias is None, override, alias, path)
+        key = ("native", path, inner.bound, override, placed.purpose, exact)
+        roots = list(prototype.GetChildren())
+        return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
+
+    def _proxy_bindings(self, instance: Usd.Prim) -> tuple[str, ...]:
+        """Material paths of all below an instance: tells which instances may share a group."""
+        prims = [
+            prim
+            for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
+            if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.Subset)
+        ]
+        bound = bound_materials(prims, self.traversal.binding_purposes)
+        return tuple(str(m.GetPath()) if m else "" for m in bound)
+
+    def _instance_material(self, placed: Placed, scope: Scope) -> int:
+        """The id for the meshes of an instance that have none of their own."""
+        if placed.material is not None:
+            return self.materials.add(self.materials.surface(placed.material))
+        if scope.override or scope.bound:
+            return INHERIT_MATERIAL
+        for primvar in placed.inherited:
+            if primvar.GetPrimvarName() == "displayColor":
+                value = from_attribute(primvar.GetAttr(), "displayColor", self.time)
+                if value is not None and len(value.values):
+                    return self.materials.plain(colour(value.values[0], DEFAULT_COLOUR))
+        return INHERIT_MATERIAL if scope.inside else self.materials.plain()
+
+    def _place_instancer(self, parent: Group, placed: Placed, scope: Scope) -> None:
+        """Adds a point instancer, all instances of one prototype at a time."""
+        prim = placed.prim
+        path = prim.GetPath()
+        targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
+        self.report.tally("point instancers")
+        instances = read_instances(prim, self.time, len(targets), self.report)
+        if instances is None or len(instances.kept) == 0:
+            return
+        materials = self._instancer_materials(placed, instances.authored, scope)[instances.kept]
+        order = np.argsort(instances.prototypes, kind="stable")
+        ranked = instances.prototypes[order]
+        outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
+        moved = None
+        if self.motion is not None:
+            moved = moved_instances(prim, self.motion, placed.track, outer, instances, self.report)
+        for index, target in enumerate(targets):
+            first, last = np.searchsorted(ranked, [index, index + 1])
+            if first == last:
+                continue
+            root = self.stage.GetPrimAtPath(target)
+            if not root:
+                self.report.warn(f"point instancer prototype {target} is not there", path)
+                continue
+            child = self._prototype_group(root, placed, scope)
+            if child is None:
+                continue
+            chosen = order[first:last]
+            transforms = instances.transforms[chosen]
+            if outer is not None:
+                transforms = transforms @ outer
+            numbers = instances.kept[chosen].astype(np.uint32)
+            motion = None if moved is None else np.ascontiguousarray(moved[chosen])
+            self._add(parent, child, transforms, materials[chosen], [prim], numbers, motion)
+        self.report.tally("point instances", len(instances.kept))
+
+    def _prototype_group(self, root: Usd.Prim, placed: Placed, scope: Scope) -> Group | None:
+        """The group of a point instancer's prototype, wherever it is."""
+        path = root.GetPath()
+        within = path.HasPrefix(scope.root) and scope.inside
+        inner = Scope(
+            True,
+            scope.bound and within,
+            scope.override and within,
+            scope.alias if within else None,
+            scope.root if within else path,
+        )
+        key = ("point", path, inner.bound, inner.override, placed.purpose, inner.alias)
+        return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)
+
+    def _instancer_materials(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
+        """(count,) ids for the instances of a point instancer: by its displayColor."""
+        if scope.bound or scope.override:
+            return np.full(count, INHERIT_MATERIAL, np.uint32)
+        inherited = self.traversal.inherit(placed.prim, placed.inherited)
+        attribute = placed.prim.GetAttribute("primvars:displayColor")
+        if attribute.HasAuthoredValue():
+            attributes = [attribute]
+        else:
+            attributes = [p.GetAttr() for p in inherited if p.GetPrimvarName() == "displayColor"]
+        for candidate in attributes:
+            try:
+                primvar = from_attribute(candidate, "displayColor", self.time)
+            except PrimvarError as error:
+                self.report.warn(f"{error}: ignored", placed.prim.GetPath())
+                continue
+            if primvar is None or primvar.values.shape[1] < 3:
+                continue
+            if len(primvar.values) == 1:
+                return np.full(count, self.materials.plain(primvar.values[0]), np.uint32)
+            if len(primvar.values) == count:
+                palette, index = quantise(primvar.values[:, :3])
+                ids = np.array([self.materials.plain(c) for c in palette], np.uint32)
+                return ids[index]
+            what = "point instancer displayColor does not match protoIndices: ignored"
+            self.report.warn(what, placed.prim.GetPath())
+        default = INHERIT_MATERIAL if scope.inside else self.materials.plain()
+        return np.full(count, default, np.uint32)
+
+    def _add(
+        self,
+        parent: Group,
+        child: Group,
+        transforms: Matrices,
+        materials: NDArray[np.uint32],
+        prims: Sequence[Usd.Prim],
+        numbers: NDArray[np.uint32] | None = None,
+        motion: Matrices | None = None,
+    ) -> None:
+        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
+
+        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
+        """
+        usable = sound(transforms)
+        if motion is not None:
+            usable &= sound(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
+        if not usable.all():
+            what = "instances left out: transform without an inverse"
+            self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
+            transforms, materials = transforms[usable], materials[usable]
+            motion = None if motion is None else motion[usable]
+            if numbers is None:
+                prims = [prim for prim, good in zip(prims, usable, strict=True) if good]
+            else:
+                numbers = numbers[usable]
+        if len(transforms) == 0:
+            return
+        if child.sampled_lamp is not None:
+            parent.sampled_lamp = child.sampled_lamp
+            if motion is not None:
+                self.mesh_lights.say_moving(child.sampled_lamp)
+        if child.lit:
+            middle = transforms if motion is None else middle_of(motion)
+            parent.children.append((child, middle))
+            parent.lit = True
+        if child.has_surfaces:
+            parent.surfaced.append((child, transforms))
+            parent.has_surfaces = True
+        if child.number is None:
+            return
+        names = [self.report.place(prim.GetPath()) for prim in prims]
+        lengths = [self._asset_length(*pair) for pair in zip(prims, names, strict=True)]
+        self.builder.add_instances(
+            self._number(parent),
+            child.number,
+            transforms,
+            materials,
+            names=names,
+            numbers=numbers,
+            asset_lengths=lengths,
+            **({} if motion is None else {"motion": motion}),
+        )
+        if child.bounds is not None:
+            if motion is not None:
+                transforms = motion.reshape(-1, 4, 4)
+            if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
+                child.outlines = [inner]
+                more = self.framed if parent.number == 0 else None
+                parent.reach(framing.placed(inner, transforms, more), more)
+            lo, hi = child.bounds
+            centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
+            linear = transforms[:, :3, :3]
+            middle = centre @ linear + transforms[:, 3, :3]
+            reach = half @ np.abs(linear)
+            parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))

@@ -1,0 +1,472 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The way in: a USD file to a scene."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Tf, Usd, UsdGeom
+
+from wavecomb.errors import WavecombError
+from wavecomb.machine import give_back_memory
+from wavecomb.picture.working_space import WORKING_SPACES, from_rec709
+from wavecomb.run.isolate import trail
+from wavecomb.run.isolate.memory import describe_limit
+from wavecomb.usd.cameras.camera import camera_motion, frame_planes, frame_points, read_camera
+from wavecomb.usd.cameras.framing import corners, joined
+from wavecomb.usd.geometry.shutter import find_motion
+from wavecomb.usd.geometry.surfaces import Surfaces, parse_level
+from wavecomb.usd.geometry.view_size import ViewSize
+from wavecomb.usd.lights.dome import soft_dome, up_rotation
+from wavecomb.usd.lights.ies import IesTable
+from wavecomb.usd.lights.light import LIGHT_SHAPES, LightReader
+from wavecomb.usd.lights.links import LinkTable
+from wavecomb.usd.looks.material import MaterialTable
+from wavecomb.usd.looks.texture import TextureStock, TextureTable
+from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
+from wavecomb.usd.materialx import references as mtlx
+from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
+from wavecomb.usd.stage.group import Group, placed_lights
+from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
+from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.named_files import keep_to
+from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
+from wavecomb.usd.stage.render_settings import RenderChoice
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.shared import FrameStock
+from wavecomb.usd.stage.times import frame_number, time_code
+from wavecomb.usd.stage.traverse import Traversal
+from wavecomb.usd.stage.view_options import Seen, ViewOptions
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+SurfacesOf = Callable[[MaterialTable], Surfaces]
+
+MAX_LIGHTS = 4096
+"""Lights that are placed; instances may multiply them."""
+
+
+@dataclass
+class LoadedStage:
+    """A stage that was read.
+
+    Attributes:
+        scene: Ready to render.
+        report: What there is to say about it.
+        camera_path: Prim of the camera; None where the bounds were framed.
+        seconds: Time taken.
+        stage_path: The file.
+        cameras: Prims of all cameras that could be chosen.
+        lights: Prims of all lights that Wavecomb knows, invisible ones too.
+        material_paths: Prim of each material of the scene, by id; "" where the loader made it (of a
+            display colour). One prim has several where meshes bring values of their own.
+        light_paths: Prim of each light of the scene, by index; "" of the soft dome. In instances
+            both are named by the first instance.
+        frame: Time code that was read; None: default values.
+        shutter: When it opens and closes, time codes from the frame; None: no motion blur.
+        render: What the stage's render settings ask for.
+        working_space: What its colours are in: of ``WORKING_SPACES``.
+        textures: What the next read of the stage can share; None unless it was read ``editable``.
+        leaves_out_levels: Whether textures have only the mip levels that its view needs.
+        outline: Points (n, 3) in the world where what is drawn reaches farthest; None unless a view
+            was framed for it.
+    """
+
+    scene: _core.Scene
+    report: LoadReport
+    camera_path: str | None
+    seconds: float
+    stage_path: Path
+    cameras: tuple[str, ...] = ()
+    lights: tuple[str, ...] = ()
+    material_paths: tuple[str, ...] = ()
+    light_paths: tuple[str, ...] = ()
+    frame: float | None = None
+    textures: TextureStock | None = None
+    shutter: tuple[float, float] | None = None
+    render: RenderChoice = field(default_factory=RenderChoice)
+    working_space: str = "rec709"
+    leaves_out_levels: bool = False
+    outline: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """What was found while the builder was filled."""
+
+    camera: str | None
+    survey: Survey
+    materials: tuple[str, ...]
+    lights: tuple[str, ...]
+    frame: float | None
+    shutter: tuple[float, float] | None
+    render: RenderChoice
+    outline: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """What is read, and how."""
+
+    opened: Callable[[], Usd.Stage]
+    frame: float | None
+    view: ViewOptions
+    editable: bool
+    texture_limit: float | None
+    size: tuple[int, int]
+    lights: str
+
+
+def load_stage(
+    source: str | Path | Usd.Stage,
+    *,
+    frame: float | None = None,
+    camera: str | None = None,
+    purposes: Sequence[str] | None = None,
+    variants: Mapping[str, str] | None = None,
+    mask: Sequence[str] = (),
+    session_layer: str | Path | None = None,
+    threads: int = 0,
+    editable: bool = False,
+    reuse: TextureStock | None = None,
+    subdivision: str | int = "auto",
+    size: tuple[int, int] = (600, 600),
+    stock: FrameStock | None = None,
+    progress: LoadProgress | None = None,
+    shutter: tuple[float, float] | None = None,
+    motion_blur: bool | None = None,
+    motion_steps: int | None = None,
+    depth_of_field: bool | None = None,
+    projection: str | None = None,
+    exposure: bool = True,
+    render_settings: str | None = None,
+    product: str | None = None,
+    texture_limit: float | None = None,
+    working_space: str = "rec709",
+    lights: str = "visible",
+    builder_factory: Callable[[], _core.SceneBuilder] | None = None,
+) -> LoadedStage:
+    """Reads a USD stage into a scene.
+
+    Args:
+        source: A .usd, .usda, .usdc or .usdz file, or a stage that is open. That stays open, and is
+            only written to where ``variants`` are chosen. It must not change meanwhile.
+        frame: Time code; None: the stage's start, else default values.
+        camera: Prim path or unique name of a camera; None: the render settings', the stage's first,
+            or a view that frames all.
+        purposes: Of the geometry to draw: default, render, proxy, guide; None: as the render
+            settings say, else default and render.
+        variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
+            prim's.
+        mask: Prims to draw, with all below them; with what they need, all lights and cameras. None:
+            all prims. Of files only.
+        session_layer: File with opinions that are stronger than the stage's. Of files only.
+        threads: For images, textures and subdivision; 0: all.
+        subdivision: Of subdivision surfaces: "off", a level from 0 to 10, or "auto", by the size of
+            edges in the picture (docs/subdivision.md).
+        size: Of the picture that automatic levels are for, width and height.
+        editable: For programs that change what was read: materials that look alike stay apart, and
+            the result has ``textures``. Changes no picture.
+        reuse: ``textures`` of an earlier read: those whose files did not change are shared.
+        stock: Of a stage that is open and was read at another frame: what did not change is
+            shared. Changes nothing else.
+        progress: Is told how many of the prims found so far are read.
+        shutter: When it opens and closes, time codes from the frame; None: as the camera says.
+        motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
+            render settings disable it.
+        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
+        depth_of_field: Whether the camera's lens blurs; None: unless the render settings disable
+            it.
+        projection: perspective, orthographic or latlong; None: the camera's.
+        exposure: Whether the camera's exposure multiplies light in the picture.
+        render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
+            else the only ones under /Render.
+        product: Path or name of one of their products; None: the first.
+        texture_limit: MB (10^6 bytes) of memory that all textures together may take; None: any.
+            Where it is too little, they wait in a temporary file (docs/textures.md).
+        working_space: What the picture is computed in: "rec709", or "acescg".
+        lights: Whether rays meet the shapes of lights: "visible" or "hidden"
+            (docs/decisions/light-shapes.md).
+        builder_factory: Makes the scene builder; None: the native one.
+
+    Raises:
+        WavecombError: The file or an option is no good.
+    """
+    started = clock.perf_counter()
+    if texture_limit is not None and not texture_limit > 0:
+        raise WavecombError(f"texture limit {texture_limit} MB: must be more than 0")
+    if working_space not in WORKING_SPACES:
+        known = ", ".join(WORKING_SPACES)
+        raise WavecombError(f"working space {working_space!r} is none of {known}")
+    if frame is not None and not np.isfinite(frame):
+        raise WavecombError(f"frame must be a number, not {frame}")
+    if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
+        raise WavecombError("mask and session_layer are chosen when the stage is opened")
+    if lights not in LIGHT_SHAPES:
+        raise WavecombError(f"lights {lights!r}: there are {', '.join(LIGHT_SHAPES)}")
+    level = parse_level(subdivision)
+    if not (len(size) == 2 and min(size) >= 1):
+        raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
+    view = ViewOptions(
+        camera, purposes, shutter, motion_blur, motion_steps, depth_of_field, projection, exposure,
+        render_settings, product,
+    )  # fmt: skip
+    view.check()
+    report = LoadReport()
+    file = _file_of(source)
+    if stock is not None:
+        reuse = stock.textures
+    opened = _opener(source, variants or {}, mask, session_layer)
+    with captured(report):
+        # A builder of the caller's own has no store, so that levels are left out.
+        store = None if builder_factory else texture_store(texture_limit, reuse, report)
+        builder = _native_builder(threads, store) if builder_factory is None else builder_factory()
+        textures = TextureTable(builder, report, threads, reuse, working_space, store)
+
+        def surfaces_of(materials: MaterialTable) -> Surfaces:
+            return Surfaces(
+                builder, materials, report, subdivision=level, size=size, threads=threads
+            )
+
+        try:
+            choice = _Choice(opened, frame, view, editable, texture_limit, size, lights)
+            filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
+        except UnicodeDecodeError:
+            raise WavecombError(f"{file}: {NOT_TEXT}") from None
+        except Tf.ErrorException as error:
+            raise WavecombError(f"{file}: USD cannot read it: {commentary(error)}") from None
+        except MemoryError:
+            raise WavecombError(
+                f"{file}: out of memory while it was read{describe_limit()}"
+            ) from None
+        finally:
+            textures.release()
+        trail.note("building the scene of", file)
+        scene = _build(builder, file)
+        trail.note("rendering", file)
+    if stock is not None:
+        stock.textures = textures.stock(scene)
+        stock.end_frame()
+        report.absorb(stock.opening)
+    if builder_factory is None:
+        give_back_memory()
+    return LoadedStage(
+        scene,
+        report,
+        filled.camera,
+        clock.perf_counter() - started,
+        file,
+        filled.survey.cameras,
+        filled.survey.lights,
+        filled.materials,
+        filled.lights,
+        filled.frame,
+        textures.stock(scene) if editable else None,
+        filled.shutter,
+        filled.render,
+        working_space,
+        texture_limit is not None and store is None,
+        filled.outline,
+    )
+
+
+def _file_of(source: str | Path | Usd.Stage) -> Path:
+    """The file of a stage; of one in memory its layer's name."""
+    if not isinstance(source, Usd.Stage):
+        return Path(source)
+    layer = source.GetRootLayer()
+    return Path(layer.realPath or layer.identifier)
+
+
+def _opener(
+    source: str | Path | Usd.Stage,
+    variants: Mapping[str, str],
+    mask: Sequence[str],
+    session_layer: str | Path | None,
+) -> Callable[[], Usd.Stage]:
+    """Gives the stage; one that is opened by it is closed when nobody holds it any more."""
+    if isinstance(source, Usd.Stage):
+        stage = source
+
+        def choose() -> Usd.Stage:
+            select_variants(stage, variants)
+            return stage
+
+        return choose
+    file = Path(source)
+    layer = None if session_layer is None else Path(session_layer)
+    return lambda: open_stage(file, variants, mask=mask, session_layer=layer)
+
+
+def _fill(
+    builder: _core.SceneBuilder,
+    choice: _Choice,
+    textures: TextureTable,
+    report: LoadReport,
+    surfaces_of: SurfacesOf,
+    stock: FrameStock | None,
+    progress: LoadProgress | None,
+) -> _Filled:
+    """Fills the builder. A stage that was opened here is closed then."""
+    stage = choice.opened()
+    keep_to(stage)
+    if stock is None:
+        mtlx.tell(stage, report)
+    time = time_code(stage, choice.frame)
+    found = survey(stage)
+    materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
+    seen = choice.view.on(stage, report)
+    chosen, lights, shutter, outline = _read(
+        stage,
+        time,
+        choice,
+        seen,
+        builder,
+        textures,
+        materials,
+        bool(found.lights),
+        report,
+        surfaces_of(materials),
+        stock,
+        progress,
+    )
+    used = frame_number(time)
+    return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline)
+
+
+def _native_builder(threads: int, store: _core.TextureStore | None) -> _core.SceneBuilder:
+    from wavecomb import _core
+
+    return _core.SceneBuilder(threads, store)
+
+
+def _read(
+    stage: Usd.Stage,
+    time: Usd.TimeCode,
+    choice: _Choice,
+    seen: Seen,
+    builder: _core.SceneBuilder,
+    textures: TextureTable,
+    materials: MaterialTable,
+    has_lights: bool,
+    report: LoadReport,
+    surfaces: Surfaces,
+    stock: FrameStock | None,
+    progress: LoadProgress | None,
+) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None, NDArray[np.float64] | None]:
+    """Fills the builder; gives paths of the camera and of lights, the shutter, the outline."""
+    up_axis = str(UsdGeom.GetStageUpAxis(stage))
+    view_prim = seen.camera
+    groups = LightGroups(report)
+    profiles, hidden = IesTable(builder, report), choice.lights == "hidden"
+    links = LinkTable(builder)
+    lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
+    motion = find_motion(view_prim, time, seen.blur, report)
+    traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
+    if choice.texture_limit is not None and textures.store is None:
+        _limit_textures(stage, traversal, seen, choice, textures, report)
+    view = None
+    if view_prim is not None:
+        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
+        view = read_camera(view_prim, to_world, time, report, seen.lens)
+    outline = None
+    planes = frame_planes(up_axis, seen.lens, choice.size)
+    meshes = None if stock is None else stock.meshes
+    surfaces.stock = None if stock is None else stock.refined
+    groups_of = GroupBuilder(
+        stage, traversal, builder, materials, groups, report, surfaces, meshes, progress,
+        framed=planes if view is None else None,
+    )  # fmt: skip
+    world = groups_of.world()
+    lit = materials.glows or has_lights or groups_of.mesh_lights.any
+    light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
+    if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
+        report.note("nothing to draw: the picture shows the environment only")
+    chosen = None if view is None or view_prim is None else str(view_prim.GetPath())
+    if view is None:
+        report.note("no camera: framed what is drawn")
+        outline = joined(world.outlines, planes)
+        view = frame_points(outline, up_axis, seen.lens, choice.size)
+    elif view_prim is not None:
+        moves = camera_motion(view_prim, motion)
+        if moves is not None:
+            view.options["motion"] = moves
+    surfaces.finish(world, view)
+    if stock is not None:
+        stock.has_same_levels = partial(surfaces.has_same_levels, world)
+    builder.set_camera(view.transform, **view.options)
+    return chosen, light_paths, None if motion is None else motion.shutter, outline
+
+
+def _limit_textures(
+    stage: Usd.Stage,
+    traversal: Traversal,
+    seen: Seen,
+    choice: _Choice,
+    textures: TextureTable,
+    report: LoadReport,
+) -> None:
+    """Says which mip levels the textures leave out."""
+    from wavecomb.usd.looks.texture_limit import plan_levels
+
+    view = None
+    if seen.camera is not None:
+        to_world = np.array(traversal.xforms.GetLocalToWorldTransform(seen.camera))
+        view = read_camera(seen.camera, to_world, traversal.time, LoadReport(), seen.lens)
+    if view is None:
+        cache = UsdGeom.BBoxCache(traversal.time, list(UsdGeom.Imageable.GetOrderedPurposeTokens()))
+        box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+        points = None
+        if not box.IsEmpty():
+            bounds = np.array([box.GetMin(), box.GetMax()])
+            # The ball inside of the box: the view that is found later is no nearer than this one's.
+            points = bounds.mean(axis=0) + (corners(bounds) - bounds.mean(axis=0)) / np.sqrt(3.0)
+        view = frame_points(points, str(UsdGeom.GetStageUpAxis(stage)), seen.lens, choice.size)
+    limit = float(choice.texture_limit or 0) * MEGABYTE
+    textures.drops = plan_levels(
+        stage, traversal.time, ViewSize(view, choice.size), limit, report, textures.working
+    )
+
+
+def _add_lights(
+    world: Group,
+    lit: bool,
+    up_axis: str,
+    textures: TextureTable,
+    builder: _core.SceneBuilder,
+    report: LoadReport,
+) -> tuple[str, ...]:
+    """Adds all lights, or a soft dome where nothing else gives light (``lit``); their paths."""
+    lights = placed_lights(world, MAX_LIGHTS + 1)
+    if len(lights) > MAX_LIGHTS:
+        report.warn(f"more than {MAX_LIGHTS} lights: the rest is left out")
+        lights = lights[:MAX_LIGHTS]
+    for light, transform in lights:
+        options = light.options
+        if "portals" in options:
+            options = {**options, "portals": options["portals"] @ transform}
+        builder.add_light(light.kind, transform, **options)
+    if lights:
+        return tuple(light.options["name"] for light, _ in lights)
+    if lit:
+        report.note("no visible light; the scene is lit by emissive materials or not at all")
+        return ()
+    report.note("no light: added a soft dome")
+    texture = textures.add_pixels("soft dome", from_rec709(soft_dome(), textures.working))
+    builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
+    return ("",)
+
+
+def _build(builder: _core.SceneBuilder, file: Path) -> _core.Scene:
+    try:
+        return builder.build()
+    except ValueError as error:
+        raise WavecombError(f"{file}: {error}") from error

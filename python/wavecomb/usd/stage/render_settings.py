@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdRender: what a stage says about how it is to be rendered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdRender
+
+from wavecomb.errors import WavecombError
+from wavecomb.usd.cameras.camera import CONFORMS
+from wavecomb.usd.looks.network import number, word
+from wavecomb.usd.stage.render_vars import aov_of
+from wavecomb.usd.stage.report import LoadReport
+
+MAX_PRODUCTS = 256
+_PURPOSES = ("default", "render", "proxy", "guide")
+
+
+@dataclass(frozen=True)
+class RenderChoice:
+    """What render settings and one of their products ask for; None: nothing is authored.
+
+    Attributes:
+        settings: Path of the RenderSettings.
+        product: Path of the RenderProduct.
+        camera: Path of the camera.
+        resolution: Width and height.
+        pixel_aspect: Width of a pixel / its height.
+        conform: One of ``CONFORMS``.
+        data_window: (xmin, ymin, xmax, ymax), 0 to 1 over the picture, y up.
+        purposes: Of the geometry.
+        material_purposes: Of material bindings, the first that a prim has counts.
+        motion_blur: False: none is wanted.
+        depth_of_field: Likewise.
+        aovs: Layers, as ``--aov`` takes them.
+        output: Name of the file.
+    """
+
+    settings: str | None = None
+    product: str | None = None
+    camera: str | None = None
+    resolution: tuple[int, int] | None = None
+    pixel_aspect: float = 1.0
+    conform: str = CONFORMS[0]
+    data_window: tuple[float, float, float, float] | None = None
+    purposes: tuple[str, ...] | None = None
+    material_purposes: tuple[str, ...] | None = None
+    motion_blur: bool = True
+    depth_of_field: bool = True
+    aovs: tuple[str, ...] | None = None
+    output: str | None = None
+
+    def region(self, width: int, height: int) -> tuple[int, int, int, int] | None:
+        """Pixels whose centres are in the data window: x0, y0, x1, y1, y down, the end excluded.
+
+        None where that is all of them.
+
+        Raises:
+            WavecombError: It holds no pixel.
+        """
+        if self.data_window is None:
+            return None
+        left, low, right, high = self.data_window
+        x0, x1 = (math.ceil(edge * width - 0.5) for edge in (left, right))
+        y0, y1 = (math.ceil((1.0 - edge) * height - 0.5) for edge in (high, low))
+        x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
+        if x0 >= x1 or y0 >= y1:
+            raise WavecombError(
+                f"{self.product or self.settings}: dataWindowNDC holds no pixel of the picture; "
+                "mend it or give --region"
+            )
+        return None if (x0, y0, x1, y1) == (0, 0, width, height) else (x0, y0, x1, y1)
+
+
+def find_settings(
+    stage: Usd.Stage, wanted: str | None, report: LoadReport
+) -> UsdRender.Settings | None:
+    """The settings asked for, else those that the stage names, else the only ones under /Render.
+
+    Raises:
+        WavecombError: There are none of that path or name.
+    """
+    found = _all_settings(stage)
+    if wanted is not None:
+        if Sdf.Path.IsValidPathString(wanted) and wanted.startswith("/"):
+            prim = stage.GetPrimAtPath(wanted)
+            if prim and prim.IsA(UsdRender.Settings):
+                return UsdRender.Settings(prim)
+        named = [settings for settings in found if settings.GetPrim().GetName() == wanted]
+        if len(named) == 1:
+            return named[0]
+        known = ", ".join(str(settings.GetPath()) for settings in found[:8]) or "none"
+        raise WavecombError(f"--render-settings {wanted}: no such prim; the stage has: {known}")
+    named_by_stage = UsdRender.Settings.GetStageRenderSettings(stage)
+    if named_by_stage:
+        return named_by_stage
+    if path := stage.GetMetadata("renderSettingsPrimPath"):
+        report.warn(f"renderSettingsPrimPath {path}: there are no render settings of that path")
+    if len(found) > 1:
+        report.note("several render settings and none named by the stage: none used")
+    return found[0] if len(found) == 1 else None
+
+
+def _all_settings(stage: Usd.Stage) -> list[UsdRender.Settings]:
+    """Settings under /Render, where they are to be."""
+    scope = stage.GetPrimAtPath("/Render")
+    prims = Usd.PrimRange(scope) if scope else ()
+    return [UsdRender.Settings(prim) for prim in prims if prim.IsA(UsdRender.Settings)]
+
+
+def find_products(
+    stage: Usd.Stage, settings: UsdRender.Settings | None, report: LoadReport
+) -> list[UsdRender.Product]:
+    """Products that are pictures, in the settings' order."""
+    found: list[UsdRender.Product] = []
+    if settings is None:
+        return found
+    for path in settings.GetProductsRel().GetForwardedTargets()[:MAX_PRODUCTS]:
+        product = UsdRender.Product(stage.GetPrimAtPath(path))
+        if not product:
+            report.warn("render product left out: there is no such prim", path)
+            continue
+        kind = word(product.GetProductTypeAttr().Get(), "raster")
+        if kind == "raster":
+            found.append(product)
+        else:
+            report.missing(f"render product of type {kind}", path)
+    return found
+
+
+def read_choices(
+    stage: Usd.Stage, wanted: str | None, product: str | None, report: LoadReport
+) -> list[RenderChoice]:
+    """One for each product to render; at least one.
+
+    Args:
+        stage: That asks.
+        wanted: Path or name of render settings; None: as ``find_settings`` says.
+        product: Path or name of the only product to render; None: all.
+        report: For what is odd or not done.
+
+    Raises:
+        WavecombError: There are none of that path or name.
+    """
+    settings = find_settings(stage, wanted, report)
+    products = find_products(stage, settings, report)
+    if product is not None:
+        chosen = [p for p in products if product in (str(p.GetPath()), p.GetPrim().GetName())]
+        if len(chosen) != 1:
+            known = ", ".join(str(p.GetPath()) for p in products[:8]) or "none"
+            raise WavecombError(f"--product {product}: no such product; the stage has: {known}")
+        products = chosen
+    if settings is None:
+        return [RenderChoice()]
+    return [_read(stage, settings, p, report) for p in products or [None]]
+
+
+def _read(
+    stage: Usd.Stage,
+    settings: UsdRender.Settings,
+    product: UsdRender.Product | None,
+    report: LoadReport,
+) -> RenderChoice:
+    """The settings' values under those that the product authors."""
+    prims = [p.GetPrim() for p in (product, settings) if p is not None]
+
+    def value(name: str, good: Callable[[Any], bool]) -> Any:
+        for prim in prims:
+            attribute = prim.GetAttribute(name)
+            if not attribute or not attribute.HasAuthoredValue():
+                continue
+            got = attribute.Get()
+            if good(got):
+                return got
+            report.warn(f"{name} of render settings is no good: left out", prim.GetPath())
+        return None
+
+    resolution = value("resolution", _is_size)
+    window = value("dataWindowNDC", _is_window)
+    if window is not None:
+        window = tuple(float(edge) for edge in window)
+        if min(window[:2]) < 0 or max(window[2:]) > 1:
+            where = product if product is not None else settings
+            report.missing("overscan: dataWindowNDC beyond the picture is cut", where.GetPath())
+    off = {
+        name: bool(value(name, _is_switch))
+        for name in ("disableMotionBlur", "instantaneousShutter", "disableDepthOfField")
+    }
+    aspect = value("pixelAspectRatio", lambda x: 0 < number(x, 0.0) <= 1e6)
+    name = None if product is None else word(product.GetProductNameAttr().Get())
+    color_space = settings.GetPrim().GetAttribute("renderingColorSpace")
+    if color_space and word(color_space.Get()) not in ("", "lin_rec709_scene", "lin_rec709"):
+        report.missing(f"renderingColorSpace {color_space.Get()}", settings.GetPath())
+    return RenderChoice(
+        settings=str(settings.GetPath()),
+        product=None if product is None else str(product.GetPath()),
+        camera=_camera(stage, prims, report),
+        resolution=None if resolution is None else (int(resolution[0]), int(resolution[1])),
+        pixel_aspect=1.0 if aspect is None else float(aspect),
+        conform=value("aspectRatioConformPolicy", CONFORMS.__contains__) or CONFORMS[0],
+        data_window=window,
+        purposes=_tokens(settings.GetIncludedPurposesAttr(), _PURPOSES, report),
+        material_purposes=_tokens(settings.GetMaterialBindingPurposesAttr(), None, report),
+        motion_blur=not (off["disableMotionBlur"] or off["instantaneousShutter"]),
+        depth_of_field=not off["disableDepthOfField"],
+        aovs=None if product is None else _vars(stage, product, report),
+        output=name or None,
+    )
+
+
+def _is_size(value: Any) -> bool:
+    return hasattr(value, "__len__") and len(value) == 2 and min(value) >= 1
+
+
+def _is_window(value: Any) -> bool:
+    if not hasattr(value, "__len__") or len(value) != 4 or not np.isfinite(list(value)).all():
+        return False
+    return bool(value[0] < value[2] and value[1] < value[3])
+
+
+def _is_switch(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+def _camera(stage: Usd.Stage, prims: Sequence[Usd.Prim], report: LoadReport) -> str | None:
+    """The camera that the first of some prims points to."""
+    for prim in prims:
+        for path in UsdRender.SettingsBase(prim).GetCameraRel().GetForwardedTargets():
+            camera = stage.GetPrimAtPath(path)
+            if camera and camera.IsA(UsdGeom.Camera):
+                return str(path)
+            report.warn(f"render settings name {path}, which is no camera", prim.GetPath())
+    return None
+
+
+def _tokens(
+    attribute: Usd.Attribute, known: Sequence[str] | None, report: LoadReport
+) -> tuple[str, ...] | None:
+    if not attribute or not attribute.HasAuthoredValue():
+        return None
+    names = tuple(map(str, attribute.Get() or ()))
+    for name in names:
+        if known is not None and name not in known:
+            what = f"{attribute.GetName()} of render settings: no purpose {name!r}"
+            report.warn(what, attribute.GetPrimPath())
+    return tuple(name for name in names if known is None or name in known) or None
+
+
+def _vars(
+    stage: Usd.Stage, product: UsdRender.Product, report: LoadReport
+) -> tuple[str, ...] | None:
+    """AOVs of the product's vars, in order; None where it lists none."""
+    found: dict[str, None] = {}
+    targets = product.GetOrderedVarsRel().GetForwardedTargets()
+    for path in targets:
+        var = UsdRender.Var(stage.GetPrimAtPath(path))
+        if not var:
+            report.warn("render var left out: there is no such prim", path)
+            continue
+        name = aov_of(var)
+        if name is None:
+            report.missing(f"render var {word(var.GetSourceNameAttr().Get())!r}", path)
+        else:
+            found[name] = None
+    return tuple({"beauty": None, **found}) if targets else None

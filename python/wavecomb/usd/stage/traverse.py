@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Walks down from some prims: what there is to draw, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
+
+from wavecomb.usd.geometry.mesh import IDENTITY
+from wavecomb.usd.geometry.primvar import authored_names
+from wavecomb.usd.geometry.shapes import SHAPES
+from wavecomb.usd.geometry.shutter import Motion, Track
+from wavecomb.usd.geometry.skeleton import Skeletons
+from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.lights.light import Light, LightReader
+from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.looks.material import BINDING_PURPOSES
+from wavecomb.usd.looks.network import word
+from wavecomb.usd.stage.instancing import sound
+from wavecomb.usd.stage.report import LoadReport
+
+Matrices = NDArray[np.float64]
+
+_UNSUPPORTED = ("NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh", "Volume")
+
+
+STRANDS = {"BasisCurves": "curves", "Points": "points"}
+DRAWN = frozenset(("mesh", "shape", *STRANDS.values()))
+"""Kinds of prims that become geometry."""
+
+
+@dataclass
+class Placed:
+    """A native instance or a point instancer, to be expanded once bindings are known."""
+
+    prim: Usd.Prim
+    matrix: Gf.Matrix4d
+    purpose: str
+    inherited: Sequence[Any]
+    material: UsdShade.Material | None = None
+    track: Track | None = None
+
+
+@dataclass
+class Gathered:
+    """What a walk found in one group."""
+
+    draws: list[Draw] = field(default_factory=list)
+    instances: list[Placed] = field(default_factory=list)
+    instancers: list[Placed] = field(default_factory=list)
+    lights: list[tuple[Light, Matrices]] = field(default_factory=list)
+
+
+class Traversal:
+    """Finds the prims to draw, one group at a time."""
+
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        purposes: Sequence[str],
+        lights: LightReader,
+        report: LoadReport,
+        motion: Motion | None = None,
+        binding_purposes: Sequence[str] = BINDING_PURPOSES,
+    ) -> None:
+        """``motion``: what is followed while the shutter is open; None: it is not."""
+        self.time = time
+        self.binding_purposes = tuple(binding_purposes)
+        self.purposes = frozenset(purposes)
+        self.lights = lights
+        self.report = report
+        self.motion = motion
+        self.skeletons = Skeletons(report)
+        self.xforms = UsdGeom.XformCache(time)
+        self._kinds: dict[str, str] = {}
+        self._counts: dict[Sdf.Path, int] = {}
+
+    def kind(self, prim: Usd.Prim) -> str:
+        """What a prim is to the walk; found once for each type."""
+        name = str(prim.GetTypeName())
+        kind = self._kinds.get(name)
+        if kind is None:
+            if prim.IsA(UsdGeom.Mesh):
+                kind = "mesh"
+            elif name in SHAPES:
+                kind = "shape"
+            elif name in STRANDS:
+                kind = STRANDS[name]
+            elif name in LIGHT_KINDS:
+                kind = "light"
+            elif prim.IsA(UsdGeom.PointInstancer):
+                kind = "instancer"
+            elif name == "PortalLight":
+                kind = "xform"  # the dome that names it reads it
+            elif prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
+                kind = "unsupported light"
+            elif prim.IsA(UsdGeom.Gprim) or name in _UNSUPPORTED:
+                kind = "unsupported"
+            elif prim.IsA(UsdGeom.Imageable):
+                kind = "xform" if prim.IsA(UsdGeom.Xformable) else "scope"
+            else:
+                kind = "shading" if prim.IsA(UsdShade.NodeGraph) else "other"
+            self._kinds[name] = kind
+        return kind
+
+    def walk(
+        self, roots: Sequence[Usd.Prim], purpose: str = "default", predicate: Any = None
+    ) -> Gathered:
+        """Finds what is at and below some prims, in stage order.
+
+        Args:
+            roots: Their own transforms count, their parents' do not.
+            purpose: Of their parents.
+            predicate: Of the children to visit; None: USD's default.
+        """
+        found = Gathered()
+        time, local = self.time, self.xforms.GetLocalTransformation
+        proxies = Usd.TraverseInstanceProxies(
+            Usd.PrimDefaultPredicate if predicate is None else predicate
+        )
+        # (prim, transform of its parent, its track, purpose, inherited primvars, predicate for its
+        # children)
+        stack: list[tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any]]
+        stack = [(prim, IDENTITY, None, purpose, (), predicate) for prim in reversed(roots)]
+        while stack:
+            prim, matrix, track, purpose, inherited, pick = stack.pop()
+            kind = self.kind(prim)
+            if kind == "shading":
+                continue
+            names: frozenset[str] = frozenset()
+            if kind != "other":
+                names = authored_names(prim)
+                if (
+                    "visibility" in names
+                    and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
+                ):
+                    continue
+                if "purpose" in names:
+                    authored = prim.GetAttribute("purpose")
+                    if authored.HasAuthoredValue():
+                        purpose = word(authored.Get(), purpose)
+                if kind != "scope" and "xformOpOrder" in names:
+                    own, resets = local(prim)
+                    if self.motion is not None:
+                        track = self.motion.follow(prim, track, matrix, resets)
+                    if resets:
+                        matrix = own
+                    elif own != IDENTITY:
+                        matrix = own * matrix
+            shown = purpose in self.purposes
+            if prim.IsInstance():
+                prototype = prim.GetPrototype()
+                if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
+                    self.report.alias(prototype.GetPath(), prim.GetPath())
+                    inherited = self.inherit(prim, inherited)
+                    placed = Placed(prim, matrix, purpose, inherited, track=track)
+                    found.instances.append(placed)
+                    continue
+                pick = proxies
+            if prim.GetTypeName() == "SkelRoot":
+                self.skeletons.enter(prim)
+            children = prim.GetChildren() if pick is None else prim.GetFilteredChildren(pick)
+            if kind in DRAWN:
+                if shown:
+                    subsets = [c for c in children if _binds(c)] if children else ()
+                    found.draws.append(Draw(prim, matrix, inherited, subsets, track=track))
+            elif kind == "instancer":
+                if shown:
+                    placed = Placed(prim, matrix, purpose, inherited, track=track)
+                    found.instancers.append(placed)
+                continue
+            elif kind == "light":
+                if shown:
+                    if track is not None and self.motion is not None:
+                        self.report.note("moving light: still, in mid-shutter", prim.GetPath())
+                        matrix = track.at(self.motion.middle)
+                    self._light(found, prim, matrix)
+            elif kind.startswith("unsupported"):
+                if shown:
+                    self.report.missing(str(prim.GetTypeName()), prim.GetPath())
+            elif (
+                children
+                and kind in ("xform", "scope")
+                and any(name.startswith("primvars:") for name in names)
+            ):
+                inherited = self.inherit(prim, inherited)
+            for child in reversed(children):
+                stack.append((child, matrix, track, purpose, inherited, pick))
+        return found
+
+    def _shared(self, prototype: Usd.Prim) -> bool:
+        """Whether a prototype has several instances; one alone is drawn as if it were none."""
+        path = prototype.GetPath()
+        known = self._counts.get(path)
+        if known is None:
+            known = self._counts[path] = len(prototype.GetInstances())
+        return known > 1
+
+    def inherit(self, prim: Usd.Prim, inherited: Sequence[Any]) -> Sequence[Any]:
+        """Primvars that the children of a prim inherit."""
+        more = UsdGeom.PrimvarsAPI(prim).FindIncrementallyInheritablePrimvars(list(inherited))
+        return more if more else inherited
+
+    def _light(self, found: Gathered, prim: Usd.Prim, matrix: Gf.Matrix4d) -> None:
+        scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
+        light = self.lights.read(prim, scale)
+        transform = light.local @ np.array(matrix)
+        if not bool(sound(transform[None])[0]):
+            self.report.warn("light left out: its transform has no inverse", prim.GetPath())
+            return
+        self.report.tally("lights")
+        found.lights.append((light, transform))
+
+
+def _binds(prim: Usd.Prim) -> bool:
+    """Whether a child of a mesh is a face subset that binds a material."""
+    return (
+        prim.GetTypeName() == "GeomSubset"
+        and word(prim.GetAttribute("familyName").Get()) == "materialBind"
+        and word(prim.GetAttribute("elementType").Get(), "face") == "face"
+    )
