@@ -193,7 +193,7 @@ def test_parts() -> None:
 
 def test_nothing_heavy_is_imported_for_a_render() -> None:
     code = (
-        "import sys, wavecomb.cli, wavecomb.compare, wavecomb.bench; "
+        "import sys, wavecomb.cli, wavecomb.picture.compare, wavecomb.bench; "
         "print([m for m in ('pandas', 'matplotlib', 'scipy') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
