@@ -8,12 +8,20 @@ import signal
 import sys
 from collections.abc import Mapping
 
-from PySide6.QtCore import QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
+from PySide6.QtCore import (
+    QCoreApplication,
+    QEvent,
+    QMessageLogContext,
+    Qt,
+    QTimer,
+    QtMsgType,
+    qInstallMessageHandler,
+)
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from wavecomb.errors import WavecombError
-from wavecomb.gui import collector, theme
+from wavecomb.gui import theme
 from wavecomb.gui.messages import install_hooks
 from wavecomb.gui.setup import Setup
 
@@ -54,7 +62,6 @@ def make_application() -> QApplication:
     application.setApplicationName("Wavecomb")
     application.setOrganizationName("Wavecomb")
     application.setDesktopFileName("wavecomb")
-    collector.install(application)
     return application
 
 
@@ -75,8 +82,10 @@ def run(
     window = MainWindow(setup)
     theme.apply(str(window.settings.value("theme", theme.SYSTEM)))
     remove = install_hooks(window.message.show_error)
-    signal.signal(signal.SIGINT, lambda *_: window.close())
-    signal.signal(signal.SIGTERM, lambda *_: window.close())
+    before = [
+        (one, signal.signal(one, lambda *_: window.close()))
+        for one in (signal.SIGINT, signal.SIGTERM)
+    ]
     # Python looks at signals only while it runs.
     beat = QTimer(window)
     beat.start(200)
@@ -91,3 +100,15 @@ def run(
     finally:
         remove()
         listening.stop()
+        for one, handler in before:
+            signal.signal(one, handler)
+        destroy(window)
+
+
+def destroy(window: QWidget) -> None:
+    """Ends a window that is closed, now and here: not when Python's collector finds it.
+
+    What Python still has of its parts has nothing of Qt's behind it any more.
+    """
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

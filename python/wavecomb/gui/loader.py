@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads stages on a thread of its own, one after the other; only the newest counts."""
+"""What reading a stage for the window takes and gives. No Qt: it happens on another thread."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pxr import Sdf, Usd
 
-from wavecomb.run.faults import describe
 from wavecomb.run.isolate.probe import check, is_wanted
 from wavecomb.usd import LoadedStage
 from wavecomb.usd.looks.texture import TextureStock
@@ -38,7 +36,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Request:
-    """Work for the loader.
+    """What the session wants to be read.
 
     Attributes:
         source: What to read.
@@ -64,59 +62,6 @@ def copied(layer: Sdf.Layer) -> Sdf.Layer:
     copy = Sdf.Layer.CreateAnonymous("overrides.usda")
     copy.TransferContent(layer)
     return copy
-
-
-class Loader:
-    """The thread.
-
-    Args:
-        done: Called on it with the request, the stage that is open and what was read.
-        failed: Called on it with the request and one line.
-    """
-
-    def __init__(
-        self,
-        done: Callable[[Request, Usd.Stage, LoadedStage], None],
-        failed: Callable[[Request, str], None],
-    ) -> None:
-        self._done = done
-        self._failed = failed
-        self._condition = threading.Condition()
-        self._request: Request | None = None
-        self._closing = False
-        self._thread = threading.Thread(target=self._run, name="wavecomb-load", daemon=True)
-        self._thread.start()
-
-    def want(self, request: Request) -> None:
-        """Reads this next, in place of what waits."""
-        with self._condition:
-            self._request = request
-            self._condition.notify_all()
-
-    def close(self, seconds: float = 0.5) -> None:
-        """Ends the thread after the stage that it is at; does not wait longer than this."""
-        with self._condition:
-            self._request, self._closing = None, True
-            self._condition.notify_all()
-        self._thread.join(seconds)
-
-    def _run(self) -> None:
-        while True:
-            with self._condition:
-                while self._request is None and not self._closing:
-                    self._condition.wait()
-                if self._closing:
-                    return
-                request, self._request = self._request, None
-            assert request is not None
-            try:
-                usd, loaded = read(request)
-            except Exception as error:
-                if not self._closing:
-                    self._failed(request, describe(error))
-            else:
-                if not self._closing:
-                    self._done(request, usd, loaded)
 
 
 def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:

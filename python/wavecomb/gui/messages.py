@@ -11,10 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QObject, QStandardPaths, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QStandardPaths, Qt, QTimer
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
 from wavecomb.gui import theme
+from wavecomb.gui.bridge import port
 from wavecomb.gui.widgets import named
 
 WARNING_MS = 12000
@@ -79,9 +80,21 @@ class MessageBar(QFrame):
 
 
 class _Reporter(QObject):
-    """Brings what was caught on any thread to the UI thread."""
+    """Tells on the window's thread what was caught on any."""
 
-    caught = Signal(str)
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        super().__init__()
+        self._tell: Callable[[str], None] | None = tell
+        self.caught = port(self._take)
+
+    def _take(self, line: str) -> None:
+        if self._tell is not None:
+            self._tell(line)
+
+    def end(self) -> None:
+        """Nothing is told any more."""
+        self._tell = None
+        self.deleteLater()
 
 
 def log_folder() -> Path:
@@ -96,15 +109,15 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
     Returns:
         What takes the hooks away again.
     """
-    reporter = _Reporter()
-    reporter.caught.connect(tell, Qt.ConnectionType.QueuedConnection)
+    reporter = _Reporter(tell)
+    caught = reporter.caught  # the hooks hold no object of Qt's
     before, before_threads = sys.excepthook, threading.excepthook
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if issubclass(kind, KeyboardInterrupt):
             before(kind, error, trace)
             return
-        reporter.caught.emit(fault_line(error, write_report(kind, error, trace)))
+        caught.send(fault_line(error, write_report(kind, error, trace)))
 
     def thread_hook(details: threading.ExceptHookArgs) -> None:
         if details.exc_value is not None:
@@ -114,7 +127,7 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
 
     def remove() -> None:
         sys.excepthook, threading.excepthook = before, before_threads
-        reporter.deleteLater()
+        reporter.end()
 
     return remove
 

@@ -12,14 +12,6 @@ pytest.importorskip("PySide6.QtWidgets", reason="the window needs the extra gui"
 pytest.importorskip("pytestqt", reason="tests of the window need pytest-qt")
 
 
-@pytest.fixture(scope="session", autouse=True)
-def collector(qapp):
-    """Garbage of windows is collected on their thread, as in the application."""
-    from wavecomb.gui import collector
-
-    collector.install(qapp)
-
-
 @pytest.fixture(scope="session")
 def cornell(tmp_path_factory):
     """The Cornell box as a file."""

@@ -7,6 +7,7 @@ import pytest
 from wavecomb.errors import WavecombError
 from wavecomb.gui.viewport import display, ocio
 from wavecomb.gui.viewport.display import Look
+from wavecomb.gui.viewport.qimages import to_qimage
 from wavecomb.picture import image
 
 
@@ -107,7 +108,7 @@ def test_ids_have_colours_of_their_own():
 
 def test_image_has_the_codes(light):
     codes = image.display(light[1:])
-    shown = display.to_qimage(codes)
+    shown = to_qimage(codes)
     assert (shown.width(), shown.height()) == (32, 23)
     for x, y in ((0, 0), (31, 22), (5, 9)):
         assert shown.pixelColor(x, y).getRgb()[:3] == tuple(int(c) for c in codes[y, x])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -30,8 +31,8 @@ from wavecomb.gui.bench.recent_folders import recent_folders, remember_folder
 from wavecomb.gui.bench.tables import RunsTable
 from wavecomb.gui.bench.two import TwoFolders
 from wavecomb.gui.command import Command
-from wavecomb.gui.newest_work import Latest
 from wavecomb.gui.widgets import set_text_colour
+from wavecomb.gui.worker import Worker
 
 _FACTS = (
     Column("fact", "text", "", "What."),
@@ -57,7 +58,7 @@ class BenchBrowser(QWidget):
         self.setObjectName("benchBrowser")
         self.setAcceptDrops(True)
         self.folder: BenchFolder | None = None
-        self._reader = Latest("folder", self)
+        self._reader = Worker("folder", self)
         self._reader.done.connect(lambda key, folder: self._show(folder))
         self._reader.failed.connect(lambda key, line: self._fail(line))
         self._report = Command(self)
@@ -149,7 +150,7 @@ class BenchBrowser(QWidget):
     def open(self, path: Path) -> None:
         """Reads a folder; what is shown stays until then."""
         self._error.hide()
-        self._reader.want(path, lambda: read_folder(path))
+        self._reader.submit(partial(read_folder, path), path)
 
     def reload(self) -> None:
         """Reads the folder again."""

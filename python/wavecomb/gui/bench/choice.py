@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, Signal
@@ -22,7 +23,7 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import theme
 from wavecomb.gui.bench.suites import Choice, SuiteInfo, suite_info, suite_infos
-from wavecomb.gui.newest_work import Latest
+from wavecomb.gui.worker import Worker
 from wavecomb.run.progress import time_text
 
 
@@ -42,7 +43,7 @@ class SuiteChoice(QWidget):
         self.setObjectName("suiteChoice")
         self._infos: dict[str, SuiteInfo] = {}
         self._wanted: str | None = None
-        self._reader = Latest("suites", self)
+        self._reader = Worker("suites", self)
         self._reader.done.connect(self._take)
         self._reader.failed.connect(lambda key, line: self.failed.emit(line))
         self.suite = QComboBox(self)
@@ -81,7 +82,7 @@ class SuiteChoice(QWidget):
         form.addRow("More stages", self._row(self.more, self._tool("askMore", self._ask_more)))
         form.addRow("Repetitions", self.repetitions)
         form.addRow("Results", self._row(self.folder, self._tool("askFolder", self._ask_folder)))
-        self._reader.want("all", suite_infos)
+        self._reader.submit(suite_infos, "all")
 
     def _line(self, name: str, accessible: str, tip: str) -> QLineEdit:
         line = QLineEdit(self)
@@ -161,7 +162,7 @@ class SuiteChoice(QWidget):
             self.suite.setCurrentIndex(self.suite.findData(suite))
         elif suite.endswith(".toml"):
             self._wanted = suite
-            self._reader.want(suite, lambda: [suite_info(suite)])
+            self._reader.submit(partial(_one_suite, suite), suite)
         else:
             self._wanted = suite
 
@@ -233,3 +234,7 @@ class SuiteChoice(QWidget):
 
     def _ask_more(self) -> None:
         self._ask(QFileDialog.FileMode.Directory, "Folder of further stages", self.more.setText)
+
+
+def _one_suite(suite: str) -> list[SuiteInfo]:
+    return [suite_info(suite)]

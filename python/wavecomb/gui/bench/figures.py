@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSize, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QImage, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtSvg import QSvgRenderer
@@ -13,7 +16,9 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSplitter, QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.bench.folder import Figure
-from wavecomb.gui.newest_work import Latest
+from wavecomb.gui.viewport.qimages import to_qimage
+from wavecomb.gui.worker import Worker
+from wavecomb.picture.image import display, read_image
 
 
 class FigureView(QWidget):
@@ -28,27 +33,27 @@ class FigureView(QWidget):
         self._svg: QSvgRenderer | None = None
         self._path: Path | None = None
         self._words = ""
-        self._reader = Latest("figure", self)
+        self._reader = Worker("figure", self)
         self._reader.done.connect(lambda key, image: self._take(image))
         self._reader.failed.connect(lambda key, line: self.show_words(line))
 
     def show_file(self, path: Path) -> None:
         """Reads it off the UI thread; what is there stays until then."""
         self._path = path
-        self._reader.want(path, lambda: _read(path))
+        self._reader.submit(partial(_read, path), path)
 
     def show_words(self, words: str) -> None:
         """In place of a figure."""
-        self._reader.forget()
+        self._reader.cancel()
         self.image = self._svg = None
         self._words = words
         self.update()
 
-    def _take(self, found: QImage | bytes) -> None:
+    def _take(self, found: NDArray[np.uint8] | bytes) -> None:
         self.image = self._svg = None
         self._words = ""
-        if isinstance(found, QImage):
-            self.image = found
+        if not isinstance(found, bytes):
+            self.image = to_qimage(found)
         else:
             self._svg = QSvgRenderer(found, self)
             if not self._svg.isValid():
@@ -110,13 +115,16 @@ class FigureView(QWidget):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._path)))
 
 
-def _read(path: Path) -> QImage | bytes:
+def _read(path: Path) -> NDArray[np.uint8] | bytes:
+    """A drawing as its file is; a picture as codes on white, (height, width, 3)."""
     if path.suffix.lower() == ".svg":
         return path.read_bytes()
-    image = QImage(str(path))
-    if image.isNull():
-        raise OSError(f"{path}: cannot be read as a picture")
-    return image
+    pixels = read_image(path)
+    colours = pixels[:, :, :3] if pixels.shape[2] >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
+    if pixels.shape[2] in (2, 4):
+        alpha = pixels[:, :, -1:]
+        colours = alpha * colours + (1.0 - alpha)
+    return display(colours)
 
 
 class Figures(QSplitter):

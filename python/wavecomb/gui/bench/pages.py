@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui.bench.page import page_html
-from wavecomb.gui.newest_work import Latest
+from wavecomb.gui.worker import Worker
 
 
 class _Browser(QTextBrowser):
@@ -60,7 +61,7 @@ class Pages(QWidget):
         self.text.setAccessibleName("Text of the page")
         self.text.setOpenLinks(False)
         self.text.anchorClicked.connect(self._follow)
-        self._reader = Latest("page", self)
+        self._reader = Worker("page", self)
         self._reader.done.connect(self._show)
         self._reader.failed.connect(lambda key, line: self.text.setPlainText(line))
         self._paths: Sequence[Path] = ()
@@ -90,7 +91,7 @@ class Pages(QWidget):
     def _load(self, number: int) -> None:
         if 0 <= number < len(self._paths):
             path = self._paths[number]
-            self._reader.want(path, lambda: _text(path))
+            self._reader.submit(partial(_text, path), path)
 
     def _show(self, path: Path, text: tuple[str, str]) -> None:
         kind, content = text

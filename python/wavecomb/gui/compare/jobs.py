@@ -4,18 +4,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QImage
 
 from wavecomb.gui.compare.differences import Numbers, numbers
 from wavecomb.gui.compare.flip_process import FlipProcess
 from wavecomb.gui.compare.picture_sides import Side, pair, problem
-from wavecomb.gui.newest_work import Latest
-from wavecomb.gui.viewport.display import Legend, Look, show, to_qimage
+from wavecomb.gui.viewport.display import Legend, Look, Shown, show
+from wavecomb.gui.viewport.qimages import to_qimage
+from wavecomb.gui.worker import Worker
 from wavecomb.picture import image
 from wavecomb.picture.heatmap import Kind, Scale, scale_of, z_scale
 
@@ -54,7 +55,7 @@ class Ask:
 
 
 class Jobs(QObject):
-    """Three threads at most: pictures, figures and map, FLIP. Of each, only the newest counts.
+    """Four workers: pictures, figures, FLIP, the map. Of each, only the newest counts.
 
     Signals:
         images(A, B): QImage or None.
@@ -70,21 +71,21 @@ class Jobs(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._pictures = Latest("images", self)
-        self._figures = Latest("figures", self)
-        self._looks = Latest("flip", self)
-        self._map = Latest("map", self)
+        self._pictures = Worker("images", self)
+        self._figures = Worker("figures", self)
+        self._looks = Worker("flip", self)
+        self._map = Worker("map", self)
         self._process = FlipProcess()
         self._ask: Ask | None = None
         self._shown: dict[str, object] = {}
         self._numbers: Numbers | None = None
         self._flip: dict[object, NDArray[np.float32] | str] = {}
-        self._pictures.done.connect(lambda key, pictures: self.images.emit(*pictures))
+        self._pictures.done.connect(self._take_images)
         self._figures.done.connect(self._take_numbers)
         self._looks.done.connect(self._take_flip)
         self._map.done.connect(self._take_map)
-        for latest in (self._pictures, self._figures, self._map):
-            latest.failed.connect(lambda key, line: self.failed.emit(line))
+        for worker in (self._pictures, self._figures, self._map):
+            worker.failed.connect(self._tell_failed)
 
     @property
     def busy(self) -> bool:
@@ -96,10 +97,10 @@ class Jobs(QObject):
         self._ask = ask
         if self._shown.get("pictures") != ask.pictures():
             self._shown["pictures"] = ask.pictures()
-            self._pictures.want(ask.pictures(), lambda: _images(ask))
+            self._pictures.submit(partial(_images, ask), ask.pictures())
         if ask.problem:
-            for latest in (self._figures, self._looks, self._map):
-                latest.forget()
+            for worker in (self._figures, self._looks, self._map):
+                worker.cancel()
             self._shown.pop("figures", None)
             self._shown.pop("map", None)
             self._numbers = None
@@ -108,14 +109,14 @@ class Jobs(QObject):
             return
         if self._shown.get("figures") != ask.figures():
             self._shown["figures"] = ask.figures()
-            self._figures.want(ask.figures(), lambda: (ask, _numbers(ask)))
+            self._figures.submit(partial(_figures, ask), ask.figures())
         self._want_map()
 
     def close(self) -> None:
         """Ends what runs."""
-        for latest in (self._pictures, self._figures, self._looks, self._map):
-            latest.close()
         self._process.stop()
+        for worker in (self._pictures, self._figures, self._looks, self._map):
+            worker.close()
         self._ask = self._numbers = None
         self._flip.clear()
 
@@ -139,13 +140,7 @@ class Jobs(QObject):
         key = (*ask.figures(), *(["high"] if high_range else []))
         if key in self._flip or ask.problem:
             return
-        self._looks.want(key, lambda: (ask, self._compute_flip(ask, high_range)))
-
-    def _compute_flip(self, ask: Ask, high_range: bool) -> NDArray[np.float32] | str:
-        try:
-            return self._process.flip(*_pair(ask), high_range, ask.look.exposure)
-        except Exception as error:
-            return str(error)
+        self._looks.submit(partial(_flip, self._process, ask, high_range), key)
 
     def _take_flip(self, key: object, result: tuple[Ask, NDArray[np.float32] | str]) -> None:
         ask, found = result
@@ -187,11 +182,19 @@ class Jobs(QObject):
                 self.map.emit(None, f"z-test: {self._numbers.test_note}")
             return
         self._shown["map"] = key
-        self._map.want(key, lambda: _map(ask, values, test))
+        self._map.submit(partial(_map, ask, values, test), key)
 
-    def _take_map(self, key: object, result: tuple[QImage, Scale]) -> None:
+    def _take_map(self, key: object, result: tuple[NDArray[np.uint8], Scale]) -> None:
         if self._ask is not None and not self._ask.problem:
-            self.map.emit(*result)
+            pixels, scale = result
+            self.map.emit(to_qimage(pixels), scale)
+
+    def _take_images(self, key: object, pictures: tuple[Shown | None, Shown | None]) -> None:
+        a, b = (to_qimage(one.pixels) if one is not None else None for one in pictures)
+        self.images.emit(a, b)
+
+    def _tell_failed(self, key: object, line: str) -> None:
+        self.failed.emit(line)
 
 
 def _pair(ask: Ask) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -199,21 +202,32 @@ def _pair(ask: Ask) -> tuple[NDArray[Any], NDArray[Any]]:
     return pair(ask.a, ask.b, ask.look.layer)
 
 
-def _numbers(ask: Ask) -> Numbers:
+def _figures(ask: Ask) -> tuple[Ask, Numbers]:
     assert ask.a is not None and ask.b is not None
-    return numbers(ask.a, ask.b, ask.look.layer, ask.look.exposure)
+    return ask, numbers(ask.a, ask.b, ask.look.layer, ask.look.exposure)
 
 
-def _map(ask: Ask, values: NDArray[np.float32] | None, test: Any) -> tuple[QImage, Scale]:
+def _flip(
+    process: FlipProcess, ask: Ask, high_range: bool
+) -> tuple[Ask, NDArray[np.float32] | str]:
+    try:
+        return ask, process.flip(*_pair(ask), high_range, ask.look.exposure)
+    except Exception as error:
+        return ask, str(error)
+
+
+def _map(
+    ask: Ask, values: NDArray[np.float32] | None, test: Any
+) -> tuple[NDArray[np.uint8], Scale]:
     if ask.kind == "z":
         scale = z_scale(test)
     else:
         kind: Kind = ask.kind  # type: ignore[assignment]
         scale = scale_of(*_pair(ask), kind, exposure=ask.look.exposure, flip_values=values)
-    return to_qimage(image.display(scale.pixels())), scale
+    return image.display(scale.pixels()), scale
 
 
-def _images(ask: Ask) -> tuple[QImage | None, QImage | None]:
+def _images(ask: Ask) -> tuple[Shown | None, Shown | None]:
     """Both as they are shown; false colours have one scale for both."""
     layers = [
         _drawable(side.layer(ask.look.layer)) if side is not None else None
@@ -229,7 +243,7 @@ def _images(ask: Ask) -> tuple[QImage | None, QImage | None]:
             high=max(legend.high for legend in legends),
         )
         shown = [show(layer, look) if layer is not None else None for layer in layers]
-    first, second = (s.image() if s is not None else None for s in shown)
+    first, second = shown
     return first, second
 
 

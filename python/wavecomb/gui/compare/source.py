@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 
 from wavecomb.gui.compare.picture_sides import Side, read_side, side_of_frame
-from wavecomb.gui.newest_work import Latest
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.worker import Worker
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.live import Live
@@ -45,7 +46,7 @@ class SideSource(QObject):
         self.side: Side | None = None
         self.live: Live | None = None
         self._session = session
-        self._reader = Latest(f"read-{name}", self)
+        self._reader = Worker(f"read-{name}", self)
         self._reader.done.connect(lambda key, side: self.set_side(side))
         self._reader.failed.connect(lambda key, line: self.failed.emit(line))
         session.frame.connect(self._on_viewport)
@@ -57,7 +58,7 @@ class SideSource(QObject):
 
     def open(self, path: Path) -> None:
         """Reads a picture file; what is there stays until then."""
-        self._reader.want(path, lambda: read_side(path))
+        self._reader.submit(partial(read_side, path), path)
 
     def set_side(self, side: Side, kind: str = FILE) -> None:
         """Takes a picture that is there."""
@@ -125,7 +126,7 @@ class SideSource(QObject):
     # ---- inside --------------------------------------------------------------------------------
 
     def _release(self) -> None:
-        self._reader.forget()
+        self._reader.cancel()
         live, self.live = self.live, None
         if live is not None:
             live.frame.disconnect(self._on_live)

@@ -66,6 +66,10 @@ class SchedulingPanel(QScrollArea):
         self.rounds.ended.connect(self._end_rounds)
         self._show(session.setup)
 
+    def shutdown(self) -> None:
+        """Ends the thread of the light."""
+        self.light.shutdown()
+
     # ---- what it is made of ---------------------------------------------------------------------
 
     def _presets_row(self) -> QHBoxLayout:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Float layers to what a screen shows: exposure, tone mapping, false colours with a legend."""
+"""Float layers to what a screen shows: exposure, tone mapping, false colours. No Qt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtGui import QImage
 
 from wavecomb.gui.viewport import ocio
 from wavecomb.picture import image
@@ -93,10 +92,6 @@ class Shown:
 
     pixels: NDArray[np.uint8]
     legend: Legend | None = None
-
-    def image(self) -> QImage:
-        """With the data copied."""
-        return to_qimage(self.pixels)
 
 
 def views() -> list[str]:
@@ -231,11 +226,3 @@ def _stretched(array: NDArray[Any]) -> NDArray[np.float32]:
 def _codes(values: NDArray[Any]) -> NDArray[np.uint8]:
     clean = np.clip(np.nan_to_num(values), 0.0, 1.0)
     return np.floor(clean * 255.0 + 0.5).astype(np.uint8)
-
-
-def to_qimage(pixels: NDArray[np.uint8]) -> QImage:
-    """(height, width, 3) 8-bit codes as an image that owns its data."""
-    height, width = pixels.shape[:2]
-    data = np.ascontiguousarray(pixels)
-    borrowed = QImage(data.data, width, height, 3 * width, QImage.Format.Format_RGB888)
-    return borrowed.convertToFormat(QImage.Format.Format_RGB32)

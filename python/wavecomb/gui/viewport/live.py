@@ -4,18 +4,21 @@
 from __future__ import annotations
 
 import itertools
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
+from wavecomb.gui.bridge import port
 from wavecomb.gui.setup import Setup
-from wavecomb.gui.viewport.denoiser import Denoiser
+from wavecomb.gui.viewport.denoiser import denoised_frame
 from wavecomb.gui.viewport.engine import Edit, Engine, Task
 from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.news import News
+from wavecomb.gui.worker import Worker
 from wavecomb.run.faults import describe
 
 if TYPE_CHECKING:
@@ -59,7 +62,6 @@ class Live(QObject):
     state_changed = Signal(str)
     failed = Signal(str)
     warned = Signal(str)
-    _wake = Signal()
 
     def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -70,19 +72,20 @@ class Live(QObject):
         self.state = IDLE
         self.renderer: Renderer | None = None
         self._numbers = itertools.count(1)
-        self._post: dict[str, Callable[[], None]] = {}
-        self._lock = threading.Lock()
         self._pending = Edit()
         self._moving = False
         self._awaiting = False
         self._submitted = 0.0
-        self._wake.connect(self._receive, Qt.ConnectionType.QueuedConnection)
         self._settle = QTimer(self)
         self._settle.setSingleShot(True)
         self._settle.setInterval(SETTLE_MS)
         self._settle.timeout.connect(self.settle)
-        self._engine = Engine(self)
-        self._denoiser = Denoiser(self._on_denoised, self.on_warned)
+        # What the render thread has of this side is the news, which are no object of Qt's.
+        self._news = News(port(self._receive))
+        self._engine = Engine(self._news)
+        self._denoiser = Worker("denoise", self)
+        self._denoiser.done.connect(self._take_denoised)
+        self._denoiser.failed.connect(self._warn)
 
     # ---- what widgets call ---------------------------------------------------------------------
 
@@ -173,7 +176,7 @@ class Live(QObject):
         self._settle.stop()
         self._engine.close()
         self._denoiser.close()
-        self._post.clear()
+        self._news.take()
         self.renderer = None
         self._set_state(IDLE)
 
@@ -200,47 +203,27 @@ class Live(QObject):
             self.state = state
             self.state_changed.emit(state)
 
-    def _receive(self) -> None:
-        """On the UI thread: the newest of each kind of news."""
-        with self._lock:
-            post, self._post = self._post, {}
-        for news in post.values():
-            news()
+    def _receive(self, letter: None) -> None:
+        """The newest of each kind of news."""
+        takes: dict[str, Callable[[Any], None]] = {
+            "frame": self._take,
+            "statistics": self._take_statistics,
+            "failed": self._fail,
+            "ready": self._take_renderer,
+        }
+        for kind, news in self._news.take():
+            takes[kind](news)
 
-    def _send(self, kind: str, news: Callable[[], None]) -> None:
-        with self._lock:
-            first = not self._post
-            self._post.pop(kind, None)
-            self._post[kind] = news
-        if first:
-            self._wake.emit()
+    def _take_renderer(self, renderer: Renderer) -> None:
+        self.renderer = renderer
 
-    # ---- Listener, on the render thread --------------------------------------------------------
+    def _take_statistics(self, news: tuple[dict[str, Any], int]) -> None:
+        statistics, version = news
+        if version == self.version:  # those of an older one would be taken for the newer one's
+            self.statistics.emit(statistics)
 
-    def on_frame(self, frame: Frame) -> None:
-        """A picture."""
-        self._send("frame", lambda: self._take(frame))
-
-    def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Figures; those of an older version would be taken for the newer one's."""
-
-        def take() -> None:
-            if version == self.version:
-                self.statistics.emit(statistics)
-
-        self._send("statistics", take)
-
-    def on_failed(self, message: str) -> None:
-        """An error."""
-        self._send(f"failed {message}", lambda: self._fail(message))
-
-    def on_warned(self, message: str) -> None:
-        """A warning."""
-        self._send(f"warned {message}", lambda: self.warned.emit(message))
-
-    def on_ready(self, renderer: Renderer) -> None:
-        """The renderer of a new scene."""
-        self._send("ready", lambda: setattr(self, "renderer", renderer))
+    def _warn(self, key: object, line: str) -> None:
+        self.warned.emit(line)
 
     def _fail(self, message: str) -> None:
         self._awaiting = False
@@ -258,7 +241,7 @@ class Live(QObject):
         if frame.final and self.state == RENDERING:
             self._set_state(FINISHED)
         if self.setup.denoise and not self._moving:
-            self._denoiser.want(frame)
+            self._denoiser.submit(partial(denoised_frame, frame))
         if self._moving and self._pending:
             self._flush()
 
@@ -266,10 +249,10 @@ class Live(QObject):
         self.last_frame = frame
         self.frame.emit(frame)
 
-    def _on_denoised(self, frame: Frame, denoised: Any) -> None:
-        self._send("denoised", lambda: self._take_denoised(frame, denoised))
-
-    def _take_denoised(self, frame: Frame, denoised: Any) -> None:
+    def _take_denoised(self, key: object, result: tuple[Frame, Any]) -> None:
+        frame, denoised = result
+        if denoised is None:
+            return
         last = self.last_frame
         if last is None or (last.version, last.scale) != (frame.version, frame.scale):
             return

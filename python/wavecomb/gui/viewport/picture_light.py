@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
-import shiboken6
-from PySide6.QtCore import QPointF, QSize, Qt, QThreadPool
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
@@ -21,6 +22,7 @@ from wavecomb.gui.compare.same_picture import (
 )
 from wavecomb.gui.scheduling.choices import scheduling_of
 from wavecomb.gui.viewport.session import Frame, Session
+from wavecomb.gui.worker import Errands
 
 WAITING = "Waits until each pixel has the samples asked for"
 
@@ -36,6 +38,7 @@ class PictureLight(QWidget):
         super().__init__(parent)
         self._session = session
         self._revision = PictureRevision(session, self)
+        self._marks = Errands("fingerprint", self)
         self.book = PictureBook()
         self.verdict = Verdict("none", "No picture yet")
         self._last: Any = None
@@ -85,20 +88,19 @@ class PictureLight(QWidget):
         self._last = mine
         settings = scheduling_of(frame.setup)
 
-        def work() -> None:
-            mark = fingerprint(beauty) + fingerprint(samples)
-            self._session.later(lambda: self._tell(key, place, mark, settings, frame.version))
-
+        tell = partial(self._tell, key, place, settings, frame.version)
         if key is None:
-            self._tell(key, place, "", settings, frame.version)
+            tell("")
         else:
-            QThreadPool.globalInstance().start(work)
+            self._marks.submit(partial(_mark, beauty, samples), tell, self._session.failed.emit)
+
+    def shutdown(self) -> None:
+        """Ends the thread."""
+        self._marks.close()
 
     def _tell(
-        self, key: Any, place: Any, mark: str, settings: dict[str, Any], version: int
+        self, key: Any, place: Any, settings: dict[str, Any], version: int, mark: str
     ) -> None:
-        if not shiboken6.isValid(self):
-            return
         verdict = self.book.add(key, place, mark, settings)
         # More samples that nobody had before take back nothing of what fewer have shown.
         weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
@@ -119,6 +121,10 @@ class PictureLight(QWidget):
         more = f" ({self.book.checked} checked)" if kind == "same" else ""
         self._text.setText(self.verdict.text + more)
         self.setAccessibleDescription(self._text.text())
+
+
+def _mark(beauty: NDArray[Any], samples: NDArray[Any]) -> str:
+    return fingerprint(beauty) + fingerprint(samples)
 
 
 class _Dot(QWidget):

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.api import Picture
 from wavecomb.errors import WavecombError
-from wavecomb.gui.scheduling.own_policies import develop_frame
 from wavecomb.gui.viewport.denoiser import denoised_frame
+from wavecomb.gui.viewport.develop import develop_frame
 from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.picture.image import Transfer, write_png_codes
@@ -73,7 +73,7 @@ def save_frame(
         raise WavecombError("there is only a preview yet: save again when the picture is there")
     if frame.setup.denoise:
         # What is shown may be of an earlier pass.
-        frame = replace(frame, denoised=denoised_frame(frame))
+        frame = replace(frame, denoised=denoised_frame(frame)[1])
     picture = picture_of_frame(frame, scene, loaded)
     as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)
     if not path.lower().endswith(".png"):
@@ -83,4 +83,4 @@ def save_frame(
         transfer: Transfer = "clamp" if look.view == LINEAR else "neutral"
         shown.save(path, exposure=look.exposure, tone_map=transfer)
     else:
-        write_png_codes(path, develop_frame(frame, look).pixels)
+        write_png_codes(path, develop_frame(frame, look).shown.pixels)

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stage that is open and its live render: what all panels of the window share.
 
-Contract: lives on the UI thread; no method waits. Reading, rendering, denoising and saving happen
-on other threads, and what they have to say arrives as signals.
+Contract: lives on the window's thread; no method waits. Reading, rendering, denoising and saving
+happen on other threads, and what they have to say arrives as signals.
 """
 
 from __future__ import annotations
 
-import contextlib
+import itertools
 import os
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 
-from wavecomb.gui.loader import Loader, Request, Source, copied
+from wavecomb.gui.loader import Request, Source, copied, read
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.display import Look
 from wavecomb.gui.viewport.engine import Edit
@@ -27,7 +27,7 @@ from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import Live
 from wavecomb.gui.viewport.orbit import Pose, pose_of_scene
 from wavecomb.gui.viewport.saving import save_frame
-from wavecomb.run.faults import describe
+from wavecomb.gui.worker import Errands, Worker
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -84,7 +84,6 @@ class Session(QObject):
     selected = Signal(object)
     saved = Signal(str)
     noted = Signal(object)
-    _call = Signal(object)
 
     def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -100,10 +99,14 @@ class Session(QObject):
             getattr(self._live, name).connect(getattr(self, name))
         self._live.failed.connect(self.failed)
         self._live.warned.connect(self.warned)
-        self._call.connect(lambda call: call(), Qt.ConnectionType.QueuedConnection)
-        self._loader = Loader(self._on_read, self._on_read_failed)
+        self._loader = Worker("load", self)
+        self._loader.done.connect(self._take)
+        self._loader.failed.connect(self._take_failure)
+        self._errands = Errands("work", self)
         self._request: Request | None = None
         self._request_wanted: Request | None = None
+        self._numbers = itertools.count(1)
+        self._reading = 0
         self._jobs: list[tuple[str, str]] = []
         self._twins: list[Live] = []
         self._closed = False
@@ -199,18 +202,13 @@ class Session(QObject):
         if request.usd is not None and self.stage is not None:
             request = replace(request, textures=self.stage.textures)
         request = replace(request, size=(self.setup.width, self.setup.height))
-        self._request_wanted = request
+        self._request_wanted, self._reading = request, next(self._numbers)
         self._work("load", what)
-        self._loader.want(request)
+        self._loader.submit(partial(read, request), self._reading)
 
-    def _on_read(self, request: Request, usd: Usd.Stage, loaded: LoadedStage) -> None:
-        self._call.emit(lambda: self._take(request, usd, loaded))
-
-    def _on_read_failed(self, request: Request, message: str) -> None:
-        self._call.emit(lambda: self._take_failure(request, message))
-
-    def _take(self, request: Request, usd: Usd.Stage, loaded: LoadedStage) -> None:
-        if self._closed or request is not self._request_wanted:
+    def _take(self, number: int, found: tuple[Usd.Stage, LoadedStage]) -> None:
+        request, (usd, loaded) = self._request_wanted, found
+        if self._closed or request is None or number != self._reading:
             return  # a newer one is under way
         from pxr import UsdGeom
 
@@ -240,8 +238,9 @@ class Session(QObject):
         for line in loaded.scene.warnings:
             self.warned.emit(line)
 
-    def _take_failure(self, request: Request, message: str) -> None:
-        if self._closed or request is not self._request_wanted:
+    def _take_failure(self, number: int, message: str) -> None:
+        request = self._request_wanted
+        if self._closed or request is None or number != self._reading:
             return
         self._done("load")
         if request.fresh and request.usd is not None:
@@ -398,11 +397,8 @@ class Session(QObject):
             return
         scene, stage, name = self.scene, self.stage, os.fspath(path)
 
-        def work() -> None:
-            save_frame(frame, name, scene, stage, look or Look(), options)
-            self._call.emit(lambda: self.saved.emit(name))
-
-        self.run(f"writing {Path(name).name}", work)
+        work = partial(save_frame, frame, name, scene, stage, look or Look(), options)
+        self.run(f"writing {Path(name).name}", work, lambda: self.saved.emit(name))
 
     def twin(self, setup: Setup) -> Live:
         """A second live render of the same scene and camera, with settings of its own.
@@ -426,31 +422,29 @@ class Session(QObject):
 
     # ---- other threads ---------------------------------------------------------------------------
 
-    def run(self, what: str, work: Callable[[], None]) -> None:
-        """Does something on a thread; an exception ends in ``failed``.
+    def run(
+        self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
+    ) -> None:
+        """Does something on another thread, after what was asked before; errors end in ``failed``.
 
         Args:
             what: For ``busy``: "writing a.exr".
-            work: Must touch no widget; use ``later`` for what follows.
+            work: Plain, without objects of Qt's.
+            then: Called on the window's thread when it went well.
         """
-        key = f"{what} {id(work)}"
-
-        def body() -> None:
-            try:
-                work()
-            except Exception as error:
-                message = describe(error)
-                self.later(lambda: self.failed.emit(message))
-            self.later(lambda: self._done(key))
-
+        key = f"{what} {next(self._numbers)}"
         self._work(key, what)
-        threading.Thread(target=body, name="wavecomb-work", daemon=True).start()
 
-    def later(self, call: Callable[[], None]) -> None:
-        """Runs something on the UI thread soon; to be called from any thread."""
-        # Where the window is gone there is nobody to be told.
-        with contextlib.suppress(RuntimeError):
-            self._call.emit(call)
+        def done(result: object) -> None:
+            if then is not None:
+                then()
+            self._done(key)
+
+        def failed(line: str) -> None:
+            self.failed.emit(line)
+            self._done(key)
+
+        self._errands.submit(work, done, failed)
 
     def _work(self, key: str, what: str) -> None:
         self._jobs = [job for job in self._jobs if job[0] != key] + [(key, what)]
@@ -468,7 +462,8 @@ class Session(QObject):
         for live in (*self._twins, self._live):
             live.shutdown()
         self._twins.clear()
-        self._loader.close()
+        self._loader.close(0.5)
+        self._errands.close()
         self.stage = self.usd = None
 
 

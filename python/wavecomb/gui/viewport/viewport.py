@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from enum import Enum, auto
+from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
-    QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
@@ -19,13 +19,15 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.scheduling.own_policies import Developer
 from wavecomb.gui.viewport import navigate
-from wavecomb.gui.viewport.display import Look, Shown
+from wavecomb.gui.viewport.develop import Developed, develop_frame
+from wavecomb.gui.viewport.display import Look
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.orbit import Pose, Vector
 from wavecomb.gui.viewport.picture_view import PictureView
+from wavecomb.gui.viewport.qimages import to_qimage
 from wavecomb.gui.viewport.session import Session
+from wavecomb.gui.worker import Worker
 from wavecomb.usd.cameras.framing import corners
 
 ORBIT_RADIANS = 0.008
@@ -116,9 +118,9 @@ class Viewport(PictureView):
         self._region_mode = False
         self._region_from: QPointF | None = None
         self._message = EMPTY
-        self._developer = Developer(self)
-        self._developer.ready.connect(self._developed)
-        self._developer.failed.connect(self.failed)
+        self._developer = Worker("develop", self)
+        self._developer.done.connect(self._developed)
+        self._developer.failed.connect(self._tell_failed)
         session.frame.connect(self._take)
         session.opened.connect(lambda stage: self._forget_pivot())
         theme.on_change(self.update)
@@ -131,7 +133,7 @@ class Viewport(PictureView):
         """Chooses layer, exposure, view."""
         self.look = look
         if self._frame is not None:
-            self._developer.want(self._frame, look)
+            self._take(self._frame)
 
     def set_message(self, message: str = EMPTY) -> None:
         """Shown where there is no picture."""
@@ -140,14 +142,19 @@ class Viewport(PictureView):
 
     def _take(self, frame: Frame) -> None:
         self._frame = frame
-        self._developer.want(frame, self.look)
+        self._developer.submit(partial(develop_frame, frame, self.look))
 
-    def _developed(self, frame: Frame, look: Look, shown: Shown, image: QImage) -> None:
+    def _developed(self, key: object, found: Developed) -> None:
+        frame, shown = found.frame, found.shown
         if frame.version < self.session.oldest:
             return
         self.frame_shown = frame
-        self.set_picture(image, QSize(frame.setup.width, frame.setup.height), shown.legend)
-        self.shown.emit(frame, look)
+        size = QSize(frame.setup.width, frame.setup.height)
+        self.set_picture(to_qimage(shown.pixels), size, shown.legend)
+        self.shown.emit(frame, found.look)
+
+    def _tell_failed(self, key: object, line: str) -> None:
+        self.failed.emit(line)
 
     # ---- the camera ----------------------------------------------------------------------------
 
