@@ -25,8 +25,8 @@ import numpy as np
 from sitting import RESULTS, ROOT, head, log, phase_times, ratio, row, show, write_result
 
 import wavecomb
+from wavecomb.options import settings
 from wavecomb.scenes import write_scene
-from wavecomb.scheduling import POLICIES
 
 SMALL_MB = 2.0
 LANES = (0, 1)
@@ -87,7 +87,7 @@ def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
     spread = 0.0
     render(stage, args, lanes=0, policy="program")  # fills caches and the allocator
     for turn in range(args.rounds):
-        cases = [(width, policy) for width in LANES for policy in POLICIES]
+        cases = [(width, policy) for width in LANES for policy in settings()["policy"].choices]
         for width, policy in shuffle.sample(cases, len(cases)):
             done = render(stage, args, lanes=width, policy=policy)
             if picture is None:
@@ -138,7 +138,7 @@ def report(found: dict[str, Any]) -> list[str]:
             "",
             *head("policy", "one lane: shade + order", "render", "widest: shade + order", "render"),
         ]
-        for policy in POLICIES:
+        for policy in settings()["policy"].choices:
             cells = [
                 show(figures[what][f"{width}/{policy}"], 2)
                 for width in reversed(LANES)

@@ -14,6 +14,7 @@ void bind_geometry(nanobind::module_& m);
 void bind_graphs(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
 void bind_watching(nanobind::module_& m);
+void bind_settings(nanobind::module_& m);
 void bind_render(nanobind::module_& m);
 void bind_renderer(nanobind::module_& m);
 

@@ -19,6 +19,7 @@ NB_MODULE(_core, m) {
   bind_graphs(m);
   bind_recording(m);
   bind_watching(m);
+  bind_settings(m);
   bind_render(m);
   bind_renderer(m);
 }

@@ -14,6 +14,7 @@
 
 #include "bind.h"
 #include "rendering.h"
+#include "settings.h"
 #include "statistics.h"
 #include "watching.h"
 #include "wavecomb/core/aov.h"
@@ -29,122 +30,6 @@ using namespace nb::literals;
 using namespace wavecomb;
 
 namespace {
-
-/// The names of an enum's values, for attributes that are strings in Python.
-template <typename Enum>
-struct Names {
-  const char* option;
-  std::vector<std::pair<const char*, Enum>> values;
-
-  const char* name(Enum e) const {
-    for (const auto& [text, value] : values)
-      if (value == e) return text;
-    return "";
-  }
-  Enum parse(const std::string& text) const {
-    std::string list;
-    for (const auto& [name, value] : values) {
-      if (text == name) return value;
-      list += (list.empty() ? "" : ", ") + std::string(name);
-    }
-    throw Error(std::string(option) + " is '" + text + "'; it must be one of " + list);
-  }
-};
-
-const Names<SamplerKind> kSamplers{
-    "sampler", {{"sobol", SamplerKind::kSobol}, {"independent", SamplerKind::kIndependent}}};
-const Names<FilterKind> kFilters{"filter",
-                                 {{"box", FilterKind::kBox},
-                                  {"gaussian", FilterKind::kGaussian},
-                                  {"blackman-harris", FilterKind::kBlackmanHarris}}};
-const Names<RouletteKind> kRoulettes{"roulette",
-                                     {{"off", RouletteKind::kOff},
-                                      {"throughput", RouletteKind::kThroughput},
-                                      {"cost-aware", RouletteKind::kCostAware}}};
-const std::vector<std::pair<const char*, RayOrder>> kOrders{
-    {"slot", RayOrder::kSlot},
-    {"morton", RayOrder::kMorton},
-    {"morton-octant", RayOrder::kMortonOctant},
-    {"direction", RayOrder::kDirection},
-    {"auto", RayOrder::kAuto}};
-const Names<RayOrder> kRayOrders{"ray_order", kOrders};
-const Names<RayOrder> kShadowOrders{"shadow_order", kOrders};
-const Names<CostSource> kCosts{"costs",
-                               {{"auto", CostSource::kAuto},
-                                {"measured", CostSource::kMeasured},
-                                {"model", CostSource::kModel}}};
-const Names<IntegratorKind> kIntegrators{
-    "integrator",
-    {{"wavefront", IntegratorKind::kWavefront}, {"reference", IntegratorKind::kReference}}};
-const Names<Materialize> kMaterialize{
-    "materialize",
-    {{"auto", Materialize::kAuto}, {"on", Materialize::kOn}, {"off", Materialize::kOff}}};
-const Names<Traversal> kTraversals{
-    "traversal", {{"packets", Traversal::kPackets}, {"single", Traversal::kSingle}}};
-const Names<LightSelection> kLightSelections{"light_selection",
-                                             {{"auto", LightSelection::kAuto},
-                                              {"tree", LightSelection::kTree},
-                                              {"power", LightSelection::kPower}}};
-const Names<LightWeights> kLightWeights{
-    "light_weights", {{"calibrated", LightWeights::kCalibrated}, {"power", LightWeights::kPower}}};
-const Names<bool> kFresnel{"fresnel", {{"exact", false}, {"schlick", true}}};
-
-template <typename Class, typename Enum>
-void def_enum(Class& c, const char* attribute, Enum Settings::* member, const Names<Enum>& names) {
-  c.def_prop_rw(
-      attribute, [member, &names](const Settings& s) { return std::string(names.name(s.*member)); },
-      [member, &names](Settings& s, const std::string& text) { s.*member = names.parse(text); });
-}
-
-constexpr const char* kAttributes[] = {"width",           "height",         "spp",
-                                       "max_depth",       "seed",           "sampler",
-                                       "filter",          "filter_width",   "roulette",
-                                       "roulette_depth",  "clamp_indirect", "fresnel",
-                                       "light_selection", "light_weights",  "cosine_sampling",
-                                       "integrator",      "aovs",           "adaptive",
-                                       "noise",           "min_spp",        "time_limit",
-                                       "error",           "region",         "progressive",
-                                       "threads",         "wave_size",      "lanes",
-                                       "traversal",       "policy",         "materialize",
-                                       "ray_order",       "shadow_order",   "costs",
-                                       "cost_weight"};
-
-/// Before the name of a light group, in names of AOVs and of layers.
-constexpr const char* kLightPrefix = "light_";
-
-/// Settings::aovs and light_groups as names.
-std::vector<std::string> aov_names(const Settings& s) {
-  std::vector<std::string> names = s.aovs.names();
-  if (s.light_groups.empty()) return names;
-  names.erase(std::remove(names.begin(), names.end(), "light_groups"), names.end());
-  for (const std::string& group : s.light_groups) names.push_back(kLightPrefix + group);
-  return names;
-}
-
-/// "light_groups" stands for all of them, "light_NAME" for one.
-void set_aovs(Settings& s, const std::vector<std::string>& names) {
-  AovSet set{0};
-  std::vector<std::string> groups;
-  bool all_groups = false;
-  for (const std::string& name : names) {
-    if (name != "light_groups" && name.starts_with(kLightPrefix)) {
-      groups.push_back(name.substr(std::string(kLightPrefix).size()));
-      set.bits |= static_cast<uint32_t>(Aov::kLightGroups);
-    } else {
-      const Aov aov = AovSet::parse(name);
-      all_groups |= aov == Aov::kLightGroups;
-      set.bits |= static_cast<uint32_t>(aov);
-    }
-  }
-  s.aovs = set;
-  s.light_groups = all_groups ? std::vector<std::string>{} : groups;
-}
-
-nb::dict to_dict(nb::handle settings) {
-  nb::dict d;
-  for (const char* name : kAttributes) d[name] = nb::getattr(settings, name);
-  return d;
-}
 
 /// Python's side of a policy. order() gets NumPy arrays of its own, so whatever it keeps or does to
 /// them harms nothing, and fills `keys`. Exceptions end the render and come out of it.
@@ -303,33 +188,13 @@ Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings,
       *scene, {settings, progress, policy, costs, recorder, watcher, state, interval});
 }
 
-/// None, or (x0, y0, x1, y1).
-nb::object region_of(const Settings& s) {
-  if (!s.region) return nb::none();
-  return nb::make_tuple(s.region->x0, s.region->y0, s.region->x1, s.region->y1);
-}
-
-void set_region(Settings& s, const nb::object& value) {
-  s.region.reset();
-  if (value.is_none()) return;
-  std::vector<int64_t> edges;
-  if (!nb::try_cast(value, edges) || edges.size() != 4)
-    throw Error("region must be None or four whole numbers: x0, y0, x1, y1");
-  for (const int64_t edge : edges)
-    if (edge < 0 || edge > kMaxSize)
-      throw Error("region has the edge " + std::to_string(edge) + "; it must be from 0 to " +
-                  std::to_string(kMaxSize));
-  const auto at = [&](size_t i) { return static_cast<uint32_t>(edges[i]); };
-  s.region = Region{at(0), at(1), at(2), at(3)};
-}
-
 }  // namespace
 
 Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& renderer,
                   const Scene& scene, const RenderArguments& a) {
   const Settings settings = nb::cast<Settings>(a.settings);
   Result result;
-  result.settings = to_dict(a.settings);
+  result.settings = settings_dict(settings);
   std::unique_ptr<PythonPolicy> own_policy;
   if (!a.policy.is_none()) {
     own_policy = std::make_unique<PythonPolicy>(a.policy, scene);
@@ -364,58 +229,6 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
 }
 
 void bind_render(nb::module_& m) {
-  nb::class_<Settings> c(m, "Settings");
-  c.def("__init__", [](nb::handle_t<Settings> self, const nb::kwargs& kwargs) {
-    new (nb::inst_ptr<Settings>(self)) Settings();
-    nb::inst_mark_ready(self);
-    for (const auto& [key, value] : kwargs) {
-      const auto name = nb::cast<std::string>(key);
-      if (std::find_if(std::begin(kAttributes), std::end(kAttributes),
-                       [&](const char* a) { return name == a; }) == std::end(kAttributes))
-        throw Error("setting '" + name + "' is not known");
-      nb::setattr(self, name.c_str(), value);
-    }
-  });
-  c.def_rw("width", &Settings::width)
-      .def_rw("height", &Settings::height)
-      .def_rw("spp", &Settings::spp)
-      .def_rw("max_depth", &Settings::max_depth)
-      .def_rw("seed", &Settings::seed)
-      .def_prop_rw(
-          "filter_width", &Settings::used_filter_width,
-          [](Settings& s, std::optional<float> width) { s.filter_width = width; },
-          nb::for_setter(nb::arg("filter_width").none()))
-      .def_rw("roulette_depth", &Settings::roulette_depth)
-      .def_rw("clamp_indirect", &Settings::clamp_indirect)
-      .def_rw("cosine_sampling", &Settings::cosine_sampling)
-      .def_rw("adaptive", &Settings::adaptive)
-      .def_rw("noise", &Settings::noise)
-      .def_rw("min_spp", &Settings::min_spp)
-      .def_rw("time_limit", &Settings::time_limit)
-      .def_rw("error", &Settings::error)
-      .def_rw("threads", &Settings::threads)
-      .def_rw("wave_size", &Settings::wave_size)
-      .def_rw("lanes", &Settings::lanes)
-      .def_rw("policy", &Settings::policy)
-      .def_rw("cost_weight", &Settings::cost_weight)
-      .def_rw("progressive", &Settings::progressive)
-      .def_prop_rw("region", &region_of, &set_region, nb::for_setter(nb::arg("region").none()))
-      .def_prop_rw("aovs", &aov_names, &set_aovs)
-      .def("check", &Settings::check)
-      .def("to_dict", [](nb::handle_t<Settings> self) { return to_dict(self); });
-  def_enum(c, "sampler", &Settings::sampler, kSamplers);
-  def_enum(c, "filter", &Settings::filter, kFilters);
-  def_enum(c, "roulette", &Settings::roulette, kRoulettes);
-  def_enum(c, "integrator", &Settings::integrator, kIntegrators);
-  def_enum(c, "materialize", &Settings::materialize, kMaterialize);
-  def_enum(c, "traversal", &Settings::traversal, kTraversals);
-  def_enum(c, "ray_order", &Settings::ray_order, kRayOrders);
-  def_enum(c, "shadow_order", &Settings::shadow_order, kShadowOrders);
-  def_enum(c, "costs", &Settings::costs, kCosts);
-  def_enum(c, "light_selection", &Settings::light_selection, kLightSelections);
-  def_enum(c, "light_weights", &Settings::light_weights, kLightWeights);
-  def_enum(c, "fresnel", &Settings::schlick_fresnel, kFresnel);
-
   nb::class_<Result>(m, "Result")
       .def_prop_ro("beauty",
                    [](nb::handle_t<Result> self) { return layer(self, &Picture::beauty, 3); })

@@ -5,7 +5,7 @@ Arrays are NumPy arrays and are not copied where said so.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -392,47 +392,84 @@ class SceneBuilder:
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
 
-class Settings:
-    """Settings of a render; attributes as keyword arguments."""
+def setting_table() -> list[dict[str, Any]]:
+    """The settings that are one value each, as wavecomb.options.Setting has them."""
 
-    width: int  # 600
-    height: int  # 600
-    spp: int  # 64
-    max_depth: int  # 8
-    seed: int  # 0
-    sampler: str  # "sobol" | "independent"
-    filter: str  # "blackman-harris" | "gaussian" | "box"
+class Settings:
+    """Settings of a render; attributes as keyword arguments. None sets a default that follows from
+    others."""
+
+    # ---- setting_table(): tools/update_stub ----
+    width: int
+    """Pixels of a row of the picture. Default: 600."""
+    height: int
+    """Rows of pixels. Default: 600."""
+    max_depth: int
+    """Longest path, in scatterings. Default: 8."""
+    seed: int
+    """Of all random numbers. Default: 0."""
+    sampler: Literal["sobol", "independent"]
+    """Where samples lie. Default: sobol."""
+    filter: Literal["box", "gaussian", "blackman-harris"]
+    """How samples count for the pixels around them. Default: blackman-harris."""
     @property
     def filter_width(self) -> float:
-        """Pixels. None sets it to the filter's own: box 1, the others 3."""
+        """Full width of the filter in pixels; its own: box 1, the others 3. Default: its own."""
 
     @filter_width.setter
-    def filter_width(self, width: float | None) -> None: ...
-    roulette: str  # "throughput" | "off" | "cost-aware"
-    roulette_depth: int
-    clamp_indirect: float  # 0: off
-    fresnel: str  # "exact" | "schlick"
-    light_selection: str  # "auto" | "tree" | "power"
-    light_weights: str  # "calibrated" | "power"
+    def filter_width(self, value: float | None) -> None: ...
+    clamp_indirect: float
+    """Limit of a sample's indirect light; biased. Default: off. 0: off."""
+    fresnel: Literal["exact", "schlick"]
+    """Reflectance of dielectrics. Default: exact."""
     cosine_sampling: bool
-    integrator: str  # "wavefront" | "reference"
-    adaptive: float  # error that a pixel may have; 0: off
-    noise: float  # mean relative error that the picture may have; 0: off
-    min_spp: int  # adaptive: before the first look at errors
-    time_limit: float  # seconds of rendering; 0: none
-    error: bool  # keep error and variance where nothing else asks for them
+    """Samples every bounce that is not a mirror's by cosine. Default: False."""
+    error: bool
+    """Keeps errors and variances where nothing else asks. Default: False."""
+    roulette: Literal["off", "throughput", "cost-aware"]
+    """How paths end early. Each is unbiased, but another estimate. Default: throughput."""
+    roulette_depth: int
+    """The first vertex at which a path may end early. Default: 2."""
+    light_selection: Literal["auto", "tree", "power"]
+    """How a light is chosen to sample: for the place that it lights, or by power. Default: auto."""
+    light_weights: Literal["calibrated", "power"]
+    """How often each light is chosen. Default: calibrated."""
+    adaptive: float
+    """Error that a pixel may have, as a share of its brightness. Default: off. 0: off."""
+    noise: float
+    """Mean relative error that the picture may have. Default: off. 0: off."""
+    min_spp: int
+    """Samples of each pixel before the first look at errors. Default: 16."""
+    spp: int
+    """Samples of each pixel; with adaptive sampling, the most. Default: 64."""
+    time_limit: float
+    """Seconds of rendering. Default: none. 0: none."""
+    integrator: Literal["wavefront", "reference"]
+    """How paths are followed. Default: wavefront."""
+    costs: Literal["auto", "measured", "model"]
+    """Where the estimated costs of materials come from. Default: auto."""
+    policy: str
+    """The order in which hits are shaded. Default: program."""
+    ray_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
+    """The order in which bounce rays are traced. Default: auto."""
+    shadow_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
+    """The order in which shadow rays are traced. Default: auto."""
+    lanes: int
+    """How many records are shaded at once. Default: auto. 0: auto."""
+    wave_size: int
+    """Paths that are followed together by one thread. Default: automatic. 0: automatic."""
+    materialize: Literal["auto", "on", "off"]
+    """Whether records are moved into their order. Default: auto."""
+    traversal: Literal["packets", "single"]
+    """How rays are handed to Embree; the picture is the same. Default: packets."""
+    threads: int
+    """Threads that render. Default: all. 0: all."""
+    cost_weight: float
+    """Weight of a pass in the moving average of costs. Default: 0.3."""
+    progressive: bool
+    """Passes of 1, 1, 2, 4 ... samples: the whole picture is there soon. Default: False."""
+    # ---- to here ----
     region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
-    progressive: bool  # passes of 1, 1, 2, 4 ... samples: the whole picture is there soon
-    threads: int  # 0: all
-    wave_size: int  # 0: default
-    lanes: int  # 0: widest
-    traversal: str  # "packets" | "single"
-    policy: str  # "program"
-    materialize: str  # "auto" | "on" | "off"
-    ray_order: str  # of bounce rays: "slot" | "morton" | "morton-octant" | "direction" | "auto"
-    shadow_order: str  # of shadow rays, likewise
-    costs: str  # "auto" | "measured" | "model"
-    cost_weight: float  # of a pass in the moving average
     aovs: list[str]  # names of AOVS; "light_NAME" for one light group
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:

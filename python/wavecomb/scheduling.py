@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The order of shading: names, and policies written in Python."""
+"""The order of shading: policies written in Python."""
 
 from __future__ import annotations
 
@@ -11,21 +11,6 @@ from wavecomb.errors import WavecombError
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-POLICIES = (
-    "none",
-    "program",
-    "material",
-    "texture",
-    "texture-locality",
-    "cost-benefit",
-    "random-runs",
-    "adaptive",
-)
-"""Names of the built-in policies; docs/scheduling.md says what each does."""
-
-RAY_ORDERS = ("slot", "morton", "morton-octant", "direction", "auto")
-"""Names of the orders of rays before traversal."""
 
 COLUMNS = ("throughput", "position_key", "texture_key")
 """Columns of a queue that are worked out only for policies that name them."""

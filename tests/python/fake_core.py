@@ -15,6 +15,7 @@ import pytest
 
 import wavecomb
 from wavecomb.errors import WavecombError
+from wavecomb.options import settings
 
 
 class Error(ValueError):
@@ -165,6 +166,7 @@ class Fake:
 
 def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     """Puts the stand-in where the native module and the loader are imported from."""
+    settings()  # of the core that there is
     fake = Fake()
     core = ModuleType("wavecomb._core")
     usd = ModuleType("wavecomb.usd")

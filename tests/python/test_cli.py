@@ -18,8 +18,6 @@ from fake_core import Error, Fake, install
 
 from wavecomb.cli import main
 from wavecomb.picture.image import read_layers, read_metadata, write_exr
-from wavecomb.run.costs import SOURCES
-from wavecomb.scheduling import POLICIES, RAY_ORDERS
 
 
 @pytest.fixture
@@ -333,17 +331,6 @@ def test_summary_of_scheduling(fake: Fake, stage: str, tmp_path: Path) -> None:
     assert len(stats["materials"]) == 9
     assert stats["sort_overhead"] == pytest.approx(0.1)
     assert stats["mean_path_length"] == 2.5
-
-
-def test_policy_names_are_the_cores() -> None:
-    core = pytest.importorskip("wavecomb._core")
-    assert list(POLICIES) == core.policies()
-    for name in POLICIES:
-        core.Settings(policy=name).check()
-    for order in RAY_ORDERS:
-        core.Settings(ray_order=order, shadow_order=order).check()
-    for source in SOURCES:
-        core.Settings(costs=source).check()
 
 
 # ---- info, scene, compare, help ------------------------------------------------------------------

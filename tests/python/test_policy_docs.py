@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 import wavecomb
-from wavecomb.scheduling import COLUMNS, POLICIES, RAY_ORDERS
+from wavecomb.options import settings
+from wavecomb.scheduling import COLUMNS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "writing-a-policy.md").read_text(encoding="utf-8")
@@ -55,7 +56,12 @@ def test_cpp_example_is_like_the_real_ones() -> None:
 def test_pages_name_every_choice() -> None:
     page = (ROOT / "docs" / "scheduling.md").read_text(encoding="utf-8")
     options = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
-    for name in (*POLICIES, *RAY_ORDERS, "cost-aware", "throughput"):
+    for name in (
+        *settings()["policy"].choices,
+        *settings()["ray_order"].choices,
+        "cost-aware",
+        "throughput",
+    ):
         assert f"`{name}`" in page
         assert f"`{name}`" in options
     for column in COLUMNS:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from wavecomb.bench.suite_model import (
 )
 from wavecomb.bench.table import Table
 from wavecomb.errors import WavecombError
+from wavecomb.options import settings
 from wavecomb.picture.files import reason
 
 if sys.version_info >= (3, 11):
@@ -31,33 +33,23 @@ SUITES = Path(__file__).parent / "suites"
 DEFAULT_REPETITIONS = 16
 IMAGES = ("none", "first", "all")
 
-SETTINGS = {
-    "size": "pair",
-    "spp": "integer",
-    "max_depth": "integer",
-    "sampler": "text",
-    "filter": "text",
-    "filter_width": "number",
-    "roulette": "text",
-    "roulette_depth": "integer",
-    "clamp_indirect": "number",
-    "fresnel": "text",
-    "light_selection": "text",
-    "light_weights": "text",
-    "cosine_sampling": "flag",
-    "integrator": "text",
-    "threads": "count",
-    "wave_size": "integer",
-    "lanes": "count",
-    "traversal": "text",
-    "policy": "text",
-    "materialize": "text",
-    "ray_order": "text",
-    "shadow_order": "text",
-    "costs": "text",
-    "cost_weight": "number",
-}
-"""Settings that a suite may choose, and their kinds; a count is an integer, "all" or "widest"."""
+_NOT_OF_SUITES = (
+    "width", "height", "seed", "adaptive", "noise", "min_spp", "time_limit", "error", "progressive",
+)  # fmt: skip
+
+
+@cache
+def suite_settings() -> dict[str, str]:
+    """Settings that a suite may choose, and their kinds.
+
+    A count is an integer, "all" or "widest".
+    """
+    kinds = {"choice": "text", "text": "text", "flag": "flag", "number": "number"}
+    own = {name: row for name, row in settings().items() if name not in _NOT_OF_SUITES}
+    counts = dict.fromkeys(("threads", "lanes"), "count")
+    return {"size": "pair"} | {
+        name: counts.get(name, kinds.get(row.kind, "integer")) for name, row in own.items()
+    }
 
 
 def suite_names() -> list[str]:
@@ -213,10 +205,10 @@ def _settings(table: Table, where: str, values: Mapping[str, Any]) -> dict[str, 
 
 
 def _check_setting(table: Table, where: str, key: str, value: Any) -> None:
-    kind = SETTINGS.get(key)
+    kind = suite_settings().get(key)
     whole = isinstance(value, int) and not isinstance(value, bool)
     if kind is None:
-        raise table.error(where, f"no setting {key!r}; there are {', '.join(SETTINGS)}")
+        raise table.error(where, f"no setting {key!r}; there are {', '.join(suite_settings())}")
     good = {
         "pair": isinstance(value, list) and len(value) == 2 and all(type(v) is int for v in value),
         "integer": whole,

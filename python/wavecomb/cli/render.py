@@ -16,15 +16,14 @@ from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
 from wavecomb.cli.sandbox import enter_to_render
+from wavecomb.cli.setting_options import SettingCommand, setting_options
+from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
-from wavecomb.run.costs import SOURCES
-from wavecomb.scheduling import POLICIES, RAY_ORDERS
-
-_INTEGERS = click.IntRange(min=0)
 
 
 @click.command(
     "render",
+    cls=SettingCommand,
     epilog=examples(
         "wavecomb render shot.usd -o shot.exr",
         "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256",
@@ -85,91 +84,12 @@ _INTEGERS = click.IntRange(min=0)
     help="Samples per pixel; with --adaptive and --noise the most of them.  [default: 64]",
 )
 @purpose_options
-@click.option("--max-depth", type=_INTEGERS, metavar="N", help="Longest path, in scatterings.")
-@click.option(
-    "--integrator",
-    type=click.Choice(["wavefront", "reference"]),
-    help="reference: scalar and slow, the oracle.  [default: wavefront]",
-)
-@click.option("--threads", type=_INTEGERS, metavar="N", help="0 is all.  [default: 0]")
-@click.option("--wave-size", type=_INTEGERS, metavar="N", help="Paths of a wave; 0 is automatic.")
-@click.option(
-    "--traversal",
-    type=click.Choice(["packets", "single"]),
-    help="Rays in packets or one by one; the picture is the same.  [default: packets]",
-)
-@click.option(
-    "--lanes", type=click.Choice(["auto", "1", "4", "8", "16"]), help="SIMD width.  [default: auto]"
-)
-@click.option("--sampler", type=click.Choice(["sobol", "independent"]), help="[default: sobol]")
-@click.option("--seed", type=_INTEGERS, metavar="N", help="[default: 0]")
-@click.option(
-    "--filter",
-    "filter_",
-    type=click.Choice(["blackman-harris", "gaussian", "box"]),
-    help="Pixel filter.  [default: blackman-harris]",
-)
-@click.option(
-    "--filter-width",
-    type=Real(0, above=True),
-    metavar="X",
-    help="Full width in pixels.  [default: the filter's own: box 1, the others 3]",
-)
-@click.option(
-    "--roulette",
-    type=click.Choice(["off", "throughput", "cost-aware"]),
-    help="How paths end early; each is unbiased.  [default: throughput]",
-)
-@click.option(
-    "--clamp-indirect",
-    type=Real(0),
-    metavar="X",
-    help="Limit of a sample's indirect light; biased; 0 is off.  [default: 0]",
-)
-@click.option("--fresnel", type=click.Choice(["exact", "schlick"]), help="[default: exact]")
-@click.option(
-    "--light-selection",
-    type=click.Choice(["auto", "tree", "power"]),
-    help="How a light is chosen to sample: for the place that it lights, or by power.  "
-    "[default: auto]",
-)
-@click.option(
-    "--light-weights",
-    type=click.Choice(["calibrated", "power"]),
-    help="What shares of that choice lights have: by what they bring to the picture, which paths "
-    "before the first pass find out, or by power.  [default: calibrated]",
-)
-@click.option(
-    "--policy",
-    type=click.Choice(POLICIES),
-    help="Order of shading; changes no picture (docs/scheduling.md).  [default: program]",
-)
-@click.option(
-    "--materialize",
-    type=click.Choice(["auto", "on", "off"]),
-    help="Move records into that order, or read them through it.  [default: auto]",
-)
-@click.option(
-    "--ray-order",
-    type=click.Choice(RAY_ORDERS),
-    help="Order of bounce rays before traversal.  [default: auto]",
-)
-@click.option(
-    "--shadow-order",
-    type=click.Choice(RAY_ORDERS),
-    help="Order of shadow rays.  [default: auto]",
-)
+@setting_options()
 @click.option(
     "--costs",
     metavar="auto|measured|model|FILE.json",
     help="Costs of materials. A file is read if it is there, and written at the end.  "
     "[default: auto]",
-)
-@click.option(
-    "--cost-weight",
-    type=Real(0),
-    metavar="X",
-    help="Weight of a pass in the moving average of costs, 0 to 1.  [default: 0.3]",
 )
 @click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="Of the PNG, in stops.")
 @click.option(
@@ -190,8 +110,6 @@ def render_command(
     exposure: float,
     tone_map: Any,
     quiet: bool,
-    lanes: str | None,
-    filter_: str | None,
     costs: str | None,
     frames: str | None,
     skip_existing: bool,
@@ -209,7 +127,8 @@ def render_command(
     source = StageOptions.take(options)
     purpose = PurposeOptions.take(options)
     layers = AovOptions.take(options)
-    costs_file = costs if costs is not None and costs not in SOURCES else None
+    sources = known_settings()["costs"].choices
+    costs_file = costs if costs is not None and costs not in sources else None
     written = (output, png, stats_file, costs_file, purpose.preview, purpose.checkpoint_file)
     enter_to_render(written, output, output_dir, frames, split=layers.split, gpu=purpose.denoise)
 
@@ -236,10 +155,6 @@ def render_command(
         check_denoiser()
     resumed = purpose.load()
     chosen = {name: value for name, value in options.items() if value is not None}
-    if lanes is not None:
-        chosen["lanes"] = 0 if lanes == "auto" else int(lanes)
-    if filter_ is not None:
-        chosen["filter"] = filter_
     if costs is not None and costs_file is None:
         chosen["costs"] = costs
     profile = _read_costs(costs_file)
@@ -326,8 +241,9 @@ def _check_outputs(
         if name is not None and ending is not None and not name.lower().endswith(ending):
             raise WavecombError(f"{option} {name}: the name must end in {ending}")
         if option == "--costs" and name is not None and not name.lower().endswith(".json"):
+            sources = known_settings()["costs"].choices
             raise WavecombError(
-                f"--costs {name}: must be one of {', '.join(SOURCES)}, "
+                f"--costs {name}: must be one of {', '.join(sources)}, "
                 "or a file whose name ends in .json"
             )
     seen = {os.path.realpath(stage): "the stage"}

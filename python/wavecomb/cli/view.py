@@ -8,13 +8,12 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import StageOptions, examples, optional_stage
-from wavecomb.scheduling import POLICIES, RAY_ORDERS
-
-_INTEGERS = click.IntRange(min=0)
+from wavecomb.cli.setting_options import SettingCommand, setting_options
 
 
 @click.command(
     "view",
+    cls=SettingCommand,
     epilog=examples(
         "wavecomb view shot.usd",
         "wavecomb view shot.usd --size 1280 720 --spp 256 --camera /World/Cam",
@@ -31,18 +30,7 @@ _INTEGERS = click.IntRange(min=0)
     help="Pixels.  [default: 960 540]",
 )
 @click.option("--spp", type=int, metavar="N", help="Samples per pixel.  [default: 64]")
-@click.option("--max-depth", type=_INTEGERS, metavar="N", help="Longest path, in scatterings.")
-@click.option("--seed", type=_INTEGERS, metavar="N", help="[default: 0]")
-@click.option("--threads", type=_INTEGERS, metavar="N", help="0 is all.  [default: 0]")
-@click.option("--policy", type=click.Choice(POLICIES), help="Order of shading.  [default: program]")
-@click.option(
-    "--ray-order", type=click.Choice(RAY_ORDERS), help="Order of bounce rays.  [default: auto]"
-)
-@click.option(
-    "--roulette",
-    type=click.Choice(["off", "throughput", "cost-aware"]),
-    help="How paths end early.  [default: throughput]",
-)
+@setting_options(("max_depth", "seed", "threads", "policy", "ray_order", "roulette"))
 @click.option("--denoise", is_flag=True, help="Show the picture without its noise.")
 def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **options: Any) -> None:
     """Open a window on STAGE: look, steer and compare.

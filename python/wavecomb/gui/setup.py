@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, make_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
+from wavecomb.options import settings
 from wavecomb.run import aovs as aov_names
-from wavecomb.scheduling import POLICIES
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
@@ -18,12 +18,27 @@ if TYPE_CHECKING:
 Region = tuple[int, int, int, int]
 
 
+if TYPE_CHECKING:
+
+    class _Rows:
+        """A field for each row of the table of settings."""
+
+        def __init__(self, **values: Any) -> None: ...
+        def __getattr__(self, name: str) -> Any: ...
+
+else:
+    _Rows = make_dataclass(
+        "_Rows",
+        [(row.name, Any, row.default) for row in settings().values() if row.name != "progressive"],
+        frozen=True,
+    )
+
+
 @dataclass(frozen=True)
-class Setup:
-    """Settings of a live render. Fields are those of ``wavecomb.Settings`` but for the last ones.
+class Setup(_Rows):
+    """Settings of a live render: those of the table, and what only a window has.
 
     Attributes:
-        filter_width: In pixels; None: the filter's own.
         aovs: Layers to keep beside the beauty, names of docs/aovs.md.
         denoise: Whether frames come denoised, too.
         region: x0, y0, x1, y1 in pixels, end excluded: only these are rendered; None: all.
@@ -31,37 +46,6 @@ class Setup:
         profile: Costs to start from, as ``wavecomb.run.costs.load_costs`` reads them.
     """
 
-    width: int = 600
-    height: int = 600
-    spp: int = 64
-    max_depth: int = 8
-    seed: int = 0
-    sampler: str = "sobol"
-    filter: str = "blackman-harris"
-    filter_width: float | None = None
-    roulette: str = "throughput"
-    roulette_depth: int = 2
-    clamp_indirect: float = 0.0
-    fresnel: str = "exact"
-    light_selection: str = "auto"
-    light_weights: str = "calibrated"
-    cosine_sampling: bool = False
-    integrator: str = "wavefront"
-    adaptive: float = 0.0
-    noise: float = 0.0
-    min_spp: int = 16
-    time_limit: float = 0.0
-    error: bool = False
-    threads: int = 0
-    wave_size: int = 0
-    lanes: int = 0
-    traversal: str = "packets"
-    policy: str = "program"
-    materialize: str = "auto"
-    ray_order: str = "auto"
-    shadow_order: str = "auto"
-    costs: str = "auto"
-    cost_weight: float = 0.3
     aovs: tuple[str, ...] = aov_names.DEFAULT
     denoise: bool = False
     region: Region | None = None
@@ -84,8 +68,9 @@ class Setup:
         if values.keys() & {"width", "height"} and "region" not in values:
             values["region"] = None
         new = replace(self, **values)
-        if new.policy not in POLICIES:
-            raise WavecombError(f"no policy {new.policy!r}; there are {', '.join(POLICIES)}")
+        policies = settings()["policy"].choices
+        if new.policy not in policies:
+            raise WavecombError(f"no policy {new.policy!r}; there are {', '.join(policies)}")
         new.settings()
         return new
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wavecomb.errors import WavecombError
+from wavecomb.options import settings as known_settings
 from wavecomb.picture.archive import ArchiveError, read_archive
 from wavecomb.picture.files import replacing
 from wavecomb.run import aovs as aov_names
@@ -30,20 +31,6 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 _KIND = "wavecomb-checkpoint"
-
-_HOW = (
-    "threads",
-    "wave_size",
-    "lanes",
-    "traversal",
-    "policy",
-    "materialize",
-    "ray_order",
-    "shadow_order",
-    "cost_weight",
-    "progressive",
-)
-"""Settings that say how a picture is computed and never change it."""
 
 _OPTIONS = {"width": "size", "height": "size", "filter_width": "filter-width"}
 
@@ -82,7 +69,12 @@ def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
 
     A time limit does not: it decides how much of it there is.
     """
-    chosen = {name: value for name, value in settings.items() if name not in _HOW}
+    rows = known_settings()
+    chosen = {
+        name: value
+        for name, value in settings.items()
+        if name not in rows or rows[name].changes_picture
+    }
     del chosen["time_limit"]
     if chosen["roulette"] != "cost-aware":
         del chosen["costs"]

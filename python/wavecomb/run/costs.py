@@ -14,8 +14,6 @@ from wavecomb.errors import WavecombError
 from wavecomb.picture.files import reason, replacing
 
 SCHEMA = "wavecomb-costs/1"
-SOURCES = ("auto", "measured", "model")
-"""Where costs come from, in words; anything else is the name of a profile."""
 
 Profile = dict[str, dict[str, float]]
 

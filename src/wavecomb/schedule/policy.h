@@ -58,7 +58,14 @@ class SchedulingPolicy {
 
 /// Makes the policy of that name. Throws Error listing the names there are.
 std::unique_ptr<SchedulingPolicy> make_policy(std::string_view name);
-/// Names of all policies that make_policy knows, and "adaptive", which chooses among them.
+/// A policy for those who choose one.
+struct PolicyInfo {
+  const char* name;
+  const char* help;  ///< what it does, a sentence
+};
+/// All policies that make_policy knows, and "adaptive", which chooses among them.
+std::vector<PolicyInfo> policy_table();
+/// Their names.
 std::vector<std::string> policy_names();
 
 }  // namespace wavecomb

@@ -141,14 +141,18 @@ def test_every_policy_and_setting_is_offered() -> None:
     from wavecomb.gui.scheduling import choices
     from wavecomb.gui.setup import Setup
 
-    assert list(choices.policy_choices()) == core.policies() == list(choices.POLICY_HELP)
+    assert list(choices.choice("policy").values) == core.policies()
     assert list(choices.lane_choices()) == [0, *core.lane_widths()]
-    for choice in (*choices.ORDER_CHOICES, choices.ROULETTE):
-        values = choices.lane_choices() if choice.field == "lanes" else choice.values
-        for value, tip in values.items():
-            Setup().changed(**{choice.field: value})
+    for one in (*choices.fields_of("order", ("progressive",)), *choices.fields_of("work")):
+        if isinstance(one, choices.Number):
+            assert one.least <= getattr(Setup(), one.field) <= one.most or one.field in (
+                "adaptive", "noise",
+            )  # fmt: skip
+            continue
+        for value, tip in one.values.items():
+            Setup().changed(**{one.field: value})
             assert tip.endswith(".") or ". " in tip
-        assert getattr(Setup(), choice.field) in values, "the default is among them"
+        assert getattr(Setup(), one.field) in one.values, "the default is among them"
     for _, preset in choices.presets().values():
         Setup().changed(**preset)
         assert not preset.keys() & set(choices.WORK_FIELDS), "presets change no picture"

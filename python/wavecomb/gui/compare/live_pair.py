@@ -18,6 +18,8 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.scheduling.choices import choice
+from wavecomb.options import Setting, settings
 
 if TYPE_CHECKING:
     from wavecomb.gui.compare.source import SideSource
@@ -28,43 +30,16 @@ NOTE = (
 )
 
 
-def _choices() -> dict[str, tuple[str, Sequence[Any], str]]:
-    """Settings with a few values: label, values, tooltip."""
-    from wavecomb import _core
-    from wavecomb.scheduling import POLICIES, RAY_ORDERS
-
-    return {
-        "policy": ("Policy", POLICIES, "Order of shading; changes no bit of the picture"),
-        "ray_order": (
-            "Ray order",
-            RAY_ORDERS,
-            "Order of bounce rays; changes no bit of the picture",
-        ),
-        "roulette": (
-            "Roulette",
-            ("off", "throughput", "cost-aware"),
-            "When paths end early: changes noise and time",
-        ),
-        "sampler": ("Sampler", ("sobol", "independent"), "Random numbers"),
-        "integrator": ("Integrator", ("wavefront", "reference"), "The wave, or the scalar oracle"),
-        "lanes": (
-            "Lanes",
-            (0, *_core.lane_widths()),
-            "SIMD width, 0: widest; changes no bit of the picture",
-        ),
-    }
+_CHOSEN = ("policy", "ray_order", "roulette", "sampler", "integrator", "lanes")
+_NUMBERS = ("spp", "max_depth", "seed", "wave_size", "adaptive", "clamp_indirect")
+_HIGHEST = {"max_depth": 64, "seed": 2**31 - 1, "adaptive": 1.0, "clamp_indirect": 1000.0}
+_STEPS = {"adaptive": 0.005, "clamp_indirect": 1.0}
 
 
-_NUMBERS = {
-    "spp": ("Samples", 1, 1 << 20, "Samples per pixel"),
-    "max_depth": ("Depth", 1, 64, "Scattering vertices of a path"),
-    "seed": ("Seed", 0, 2**31 - 1, "Of the random numbers: another one is other noise"),
-    "wave_size": ("Wave size", 0, 1 << 24, "Paths of a wave, 0: chosen; changes no bit"),
-}
-_REALS = {
-    "adaptive": ("Adaptive", 1.0, 0.005, "Error to sample to, 0: all pixels alike"),
-    "clamp_indirect": ("Clamp", 1000.0, 1.0, "Most that an indirect sample may add, 0: no limit"),
-}
+def _tip(row: Setting) -> str:
+    """What it is, and whether the picture depends on it."""
+    zero = f" 0: {row.zero}." if row.zero else ""
+    return row.help + zero + ("" if row.changes_picture else " Changes no bit of the picture.")
 
 
 class LiveSettings(QWidget):
@@ -82,22 +57,12 @@ class LiveSettings(QWidget):
         for column, form in enumerate(forms):
             form.setVerticalSpacing(theme.em(0.2))
             grid.addLayout(form, 0, column)
-        for name, (label, values, tip) in _choices().items():
-            self._add(forms[len(self._widgets) % 3], name, label, tip, self._combo(name, values))
-        for name, (label, low, high, tip) in _NUMBERS.items():
-            spin = QSpinBox(self)
-            spin.setRange(low, high)
-            spin.setKeyboardTracking(False)
-            spin.valueChanged.connect(lambda value, name=name: self._change(name, value))
-            self._add(forms[len(self._widgets) % 3], name, label, tip, spin)
-        for name, (label, high_real, step, tip) in _REALS.items():
-            real = QDoubleSpinBox(self)
-            real.setRange(0.0, high_real)
-            real.setDecimals(4 if high_real <= 1.0 else 2)
-            real.setSingleStep(step)
-            real.setKeyboardTracking(False)
-            real.valueChanged.connect(lambda value, name=name: self._change(name, value))
-            self._add(forms[len(self._widgets) % 3], name, label, tip, real)
+        rows = settings()
+        for name in _CHOSEN:
+            offered = tuple(choice(name).values)
+            self._add(forms[len(self._widgets) % 3], rows[name], self._combo(name, offered))
+        for name in _NUMBERS:
+            self._add(forms[len(self._widgets) % 3], rows[name], self._spin(rows[name]))
         note = QLabel(NOTE, self)
         note.setObjectName("sharing")
         note.setWordWrap(True)
@@ -112,13 +77,30 @@ class LiveSettings(QWidget):
         combo.activated.connect(lambda index, name=name: self._change(name, combo.itemData(index)))
         return combo
 
-    def _add(self, form: QFormLayout, name: str, label: str, tip: str, widget: QWidget) -> None:
-        widget.setObjectName(f"{name}{self._source.name}")
-        widget.setAccessibleName(f"{label} of {self._source.name}")
-        widget.setToolTip(tip)
+    def _spin(self, row: Setting) -> QSpinBox | QDoubleSpinBox:
+        spin: QSpinBox | QDoubleSpinBox
+        least, most = row.least or 0.0, _HIGHEST.get(row.name, row.most or 0.0)
+        if row.zero:
+            least = 0
+        if row.kind == "integer":
+            spin = QSpinBox(self)
+            spin.setRange(int(least), int(most))
+        else:
+            spin = QDoubleSpinBox(self)
+            spin.setDecimals(4 if most <= 1.0 else 2)
+            spin.setRange(least, most)
+            spin.setSingleStep(_STEPS.get(row.name, 0.1))
+        spin.setKeyboardTracking(False)
+        spin.valueChanged.connect(lambda value, name=row.name: self._change(name, value))
+        return spin
+
+    def _add(self, form: QFormLayout, row: Setting, widget: QWidget) -> None:
+        widget.setObjectName(f"{row.name}{self._source.name}")
+        widget.setAccessibleName(f"{row.label} of {self._source.name}")
+        widget.setToolTip(_tip(row))
         widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._widgets[name] = widget
-        form.addRow(label, widget)
+        self._widgets[row.name] = widget
+        form.addRow(row.label, widget)
 
     def _change(self, name: str, value: Any) -> None:
         if not self._showing:

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.gui.scheduling.run_log import describe, differences
+from wavecomb.options import settings
 
 BITS = (
-    "width", "height", "max_depth", "seed", "sampler", "filter", "filter_width", "roulette",
-    "roulette_depth", "clamp_indirect", "fresnel", "light_selection", "light_weights",
-    "cosine_sampling", "adaptive", "noise", "min_spp", "time_limit", "region",
-)  # fmt: skip
+    *(
+        name
+        for name, row in settings().items()
+        if row.changes_picture and name not in ("spp", "integrator", "costs", "error")
+    ),
+    "region",
+)
 """Settings that decide over the bits, beside the samples of each pixel."""
 
 MAX_PICTURES = 32

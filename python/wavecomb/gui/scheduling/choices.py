@@ -9,28 +9,7 @@ from typing import Any
 
 from wavecomb.gui.scheduling.run_log import FIELDS
 from wavecomb.gui.setup import Setup
-from wavecomb.scheduling import POLICIES, RAY_ORDERS
-
-POLICY_HELP = {
-    "none": "Arrival order; nothing is paid for it.",
-    "program": "By program, the kind of material: what lanes need and no more. The default.",
-    "material": "By program, then by estimated cost of the material, then by material.",
-    "texture": "By program, then by the size of the material's largest texture.",
-    "texture-locality": "By program, material and place in its texture (tile, mip level, uv), "
-    "as MoonRay's shade queues.",
-    "cost-benefit": "By program, then by throughput over cost of a material, highest first, "
-    "then by place in the scene.",
-    "random-runs": "The placebo: the runs of 'material' in an order that means nothing.",
-    "adaptive": "Chooses among none, program, material, texture and texture-locality, queue by "
-    "queue, by the times that it learns.",
-}
-RAY_ORDER_HELP = {
-    "slot": "As generated: survivors keep their places.",
-    "morton": "By place of the origin.",
-    "morton-octant": "By octant of the direction, then by place of the origin.",
-    "direction": "By octant and long axes of the direction.",
-    "auto": "The quickest of the four, learned for each depth. The default.",
-}
+from wavecomb.options import names, settings
 
 
 @dataclass(frozen=True)
@@ -73,102 +52,63 @@ def lane_choices() -> dict[Any, str]:
     }
 
 
-def policy_choices() -> dict[str, str]:
-    """Every policy of the core, with what it does."""
-    from wavecomb import _core
-
-    return {name: POLICY_HELP.get(name, "A policy of this build.") for name in _core.policies()}
-
-
 WAVE_SIZES: dict[Any, str] = {
     0: "As wide as the caches of this machine ask for.",
     **{1 << n: f"{1 << n} paths a wave." for n in range(8, 21)},
 }
 
-ORDER_CHOICES = (
-    Choice("policy", "Policy", "The order in which hits are shaded.",
-           {name: POLICY_HELP[name] for name in POLICIES}),
-    Choice("ray_order", "Ray order", "The order in which bounce rays are traced.",
-           {name: RAY_ORDER_HELP[name] for name in RAY_ORDERS}),
-    Choice("shadow_order", "Shadow order", "The order in which shadow rays are traced.",
-           {name: RAY_ORDER_HELP[name] for name in RAY_ORDERS}),
-    Choice("lanes", "Lanes", "How many records are shaded at once.", {}),
-    Choice("wave_size", "Wave size", "Paths that are followed together by one thread.",
-           WAVE_SIZES),
-    Choice("materialize", "Materialize", "Whether records are moved into their order.",
-           {"auto": "Off, since that measures faster. The default.",
-            "on": "Records are moved into their order before they are shaded.",
-            "off": "Shading gathers its inputs through indices."}),
-    Choice("traversal", "Traversal", "How rays are handed to Embree.",
-           {"packets": "In packets. The default.", "single": "One by one."}),
-    Choice("integrator", "Integrator", "How paths are followed.",
-           {"wavefront": "Waves of paths, stage by stage. The default.",
-            "reference": "One path at a time, depth first: the oracle. Slow; has no queues, so "
-            "that nothing above plays a part."}),
-    Choice("costs", "Costs", "Where the estimated costs of materials come from.",
-           {"auto": "Calibrated, then measured; roulette uses the model. The default.",
-            "measured": "Calibrated, then measured, for roulette too: with cost-aware roulette "
-            "the picture then varies within its noise.",
-            "model": "Fixed numbers by program and texture reads: reproducible."}),
-)  # fmt: skip
-"""The order of work. With the policy first; lanes and policies are filled in by the build."""
 
-THREADS = Number("threads", "Threads", "Threads that render.", 256, zero="all")
-COST_WEIGHT = Number(
-    "cost_weight", "Cost weight", "Weight of a pass in the moving average of costs.",
-    1.0, decimals=2, step=0.05,
-)  # fmt: skip
+def choice(name: str) -> Choice:
+    """A setting of the table as a choice."""
+    row = settings()[name]
+    values: dict[Any, str] = dict(row.choices)
+    if name == "wave_size":
+        values = WAVE_SIZES
+    elif name == "lanes":
+        values = lane_choices()
+    elif row.default in values:
+        values[row.default] += " The default."
+    return Choice(name, row.label, row.help, values)
 
-ROULETTE = Choice(
-    "roulette", "Roulette", "How paths end early. Each is unbiased, but another estimate.",
-    {"throughput": "By the light that the path still carries. The default.",
-     "cost-aware": "By the light that it carries, over the root of what shading costs.",
-     "off": "Paths end at the greatest depth only."},
-)  # fmt: skip
-ROULETTE_DEPTH = Number(
-    "roulette_depth", "From depth", "The first vertex at which a path may end early.", 64
-)
-LIGHT_SELECTION = Choice(
-    "light_selection", "Lights", "How a light is chosen to sample.",
-    {"auto": "By tree where there are several to choose among, else by power. The default.",
-     "tree": "For the place that it lights, by a tree of lights.",
-     "power": "By its power, wherever it is."},
-)  # fmt: skip
-LIGHT_WEIGHTS = Choice(
-    "light_weights", "Light shares", "How often each light is chosen.",
-    {"calibrated": "By what it brings to the picture, as some paths before the first pass find "
-     "out. The default.",
-     "power": "By its power, wherever it is."},
-)  # fmt: skip
+
+_SHOWN: dict[str, dict[str, Any]] = {
+    "cost_weight": {"decimals": 2, "step": 0.05},
+    "adaptive": {"least": 0.0001, "most": 10.0, "zero": "", "decimals": 4, "step": 0.005},
+    "noise": {"least": 0.0001, "zero": "", "decimals": 4, "step": 0.005},
+    "time_limit": {"most": 86400, "decimals": 1, "suffix": " s"},
+    "threads": {"most": 256},
+    "roulette_depth": {"most": 64},
+    "min_spp": {"most": 65536},
+}
+"""How fields show numbers, where that is not as the table has it."""
+
+
+def number(name: str) -> Number:
+    """A setting of the table as a number."""
+    row = settings()[name]
+    values: dict[str, Any] = {"least": row.least or 0, "most": row.most, "zero": row.zero}
+    if row.kind == "number":
+        values |= {"decimals": 3, "step": 0.1}
+    if row.zero:
+        values["least"] = 0
+    return Number(name, row.label, row.help, **{**values, **_SHOWN.get(name, {})})
+
+
+def fields_of(group: str, without: tuple[str, ...] = ()) -> tuple[Choice | Number, ...]:
+    """The settings of a group, as fields, in the table's order."""
+    rows = (settings()[name] for name in names(group, without=without))
+    is_choice = lambda row: row.kind == "choice" or row.name in ("lanes", "wave_size")  # noqa: E731
+    return tuple(choice(row.name) if is_choice(row) else number(row.name) for row in rows)
+
+
 ADAPTIVE_MODES = {
     "off": "Every pixel gets as many samples.",
     "pixel": "Pixels stop when their own error is small enough.",
     "noise": "The render ends when the picture's mean error is small enough; samples go where "
     "the noise is.",
 }
-PIXEL_ERROR = Number(
-    "adaptive", "Pixel error", "Error that a pixel may have, as a share of its brightness.",
-    10.0, least=0.0001, decimals=4, step=0.005,
-)  # fmt: skip
-NOISE = Number(
-    "noise", "Noise", "Mean relative error that the picture may have.",
-    10.0, least=0.0001, decimals=4, step=0.005,
-)  # fmt: skip
-MIN_SPP = Number(
-    "min_spp", "Min samples", "Samples of each pixel before the first look at errors.",
-    65536, least=1,
-)  # fmt: skip
-SPP = Number("spp", "Samples", "Samples of each pixel; with adaptive sampling, the most.",
-             1 << 24, least=1)  # fmt: skip
-TIME_LIMIT = Number(
-    "time_limit", "Time limit", "Seconds of rendering.", 86400, zero="none", decimals=1, suffix=" s"
-)
-
-ORDER_FIELDS = (*(choice.field for choice in ORDER_CHOICES), THREADS.field, COST_WEIGHT.field)
-WORK_FIELDS = (
-    "roulette", "roulette_depth", "light_selection", "light_weights", "adaptive", "noise",
-    "min_spp", "spp", "time_limit",
-)  # fmt: skip
+ORDER_FIELDS = names("order", without=("progressive",))
+WORK_FIELDS = names("work")
 
 
 def scheduling_of(setup: Setup) -> dict[str, Any]:

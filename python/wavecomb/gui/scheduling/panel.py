@@ -9,6 +9,7 @@ from typing import Any
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
+    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QGroupBox,
@@ -16,6 +17,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QScrollArea,
+    QSpinBox,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -45,6 +47,7 @@ class SchedulingPanel(QScrollArea):
         self._policy_file: str | None = None
         self._loads: dict[str, int] = {}
         self._boxes: dict[str, ChoiceBox] = {}
+        self._numbers: dict[str, QSpinBox | QDoubleSpinBox] = {}
         self.light = PictureLight(session)
         self.rounds = Rounds(session, self)
         self._work = WorkGroup(session)
@@ -115,12 +118,14 @@ class SchedulingPanel(QScrollArea):
         )
         self._try.clicked.connect(self._try_every_policy)
         form.addRow(self._try)
-        for choice in choices.ORDER_CHOICES:
-            box = ChoiceBox(choice, self._choose)
-            self._boxes[choice.field] = box
+        for one in choices.fields_of("order", without=("progressive",)):
+            if isinstance(one, choices.Number):
+                spin = self._numbers[one.field] = number_box(one, self._choose)
+                form.addRow(self._labelled(one.label, spin), spin)
+                continue
+            box = self._boxes[one.field] = ChoiceBox(one, self._choose)
             field: QWidget = box
-            if choice.field == "policy":
-                box.fill(choices.policy_choices())
+            if one.field == "policy":
                 field = self._with_buttons(
                     box,
                     ("load_policy", "Load…", "Load a policy of your own: a Python file that "
@@ -128,19 +133,13 @@ class SchedulingPanel(QScrollArea):
                     ("reload_policy", "↻", "Load the file again, after an edit.",
                      self._reload_policy),
                 )  # fmt: skip
-            elif choice.field == "lanes":
-                box.fill(choices.lane_choices())
-            elif choice.field == "costs":
+            elif one.field == "costs":
                 field = self._with_buttons(
                     box,
                     ("load_profile", "File…", "Start from the costs of an earlier render: the "
                      "file that its --costs FILE.json wrote.", self._ask_profile),
                 )  # fmt: skip
-            form.addRow(self._labelled(choice.label, box), field)
-        self._threads = number_box(choices.THREADS, self._choose)
-        self._cost_weight = number_box(choices.COST_WEIGHT, self._choose)
-        form.insertRow(8, self._labelled("Threads", self._threads), self._threads)
-        form.addRow(self._labelled("Cost weight", self._cost_weight), self._cost_weight)
+            form.addRow(self._labelled(one.label, box), field)
         return group
 
     def _labelled(self, text: str, buddy: QWidget) -> QLabel:
@@ -188,7 +187,7 @@ class SchedulingPanel(QScrollArea):
             if field == "costs" and setup.profile is not None:
                 value = setup.profile
             box.show_value(value)
-        for spin, field in ((self._threads, "threads"), (self._cost_weight, "cost_weight")):
+        for field, spin in self._numbers.items():
             show_number(spin, getattr(setup, field))
         self._promise.setText(choices.promise(setup))
         self._find("reload_policy").setEnabled(self._policy_file is not None)
@@ -268,7 +267,7 @@ class SchedulingPanel(QScrollArea):
             return
         now = self._session.setup
         first = {"policy": now.policy, "own_policy": now.own_policy}
-        others = [{"policy": name, "own_policy": None} for name in choices.policy_choices()]
+        others = [{"policy": name, "own_policy": None} for name in choices.choice("policy").values]
         self.rounds.start([first, *(one for one in others if one != first)])
 
     def _show_rounds(self, done: int, count: int) -> None:

@@ -12,36 +12,14 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from wavecomb.options import names
 from wavecomb.run.stats import COHERENCE, PHASES, SORTING
 
-FIELDS = (
-    "policy",
-    "lanes",
-    "wave_size",
-    "threads",
-    "ray_order",
-    "shadow_order",
-    "integrator",
-    "materialize",
-    "traversal",
-    "costs",
-    "cost_weight",
-    "roulette",
-    "roulette_depth",
-    "light_selection",
-    "light_weights",
-    "adaptive",
-    "noise",
-    "min_spp",
-    "time_limit",
-)
-"""Settings by which series are told apart; all but those of ``WORK`` leave the picture as it is."""
-
-WORK = (
-    "roulette", "roulette_depth", "light_selection", "light_weights", "adaptive", "noise",
-    "min_spp", "time_limit",
-)  # fmt: skip
+WORK = names("work", without=("spp",))
 """Settings that change how much is done, and with it the noise."""
+
+FIELDS = (*names("order", without=("progressive",)), *WORK)
+"""Settings by which series are told apart; all but those of ``WORK`` leave the picture as it is."""
 
 MAX_LOOKS = 240
 """More are thinned out, so that a long render costs no more memory than a short one."""

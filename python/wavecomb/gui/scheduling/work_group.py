@@ -5,21 +5,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QWidget
+from PySide6.QtWidgets import (
+    QDoubleSpinBox,
+    QFormLayout,
+    QGroupBox,
+    QLabel,
+    QSpinBox,
+    QWidget,
+)
 
 from wavecomb.gui.scheduling import choices
 from wavecomb.gui.scheduling.choices import Choice
 from wavecomb.gui.scheduling.setting_controls import ChoiceBox, number_box, show_number
 from wavecomb.gui.viewport.session import Session, Setup
 
-NUMBERS = (
-    choices.ROULETTE_DEPTH,
-    choices.SPP,
-    choices.PIXEL_ERROR,
-    choices.NOISE,
-    choices.MIN_SPP,
-    choices.TIME_LIMIT,
-)
 _MODE = Choice("adaptive_mode", "Adaptive", "How samples are spread.", choices.ADAPTIVE_MODES)
 _FIRST = {"adaptive": 0.02, "noise": 0.02}
 """What a target is when it is first switched on."""
@@ -37,12 +36,9 @@ class WorkGroup(QGroupBox):
         note = QLabel("These change the noise, and not what the picture converges to.")
         note.setWordWrap(True)
         form.addRow(note)
-        self._roulette = ChoiceBox(choices.ROULETTE, self._choose)
-        self._lights = ChoiceBox(choices.LIGHT_SELECTION, self._choose)
-        self._weights = ChoiceBox(choices.LIGHT_WEIGHTS, self._choose)
         self._mode = ChoiceBox(_MODE, self._choose_mode)
-        self._numbers = {number.field: number_box(number, self._choose) for number in NUMBERS}
-        labels = {number.field: number.label for number in NUMBERS}
+        self._boxes: dict[str, ChoiceBox] = {}
+        self._numbers: dict[str, QSpinBox | QDoubleSpinBox] = {}
 
         def add(label: str, widget: QWidget) -> None:
             text = QLabel(label)
@@ -50,13 +46,15 @@ class WorkGroup(QGroupBox):
             text.setToolTip(widget.toolTip())
             form.addRow(text, widget)
 
-        add("Roulette", self._roulette)
-        add(labels["roulette_depth"], self._numbers["roulette_depth"])
-        add("Lights", self._lights)
-        add("Light shares", self._weights)
-        add("Adaptive", self._mode)
-        for field in ("adaptive", "noise", "min_spp", "spp", "time_limit"):
-            add(labels[field], self._numbers[field])
+        for one in choices.fields_of("work"):
+            if one.field == "adaptive":
+                add("Adaptive", self._mode)
+            if isinstance(one, Choice):
+                self._boxes[one.field] = ChoiceBox(one, self._choose)
+                add(one.label, self._boxes[one.field])
+            else:
+                self._numbers[one.field] = number_box(one, self._choose)
+                add(one.label, self._numbers[one.field])
         session.setup_changed.connect(self._show)
         self._show(session.setup)
 
@@ -76,16 +74,15 @@ class WorkGroup(QGroupBox):
             self._show(setup)
 
     def _show(self, setup: Setup) -> None:
-        self._roulette.show_value(setup.roulette)
-        self._lights.show_value(setup.light_selection)
-        self._weights.show_value(setup.light_weights)
+        for field, box in self._boxes.items():
+            box.show_value(getattr(setup, field))
         self._mode.show_value(mode_of(setup))
         for field in _FIRST:
             if getattr(setup, field):
                 self._targets[field] = getattr(setup, field)
         is_adaptive = bool(setup.adaptive or setup.noise)
-        for field, box in self._numbers.items():
-            show_number(box, self._targets.get(field) or getattr(setup, field))
+        for field, spin in self._numbers.items():
+            show_number(spin, self._targets.get(field) or getattr(setup, field))
         self._numbers["roulette_depth"].setEnabled(setup.roulette != "off")
         self._numbers["adaptive"].setEnabled(bool(setup.adaptive))
         self._numbers["noise"].setEnabled(bool(setup.noise))

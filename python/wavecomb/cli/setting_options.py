@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options of commands that are settings of a render: one for each row of the table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import click
+
+from wavecomb.cli.options import Real
+from wavecomb.options import Setting, default_text, settings
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+ASKED_FOR_ELSEWHERE = (
+    *("width", "height", "spp", "min_spp", "adaptive", "noise", "time_limit", "error"),
+    *("progressive", "costs"),
+)
+"""Settings whose options say more than the setting: --size, --adaptive, --costs FILE ..."""
+
+
+class SettingCommand(click.Command):
+    """A command with ``setting_options``. The core is loaded when its options are needed."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Its parameters; the settings where ``setting_options`` stands."""
+        params: list[click.Parameter] = []
+        for one in super().get_params(ctx):
+            params += one.options() if isinstance(one, _Settings) else [one]
+        return params
+
+
+class _Settings(click.Option):
+    """Where the options of settings come."""
+
+    def __init__(self, only: Iterable[str] | None) -> None:
+        super().__init__(["--settings"], hidden=True)
+        self._only = only
+        self._options: list[click.Parameter] | None = None
+
+    def options(self) -> list[click.Parameter]:
+        """One for each setting."""
+        if self._options is None:
+            rows = settings()
+            names = self._only
+            if names is None:
+                names = [name for name in rows if name not in ASKED_FOR_ELSEWHERE]
+            self._options = [_option(rows[name]) for name in names]
+        return self._options
+
+
+def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
+    """An option for each setting, by default of all that no other option stands for.
+
+    For a ``SettingCommand``. Where an option is not given, its value is None.
+    """
+
+    def decorate(command: F) -> F:
+        command.__dict__.setdefault("__click_params__", []).append(_Settings(only))
+        return command
+
+    return decorate
+
+
+def _option(row: Setting) -> click.Option:
+    """Of a setting."""
+    if row.kind == "flag":
+        return click.Option([row.option, row.name], is_flag=True, default=None, help=row.help)
+    kind: Any
+    metavar = None
+    text = row.help
+    if row.kind == "choice":
+        kind = click.Choice(list(row.choices))
+    elif row.steps:
+        kind = _Steps(row)
+    elif row.kind == "integer":
+        kind, metavar = click.IntRange(min=0), "N"
+    elif row.kind == "number":
+        least = row.least or 0.0
+        kind, metavar = Real(0, above=least > 0 and not row.zero), "X"
+    else:
+        kind, metavar = str, "TEXT"
+    if row.zero and not row.steps:
+        text += f" 0: {row.zero}."
+    return click.Option(
+        [row.option, row.name],
+        type=kind,
+        metavar=metavar,
+        help=f"{text}  [default: {default_text(row)}]",
+    )
+
+
+class _Steps(click.Choice):
+    """The few numbers of a setting; a word for 0."""
+
+    def __init__(self, row: Setting) -> None:
+        super().__init__([row.zero, *(f"{step:g}" for step in row.steps)])
+        self._zero = row.zero
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Text to the number."""
+        if isinstance(value, int):
+            return value
+        text = super().convert(value, param, ctx)
+        return 0 if text == self._zero else int(text)
