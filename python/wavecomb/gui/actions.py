@@ -11,6 +11,8 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QWidget
 
 SEPARATOR = "-"
+TITLE = "title"
+"""Property: the text of an action as it was made, where it says more meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ def make_action(entry: Entry, window: QWidget, viewport: QWidget) -> QAction:
     action.setShortcuts([QKeySequence(key) for key in entry.keys])
     tip = entry.tip or entry.text.replace("&", "").rstrip(".\u2026")
     action.setToolTip(tip)
+    action.setProperty(TITLE, entry.text)
     action.setStatusTip(tip)
     action.setCheckable(entry.checkable)
     if entry.local:

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the lists of the scene panel share: a model with a header, and a view of whole rows."""
+"""What models of lists share: fixed headers, and roles for what a view paints. No widgets."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QObject, Qt
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
-from wavecomb.gui import theme
-from wavecomb.gui.widgets import named
+ColourRole = Qt.ItemDataRole.UserRole + 10
+"""A linear colour, shown as a square before the text."""
+ToneRole = Qt.ItemDataRole.UserRole + 11
+"""Of the text: "dim", "warning", "error", or None."""
 
 
 class HeadedModel(QAbstractTableModel):
@@ -31,6 +32,12 @@ class HeadedModel(QAbstractTableModel):
         """How many rows there are."""
         raise NotImplementedError
 
+    def tell(self, first: int, last: int) -> None:
+        """Some columns say something else now."""
+        if self.row_count():
+            corners = self.index(0, first), self.index(self.row_count() - 1, last)
+            self.dataChanged.emit(*corners)
+
     def rowCount(self, parent: Any = None) -> int:
         """As Qt has it."""
         return 0 if parent is not None and parent.isValid() else self.row_count()
@@ -48,36 +55,3 @@ class HeadedModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.DisplayRole:
             return self._headers[section]
         return self._tips[section] if self._tips and role == Qt.ItemDataRole.ToolTipRole else None
-
-
-def lay_out_rows(
-    view: QTableView,
-    name: str,
-    title: str,
-    tip: str,
-    *,
-    stretch: int,
-    widths: Mapping[int, float],
-) -> None:
-    """A list of which whole rows are chosen, one at a time.
-
-    Args:
-        view: With its model.
-        name: Object name.
-        title: Accessible name.
-        tip: Tooltip.
-        stretch: Column that takes what room is left.
-        widths: Of the others, in font heights.
-    """
-    named(view, name, title, tip)
-    view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-    view.setTabKeyNavigation(False)
-    view.setShowGrid(False)
-    view.setAlternatingRowColors(True)
-    view.verticalHeader().hide()
-    view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
-    header = view.horizontalHeader()
-    header.setSectionResizeMode(stretch, QHeaderView.ResizeMode.Stretch)
-    for column, wide in widths.items():
-        header.resizeSection(column, theme.em(wide))

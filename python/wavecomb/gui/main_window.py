@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
@@ -22,9 +21,11 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.about import make_about
 from wavecomb.gui.actions import make_action
+from wavecomb.gui.history_actions import HistoryActions, UnsavedMark
 from wavecomb.gui.menus import CHECKED, MENUS, entries
 from wavecomb.gui.messages import MessageBar
 from wavecomb.gui.panels import make_panels
+from wavecomb.gui.recent_stages import RecentStages
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog
 from wavecomb.gui.status import StatusLine
@@ -32,9 +33,9 @@ from wavecomb.gui.viewport.display_bar import DisplayBar
 from wavecomb.gui.viewport.inspector import Inspector
 from wavecomb.gui.viewport.render_bar import RenderBar
 from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.gui.viewport.view_history import ViewHistory
 from wavecomb.gui.viewport.viewport import Viewport
 
-RECENT = 10
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 _STATE_VERSION = 1
 
@@ -50,7 +51,7 @@ class MainWindow(QMainWindow):
     def __init__(self, setup: Setup | None = None, settings: QSettings | None = None) -> None:
         super().__init__()
         self.setObjectName("window")
-        self.settings = settings or QSettings("Wavecomb", "Wavecomb")
+        self.settings = settings or QSettings("Wavecomb", "Wavecomb", self)
         self.session = Session(setup, self)
         self.viewport = Viewport(self.session)
         self.message = MessageBar()
@@ -58,6 +59,7 @@ class MainWindow(QMainWindow):
         self.render_bar = RenderBar(self.session, self)
         self.inspector = Inspector(self.session)
         self.status = StatusLine(self.session, self)
+        self.views = ViewHistory(self.session, self)
         self.docks: dict[str, QDockWidget] = {}
         self._save_path: str | None = None
         self._bottom_sized = False
@@ -148,7 +150,9 @@ class MainWindow(QMainWindow):
                 if name == "-":
                     menu.addSeparator()
                 elif name == "recent":
-                    self._recent_menu = menu.addMenu("Open &recent")
+                    inner = menu.addMenu("Open &recent")
+                    self._recent = RecentStages(self.settings, inner)
+                    self._recent.chosen.connect(self.open)
                 elif name == "theme":
                     self._add_theme_menu(menu)
                 elif name == "panels":
@@ -160,7 +164,6 @@ class MainWindow(QMainWindow):
                     menu.addAction(action)
         for name in ("pause", "stop", "restart", "region", "clear_region"):
             self.render_bar.addAction(self.actions_by_name[name])
-        self._fill_recent()
 
     def _add_theme_menu(self, menu: QMenu) -> None:
         inner = menu.addMenu("&Colours")
@@ -194,6 +197,10 @@ class MainWindow(QMainWindow):
         viewport.hovered.connect(self.inspector.hover)
         viewport.picked.connect(self.inspector.pick)
         viewport.region_mode_changed.connect(self.actions_by_name["region"].setChecked)
+        actions, edits = self.actions_by_name, self.scene.edits.history.stack
+        HistoryActions(edits, actions["undo"], actions["redo"], self)
+        HistoryActions(self.views.stack, actions["view_back"], actions["view_forth"], self)
+        UnsavedMark(edits, self)
         self._state_changed(session.state)
         self._setup_changed(session.setup)
 
@@ -226,29 +233,17 @@ class MainWindow(QMainWindow):
 
     def recent(self) -> list[str]:
         """Files that were opened, the last first."""
-        value: Any = self.settings.value("recent", [])
-        return [value] if isinstance(value, str) else [str(path) for path in value or []]
+        return self._recent.names()
 
     def _opened(self) -> None:
         path = self.session.path
         if path is not None:
-            name = str(path.resolve())
-            others = [other for other in self.recent() if other != name]
-            self.settings.setValue("recent", [name, *others][:RECENT])
-            self._fill_recent()
+            self._recent.add(path)
         self._retitle()
-
-    def _fill_recent(self) -> None:
-        self._recent_menu.clear()
-        names = self.recent()
-        self._recent_menu.setEnabled(bool(names))
-        for name in names:
-            action = self._recent_menu.addAction(name.replace("&", "&&"))
-            action.triggered.connect(lambda checked=False, name=name: self.open(name))
 
     def _retitle(self) -> None:
         path = self.session.path
-        self.setWindowTitle("Wavecomb" if path is None else f"{path.name} \u2014 Wavecomb")
+        self.setWindowTitle("Wavecomb" if path is None else f"{path.name}[*] \u2014 Wavecomb")
 
     def _busy(self, what: str) -> None:
         if self.session.stage is None:
@@ -394,6 +389,7 @@ class MainWindow(QMainWindow):
             close = getattr(dock.widget(), "shutdown", None)
             if close is not None:
                 close()
+        self.views.stack.clear()
         self.viewport.close_threads()
         self.session.shutdown()
         super().closeEvent(event)

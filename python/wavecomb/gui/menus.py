@@ -22,7 +22,8 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     (
         "&Camera",
-        ("frame", "frame_all", "stage_camera", "-", "front", "right", "top", "opposite"),
+        ("frame", "frame_all", "stage_camera", "-", "front", "right", "top", "opposite", "-",
+         "view_back", "view_forth"),
     ),
     (
         "&Picture",
@@ -107,6 +108,14 @@ def entries(window: Window) -> list[Entry]:
         view("front", 1),
         view("right", 3),
         view("top", 7),
+        Entry(
+            "view_back", "&Back from", window.views.back, ["Ctrl+Alt+Z"],
+            "Where the camera was before; edits stay",
+        ),
+        Entry(
+            "view_forth", "For&ward to", window.views.forth, ["Ctrl+Alt+Shift+Z"],
+            "Where the camera was before it went back",
+        ),
         Entry("opposite", "From the other side", viewport.view_opposite, keypad(9), local=True),
         Entry("brighter", "&Brighter", lambda: expose(0.5), ["]"], "Half a stop", local=True),
         Entry("darker", "&Darker", lambda: expose(-0.5), ["["], "Half a stop", local=True),

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.actions import TITLE
 from wavecomb.gui.widgets import named
 
 MOUSE = (
@@ -34,8 +35,9 @@ MOUSE = (
 
 
 def plain_text(action: QAction) -> str:
-    """Without mnemonics and dots."""
-    return action.text().replace("&", "").rstrip(".\u2026")
+    """Without mnemonics and dots, and without what is at hand just now."""
+    text = str(action.property(TITLE) or action.text())
+    return text.replace("&", "").rstrip(".\u2026")
 
 
 def listed(window: QWidget) -> list[tuple[str, str]]:

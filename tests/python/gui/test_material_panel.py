@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 from mtlx_stage import write_referring, write_stage
-from pxr import Sdf
 from PySide6.QtCore import QPoint, QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDoubleSpinBox, QLineEdit, QToolButton
@@ -12,13 +11,12 @@ from PySide6.QtWidgets import QDoubleSpinBox, QLineEdit, QToolButton
 import wavecomb
 from wavecomb.gui import theme
 from wavecomb.gui.main_window import MainWindow
+from wavecomb.gui.scene.ranges import Range, differs
 from wavecomb.gui.scene.scene_panel import ScenePanel
-from wavecomb.gui.scene.stage_edits import Opinion, StageEdits
 from wavecomb.gui.scene.value_fields import (
     ColourField,
     DrivenField,
     NumberField,
-    Range,
     SwitchField,
 )
 from wavecomb.gui.setup import Setup
@@ -227,7 +225,7 @@ def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
     materials, edits = window.scene.materials, window.scene.edits
     materials.choose(f"{LOOKS}/Car")
     clock = [100.0]
-    edits.edits.now = lambda: clock[0]
+    edits.history.now = lambda: clock[0]
     spin = materials.fields["base_weight"].spin
     window.activateWindow()
     spin.setFocus()
@@ -263,7 +261,6 @@ def test_digits_are_typed_where_they_were_begun(qtbot):
     field = NumberField("x", Range(0.0, 10.0, 0.0, 1.0))
     qtbot.addWidget(field)
     field.show()
-    from wavecomb.gui.scene.value_fields import differs
     from wavecomb.usd.looks.parameters import as_stored
 
     def back(value):
@@ -280,34 +277,6 @@ def test_a_value_out_of_range_is_shown(qtbot):
     qtbot.addWidget(field)
     field.set_value((5.0, 0.5, 0.25))
     assert field.value() == (5.0, 0.5, 0.25) and field.spins[0].value() == 5.0
-
-
-def test_typing_joins_what_is_slow_and_nothing_else():
-    from pxr import Usd
-
-    stage = Usd.Stage.CreateInMemory()
-    stage.DefinePrim("/A")
-    clock = [0.0]
-    edits = StageEdits(stage, Usd.TimeCode.Default(), now=lambda: clock[0])
-    key = (Sdf.Path("/A"), ".x")
-
-    def change(value):
-        clock[0] += 5.0
-        edits.change("x", {key: Opinion(value, Sdf.ValueTypeNames.Float)})
-
-    def count():
-        steps = 0
-        while edits.undo():
-            steps += 1
-        return steps
-
-    for run in ((1.0, 2.0), (3.0, 4.0)):
-        edits.set_typing(True)
-        for value in run:
-            change(value)
-        edits.set_typing(False)
-    change(5.0)
-    assert count() == 3
 
 
 def test_what_usd_says_goes_to_the_notes(new_session, qtbot, final, tmp_path, capfd):

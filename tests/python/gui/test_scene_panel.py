@@ -13,7 +13,8 @@ from scene_stage import write_stage
 import wavecomb
 from wavecomb.gui.scene.scene_model import NAME, VARIANTS, VISIBILITY
 from wavecomb.gui.scene.scene_panel import ScenePanel
-from wavecomb.gui.scene.value_fields import DrivenField, from_display, to_display
+from wavecomb.gui.scene.swatch import from_display, to_display
+from wavecomb.gui.scene.value_fields import DrivenField
 
 SIZE, SPP = 40, 2
 LEFT = Qt.MouseButton.LeftButton
@@ -196,7 +197,7 @@ def test_material_parameters(panel, same_as_saved, stage_path, final):
     stage = panel.session.usd
     value = stage.GetAttributeAtPath("/World/Looks/Red/S.inputs:diffuseColor").Get()
     assert tuple(value) == pytest.approx((0.8, 0.1, 0.9))
-    twin = materials._edits.material_ids("/World/Looks/Twin")[0]
+    twin = panel.edits.material_ids("/World/Looks/Twin")[0]
     assert panel.session.scene.material(twin)["base_color"][2] == pytest.approx(0.1)
     QTest.mouseClick(field.back, LEFT)
     assert (final(panel.session).beauty == before).all()

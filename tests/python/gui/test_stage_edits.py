@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Edits in the session layer: as USD would make them, undone, and back as a layer."""
 
-import itertools
-
 import pytest
 from pxr import Sdf, Usd, UsdGeom
 
 import wavecomb
 from wavecomb.errors import WavecombError
 from wavecomb.gui.scene.edit_layer import save_edits
+from wavecomb.gui.scene.history import History
 from wavecomb.gui.scene.stage_edits import Opinion, StageEdits
 from wavecomb.gui.scene.visibility import state
 from wavecomb.usd import load_stage, open_stage
@@ -63,10 +62,39 @@ def path(tmp_path):
     return file
 
 
+class Edits:
+    """Edits of a stage with their steps of undo, and a clock that is set by hand."""
+
+    def __init__(self, stage, time):
+        self.of = StageEdits(stage, time)
+        self.moment = 0.0
+        self.history = History(now=lambda: self.moment)
+        self.history.step.connect(self.of.apply)
+
+    def __getattr__(self, name):
+        return getattr(self.of, name)
+
+    def do(self, step):
+        """Makes what was planned."""
+        if step is not None:
+            self.history.push(step)
+        return step
+
+    def change(self, label, opinions):
+        return self.do(self.of.plan(label, opinions))
+
+    def undone(self):
+        """How many steps there are; all are taken back."""
+        count = 0
+        while self.history.stack.canUndo():
+            self.history.undo()
+            count += 1
+        return count
+
+
 @pytest.fixture
-def edits(path):
-    ticks = itertools.count(step=10.0)
-    return StageEdits(open_stage(path), Usd.TimeCode(7), now=lambda: next(ticks))
+def edits(path, qapp):
+    return Edits(open_stage(path), Usd.TimeCode(7))
 
 
 def visible(stage):
@@ -81,7 +109,7 @@ def visible(stage):
 @pytest.mark.parametrize("name", PRIMS)
 @pytest.mark.parametrize("shown", [True, False])
 def test_visibility_is_what_usd_would_make(path, edits, name, shown):
-    edits.set_visible([Sdf.Path(name)], shown)
+    edits.do(edits.visible([Sdf.Path(name)], shown))
     other = open_stage(path)
     other.SetEditTarget(other.GetSessionLayer())
     prim = UsdGeom.Imageable.Get(other, name)
@@ -96,66 +124,64 @@ def test_visibility_is_what_usd_would_make(path, edits, name, shown):
 def test_several_at_once_and_back(edits):
     before = edits.stage.GetSessionLayer().ExportToString()
     start = visible(edits.stage)
-    step = edits.set_visible([Sdf.Path("/World/A/B/One"), Sdf.Path("/World/A/C")], True)
+    step = edits.do(edits.visible([Sdf.Path("/World/A/B/One"), Sdf.Path("/World/A/C")], True))
     assert step.structural
     now = visible(edits.stage)
     assert now["/World/A/B/One"] and now["/World/A/C/Three"] and not now["/World/A/B/Two"]
-    assert edits.undo_label == "show 2 prims"
-    edits.undo()
+    assert edits.history.stack.undoText() == "show 2 prims"
+    edits.history.undo()
     assert visible(edits.stage) == start
     assert edits.stage.GetSessionLayer().ExportToString() == before
-    edits.redo()
+    edits.history.redo()
     assert visible(edits.stage) == now
-    assert edits.undo() and edits.undo() is None
+    assert edits.undone() == 1 and edits.undone() == 0
 
 
 def test_variants(edits):
     world = Sdf.Path("/World")
     (look,) = edits.variant_sets(world)
     assert (look.name, look.choices, look.choice) == ("look", ("ball", "box"), "ball")
-    assert edits.select_variant(world, "look", "box").structural
+    assert edits.do(edits.variant(world, "look", "box")).structural
     assert edits.stage.GetPrimAtPath("/World/Thing").GetTypeName() == "Cube"
     assert edits.lines() == ["/World{look} = box"]
-    edits.select_variant(world, "look", None)
+    edits.do(edits.variant(world, "look", None))
     assert edits.stage.GetPrimAtPath("/World/Thing").GetTypeName() == "Sphere"
     assert edits.lines() == []
     with pytest.raises(WavecombError, match=r"look=cone.*ball, box"):
-        edits.select_variant(world, "look", "cone")
+        edits.do(edits.variant(world, "look", "cone"))
 
 
 def test_inside_instances_nothing_can_be_edited(edits):
     inside = Sdf.Path("/I1/Cube")
     assert edits.stage.GetPrimAtPath(inside).IsInstanceProxy()
     with pytest.raises(WavecombError, match=r"/I1/Cube.*inside an instance"):
-        edits.set_visible([inside], False)
+        edits.do(edits.visible([inside], False))
     with pytest.raises(WavecombError, match="inside an instance"):
-        edits.select_variant(inside, "look", "box")
-    assert edits.set_visible([Sdf.Path("/I1")], False)
+        edits.do(edits.variant(inside, "look", "box"))
+    assert edits.do(edits.visible([Sdf.Path("/I1")], False))
     assert edits.edited() == [(Sdf.Path("/I1"), ".visibility")]
 
 
-def test_a_drag_is_one_step(path):
-    moment = [0.0]
-    edits = StageEdits(open_stage(path), Usd.TimeCode(7), now=lambda: moment[0])
+def test_a_drag_is_one_step(edits):
     key = (Sdf.Path("/World/A/B/One"), ".size")
     for size in (3.0, 4.0, 5.0):
         edits.change("size", {key: Opinion(size, Sdf.ValueTypeNames.Double)})
-        moment[0] += 0.1
-    moment[0] += 5
+        edits.moment += 0.1
+    edits.moment += 5
     edits.change("size", {key: Opinion(6.0, Sdf.ValueTypeNames.Double)})
     size = edits.stage.GetAttributeAtPath("/World/A/B/One.size")
     assert size.Get() == 6
-    edits.undo()
+    edits.history.undo()
     assert size.Get() == 5
-    edits.undo()
+    edits.history.undo()
     assert size.Get() == 2 and not edits.edited()
     assert edits.change("nothing", {key: None}) is None
 
 
 def test_saved_edits_give_the_same_picture(edits, path, tmp_path):
-    edits.set_visible([Sdf.Path("/World/A/B/One")], True)
-    edits.select_variant(Sdf.Path("/World"), "look", "box")
-    edits.set_visible([Sdf.Path("/I2")], False)
+    edits.do(edits.visible([Sdf.Path("/World/A/B/One")], True))
+    edits.do(edits.variant(Sdf.Path("/World"), "look", "box"))
+    edits.do(edits.visible([Sdf.Path("/I2")], False))
     (tmp_path / "sub").mkdir()
     saved = save_edits(edits.stage, tmp_path / "sub" / "edits.usda")
     text = saved.read_text()
@@ -168,8 +194,8 @@ def test_saved_edits_give_the_same_picture(edits, path, tmp_path):
     stage = Usd.Stage.Open(str(saved))
     assert UsdGeom.GetStageUpAxis(stage) == "Z" and stage.GetDefaultPrim().GetName() == "World"
     # Over the edits further ones can be made.
-    more = StageEdits(open_stage(saved), Usd.TimeCode(7))
-    more.set_visible([Sdf.Path("/World/A/C")], True)
+    more = Edits(open_stage(saved), Usd.TimeCode(7))
+    more.do(more.visible([Sdf.Path("/World/A/C")], True))
     third = save_edits(more.stage, tmp_path / "sub" / "third.usda")
     assert "@./edits.usda@" in third.read_text()
 

@@ -55,7 +55,7 @@ class Saved:
 
     def look(self):
         gc.collect()
-        return [f"{type(one).__name__} {one!r}" for one in owned(gc.garbage)]
+        return [f"{type(one).__name__} {one!r:.80}" for one in owned(gc.garbage)]
 
 
 def test_garbage_that_holds_qt_is_found(qapp):

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QModelIndex, QObject, QSortFilterProxyModel, Qt
+from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -21,100 +20,12 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.headed_model import HeadedModel
+from wavecomb.gui.scene.list_view import RowDelegate
+from wavecomb.gui.scene.notes_model import KIND, KINDS, WHAT, NotesFilter, NotesModel, Row, rows_of
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
-    from wavecomb.usd import Finding, LoadedStage
-
-KIND, WHAT, PLACE = range(3)
-HEADERS = ("Kind", "What", "Where")
-UNSUPPORTED, WARNING, NOTE = "not supported", "warning", "note"
-KINDS = (UNSUPPORTED, WARNING, NOTE)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One finding at one place; place: a prim path, a file, or "" for the whole stage."""
-
-    kind: str
-    what: str
-    place: str
-
-    def line(self) -> str:
-        """As text."""
-        return f"{self.kind}: {self.what}" + (f": {self.place}" if self.place else "")
-
-
-def rows_of(stage: LoadedStage) -> list[Row]:
-    """A row for each place that the report names, and one for those that it only counts."""
-    out: list[Row] = []
-    report = stage.report
-
-    def add(kind: str, finding: Finding) -> None:
-        places = finding.all_places or [""]
-        out.extend(Row(kind, finding.what, place) for place in places)
-        more = finding.count - len(places)
-        if more > 0 and finding.all_places:
-            out.append(Row(kind, finding.what, f"({more} more)"))
-
-    for kind, findings in zip(
-        KINDS, (report.unsupported, report.warnings, report.notes), strict=True
-    ):
-        for finding in findings:
-            add(kind, finding)
-    out += [Row(WARNING, line, "") for line in stage.scene.warnings]
-    return out
-
-
-class NotesModel(HeadedModel):
-    """The rows."""
-
-    def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(HEADERS, parent)
-        self.rows: list[Row] = []
-
-    def fill(self, rows: list[Row]) -> None:
-        """Other rows."""
-        self.beginResetModel()
-        self.rows = rows
-        self.endResetModel()
-
-    def row_count(self) -> int:
-        """Findings."""
-        return len(self.rows)
-
-    def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it."""
-        row = self.rows[index.row()]
-        if role == Qt.ItemDataRole.DisplayRole:
-            return (row.kind, row.what, row.place)[index.column()]
-        if role == Qt.ItemDataRole.ToolTipRole:
-            return row.line()
-        if role == Qt.ItemDataRole.ForegroundRole and index.column() == KIND:
-            return {UNSUPPORTED: theme.error(), WARNING: theme.warning()}.get(row.kind, theme.dim())
-        return None
-
-
-class _Filter(QSortFilterProxyModel):
-    """Rows of one kind that hold a text in any column."""
-
-    def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self.kind = ""
-        self.text = ""
-
-    def set(self, kind: str, text: str) -> None:
-        """What to show; kind "": all."""
-        self.kind, self.text = kind, text.casefold()
-        self.invalidate()
-
-    def filterAcceptsRow(self, number: int, parent: Any) -> bool:
-        """As Qt has it."""
-        model = self.sourceModel()
-        assert isinstance(model, NotesModel)
-        row = model.rows[number]
-        return (not self.kind or row.kind == self.kind) and self.text in row.line().casefold()
+    from wavecomb.usd import LoadedStage
 
 
 class NotesPanel(QWidget):
@@ -124,7 +35,7 @@ class NotesPanel(QWidget):
         super().__init__(parent)
         self._session = session
         self.model = NotesModel(self)
-        self._filter = _Filter(self)
+        self._filter = NotesFilter(self)
         self._filter.setSourceModel(self.model)
         self.kinds = QComboBox()
         self.kinds.setObjectName("notes-kind")
@@ -162,6 +73,7 @@ class NotesPanel(QWidget):
     def _make_view(self) -> None:
         view = self.view
         view.setModel(self._filter)
+        view.setItemDelegate(RowDelegate(view))
         view.setObjectName("notes")
         view.setAccessibleName("What loading found")
         view.setToolTip("Double click chooses the prim; Ctrl+C copies")

@@ -10,7 +10,7 @@ from pxr import Sdf, Usd, UsdGeom
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, Qt
 from PySide6.QtGui import QFont
 
-from wavecomb.gui import theme
+from wavecomb.gui.headed_model import ToneRole
 from wavecomb.gui.scene.visibility import HIDDEN_ABOVE, NOT_DRAWN, VISIBLE, state, uneditable
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class SceneModel(QAbstractItemModel):
         return None
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it, and ``PathRole`` and ``StateRole``."""
+        """As Qt has it, and ``PathRole``, ``StateRole`` and ``ToneRole``."""
         prim = self.prim(index)
         if not prim:
             return None
@@ -195,9 +195,9 @@ class SceneModel(QAbstractItemModel):
             font.setItalic(prim.IsInstanceProxy())
             font.setBold(prim.GetPath() in self._matches)
             return font
-        if role == Qt.ItemDataRole.ForegroundRole and column != VISIBILITY:
+        if role == ToneRole and column != VISIBILITY:
             drawn = state(prim, self._edits.time)[0]
-            return None if drawn in (VISIBLE, NOT_DRAWN) else theme.dim()
+            return None if drawn in (VISIBLE, NOT_DRAWN) else "dim"
         return None
 
     def _text(self, prim: Usd.Prim, column: int) -> str:

@@ -4,16 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pxr import Sdf, UsdShade
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QComboBox,
     QFileDialog,
-    QFormLayout,
     QHBoxLayout,
     QLabel,
     QTabWidget,
@@ -27,64 +24,11 @@ from wavecomb.gui.scene.materials_panel import MaterialsPanel
 from wavecomb.gui.scene.notes_panel import NotesPanel
 from wavecomb.gui.scene.scene_edits import SceneEdits
 from wavecomb.gui.scene.scene_tree import SceneTree
+from wavecomb.gui.scene.variants import VariantBar
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
     from wavecomb.usd import LoadedStage
-
-STAGE_CHOICE = "as in the stage"
-
-
-class VariantBar(QWidget):
-    """A combo for each variant set of the prim that is selected."""
-
-    def __init__(self, edits: SceneEdits) -> None:
-        super().__init__()
-        self._edits = edits
-        self._path: str | None = None
-        self.combos: dict[str, QComboBox] = {}
-        self._form = QFormLayout(self)
-        self._form.setContentsMargins(0, 0, 0, 0)
-        edits.changed.connect(self._again)
-        edits.reset.connect(lambda: self.show_prim(None))
-        self.hide()
-
-    def show_prim(self, path: str | None) -> None:
-        """Another prim."""
-        self._path = path
-        self._again()
-
-    def _again(self) -> None:
-        while self._form.rowCount():
-            self._form.removeRow(0)
-        self.combos = {}
-        prim = self._edits.prim(self._path or "")
-        editable = bool(prim) and not prim.IsInstanceProxy()
-        sets = []
-        if prim and self._edits.edits is not None:
-            sets = self._edits.edits.variant_sets(prim.GetPath())
-        for one in sets:
-            combo = QComboBox()
-            combo.setObjectName(f"variant-{one.name}")
-            combo.setAccessibleName(f"Variant {one.name}")
-            combo.setToolTip(
-                f"Variant {one.name} of {self._path}"
-                if editable
-                else "Inside an instance: choose variants of the instance itself"
-            )
-            combo.addItem(STAGE_CHOICE, None)
-            for choice in one.choices:
-                combo.addItem(choice, choice)
-            combo.setCurrentIndex(combo.findData(one.choice) if one.choice else 0)
-            combo.setEnabled(editable)
-            combo.activated.connect(partial(self._choose, one.name, combo))
-            self._form.addRow(one.name, combo)
-            self.combos[one.name] = combo
-        self.setVisible(bool(sets))
-
-    def _choose(self, name: str, combo: QComboBox, number: int) -> None:
-        if self._path is not None:
-            self._edits.select_variant(self._path, name, combo.itemData(number))
 
 
 class ScenePanel(QWidget):
@@ -139,11 +83,17 @@ class ScenePanel(QWidget):
         layout.addLayout(bottom)
         self.tree.view.frame_wanted.connect(self.frame_wanted)
         self.edits.changed.connect(self._on_changed)
+        self.edits.history.changed.connect(self._on_history)
         session.selected.connect(self._on_selected)
         session.opened.connect(self._on_opened)
         session.noted.connect(lambda stage: self._count_notes())
         self._on_changed()
+        self._on_history()
         self._count_notes()
+
+    def shutdown(self) -> None:
+        """Forgets all steps of undo: Qt's stack goes before Python's side of it does."""
+        self.edits.history.clear()
 
     def _make_actions(self) -> None:
         # Without keys: the menus of the window have them.
@@ -173,13 +123,15 @@ class ScenePanel(QWidget):
         dialog.fileSelected.connect(self.edits.save)
         dialog.open()
 
-    def _on_changed(self) -> None:
+    def _on_history(self) -> None:
         for action, name, what in (
             (self.undo_action, "Undo", self.edits.can_undo()),
             (self.redo_action, "Redo", self.edits.can_redo()),
         ):
             action.setEnabled(bool(what))
             action.setToolTip(f"{name} {what}".strip())
+
+    def _on_changed(self) -> None:
         lines = self.edits.lines()
         self.save_action.setEnabled(bool(lines))
         self.state.setText(f"{len(lines)} edited" if lines else "")

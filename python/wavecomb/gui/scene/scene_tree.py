@@ -10,10 +10,7 @@ from typing import TYPE_CHECKING
 from pxr import Sdf, UsdGeom
 from PySide6.QtCore import (
     QModelIndex,
-    QPersistentModelIndex,
     QPoint,
-    QRectF,
-    QSize,
     Qt,
     QTimer,
     Signal,
@@ -23,9 +20,6 @@ from PySide6.QtGui import (
     QGuiApplication,
     QKeyEvent,
     QMouseEvent,
-    QPainter,
-    QPainterPath,
-    QPen,
 )
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -33,14 +27,14 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMenu,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
     QTreeView,
     QVBoxLayout,
     QWidget,
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.scene.eye import EyeDelegate
+from wavecomb.gui.scene.list_view import RowDelegate
 from wavecomb.gui.scene.scene_model import (
     HEADERS,
     NAME,
@@ -49,10 +43,8 @@ from wavecomb.gui.scene.scene_model import (
     VISIBILITY,
     PathRole,
     SceneModel,
-    StateRole,
     search,
 )
-from wavecomb.gui.scene.visibility import HIDDEN, NOT_DRAWN, VISIBLE
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
@@ -62,49 +54,6 @@ MAX_FOUND = 2000
 
 MAX_EXPANDED = 300
 """With more found, only the way to the first is opened."""
-
-
-class EyeDelegate(QStyledItemDelegate):
-    """Paints an eye: open, crossed out, or faint where something above hides the prim."""
-
-    def sizeHint(
-        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
-    ) -> QSize:
-        """As Qt has it: rows are high enough to be hit."""
-        return QSize(theme.em(2), theme.em(1.5))
-
-    def paint(
-        self,
-        painter: QPainter,
-        option: QStyleOptionViewItem,
-        index: QModelIndex | QPersistentModelIndex,
-    ) -> None:
-        """As Qt has it."""
-        super().paint(painter, option, index)
-        seen = index.data(StateRole)
-        if seen == NOT_DRAWN or seen is None:
-            return
-        size = min(option.rect.height() * 0.8, option.rect.width())
-        box = QRectF(0, 0, size, size * 0.6)
-        box.moveCenter(QRectF(option.rect).center())
-        painter.save()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        colour = theme.text() if seen in (VISIBLE, HIDDEN) else theme.dim()
-        painter.setPen(QPen(colour, size / 12))
-        left, right = box.center().x() - box.width() / 2, box.center().x() + box.width() / 2
-        middle = box.center().y()
-        lid = QPainterPath()
-        lid.moveTo(left, middle)
-        lid.quadTo(box.center().x(), box.top() - box.height() * 0.4, right, middle)
-        lid.quadTo(box.center().x(), box.bottom() + box.height() * 0.4, left, middle)
-        painter.drawPath(lid)
-        if seen == VISIBLE:
-            painter.setBrush(colour)
-        pupil = size * 0.14
-        painter.drawEllipse(box.center(), pupil, pupil)
-        if seen != VISIBLE:
-            painter.drawLine(box.bottomLeft(), box.topRight())
-        painter.restore()
 
 
 class _View(QTreeView):
@@ -218,6 +167,7 @@ class SceneTree(QWidget):
         view.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         view.setUniformRowHeights(True)
         view.setAlternatingRowColors(True)
+        view.setItemDelegate(RowDelegate(view))
         view.setItemDelegateForColumn(VISIBILITY, EyeDelegate(view))
         view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         view.setExpandsOnDoubleClick(False)

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits of a stage in its session layer: made, undone, listed and saved. Knows nothing of Qt.
+"""Edits of a stage in its session layer: planned, made, listed. Knows nothing of Qt.
 
 Contract: used by one thread, the one that owns the stage. The files of the stage are never written.
 """
 
 from __future__ import annotations
 
-import time as clock
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,9 +18,6 @@ from wavecomb.gui.scene.visibility import hide, show, uneditable
 Key = tuple[Sdf.Path, str]
 """A prim and what of it: ``.NAME`` of an attribute, ``{NAME}`` of a variant set, ``!NAME`` of a
 value that no attribute of the stage holds."""
-
-MERGE_S = 0.7
-"""Changes of one thing that follow each other faster are one step of undo."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +43,42 @@ class VariantSet:
 
 
 @dataclass(frozen=True)
+class Solo:
+    """The light that is shown alone, None where none is, and what was said before of all."""
+
+    path: str | None = None
+    before: Mapping[Key, Opinion | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Step:
-    """One step of undo: opinions before and after, None where there is none."""
+    """One step of undo.
+
+    Attributes:
+        label: For people: "intensity of /Key".
+        before: Opinions, None where there is none.
+        after: Of the same things.
+        solo: Before and after; None: it stays.
+    """
 
     label: str
     before: Mapping[Key, Opinion | None]
     after: Mapping[Key, Opinion | None]
+    solo: tuple[Solo, Solo] | None = None
+
+    def inverse(self) -> Step:
+        """What takes it back."""
+        solo = self.solo[::-1] if self.solo is not None else None
+        return Step(f"undo {self.label}", self.after, self.before, solo)
+
+    def then(self, later: Step) -> Step:
+        """This and a later one of the same things as one."""
+        return Step(later.label, self.before, later.after, self.solo)
+
+    @property
+    def drags(self) -> bool:
+        """Whether it may be part of a drag: a value that is taken back is a step of its own."""
+        return not self.structural and self.solo is None and None not in self.after.values()
 
     @property
     def structural(self) -> bool:
@@ -74,19 +100,11 @@ class StageEdits:
         time: At which its attributes are read.
         values: What is changed and no attribute holds, by prim and parameter: it is in the picture,
             and is not saved.
-        now: The clock, for telling drags from single changes.
     """
 
     stage: Usd.Stage
     time: Usd.TimeCode
-    now: Callable[[], float] = clock.monotonic
     values: dict[Key, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self._done: list[Step] = []
-        self._undone: list[Step] = []
-        self._last = -MERGE_S
-        self._typing = self._joins = False
 
     # ---- what there is -------------------------------------------------------------------------
 
@@ -149,10 +167,10 @@ class StageEdits:
                 out.append(f"{path}{what} = {value}")
         return out
 
-    # ---- changes -------------------------------------------------------------------------------
+    # ---- changes: each gives a step, None where nothing changes; ``apply`` makes it -------------
 
-    def set_visible(self, paths: Iterable[Sdf.Path], visible: bool) -> Step | None:
-        """Shows or hides prims, as ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible`` do.
+    def visible(self, paths: Iterable[Sdf.Path], visible: bool) -> Step | None:
+        """To show or hide prims, as ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible`` do.
 
         Raises:
             WavecombError: One is inside an instance.
@@ -168,10 +186,10 @@ class StageEdits:
             for at, word in (show if visible else hide)(prim, self.time, hidden).items():
                 opinions[(at, ".visibility")] = Opinion(word, Sdf.ValueTypeNames.Token)
         name = str(wanted[0]) if len(wanted) == 1 else f"{len(wanted)} prims"
-        return self.change(f"{'show' if visible else 'hide'} {name}", opinions)
+        return self.plan(f"{'show' if visible else 'hide'} {name}", opinions)
 
-    def select_variant(self, path: Sdf.Path, name: str, choice: str | None) -> Step | None:
-        """Selects a variant; None: what the stage itself selects.
+    def variant(self, path: Sdf.Path, name: str, choice: str | None) -> Step | None:
+        """To select a variant; None: what the stage itself selects.
 
         Raises:
             WavecombError: There is no such set or variant, or the prim is inside an instance.
@@ -184,88 +202,23 @@ class StageEdits:
             known = ", ".join(sets[name].choices if name in sets else sets) or "none"
             raise WavecombError(f"{path}{{{name}={choice}}}: there is no such variant, but {known}")
         opinion = None if choice is None else Opinion(choice)
-        return self.change(f"{name} of {path}", {(path, f"{{{name}}}"): opinion})
+        return self.plan(f"{name} of {path}", {(path, f"{{{name}}}"): opinion})
 
-    def change(self, label: str, opinions: Mapping[Key, Opinion | None]) -> Step | None:
-        """Sets or removes (None) opinions as one step of undo; None where nothing changes.
-
-        Changes of the same things in quick succession are one step.
-        """
+    def plan(self, label: str, opinions: Mapping[Key, Opinion | None]) -> Step | None:
+        """To set or remove (None) opinions."""
         before = {key: self.opinion(key) for key in opinions}
         step = Step(
             label,
             {key: old for key, old in before.items() if old != opinions[key]},
             {key: new for key, new in opinions.items() if before[key] != new},
         )
-        if not step.after:
-            return None
-        self._apply(step.after)
-        moment = self.now()
-        last = self._done[-1] if self._done else None
-        # A value that is taken back is a step of its own, however fast it comes.
-        drag = not step.structural and None not in step.after.values()
-        quick = moment - self._last < MERGE_S or self._joins
-        self._joins = self._typing
-        if drag and quick and last is not None and last.after.keys() == step.after.keys():
-            self._done[-1] = Step(label, last.before, step.after)
-        else:
-            self._done.append(step)
-        self._undone.clear()
-        self._last = moment
-        return step
+        return step if step.after else None
 
-    def next_prims(self, *, undo: bool) -> tuple[Sdf.Path, ...]:
-        """Prims that ``undo`` or ``redo`` would change."""
-        steps = self._done if undo else self._undone
-        return steps[-1].prims if steps else ()
-
-    def set_typing(self, typing: bool) -> None:
-        """Between True and False all changes of one thing are one step, however slow they are."""
-        self._typing, self._joins = typing, False
-        self._last = -MERGE_S
-
-    def undo(self) -> Step | None:
-        """Takes the last step back; None where there is none. Gives what was done thereby."""
-        self._joins = False
-        if not self._done:
-            return None
-        step = self._done.pop()
-        self._undone.append(step)
-        self._apply(step.before)
-        self._last = -MERGE_S
-        return Step(f"undo {step.label}", step.after, step.before)
-
-    def redo(self) -> Step | None:
-        """Makes the step again that was taken back last."""
-        self._joins = False
-        if not self._undone:
-            return None
-        step = self._undone.pop()
-        self._done.append(step)
-        self._apply(step.after)
-        self._last = -MERGE_S
-        return step
-
-    @property
-    def undo_label(self) -> str:
-        """What ``undo`` would take back; "": nothing."""
-        return self._done[-1].label if self._done else ""
-
-    @property
-    def redo_label(self) -> str:
-        """What ``redo`` would do again; "": nothing."""
-        return self._undone[-1].label if self._undone else ""
-
-    def forget(self) -> None:
-        """Forgets all steps: the session layer was emptied by another."""
-        self._done.clear()
-        self._undone.clear()
-        self.values.clear()
-
-    def _apply(self, opinions: Mapping[Key, Opinion | None]) -> None:
+    def apply(self, step: Step) -> None:
+        """Makes it so."""
         layer = self.stage.GetSessionLayer()
         with Sdf.ChangeBlock():
-            for (path, what), opinion in opinions.items():
+            for (path, what), opinion in step.after.items():
                 if what.startswith("!"):
                     if opinion is None:
                         self.values.pop((path, what), None)

@@ -3,14 +3,11 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
 from PySide6.QtCore import QEvent, QKeyCombination, QLocale, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QIcon, QKeyEvent, QKeySequence, QPainter, QPalette, QPixmap
+from PySide6.QtGui import QColor, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
     QCheckBox,
     QColorDialog,
@@ -25,70 +22,14 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.scene.ranges import UNIT, Colour, Range
+from wavecomb.gui.scene.swatch import from_display, swatch, to_display
 
-Colour = tuple[float, float, float]
 Control = Qt.KeyboardModifier.ControlModifier
 
 SLIDER_STEPS = 1000
 _BAR = 6
 """Width of the swatch of a colour that can be changed, of its height."""
-
-
-@dataclass(frozen=True)
-class Range:
-    """What a parameter can be.
-
-    Attributes:
-        low: Least value.
-        high: Greatest value.
-        soft_low: Left end of the slider.
-        soft_high: Right end of the slider.
-        decimals: Of the number.
-        logarithmic: The slider's steps are ratios; its left end is 0 then where low is.
-    """
-
-    low: float
-    high: float
-    soft_low: float
-    soft_high: float
-    decimals: int = 3
-    logarithmic: bool = False
-
-
-UNIT = Range(0.0, 1.0, 0.0, 1.0)
-
-
-def to_display(colour: Colour) -> QColor:
-    """A linear colour as a screen shows it, clipped."""
-    linear = np.clip(np.asarray(colour, float), 0.0, 1.0)
-    low, high = 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055
-    r, g, b = np.where(linear <= 0.0031308, low, high)
-    return QColor.fromRgbF(float(r), float(g), float(b))
-
-
-def from_display(colour: QColor) -> Colour:
-    """The linear colour of one on the screen."""
-    shown = np.array([colour.redF(), colour.greenF(), colour.blueF()])
-    low, high = shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4
-    r, g, b = np.where(shown <= 0.04045, low, high)
-    return float(r), float(g), float(b)
-
-
-def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
-    """A square of a colour, or a bar of some, framed so that it is seen on any background."""
-    ratio = 2.0
-    pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))
-    pixmap.setDevicePixelRatio(ratio)
-    peak = max(*colour, 1e-30)
-    shown = colour if peak <= 1.0 else tuple(c / peak for c in colour)
-    pixmap.fill(to_display((shown[0], shown[1], shown[2])))
-    with QPainter(pixmap) as painter:
-        painter.setPen(theme.dim())
-        painter.drawRect(0, 0, wide * size - 1, size - 1)
-    icon = QIcon(pixmap)
-    # Else a row that is selected would tint it.
-    icon.addPixmap(pixmap, QIcon.Mode.Selected)
-    return icon
 
 
 def _is_history(event: Any) -> bool:
@@ -97,15 +38,6 @@ def _is_history(event: Any) -> bool:
     if event.matches(undo) or event.matches(redo):
         return True
     return bool(event.keyCombination() == QKeyCombination(Control, Qt.Key.Key_Y))
-
-
-def differs(shown: Any, value: Any) -> bool:
-    """Whether a field must be set anew: not for rounding, which would take the cursor away."""
-    if isinstance(shown, tuple) != isinstance(value, tuple):
-        return True
-    if isinstance(value, tuple):
-        return any(differs(a, b) for a, b in zip(shown, value, strict=True))
-    return bool(abs(shown - value) > 1e-6 * max(1.0, abs(value)))
 
 
 class _Spin(QDoubleSpinBox):
@@ -248,23 +180,11 @@ class NumberField(Field):
         self._place(value)
 
     def _place(self, value: float) -> None:
-        low, high = self.bounds.soft_low, self.bounds.soft_high
-        if self.bounds.logarithmic:
-            share = math.log(max(value, low) / low) / math.log(high / low)
-        else:
-            share = (value - low) / (high - low)
         with QSignalBlocker(self.slider):
-            self.slider.setValue(round(min(max(share, 0.0), 1.0) * SLIDER_STEPS))
+            self.slider.setValue(round(self.bounds.share(value) * SLIDER_STEPS))
 
     def _on_slider(self, step: int) -> None:
-        share = step / SLIDER_STEPS
-        low, high = self.bounds.soft_low, self.bounds.soft_high
-        if not self.bounds.logarithmic:
-            value = low + share * (high - low)
-        elif step == 0:
-            value = self.bounds.low
-        else:
-            value = low * (high / low) ** share
+        value = self.bounds.value_at(step / SLIDER_STEPS)
         with QSignalBlocker(self.spin):
             self.spin.setValue(value)
         self.changed.emit(self.spin.value())

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lights of the stage as data: the list with its switches, and the fields of one. No widgets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Qt
+
+from wavecomb.gui.headed_model import ColourRole, HeadedModel, ToneRole
+from wavecomb.gui.scene.form_model import COLOUR, NUMBER, FieldRow, FormModel
+from wavecomb.gui.scene.ranges import Range
+from wavecomb.gui.scene.render_sync import LIGHT_INPUTS
+from wavecomb.gui.scene.visibility import uneditable
+
+if TYPE_CHECKING:
+    from wavecomb.gui.scene.scene_edits import SceneEdits
+
+NAME, KIND, ON, SOLO = range(4)
+HEADERS = ("Light", "Kind", "On", "Solo")
+SOFT_DOME = "soft dome"
+
+RANGES = {
+    "intensity": Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True),
+    "exposure": Range(-30.0, 30.0, -10.0, 10.0, 2),
+    "color": Range(0.0, 1e4, 0.0, 1.0),
+}
+TIPS = {
+    "intensity": "What the colour is multiplied by",
+    "exposure": "Stops: one more is twice as bright",
+    "color": "Linear Rec.709; the colour temperature of the stage comes on top",
+}
+LABELS = {"color": "colour"}
+
+
+class LightsModel(HeadedModel):
+    """The list: lights that are switched off are in it, too."""
+
+    def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
+        super().__init__(HEADERS, parent)
+        self._edits = edits
+        self.paths: list[str] = []
+        edits.scene_changed.connect(self.fill)
+        edits.changed.connect(self.refresh)
+        self.fill()
+
+    def fill(self) -> None:
+        """Reads which lights there are."""
+        stage = self._edits.stage
+        self.beginResetModel()
+        self.paths = []
+        if stage is not None and self._edits.edits is not None:
+            self.paths = list(dict.fromkeys((*stage.lights, *stage.light_paths)))
+        self.endResetModel()
+
+    def refresh(self) -> None:
+        """What rows say may have changed."""
+        self.tell(0, len(HEADERS) - 1)
+
+    def row_count(self) -> int:
+        """Lights."""
+        return len(self.paths)
+
+    def flags(self, index: Any) -> Qt.ItemFlag:
+        """As Qt has it: what can be switched has a box."""
+        flags = super().flags(index)
+        if index.column() in (ON, SOLO) and self._switch(self.paths[index.row()]):
+            flags |= Qt.ItemFlag.ItemIsUserCheckable
+        return flags
+
+    def _switch(self, path: str) -> bool:
+        return bool(path) and not uneditable(self._edits.prim(path))
+
+    def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """As Qt has it, and ``ColourRole`` and ``ToneRole``."""
+        path, column = self.paths[index.row()], index.column()
+        if role == Qt.ItemDataRole.DisplayRole:
+            if column == NAME:
+                return path.rpartition("/")[2] or SOFT_DOME
+            return self._kind(path) if column == KIND else None
+        if role == Qt.ItemDataRole.CheckStateRole and column in (ON, SOLO) and self._switch(path):
+            on = self._edits.solo == path if column == SOLO else not self._edits.is_hidden(path)
+            return Qt.CheckState.Checked if on else Qt.CheckState.Unchecked
+        if role == ColourRole and column == NAME:
+            return self._edits.light_value(path, "color")
+        if role == ToneRole and path and self._edits.is_hidden(path):
+            return "dim"
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return self._tip(path, column)
+        return None
+
+    def _kind(self, path: str) -> str:
+        prim = self._edits.prim(path)
+        return str(prim.GetTypeName()).removesuffix("_1").removesuffix("Light") if prim else "Dome"
+
+    def _tip(self, path: str, column: int) -> str:
+        if not path:
+            return "Added because the stage has no light; it is not on the stage"
+        if column == ON:
+            return "Switches the light: its visibility on the stage"
+        return "Shows this light alone, or all again" if column == SOLO else path
+
+    def setData(self, index: Any, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
+        """As Qt has it: boxes switch lights."""
+        if role != Qt.ItemDataRole.CheckStateRole:
+            return False
+        path = self.paths[index.row()]
+        on = Qt.CheckState(value) == Qt.CheckState.Checked
+        if index.column() == ON:
+            self._edits.set_visible([path], on)
+        else:
+            self._edits.solo_light(path if on else None, [one for one in self.paths if one])
+        return True
+
+
+class LightForm(FormModel):
+    """The fields of one light.
+
+    Attributes:
+        path: Its prim, "" of the soft dome; None: no light is shown.
+    """
+
+    def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._edits = edits
+        self.path: str | None = None
+        edits.changed.connect(self.changed)
+        self.show_light(None)
+
+    def show_light(self, path: str | None) -> None:
+        """Another light."""
+        self._edits.set_typing(False)
+        self.path = path
+        self.note = "No light" if path is None else ""
+        self.title = "" if path is None else path or f"{SOFT_DOME}: the stage has no light"
+        self.rows = [self._row(path, name) for name in LIGHT_INPUTS] if path is not None else []
+        self.remade.emit()
+
+    def _row(self, path: str, name: str) -> FieldRow:
+        reason = self._edits.light_reason(path)
+        where = f"in the picture only, it cannot be saved: {reason}" if reason else "on the stage"
+        return FieldRow(
+            name,
+            LABELS.get(name, name),
+            COLOUR if name == "color" else NUMBER,
+            self._edits.light_value(path, name),
+            name,
+            RANGES[name],
+            LIGHT_INPUTS[name],
+            tip=f"{TIPS[name]} ({where})",
+        )
+
+    def value(self, name: str) -> Any:
+        """What a field is to show now; None while there is no stage to edit."""
+        if self.path is None or self._edits.edits is None:
+            return None
+        return self._edits.light_value(self.path, name)
+
+    def is_edited(self, name: str) -> bool:
+        """Whether there is something to take back."""
+        return self.path is not None and self._edits.light_is_edited(self.path, name)
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Edits a field; None: back to what the stage has."""
+        if self.path is not None:
+            self._edits.set_light(self.path, name, value)
+
+    def set_typing(self, typing: bool) -> None:
+        """Whether a value is being typed."""
+        self._edits.set_typing(typing)

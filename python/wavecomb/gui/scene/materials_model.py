@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Materials of the scene as data: the list with costs, and the fields of one. No widgets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Qt
+
+from wavecomb.gui.headed_model import ColourRole, HeadedModel
+from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER, SWITCH, FieldRow, FormModel
+from wavecomb.gui.scene.ranges import UNIT, Colour, Range
+
+if TYPE_CHECKING:
+    from wavecomb._core import Scene
+    from wavecomb.gui.scene.scene_edits import SceneEdits
+    from wavecomb.usd.looks.parameters import Parameter
+
+NAME, PROGRAM, RECORDS, COST = range(4)
+HEADERS = ("Material", "Program", "Records", "ns")
+TIPS = (
+    "Prim of the material",
+    "Shading code that it runs",
+    "Hits that were shaded with it (statistics: records)",
+    "Nanoseconds for each of them, measured (statistics: ns_per_record)",
+)
+
+
+RANGES = {
+    "emission": Range(0.0, 1e6, 0.0, 10.0),
+    "ior": Range(0.01, 100.0, 1.0, 3.0),
+    "conductor_eta": Range(0.0, 100.0, 0.0, 5.0),
+    "conductor_k": Range(0.0, 100.0, 0.0, 10.0),
+}
+"""Of parameters of UsdPreviewSurface that are not within 0 and 1."""
+
+LABELS = {"conductor_eta": "eta", "conductor_k": "k"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the list: a prim, or a material that the loader made.
+
+    Attributes:
+        path: The prim, "" where there is none.
+        name: For people.
+        program: Its shading code.
+        ids: Materials of the scene.
+    """
+
+    path: str
+    name: str
+    program: str
+    ids: tuple[int, ...]
+
+
+def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
+    """One row for each prim, and for each material without one."""
+    by_path: dict[str, list[int]] = {}
+    for number, path in enumerate(paths):
+        by_path.setdefault(path or f"#{number}", []).append(number)
+    out = []
+    for key, ids in by_path.items():
+        name, program = scene.materials[ids[0]]
+        path = "" if key.startswith("#") else key
+        out.append(Row(path, path.rpartition("/")[2] or name or "material", program, tuple(ids)))
+    return out
+
+
+class MaterialsModel(HeadedModel):
+    """The list."""
+
+    def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
+        super().__init__(HEADERS, parent, TIPS)
+        self._edits = edits
+        self.rows: list[Row] = []
+        self.colours: list[Colour] = []
+        self._figures: list[dict[str, Any]] = []
+        edits.scene_changed.connect(self.fill)
+        edits.changed.connect(self.recolour)
+        edits.session.statistics.connect(self.count)
+        self.fill()
+
+    def fill(self) -> None:
+        """Reads which materials there are."""
+        stage = self._edits.stage
+        self.beginResetModel()
+        self.rows, self._figures = [], []
+        if stage is not None and self._edits.edits is not None:
+            self.rows = rows_of(stage.scene, stage.material_paths)
+        self.colours = self._read_colours()
+        self.endResetModel()
+
+    def recolour(self) -> None:
+        """Swatches after an edit."""
+        colours = self._read_colours()
+        if colours != self.colours:
+            self.colours = colours
+            self.tell(NAME, NAME)
+
+    def count(self, statistics: dict[str, Any]) -> None:
+        """Records and costs: ``materials`` of the statistics."""
+        self._figures = statistics["materials"]
+        self.tell(RECORDS, COST)
+
+    def place(self, row: Row | None) -> int | None:
+        """Where a row of before is now, else the first; None where there is none."""
+        same = (
+            number
+            for number, one in enumerate(self.rows)
+            if row is not None and (one.path, one.name) == (row.path, row.name)
+        )
+        return next(same, 0 if self.rows else None)
+
+    def _read_colours(self) -> list[Colour]:
+        scene = self._edits.session.scene
+        if scene is None:
+            return [(0.0, 0.0, 0.0)] * len(self.rows)
+        out = []
+        for row in self.rows:
+            values = scene.material(row.ids[0])
+            r, g, b = values["emission" if row.program == "emissive" else "base_color"]
+            out.append((r, g, b))
+        return out
+
+    def row_count(self) -> int:
+        """Materials."""
+        return len(self.rows)
+
+    def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """As Qt has it, and ``ColourRole``."""
+        row, column = self.rows[index.row()], index.column()
+        if role == Qt.ItemDataRole.DisplayRole:
+            if column == NAME:
+                return row.name
+            return row.program if column == PROGRAM else self._figure(row, column)
+        if role == ColourRole and column == NAME:
+            return self.colours[index.row()]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            more = f"\n{len(row.ids)} of them: meshes bring values" if len(row.ids) > 1 else ""
+            return (row.path or "made by the loader: of a display colour") + more
+        if role == Qt.ItemDataRole.TextAlignmentRole and column in (RECORDS, COST):
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        return None
+
+    def _figure(self, row: Row, column: int) -> str:
+        known = [self._figures[i] for i in row.ids if i < len(self._figures)]
+        records = sum(one["records"] for one in known)
+        if column == RECORDS:
+            return f"{records:,}" if known else ""
+        timed = sum(one["timed_records"] for one in known)
+        spent = sum(one["timed_records"] * one["ns_per_record"] for one in known)
+        return f"{spent / timed:.0f}" if timed else ""
+
+
+class MaterialForm(FormModel):
+    """The parameters of one material, under the headings that MaterialX gives them.
+
+    Attributes:
+        row: The material; None: none is shown.
+    """
+
+    def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._edits = edits
+        self.row: Row | None = None
+        self._now: dict[str, Parameter] = {}
+        edits.changed.connect(self._on_changed)
+        self.show_material(None)
+
+    def show_material(self, row: Row | None) -> None:
+        """Another material."""
+        self._edits.set_typing(False)
+        self.row = row
+        self._read()
+        self.rows = [row_of(parameter) for parameter in self._now.values()]
+        self.title = self.note = ""
+        if row is None:
+            self.note = "No stage is open"
+        else:
+            self.title = row.path or f"{row.name}: made by the loader"
+            if not self.rows:
+                self.note = "Nothing to edit: it has no material prim."
+        self.remade.emit()
+
+    def _read(self) -> None:
+        path = self.row.path if self.row is not None else ""
+        self._now = self._edits.parameters(path) if path else {}
+
+    def _on_changed(self) -> None:
+        self._read()
+        self.changed.emit()
+
+    def value(self, name: str) -> Any:
+        """What a field is to show now; None: what it shows."""
+        parameter = self._now.get(name)
+        if parameter is None or parameter.driven_by or self.row is None:
+            return None
+        return self._edits.parameter_value(self.row.path, parameter)
+
+    def is_edited(self, name: str) -> bool:
+        """Whether there is something to take back."""
+        parameter = self._now.get(name)
+        if parameter is None or self.row is None:
+            return False
+        return self._edits.is_edited(self.row.path, parameter)
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Edits a field; None: back to what the stage has."""
+        if self.row is not None:
+            self._edits.set_parameter(self.row.path, name, value)
+
+    def set_typing(self, typing: bool) -> None:
+        """Whether a value is being typed."""
+        self._edits.set_typing(typing)
+
+    def is_open(self, group: str) -> bool:
+        """The base is always open at first."""
+        return self._folds.get(group, group == "Base" or super().is_open(group))
+
+
+def range_of(parameter: Parameter) -> Range:
+    """What a parameter can be."""
+    one = parameter.definition
+    if one is None:
+        return RANGES.get(parameter.slot, UNIT)
+    decimals = 1 if one.soft_high >= 100.0 else 3
+    return Range(one.low, one.high, one.soft_low, one.soft_high, decimals)
+
+
+def row_of(parameter: Parameter) -> FieldRow:
+    """The field of a parameter; one that only says what drives it where there is no value."""
+    slot, one = parameter.slot, parameter.definition
+    title = slot.replace("_", " ")
+    driver, kind = "", NUMBER
+    if parameter.driven_by or parameter.value is None:
+        driver, kind = parameter.driven_by or parameter.reason, DRIVEN
+    elif isinstance(parameter.value, bool):
+        kind = SWITCH
+    elif isinstance(parameter.value, tuple):
+        kind = COLOUR
+    if parameter.attribute is not None:
+        tip = f"{slot}: edits {parameter.attribute}"
+    else:
+        why = parameter.reason
+        tip = f"{slot}: in the picture only, edits of it cannot be saved: {why}"
+    return FieldRow(
+        slot,
+        one.label if one is not None else LABELS.get(slot, title),
+        kind,
+        None if kind == DRIVEN else parameter.value,
+        title,
+        range_of(parameter),
+        one.default if one is not None else None,
+        driver,
+        one.group if one is not None else "",
+        tip,
+    )

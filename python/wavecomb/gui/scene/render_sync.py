@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Brings edits of a stage into the scene that is rendered, without reading it again.
+
+What is visible and which variants are chosen decides what is in the scene: that is read again.
+So are constants that are part of a graph, or of how a texture is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from pxr import Gf, Sdf, Usd, UsdGeom
+
+from wavecomb.gui.scene.stage_edits import Key, StageEdits, Step
+from wavecomb.usd.looks.parameters import (
+    IN_INSTANCE,
+    Parameter,
+    as_stored,
+    light_radiance,
+    material_parameters,
+)
+from wavecomb.usd.looks.surface_values import surface_values
+
+if TYPE_CHECKING:
+    from wavecomb.gui.viewport.session import Session
+    from wavecomb.usd import LoadedStage
+
+LIGHT_INPUTS: dict[str, Any] = {"intensity": 1.0, "exposure": 0.0, "color": (1.0, 1.0, 1.0)}
+"""What of a light is edited, and its value where nothing is authored."""
+
+
+class RenderSync:
+    """What materials and lights are on the stage with its edits, and the render made to follow.
+
+    Args:
+        session: Whose scene follows.
+        edits: Of the stage that it has open.
+    """
+
+    def __init__(self, session: Session, edits: StageEdits) -> None:
+        self._session = session
+        self.edits = edits
+
+    @property
+    def loaded(self) -> LoadedStage | None:
+        """What was read."""
+        return self._session.stage
+
+    @property
+    def time(self) -> Usd.TimeCode:
+        """At which attributes are read."""
+        return self.edits.time
+
+    def prim(self, path: str) -> Usd.Prim:
+        """A prim by path, an invalid one where there is none."""
+        if not path or not Sdf.Path.IsValidPathString(path):
+            return Usd.Prim()
+        return self.edits.stage.GetPrimAtPath(path)
+
+    # ---- materials -----------------------------------------------------------------------------
+
+    def parameters(self, path: str) -> dict[str, Parameter]:
+        """Parameters of a material by slot; empty of one that no prim is there for."""
+        prim = self.prim(path)
+        return material_parameters(prim, self.time) if prim else {}
+
+    def parameter_value(self, path: str, parameter: Parameter) -> Any:
+        """What a parameter is now."""
+        return self.edits.values.get((Sdf.Path(path), f"!{parameter.slot}"), parameter.value)
+
+    def is_edited(self, path: str, parameter: Parameter) -> bool:
+        """Whether a parameter was changed here."""
+        attribute = parameter.attribute
+        if attribute is None:
+            return (Sdf.Path(path), f"!{parameter.slot}") in self.edits.values
+        return self.edits.opinion((attribute.GetPrimPath(), f".{attribute.name}")) is not None
+
+    def material_ids(self, path: str) -> list[int]:
+        """The materials that a prim gave: several where meshes bring values of their own."""
+        paths = self.loaded.material_paths if self.loaded is not None else ()
+        return [i for i, one in enumerate(paths) if one == path]
+
+    # ---- lights --------------------------------------------------------------------------------
+
+    def light_reason(self, path: str) -> str:
+        """Why edits of a light cannot be saved; "" where they can."""
+        prim = self.prim(path)
+        if not prim:
+            return "it is not on the stage"
+        return IN_INSTANCE if prim.IsInstanceProxy() else ""
+
+    def light_value(self, path: str, name: str) -> Any:
+        """One of ``LIGHT_INPUTS`` as it is now.
+
+        Of a light whose edits cannot be saved: what its colour on the stage is multiplied by.
+        """
+        default = LIGHT_INPUTS[name]
+        if self.light_reason(path):
+            return self.edits.values.get((light_prim(path), f"!{name}"), default)
+        attribute = self.prim(path).GetAttribute(f"inputs:{name}")
+        value = attribute.Get(self.time) if attribute else None
+        if value is None:
+            return default
+        return tuple(value) if isinstance(value, Gf.Vec3f) else float(value)
+
+    def light_key(self, path: str, name: str) -> Key:
+        """Where an input of a light is edited."""
+        if self.light_reason(path):
+            return light_prim(path), f"!{name}"
+        return Sdf.Path(path), f".inputs:{name}"
+
+    def light_is_edited(self, path: str, name: str) -> bool:
+        """Whether an input of a light was changed here."""
+        return self.edits.opinion(self.light_key(path, name)) is not None
+
+    # ---- into the render -----------------------------------------------------------------------
+
+    def perform(self, step: Step) -> None:
+        """Makes a step on the stage, and the picture follow."""
+        before = {} if step.structural else self.structures(step.prims)
+        self.edits.apply(step)
+        if step.structural or self.structures(step.prims) != before:
+            self._session.rebuild(step.label)
+        else:
+            self.show(step)
+
+    def _materials_of(self, prim: Sdf.Path) -> set[str]:
+        """Materials in use that a prim is, or is in."""
+        path, stage = str(prim), self.loaded
+        known = {one for one in stage.material_paths if one} if stage is not None else set()
+        return {one for one in known if path == one or path.startswith(one + "/")}
+
+    def live_values(self, path: str) -> dict[str, Any]:
+        """What was changed of a material and no attribute holds."""
+        own = Sdf.Path(path)
+        known = self.edits.values.items()
+        return {what[1:]: value for (prim, what), value in known if prim == own}
+
+    def can_show(self, path: str, slot: str, value: Any) -> bool:
+        """Whether a value that no attribute can hold can be brought into the picture."""
+        known = self.live_values(path)
+        before = surface_values(self.prim(path), self.time, known)
+        after = surface_values(self.prim(path), self.time, {**known, slot: value})
+        return before is None or after is None or before.structure == after.structure
+
+    def structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
+        """What of materials cannot be edited in the scene that there is."""
+        out = {}
+        for path in {one for prim in prims for one in self._materials_of(prim)}:
+            found = surface_values(self.prim(path), self.time)
+            if found is not None:
+                out[path] = found.structure
+        return out
+
+    def show(self, step: Step) -> None:
+        """Brings a step into the scene that is rendered."""
+        stage = self.loaded
+        if stage is None:
+            return
+        emission = any("emissi" in what for _, what in step.after)
+        if emission and not stage.lights:
+            # Whether a stage without lights gets the soft dome goes by what its materials emit.
+            self._session.rebuild(step.label)
+        for prim in step.prims:
+            for light in {one for one in stage.light_paths if light_prim(one) == prim}:
+                self._sync_light(light)
+            for material in self._materials_of(prim):
+                self._sync_material(material)
+
+    def _sync_material(self, path: str) -> None:
+        """Gives the materials of a prim the values that the stage has now."""
+        scene = self._session.scene
+        if scene is None:
+            return
+        surface = surface_values(self.prim(path), self.time, self.live_values(path))
+        if surface is not None:
+            wanted = {name: as_stored(value) for name, value in surface.constants.items()}
+        else:
+            wanted = {
+                slot: as_stored(self.parameter_value(path, parameter))
+                for slot, parameter in self.parameters(path).items()
+                if not parameter.driven_by
+            }
+        for number in self.material_ids(path):
+            if number >= len(scene.materials):
+                continue
+            have = scene.material(number)
+            have |= have.get("openpbr", {})
+            # A mesh may bring a value for a slot, which a graph reads then.
+            values = {
+                slot: value
+                for slot, value in wanted.items()
+                if slot not in have.get("driven", ()) and as_stored(have[slot]) != value
+            }
+            if values:
+                self._session.edit_material(number, **values)
+            # The stage holds the edit: it comes with the next reading.
+            self._session.material_edits.pop(have["name"], None)
+
+    def _sync_light(self, path: str) -> None:
+        scene, stage = self._session.scene, self.loaded
+        if scene is None or stage is None:
+            return
+        reason = self.light_reason(path)
+        radiance = None
+        if not reason:
+            up = str(UsdGeom.GetStageUpAxis(self.edits.stage))
+            radiance = light_radiance(self.prim(path), self.time, up)
+        for number, one in enumerate(stage.light_paths):
+            if one != path or number >= scene.light_count:
+                continue
+            if radiance is None:
+                tint = self.light_value(path, "color")
+                power = self.light_value(path, "intensity") * 2.0 ** self.light_value(
+                    path, "exposure"
+                )
+                base = stage.scene.light(number)["color"]
+                colour = tuple(b * t * power for b, t in zip(base, tint, strict=True))
+            else:
+                colour = radiance
+            if as_stored(tuple(scene.light(number)["color"])) != as_stored(colour):
+                self._session.edit_light(number, color=colour)
+        self._session.light_edits.clear()
+
+
+def light_prim(path: str) -> Sdf.Path:
+    """The key of a light; of the soft dome, which is no prim, one that no prim has."""
+    return Sdf.Path(path) if path else Sdf.Path("/soft_dome_of_wavecomb")

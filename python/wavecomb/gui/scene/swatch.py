@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Linear colours on the screen."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
+
+from wavecomb.gui import theme
+from wavecomb.gui.scene.ranges import Colour
+
+
+def to_display(colour: Colour) -> QColor:
+    """A linear colour as a screen shows it, clipped."""
+    linear = np.clip(np.asarray(colour, float), 0.0, 1.0)
+    low, high = 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055
+    r, g, b = np.where(linear <= 0.0031308, low, high)
+    return QColor.fromRgbF(float(r), float(g), float(b))
+
+
+def from_display(colour: QColor) -> Colour:
+    """The linear colour of one on the screen."""
+    shown = np.array([colour.redF(), colour.greenF(), colour.blueF()])
+    low, high = shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4
+    r, g, b = np.where(shown <= 0.04045, low, high)
+    return float(r), float(g), float(b)
+
+
+def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
+    """A square of a colour, or a bar of some, framed so that it is seen on any background."""
+    ratio = 2.0
+    pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))
+    pixmap.setDevicePixelRatio(ratio)
+    peak = max(*colour, 1e-30)
+    shown = colour if peak <= 1.0 else tuple(c / peak for c in colour)
+    pixmap.fill(to_display((shown[0], shown[1], shown[2])))
+    with QPainter(pixmap) as painter:
+        painter.setPen(theme.dim())
+        painter.drawRect(0, 0, wide * size - 1, size - 1)
+    icon = QIcon(pixmap)
+    # Else a row that is selected would tint it.
+    icon.addPixmap(pixmap, QIcon.Mode.Selected)
+    return icon

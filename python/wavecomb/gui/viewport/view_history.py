@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the camera was: back and forth, apart from what is edited.
+
+Moving the view changes nothing of the stage, so it is no step among the edits: undoing a light
+would else mean to take back all looking about since, and a stage would look unsaved for having been
+seen.
+"""
+
+from __future__ import annotations
+
+import time as clock
+import weakref
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoCommand, QUndoStack
+
+from wavecomb.gui.viewport.orbit import Pose
+from wavecomb.gui.viewport.session import Session
+
+MERGE_S = 0.7
+"""Movements that follow each other faster are one."""
+_MOVE = 2
+
+
+class MoveCommand(QUndoCommand):
+    """From one pose to another, which the camera has already."""
+
+    def __init__(self, before: Pose, after: Pose, history: ViewHistory, moment: float) -> None:
+        super().__init__("view" if after.path is None else f"camera {after.path}")
+        self.before, self.after, self.moment = before, after, moment
+        self._history = weakref.ref(history)
+        self._there = True
+
+    def redo(self) -> None:
+        """Goes there again."""
+        history = self._history()
+        if history is not None and not self._there:
+            history.go(self.after)
+        self._there = False
+
+    def undo(self) -> None:
+        """Goes back."""
+        if (history := self._history()) is not None:
+            history.go(self.before)
+
+    def id(self) -> int:
+        """Qt asks those with the same to join; a camera that was chosen is a step of its own."""
+        return _MOVE if self.after.path is None else -1
+
+    def mergeWith(self, other: QUndoCommand) -> bool:
+        """Takes in a later movement of the same drag."""
+        if not isinstance(other, MoveCommand) or other.moment - self.moment >= MERGE_S:
+            return False
+        self.after, self.moment = other.after, other.moment
+        return True
+
+
+class ViewHistory(QObject):
+    """Poses of a session's camera.
+
+    Signals:
+        changed(): There is another way back or forth.
+
+    Attributes:
+        stack: Qt's.
+        now: The clock, for telling drags from single movements.
+    """
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        session: Session,
+        parent: QObject | None = None,
+        now: Callable[[], float] = clock.monotonic,
+    ) -> None:
+        super().__init__(parent)
+        self.stack = QUndoStack(self)
+        self.now = now
+        self._session = session
+        self._pose = session.pose
+        self._usd: object = session.usd
+        self.stack.indexChanged.connect(self._tell)
+        session.opened.connect(self._on_opened)
+        session.camera_changed.connect(self._on_moved)
+
+    def back(self) -> None:
+        """Where the camera was before."""
+        self.stack.undo()
+
+    def forth(self) -> None:
+        """Where it was before it went back."""
+        self.stack.redo()
+
+    def go(self, pose: Pose) -> None:
+        """Moves the camera without a step of its own."""
+        self._pose = pose
+        self._session.set_camera(pose)
+
+    def _on_opened(self, stage: object) -> None:
+        self._pose = self._session.pose
+        if self._usd is not self._session.usd:
+            self._usd = self._session.usd
+            self.stack.clear()
+
+    def _on_moved(self, pose: Pose | None) -> None:
+        before, self._pose = self._pose, pose
+        if pose is None or before is None or pose is before:
+            return
+        self.stack.push(MoveCommand(before, pose, self, self.now()))
+
+    def _tell(self, index: int) -> None:
+        self.changed.emit()
