@@ -249,11 +249,8 @@ TEST(LightParts, AreAllLightsThatShine) {
     sum += weighed.shares[i];
   }
   EXPECT_NEAR(sum, 1, 1e-12) << "in integers";
-  for (uint32_t i = 0; i < set.size(); ++i) {
-    const float pdf = i < set.record_count ? weighed.records[i].pick_pdf
-                                           : weighed.triangles[i - set.record_count].pick_pdf;
-    EXPECT_EQ(pdf > 0, set.pick_pdf(i) > 0);
-  }
+  ASSERT_EQ(weighed.pick_pdf.size(), set.size());
+  for (uint32_t i = 0; i < set.size(); ++i) EXPECT_EQ(weighed.pick_pdf[i] > 0, set.pick_pdf(i) > 0);
 }
 
 TEST(LightParts, TheTreeIsOne) {

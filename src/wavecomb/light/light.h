@@ -64,35 +64,36 @@ inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>&
   return select(rest < threshold, bin, other) + select(triangle, U(view.first_triangle), U(0u));
 }
 
-/// A choice, by power or by tree.
+/// A choice, by tree or by shares.
 template <typename F>
 struct LightPick {
   UInt<F> light;
-  F by_tree;       ///< probability, where the tree chose
+  F probability;   ///< where it is not what the light's record says
   Mask<F> active;  ///< lanes that have a light
-  bool tree_chose;
+  bool of_record;
 
   LightPick(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
             const Mask<F>& wanted)
-      : by_tree(0.f), active(wanted), tree_chose(view.by_tree) {
-    if (tree_chose) {
+      : probability(0.f), active(wanted), of_record(!view.by_tree && !view.pick_pdf) {
+    if (view.by_tree) {
       const LightChoice<F> choice = choose_by_tree<F>(view, to, u_pick, wanted);
       light = choice.light;
-      by_tree = choice.pdf;
+      probability = choice.pdf;
       active = wanted & (choice.pdf > 0.f);
     } else {
       light = pick_light<F>(view, u_pick, wanted);
+      if (view.pick_pdf) probability = gather<F>(view.pick_pdf, light, wanted);
     }
   }
-  F pdf(const F& by_power) const { return tree_chose ? by_tree : by_power; }
+  F pdf(const F& recorded) const { return of_record ? recorded : probability; }
 };
 
-/// Probability with which sample_light chooses finite light `light`, which is `by_power` where
-/// lights are chosen by power.
+/// Probability with which sample_light chooses finite light `light`, whose record says `recorded`.
 template <typename F>
-inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& by_power,
+inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
                          const LightReceiver<F>& to, const Mask<F>& active) {
-  return view.by_tree ? tree_pdf<F>(view, light, to, active) : by_power;
+  if (view.by_tree) return tree_pdf<F>(view, light, to, active);
+  return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
 }
 
 /// Runs `one(kind, lanes)` for each kind of light among the active lanes.
@@ -277,7 +278,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
               : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -dir, hit.radiance, active);
-  const float pick_pdf = view.by_tree ? view.tree.infinite_pdf[light] : record.pick_pdf;
+  const float pick_pdf = view.by_tree    ? view.tree.infinite_pdf[light]
+                         : view.pick_pdf ? view.pick_pdf[light]
+                                         : record.pick_pdf;
   F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * pick_pdf)));
   if (view.has_sampled_only)
     weight *= LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera);

@@ -121,29 +121,33 @@ void weigh_tree(const LightSet& set, const LightParts& parts, std::span<const do
   }
 }
 
-void weigh_table(const LightSet& set, const LightParts& parts, std::span<const double> shares,
-                 WeighedLights& out) {
-  std::vector<double> weights(set.size());
-  std::vector<uint32_t> of(set.size(), kNoPart);
-  std::copy_n(parts.of_record.begin(), set.record_count, of.begin());
+/// Runs one(begin, end, part) for the lights of each part, in ranges of their numbers, ascending.
+template <typename One>
+void for_each_range(const LightSet& set, const LightParts& parts, const One& one) {
+  for (size_t i = 0; i < set.record_count; ++i)
+    if (parts.of_record[i] != kNoPart) one(i, i + 1, parts.of_record[i]);
   for (size_t m = 0; m < parts.of_mesh.size(); ++m) {
     const auto [begin, part] = parts.of_mesh[m];
     const size_t end = m + 1 < parts.of_mesh.size() ? parts.of_mesh[m + 1].first : set.size();
-    std::fill(of.begin() + begin, of.begin() + static_cast<std::ptrdiff_t>(end), part);
+    if (part != kNoPart) one(begin, end, part);
   }
-  for (size_t i = 0; i < weights.size(); ++i)
-    if (of[i] != kNoPart)
-      weights[i] = double{set.pick_pdf(i)} * (shares[of[i]] / parts.power[of[i]]);
+}
+
+void weigh_table(const LightSet& set, const LightParts& parts, std::span<const double> shares,
+                 WeighedLights& out) {
+  std::vector<double> weights(set.size(), 0);
+  for_each_range(set, parts, [&](size_t begin, size_t end, uint32_t part) {
+    const double factor = shares[part] / parts.power[part];
+    for (size_t i = begin; i < end; ++i) weights[i] = double{set.pick_pdf(i)} * factor;
+  });
   std::vector<uint32_t> numbers;
   out.pick = build_pick_table(weights, set.first_triangle(), out.pick_bins, numbers);
-  out.records = set.records;
-  out.triangles = set.triangles;
-  for (size_t i = 0; i < set.size(); ++i) {
-    const float pdf = static_cast<float>(numbers[i]) * 0x1p-24f;
-    (i < set.record_count ? out.records[i].pick_pdf
-                          : out.triangles[i - set.record_count].pick_pdf) = pdf;
-    if (of[i] != kNoPart) out.shares[of[i]] += numbers[i] * 0x1p-24;
-  }
+  for_each_range(set, parts, [&](size_t begin, size_t end, uint32_t part) {
+    for (size_t i = begin; i < end; ++i) out.shares[part] += numbers[i] * 0x1p-24;
+  });
+  out.pick_pdf.resize(numbers.size());
+  for (size_t i = 0; i < numbers.size(); ++i)
+    out.pick_pdf[i] = static_cast<float>(numbers[i]) * 0x1p-24f;
 }
 
 }  // namespace
@@ -180,9 +184,8 @@ LightParts divide_lights(const Scene& scene, bool by_tree) {
 
 void WeighedLights::apply(LightView& view) const {
   if (shares.empty()) return;
-  if (!records.empty()) {
-    view.lights = records.data();
-    view.triangles = triangles.data();
+  if (!pick_pdf.empty()) {
+    view.pick_pdf = pick_pdf.data();
     view.pick = pick;
     view.pick.bins = pick_bins.data();
     return;

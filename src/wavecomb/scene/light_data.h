@@ -108,7 +108,7 @@ struct alignas(64) LightRecord {
   float area;
   float radius;
   float one_minus_cos;
-  float pick_pdf;  ///< probability of choosing this light
+  float pick_pdf;  ///< probability of choosing this light by power
   uint32_t kind;
   uint32_t texture;
   /// Dome and rect with a texture: index into LightView::distributions; kNoDistribution: a rect
@@ -153,7 +153,7 @@ struct alignas(64) TriangleLight {
   /// the bits of the material that says so, and of the index of its TriangleUvs.
   float radiance[3];
   float m[3];      ///< unit geometric normal times the area
-  float pick_pdf;  ///< probability of choosing this light
+  float pick_pdf;  ///< probability of choosing this light by power
   /// The material's emission times its opacity.
   static constexpr float kEmission = -1.f;
   /// Its opacity alone, by which the radiance of a mesh light is multiplied that shows no glow.
@@ -274,6 +274,8 @@ struct LightView {
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
   PickTable pick;
+  /// Probabilities of `pick` where they are not those of the records; of each light, or null.
+  const float* pick_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< lights are chosen by `tree` and not by `pick`
   uint32_t count = 0;    ///< records and triangles
