@@ -39,27 +39,19 @@ const Members<Material, float> kMaterialNumbers{
 const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material::specular_workflow},
                                                 {"presence", &Material::presence}};
 const Members<Material, uint32_t> kMaterialCounts{{"evaluations", &Material::evaluations}};
+// Of an input, where it is of the kind that a list is for.
+#define WAVECOMB_NUMBER_Number(name) {#name, &OpenPbr::name},
+#define WAVECOMB_NUMBER_Colour(name)
+#define WAVECOMB_NUMBER_Derived(name)
+#define WAVECOMB_COLOUR_Number(name)
+#define WAVECOMB_COLOUR_Colour(name) {#name, &OpenPbr::name},
+#define WAVECOMB_COLOUR_Derived(name)
+#define WAVECOMB_NUMBER(kind, name, standard, least, most) WAVECOMB_NUMBER_##kind(name)
+#define WAVECOMB_COLOUR(kind, name, standard, least, most) WAVECOMB_COLOUR_##kind(name)
 const Members<OpenPbr, Vec3<float>> kOpenPbrColors{
-    {"transmission_color", &OpenPbr::transmission_color},
-    {"subsurface_color", &OpenPbr::subsurface_color},
-    {"fuzz_color", &OpenPbr::fuzz_color},
-    {"coat_color", &OpenPbr::coat_color}};
-const Members<OpenPbr, float> kOpenPbrNumbers{
-    {"diffuse_roughness", &OpenPbr::diffuse_roughness},
-    {"specular_weight", &OpenPbr::specular_weight},
-    {"anisotropy", &OpenPbr::anisotropy},
-    {"rotation", &OpenPbr::rotation},
-    {"transmission_weight", &OpenPbr::transmission_weight},
-    {"transmission_depth", &OpenPbr::transmission_depth},
-    {"subsurface_weight", &OpenPbr::subsurface_weight},
-    {"subsurface_anisotropy", &OpenPbr::subsurface_anisotropy},
-    {"fuzz_weight", &OpenPbr::fuzz_weight},
-    {"fuzz_roughness", &OpenPbr::fuzz_roughness},
-    {"coat_ior", &OpenPbr::coat_ior},
-    {"coat_darkening", &OpenPbr::coat_darkening},
-    {"film_weight", &OpenPbr::film_weight},
-    {"film_thickness", &OpenPbr::film_thickness},
-    {"film_ior", &OpenPbr::film_ior}};
+    {"transmission_color", &OpenPbr::transmission_color}, WAVECOMB_OPENPBR_INPUTS(WAVECOMB_COLOUR)};
+const Members<OpenPbr, float> kOpenPbrNumbers{{"transmission_depth", &OpenPbr::transmission_depth},
+                                              WAVECOMB_OPENPBR_INPUTS(WAVECOMB_NUMBER)};
 const Members<OpenPbr, bool> kOpenPbrSwitches{{"thin_walled", &OpenPbr::thin_walled}};
 const Members<Light, Vec3<float>> kLightColors{{"color", &Light::color}};
 const Members<Light, float> kLightNumbers{

@@ -85,8 +85,8 @@ void fetch(benchmark::State& state, Kind kind) {
         at.position = {column(2), column(3), column(4)};
         return at;
       };
-      const auto p = fetch_openpbr<kAllSlots, F>(view, load<UInt<F>>(&material[i]), uv, F(0.f),
-                                                 point, Mask<F>(true));
+      const auto p = OpenPbrParams<F>::template fetch<kAllSlots>(view, load<UInt<F>>(&material[i]),
+                                                                 uv, F(0.f), point, Mask<F>(true));
       keep(F(p.base_color.x + p.roughness + p.coat_ior));
     }
   }

@@ -112,7 +112,7 @@ std::vector<F> parameters(const MaterialView& view, const UInt<F>& material, con
     at.uv_width = width;
     return at;
   };
-  auto p = fetch_openpbr<kAllSlots, F>(view, material, uv, width, point, active);
+  auto p = OpenPbrParams<F>::template fetch<kAllSlots>(view, material, uv, width, point, active);
   std::vector<F> all;
   for (const F* place : parameter_places(p)) all.push_back(*place);
   const Color<F> emission = fetch_emission<F>(view, material, uv, width, active);

@@ -169,20 +169,18 @@ class Integrator {
   /// A surface at a hit, with what its material says there.
   template <typename Bsdf>
   struct Point {
-    static constexpr bool kEmits = can_emit(Bsdf::kProgram);
+    static constexpr bool kEmits = Bsdf::kEmits;
     static constexpr uint32_t kSlots = Bsdf::kSlots | (kEmits ? slot_bit(Slot::kEmission) : 0u);
     Surface<F> s;
     MaterialRecord record;
     bool reads_texture;
-    decltype(fetch_for<Bsdf, kSlots, F>(
-        std::declval<const MaterialView&>(), 0u, std::declval<const Vec2<F>&>(), 0.f,
-        std::declval<GraphPoint<F> (*)(const Mask<F>&)>(), true)) params;
+    ParamsOf<Bsdf, F> params;
 
     Point(const SceneView& scene, const Hit& hit, uint32_t mesh, uint32_t material, const Ray& ray,
           F time)
         : Point(scene, hit, MeshHit<F>{hit.inst, mesh, hit.prim, hit.u, hit.v, time}, material, ray,
                 setup_surface<F>(scene, {hit.inst, mesh, hit.prim, hit.u, hit.v, time}, ray.d, true,
-                                 Bsdf::kProgram != ProgramId::kDielectric, true)) {}
+                                 Bsdf::kHasTerminator, true)) {}
     Point(const SceneView& scene, const Hit&, const MeshHit<F>& at, uint32_t material,
           const Ray& ray, const Surface<F>& surface)
         : s(surface),
@@ -218,10 +216,9 @@ class Integrator {
     const Point<Bsdf> at(scene_, hit, mesh_of(hit), material_of(hit), ray, time_);
     const Surface<F>& s = at.s;
     Rgb passed(1.f);
-    if constexpr (Bsdf::kProgram == ProgramId::kOpenPbr)
-      passed = openpbr_transmittance<F>(at.params, hit.t, -dot(ray.d, s.ng));
+    if constexpr (Bsdf::kAbsorbs) passed = at.params.transmittance(hit.t, -dot(ray.d, s.ng));
     Rgb out(0.f);
-    if constexpr (can_emit(Bsdf::kProgram)) {
+    if constexpr (Bsdf::kEmits) {
       out = at.params.emission;
       if (scene_.mesh_lights)
         out =
@@ -251,8 +248,7 @@ class Integrator {
     next.is_seen = false;
     out += delta_lights(bsdf, s, frame, wo, next);
 
-    constexpr bool kOpaque =
-        Bsdf::kProgram != ProgramId::kDielectric && Bsdf::kProgram != ProgramId::kOpenPbr;
+    constexpr bool kOpaque = Bsdf::kHasTerminator && Bsdf::kProgram != ProgramId::kOpenPbr;
     const uint32_t n = depth == 0 ? settings_.directions : 1u;
     next.cone_spread = std::max(ray.cone_spread, 0.25f);
     for (uint32_t i = 0; i < n; ++i) {
@@ -367,7 +363,7 @@ class Integrator {
     Rgb out(0.f);
     visit_program<F>(static_cast<ProgramId>(scene_.material_program[material_of(hit)]),
                      [&]<typename Bsdf>() {
-                       if constexpr (can_emit(Bsdf::kProgram))
+                       if constexpr (Bsdf::kEmits)
                          out = Point<Bsdf>(scene_, hit, mesh_of(hit), material_of(hit), ray, time_)
                                    .params.emission;
                      });

@@ -215,6 +215,29 @@ WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::* field, con
                    Mask<UInt<F>>(active));
 }
 
+/// A member of record `index` of the records at `base`, for each active lane; 0 in the others.
+template <typename F, typename Record>
+WAVECOMB_INLINE UInt<F> gather_member(const Record* base, uint32_t Record::* member,
+                                      const UInt<F>& index, const Mask<F>& active) {
+  constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
+  return gather<UInt<F>>(base, index * kWords + word_of(member), Mask<UInt<F>>(active));
+}
+template <typename F, typename Record>
+WAVECOMB_INLINE F gather_member(const Record* base, float Record::* member, const UInt<F>& index,
+                                const Mask<F>& active) {
+  constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
+  return gather<F>(base, index * kWords + word_of(member), active);
+}
+
+template <typename F, typename Record>
+WAVECOMB_INLINE Vec3<F> gather_member(const Record* base, float (Record::*member)[3],
+                                      const UInt<F>& index, const Mask<F>& active) {
+  constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
+  const UInt<F> first = index * kWords + word_of(member);
+  return {gather<F>(base, first, active), gather<F>(base, first + 1u, active),
+          gather<F>(base, first + 2u, active)};
+}
+
 /// Stores the words of the lanes' heads side by side: word k of all lanes from columns[k] on.
 template <template <typename> class Head, typename F, size_t C>
 WAVECOMB_INLINE void store_columns(const Head<F>& head, float* const (&columns)[C], size_t at) {

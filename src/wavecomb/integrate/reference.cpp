@@ -175,8 +175,8 @@ class PathTracer {
     VertexResult<F> v{};
     visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
                      [&]<typename Bsdf>() {
-                       v = shade_vertex<Bsdf, F>(scene, settings_, key, depth, mesh_hit, hit.geom,
-                                                 hit.t, material, path, &aovs, true);
+                       v = shade_vertex<Bsdf, F>({scene, settings_, key, depth, mesh_hit, hit.geom,
+                                                  hit.t, material, path, &aovs, true});
                      });
     return v;
   }

@@ -78,7 +78,7 @@ template <typename F>
 inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<F>& light,
                                        const F& u, const F& v, const Mask<F>& active) {
   KindSample<F> result = sample_dome_constant<F>(light, u, v);
-  const UInt<F> texture = light.texture(), index = light.bits(offsetof(LightRecord, distribution));
+  const UInt<F> texture = light.texture(), index = light[&LightRecord::distribution];
   Mask<F> pending = active & Mask<F>(texture != UInt<F>(kNoTexture));
   while (any(pending)) {
     const auto first = static_cast<size_t>(std::countr_zero(lane_bits<F>(pending)));

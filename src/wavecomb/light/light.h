@@ -178,18 +178,17 @@ inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>
   const Mask<F> others = active & not_(triangle);
   if (none(others)) return result;
   const detail::LightReader<F> any_light(view.lights, index, others);
-  detail::for_each_kind<F>(any_light.bits(offsetof(LightRecord, kind)), others,
-                           [&](LightKind kind, const Mask<F>& lanes) {
-                             // Often there is one light of a kind, whose record is the same in all
-                             // its lanes.
-                             const detail::LightReader<F> light(view.lights, index, lanes);
-                             detail::KindSample<F> s =
-                                 detail::sample_kind<F>(kind, view, index, light, p, u, v, lanes);
-                             if (view.shapings)
-                               s.radiance = detail::shaped<F>(view, light.shaping(), -s.wi,
-                                                              s.radiance, lanes & (s.pdf > 0.f));
-                             put(s, pick.pdf(light.pick_pdf()), lanes);
-                           });
+  detail::for_each_kind<F>(
+      any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
+        // Often there is one light of a kind, whose record is the same in all
+        // its lanes.
+        const detail::LightReader<F> light(view.lights, index, lanes);
+        detail::KindSample<F> s = detail::sample_kind<F>(kind, view, index, light, p, u, v, lanes);
+        if (view.shapings)
+          s.radiance =
+              detail::shaped<F>(view, light.shaping(), -s.wi, s.radiance, lanes & (s.pdf > 0.f));
+        put(s, pick.pdf(light.pick_pdf()), lanes);
+      });
   return result;
 }
 
@@ -212,7 +211,7 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
   const detail::LightReader<F> reader(view.lights, light, active);
   const F pick_pdf = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, active);
   detail::for_each_kind<F>(
-      reader.bits(offsetof(LightRecord, kind)), active, [&](LightKind kind, const Mask<F>& lanes) {
+      reader[&LightRecord::kind], active, [&](LightKind kind, const Mask<F>& lanes) {
         detail::KindHit<F> hit{Color<F>(F(0.f)), F(0.f)};
         if (kind == LightKind::kRect)
           hit = detail::hit_rect<F>(view, reader, origin, dir, t, lanes);
@@ -250,9 +249,9 @@ struct LightEffect {
     const UInt<F> record = detail::record_of<F>(view, light, active);
     const Mask<F> known = active & Mask<F>(record != UInt<F>(kNoLight));
     const detail::LightReader<F> reader(view.lights, record, known);
-    diffuse = select(known, reader.real(offsetof(LightRecord, diffuse)), F(1.f));
-    specular = select(known, reader.real(offsetof(LightRecord, specular)), F(1.f));
-    sampled_only = known & Mask<F>(reader.bits(offsetof(LightRecord, sampled_only)) != UInt<F>(0u));
+    diffuse = select(known, reader[&LightRecord::diffuse], F(1.f));
+    specular = select(known, reader[&LightRecord::specular], F(1.f));
+    sampled_only = known & Mask<F>(reader[&LightRecord::sampled_only] != UInt<F>(0u));
   }
 
   /// Factor of what a path gets that meets the light; a mirror's image of it is specular.

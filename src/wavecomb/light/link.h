@@ -26,7 +26,7 @@ inline Mask<F> shines_on(const LightView& view, const UInt<F>& link, const UInt<
   const Mask<F> known = active & Mask<F>(record != UInt<F>(kNoLight));
   if (none(known)) return Mask<F>(true);
   const detail::LightReader<F> reader(view.lights, record, known);
-  const UInt<F> set = reader.bits(offsetof(LightRecord, light_link));
+  const UInt<F> set = reader[&LightRecord::light_link];
   return not_(known) | is_linked<F>(view.links, link, set, known);
 }
 
@@ -38,7 +38,7 @@ inline UInt<F> shadow_set(const LightView& view, const UInt<F>& light, const Mas
   const Mask<F> known = active & Mask<F>(record != U(kNoLight));
   if (none(known)) return U(0u);
   const detail::LightReader<F> reader(view.lights, record, known);
-  return select(Mask<U>(known), reader.bits(offsetof(LightRecord, shadow_link)) + 1u, U(0u));
+  return select(Mask<U>(known), reader[&LightRecord::shadow_link] + 1u, U(0u));
 }
 
 }  // namespace wavecomb

@@ -42,18 +42,18 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   const Mask<F> known = active & Mask<F>(record != U(kNoLight));
   if (none(known)) return glow;
   const detail::LightReader<F> light(view.lights, record, known);
-  const U sync = light.bits(offsetof(R, sync));
+  const U sync = light[&R::sync];
   const Mask<F> shows_glow =
       is_seen & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
   const Mask<F> given = known & not_(shows_glow);
   if (none(given)) return glow;
   Color<F> radiance = glow * light.radiance();
   if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -dir, radiance, given);
-  const F mirrored = from_camera ? F(1.f) : light.real(offsetof(R, specular));
-  const Mask<F> sampled_only = Mask<F>(light.bits(offsetof(R, sampled_only)) != U(0u));
+  const F mirrored = from_camera ? F(1.f) : light[&R::specular];
+  const Mask<F> sampled_only = Mask<F>(light[&R::sampled_only] != U(0u));
   F factor = select(sampled_only, select(is_seen, mirrored, F(0.f)), F(1.f));
   if (view.links.members) {
-    const U set = light.bits(offsetof(R, light_link));
+    const U set = light[&R::light_link];
     factor = select(is_linked<F>(view.links, link, set, given), factor, F(0.f));
   }
   return select<F>(given, radiance * factor, glow);

@@ -2,8 +2,7 @@
 /// Reads light records by lane, and what the files of the light kinds share.
 #pragma once
 
-#include <cstddef>
-
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/core/warp.h"
@@ -44,28 +43,38 @@ struct LightReader {
         shared(reinterpret_cast<const float*>(&record)),
         active(active_) {}
 
-  F real(size_t offset_bytes) const {
-    const auto word = static_cast<uint32_t>(offset_bytes / 4);
-    if (shared) return F(shared[word]);
-    return gather<F>(base, first_word + word, active);
+  /// A member of the record: reader[&LightRecord::area].
+  template <typename Record>
+  F operator[](float Record::* member) const {
+    return word(word_of(member));
   }
-  UInt<F> bits(size_t offset_bytes) const { return float_bits<F>(real(offset_bytes)); }
-  Vec2<F> vec2(size_t offset_bytes) const { return {real(offset_bytes), real(offset_bytes + 4)}; }
-  Vec3<F> vec3(size_t offset_bytes) const {
-    return {real(offset_bytes), real(offset_bytes + 4), real(offset_bytes + 8)};
+  template <typename Record>
+  UInt<F> operator[](uint32_t Record::* member) const {
+    return float_bits<F>(word(word_of(member)));
+  }
+  template <typename Record>
+  Vec3<F> operator[](float (Record::*member)[3]) const {
+    const uint32_t first = word_of(member);
+    return {word(first), word(first + 1), word(first + 2)};
   }
 
-  Vec3<F> p() const { return vec3(offsetof(LightRecord, p)); }
-  Vec3<F> u() const { return vec3(offsetof(LightRecord, u)); }
-  Vec3<F> v() const { return vec3(offsetof(LightRecord, v)); }
-  Vec3<F> n() const { return vec3(offsetof(LightRecord, n)); }
-  Color<F> radiance() const { return vec3(offsetof(LightRecord, radiance)); }
-  F area() const { return real(offsetof(LightRecord, area)); }
-  F radius() const { return real(offsetof(LightRecord, radius)); }
-  F one_minus_cos() const { return real(offsetof(LightRecord, one_minus_cos)); }
-  F pick_pdf() const { return real(offsetof(LightRecord, pick_pdf)); }
-  UInt<F> texture() const { return bits(offsetof(LightRecord, texture)); }
-  UInt<F> shaping() const { return bits(offsetof(LightRecord, shaping)); }
+  Vec3<F> p() const { return (*this)[&LightRecord::p]; }
+  Vec3<F> u() const { return (*this)[&LightRecord::u]; }
+  Vec3<F> v() const { return (*this)[&LightRecord::v]; }
+  Vec3<F> n() const { return (*this)[&LightRecord::n]; }
+  Color<F> radiance() const { return (*this)[&LightRecord::radiance]; }
+  F area() const { return (*this)[&LightRecord::area]; }
+  F radius() const { return (*this)[&LightRecord::radius]; }
+  F one_minus_cos() const { return (*this)[&LightRecord::one_minus_cos]; }
+  F pick_pdf() const { return (*this)[&LightRecord::pick_pdf]; }
+  UInt<F> texture() const { return (*this)[&LightRecord::texture]; }
+  UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
+
+ private:
+  F word(uint32_t at) const {
+    if (shared) return F(shared[at]);
+    return gather<F>(base, first_word + at, active);
+  }
 };
 
 /// The record that says what light `light` shines on and how: its own, or that of the mesh light

@@ -131,14 +131,14 @@ inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
 template <typename F>
 inline Mask<F> has_picture(const LightReader<F>& light, const Mask<F>& active) {
   return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &
-         Mask<F>(light.bits(offsetof(LightRecord, distribution)) != UInt<F>(kNoDistribution));
+         Mask<F>(light[&LightRecord::distribution] != UInt<F>(kNoDistribution));
 }
 
 /// Runs `one(distribution, lanes)` for each picture among the lanes.
 template <typename F, typename Function>
 inline void for_each_picture(const LightView& view, const LightReader<F>& light,
                              const Mask<F>& lanes, const Function& one) {
-  const UInt<F> index = light.bits(offsetof(LightRecord, distribution));
+  const UInt<F> index = light[&LightRecord::distribution];
   Mask<F> pending = lanes;
   while (any(pending)) {
     const auto first = static_cast<size_t>(std::countr_zero(lane_bits<F>(pending)));

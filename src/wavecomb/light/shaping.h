@@ -9,6 +9,7 @@
 /// multiply the radiance.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/light/record.h"
 
 namespace wavecomb::detail {
@@ -52,16 +53,12 @@ template <typename F>
 inline F ies_candela(const LightView& view, const UInt<F>& ies, const F& theta, const F& phi,
                      const Mask<F>& active) {
   using U = UInt<F>;
-  constexpr uint32_t kWords = sizeof(IesRecord) / 4;
-  const auto field = [&](size_t offset_bytes) {
-    return gather<U>(view.ies, ies * kWords + static_cast<uint32_t>(offset_bytes / 4),
-                     Mask<U>(active));
+  const auto field = [&](uint32_t IesRecord::* member) {
+    return gather_member<F>(view.ies, member, ies, active);
   };
   const float* const numbers = view.ies_numbers;
-  const U vertical = field(offsetof(IesRecord, vertical)),
-          rows = field(offsetof(IesRecord, vertical_count)),
-          horizontal = field(offsetof(IesRecord, horizontal)),
-          columns = field(offsetof(IesRecord, horizontal_count));
+  const U vertical = field(&IesRecord::vertical), rows = field(&IesRecord::vertical_count),
+          horizontal = field(&IesRecord::horizontal), columns = field(&IesRecord::horizontal_count);
   const Mask<F> inside = active & (theta >= gather<F>(numbers, vertical, active)) &
                          (theta <= gather<F>(numbers, vertical + rows - 1u, active));
   if (none(inside)) return F(0.f);
@@ -88,26 +85,22 @@ inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3
   const Mask<F> active = lanes & Mask<F>(shaping != U(kNoShaping));
   if (none(active)) return radiance;
   using R = ShapingRecord;
-  const U word = shaping * static_cast<uint32_t>(sizeof(R) / 4);
-  const auto real = [&](size_t offset_bytes, uint32_t i = 0) {
-    return gather<F>(view.shapings, word + (static_cast<uint32_t>(offset_bytes / 4) + i), active);
-  };
-  const auto vec3 = [&](size_t offset_bytes, uint32_t i = 0) {
-    return Vec3<F>(real(offset_bytes, i), real(offset_bytes, i + 1), real(offset_bytes, i + 2));
+  const auto read = [&](auto R::* member) {
+    return gather_member<F>(view.shapings, member, shaping, active);
   };
   Color<F> result = radiance;
 
-  const Vec3<F> axis = vec3(offsetof(R, axis));
+  const Vec3<F> axis = read(&R::axis);
   const F cosine = clamp(dot(emitted, axis), F(-1.f), F(1.f));
-  const F focus = real(offsetof(R, focus));
+  const F focus = read(&R::focus);
   const Mask<F> focused = active & (focus > 0.f);
   if (any(focused)) {
     const F power = pow(max(abs(cosine), F(1e-30f)), focus);
-    const Color<F> tint = lerp(Color<F>(vec3(offsetof(R, tint))), Color<F>(F(1.f)), power);
+    const Color<F> tint = lerp(Color<F>(read(&R::tint)), Color<F>(F(1.f)), power);
     result = select<F>(focused, result * tint, result);
   }
 
-  const F cone = real(offsetof(R, cone)), start = real(offsetof(R, cone_start));
+  const F cone = read(&R::cone), start = read(&R::cone_start);
   const Mask<F> coned = active & (cone < kPi);
   if (any(coned)) {
     const Vec3<F> across = cross(emitted, axis);  // the sine keeps small angles exact
@@ -119,22 +112,22 @@ inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3
     result = select<F>(coned, result * select(width > 0.f, soft, hard), result);
   }
 
-  const U ies = float_bits<F>(real(offsetof(R, ies)));
+  const U ies = read(&R::ies);
   const Mask<F> profiled = active & Mask<F>(ies != U(kNoIes));
   if (any(profiled)) {
-    const size_t m = offsetof(R, to_light);
-    const Vec3<F> e(dot(emitted, vec3(m)), dot(emitted, vec3(m, 3)), dot(emitted, vec3(m, 6)));
+    const Vec3<F> e(dot(emitted, read(&R::to_light_x)), dot(emitted, read(&R::to_light_y)),
+                    dot(emitted, read(&R::to_light_z)));
     constexpr float kDegrees = 57.29577951308232f;
     const F flat = sqrt(fma(e.x, e.x, F(e.y * e.y)));
     F theta = atan2(flat, F(-e.z)) * kDegrees;  // from -z
-    const F scale = real(offsetof(R, angle_scale));
+    const F scale = read(&R::angle_scale);
     const F safe = select(scale == 0.f, F(1.f), abs(scale));
     theta = select(scale < 0.f, F(F(theta - 180.f) / safe + 180.f), F(theta / safe));
     theta = select(scale == 0.f, theta, min(theta, F(180.f)));
     const F turn = atan2(F(-e.y), F(-e.x)) * kDegrees;
     const F phi = select(turn < 0.f, F(turn + 360.f), turn);
     const F candela = ies_candela<F>(view, ies, theta, phi, profiled);
-    result = select<F>(profiled, result * F(candela * real(offsetof(R, ies_scale))), result);
+    result = select<F>(profiled, result * F(candela * read(&R::ies_scale)), result);
   }
   return result;
 }

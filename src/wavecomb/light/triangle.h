@@ -2,6 +2,7 @@
 /// Triangles of emissive meshes: uniform over the area, shining to both sides.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/rows.h"
 #include "wavecomb/light/record.h"
 #include "wavecomb/surface/presence.h"
@@ -9,27 +10,23 @@
 
 namespace wavecomb::detail {
 
+/// A TriangleLight.
+template <typename F>
+struct TriangleRow {
+  Vec3<F> p, u, v;
+  Color<F> radiance;
+  Vec3<F> m;
+  F pick_pdf;
+  WAVECOMB_FIELDS(p, u, v, radiance, m, pick_pdf)
+};
+static_assert(sizeof(TriangleLight) == 4 * kRowWords<TriangleRow>);
+
 /// The triangles of the lights in the active lanes.
 template <typename F>
-struct TriangleReader {
-  Vec3<F> p, u, v, m;
-  Color<F> radiance;
-  F pick_pdf;
-
-  TriangleReader(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
-    constexpr uint32_t kWords = sizeof(TriangleLight) / 4;
-    const auto r =
-        load_rows<kWords, F>(view.triangles, (light - view.first_triangle) * kWords, active);
-    const auto vec3 = [&](size_t offset_bytes) {
-      return Vec3<F>(r[offset_bytes / 4], r[offset_bytes / 4 + 1], r[offset_bytes / 4 + 2]);
-    };
-    p = vec3(offsetof(TriangleLight, p));
-    u = vec3(offsetof(TriangleLight, u));
-    v = vec3(offsetof(TriangleLight, v));
-    m = vec3(offsetof(TriangleLight, m));
-    radiance = vec3(offsetof(TriangleLight, radiance));
-    pick_pdf = r[offsetof(TriangleLight, pick_pdf) / 4];
-  }
+struct TriangleReader : TriangleRow<F> {
+  TriangleReader(const LightView& view, const UInt<F>& light, const Mask<F>& active)
+      : TriangleRow<F>(
+            load_row<TriangleRow, F>(view.triangles, light - view.first_triangle, active)) {}
 };
 
 /// What triangles at barycentrics `b`, world position q, give where it varies: the emission of
@@ -66,9 +63,7 @@ template <typename F>
   const Mask<F> partly = has_presence<F>(view.materials, material, active);
   if (any(partly)) {
     const UInt<F> instance =
-        gather<UInt<F>>(view.triangle_uvs,
-                        index * kWords + static_cast<uint32_t>(offsetof(TriangleUvs, instance) / 4),
-                        Mask<UInt<F>>(partly));
+        gather_member<F>(view.triangle_uvs, &TriangleUvs::instance, index, partly);
     const F opacity = opacity_at<F>(view.materials, view.meshes, view.instances, material, instance,
                                     place, uv, partly);
     radiance = radiance * select(partly, opacity, F(1.f));
@@ -111,10 +106,10 @@ struct TriangleDensity {
 template <typename F>
 inline TriangleDensity<F> triangle_pdf(const LightView& view, const UInt<F>& light,
                                        const Vec3<F>& dir, const F& t, const Mask<F>& active) {
-  static_assert(offsetof(TriangleLight, pick_pdf) == offsetof(TriangleLight, m) + 12);
+  // The last four words of the row.
   const auto r = load_rows<4, F>(
       view.triangles,
-      (light - view.first_triangle) * (sizeof(TriangleLight) / 4) + offsetof(TriangleLight, m) / 4,
+      (light - view.first_triangle) * (sizeof(TriangleLight) / 4) + word_of(&TriangleLight::m),
       active);
   const F projected = abs(dot(dir, Vec3<F>(r[0], r[1], r[2])));
   return {area_to_solid_angle<F>(F(t * t), projected, F(1.f)), r[3]};

@@ -6,8 +6,9 @@
 ///
 ///   static constexpr ProgramId kProgram;
 ///   static constexpr uint32_t kSlots;      what it reads
-///   static constexpr bool kHasNonDelta;
-///   Bsdf(const ShadingParams<F>&, bool schlick);
+///   BsdfTraits, or what differs from them
+///   using Params;                          where it takes more than ShadingParams (params.h)
+///   Bsdf(const Params&, bool schlick);
 ///   Color<F> albedo() const;               for the AOV: diffuse and specular colour
 ///   Mask<F> has_non_delta() const;         lanes where light sampling makes sense
 ///   F delta_probability(wo) const;         with which sample() chooses a delta lobe
@@ -20,6 +21,15 @@
 #include "wavecomb/scene/material_data.h"
 
 namespace wavecomb {
+
+/// What the integrator knows of a program. Programs are derived from this and say what differs.
+struct BsdfTraits {
+  static constexpr bool kEmits = false;         ///< its materials may emit
+  static constexpr bool kAbsorbs = false;       ///< rays inside lose light: Params::transmittance
+  static constexpr bool kHasNonDelta = true;    ///< has lobes that light sampling makes sense for
+  static constexpr bool kTransmits = false;     ///< those may lead to the other side
+  static constexpr bool kHasTerminator = true;  ///< rays start beyond the terminator of its normals
+};
 
 /// f(wo, wi) |cos theta_i| and the solid-angle density with which sample() would have chosen wi.
 /// Delta lobes do not count in either.

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/material/bsdf.h"
 #include "wavecomb/scene/graph_value.h"
 
@@ -50,11 +51,7 @@ template <typename F, typename Params>
 inline void drive_parameters(const MaterialView& view, const UInt<F>& material,
                              const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
   using U = UInt<F>;
-  constexpr auto kWords = static_cast<uint32_t>(sizeof(MaterialRecord) / 4);
-  const U graph =
-      gather<U>(view.materials,
-                material * kWords + static_cast<uint32_t>(offsetof(MaterialRecord, graph) / 4),
-                Mask<U>(active));
+  const U graph = gather_member<F>(view.materials, &MaterialRecord::graph, material, active);
   const auto places = parameter_places(p);
   const F opacity = p.opacity;
   F registers[kMaxGraphRegisters];

@@ -2,8 +2,6 @@
 /// Reads the parameters of materials at hits: constants from records, textures, or value graphs.
 #pragma once
 
-#include <cstddef>
-
 #include "wavecomb/core/math.h"
 #include "wavecomb/material/bsdf.h"
 #include "wavecomb/material/graph.h"
@@ -24,30 +22,30 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
   using R = MaterialRecord;
   const SlotReader<F> slots(view, material, uv, uv_width, active);
   const auto& r = slots.record;
-  const auto color = [&](Slot s, size_t offset) {
-    const Vec3<F> constant = r.vec3(offset);
+  const auto color = [&](Slot s, float (R::*member)[3]) {
+    const Vec3<F> constant = r[member];
     return (kSlots & slot_bit(s)) ? slots.value(s, constant) : constant;
   };
-  const auto real = [&](Slot s, size_t offset) {
-    const F constant = r.real(offset);
+  const auto real = [&](Slot s, float R::* member) {
+    const F constant = r[member];
     return saturate((kSlots & slot_bit(s)) ? slots.value(s, constant) : constant);
   };
   ShadingParams<F> p;
-  p.base_color = saturate(color(Slot::kBaseColor, offsetof(R, base_color)));
-  p.specular_color = saturate(color(Slot::kSpecularColor, offsetof(R, specular_color)));
-  p.emission = sane_emission(color(Slot::kEmission, offsetof(R, emission)));
-  p.roughness = real(Slot::kRoughness, offsetof(R, roughness));
-  p.metallic = real(Slot::kMetallic, offsetof(R, metallic));
-  p.clearcoat = real(Slot::kClearcoat, offsetof(R, clearcoat));
-  p.clearcoat_roughness = real(Slot::kClearcoatRoughness, offsetof(R, clearcoat_roughness));
-  p.opacity = real(Slot::kOpacity, offsetof(R, opacity));
-  const F threshold = r.real(offsetof(R, opacity_threshold));
+  p.base_color = saturate(color(Slot::kBaseColor, &R::base_color));
+  p.specular_color = saturate(color(Slot::kSpecularColor, &R::specular_color));
+  p.emission = sane_emission(color(Slot::kEmission, &R::emission));
+  p.roughness = real(Slot::kRoughness, &R::roughness);
+  p.metallic = real(Slot::kMetallic, &R::metallic);
+  p.clearcoat = real(Slot::kClearcoat, &R::clearcoat);
+  p.clearcoat_roughness = real(Slot::kClearcoatRoughness, &R::clearcoat_roughness);
+  p.opacity = real(Slot::kOpacity, &R::opacity);
+  const F threshold = r[&R::opacity_threshold];
   p.opacity = select(opacity_is_presence(slots, threshold), F(1.f), p.opacity);
-  p.normal = sane_normal(color(Slot::kNormal, offsetof(R, normal)));
-  p.ior = clamp(r.real(offsetof(R, ior)), F(1.f / kMaxIor), F(kMaxIor));
-  p.conductor_eta = max(r.vec3(offsetof(R, conductor_eta)), Color<F>(F(0.f)));
-  p.conductor_k = max(r.vec3(offsetof(R, conductor_k)), Color<F>(F(0.f)));
-  p.flags = r.bits(offsetof(R, flags));
+  p.normal = sane_normal(color(Slot::kNormal, &R::normal));
+  p.ior = clamp(r[&R::ior], F(1.f / kMaxIor), F(kMaxIor));
+  p.conductor_eta = max(r[&R::conductor_eta], Color<F>(F(0.f)));
+  p.conductor_k = max(r[&R::conductor_k], Color<F>(F(0.f)));
+  p.flags = r[&R::flags];
   return p;
 }
 
@@ -113,6 +111,34 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
                                               const Mask<F>& active) {
   return fetch_params<kSlots, F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width},
                                  active);
+}
+
+namespace detail {
+template <typename Bsdf, typename F>
+struct ParamsOf {
+  using Type = ShadingParams<F>;
+};
+template <typename Bsdf, typename F>
+  requires requires { typename Bsdf::Params; }
+struct ParamsOf<Bsdf, F> {
+  using Type = typename Bsdf::Params;
+};
+}  // namespace detail
+
+/// The parameters that program `Bsdf` takes.
+template <typename Bsdf, typename F>
+using ParamsOf = typename detail::ParamsOf<Bsdf, F>::Type;
+
+/// fetch_params for program `Bsdf`.
+template <typename Bsdf, uint32_t kSlots, typename F, typename MakePoint>
+WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
+                                            const Vec2<F>& uv, const F& uv_width,
+                                            const MakePoint& make_point, const Mask<F>& active) {
+  if constexpr (requires { typename Bsdf::Params; })
+    return Bsdf::Params::template fetch<kSlots>(materials, material, uv, uv_width, make_point,
+                                                active);
+  else
+    return fetch_params<kSlots, F>(materials, material, uv, uv_width, make_point, active);
 }
 
 }  // namespace wavecomb

@@ -93,11 +93,10 @@ uint64_t hash_materials(const Scene& scene) {
           m.conductor_eta, m.conductor_k, m.specular_workflow, m.presence);
     if (m.program == ProgramId::kOpenPbr) {
       const OpenPbr& o = m.openpbr;
-      h.add(o.diffuse_roughness, o.specular_weight, o.anisotropy, o.rotation, o.transmission_weight,
-            o.transmission_color, o.transmission_depth, o.subsurface_weight, o.subsurface_color,
-            o.subsurface_anisotropy, o.fuzz_weight, o.fuzz_color, o.fuzz_roughness, o.coat_color,
-            o.coat_ior, o.coat_darkening, o.film_weight, o.film_thickness, o.film_ior,
-            o.thin_walled);
+#define WAVECOMB_ADD(kind, name, standard, least, most) h.add(o.name);
+      WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)
+#undef WAVECOMB_ADD
+      h.add(o.transmission_color, o.transmission_depth, o.thin_walled);
     }
     for (const TextureUse& use : m.textures) {
       h.add(use.texture, use.channel);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "wavecomb/scene/openpbr_data.h"
 #include "wavecomb/texture/graph_data.h"
 
 namespace wavecomb {
@@ -17,36 +18,20 @@ struct GraphParameter {
 };
 
 /// Slots and ior first, then what program "openpbr" has beside them, as OpenPbrRecord has it.
-inline constexpr GraphParameter kGraphParameters[] = {
-    {"base_color", 3, 0, 1},
-    {"specular_color", 3, 0, 1},
-    {"emission", 3, 0, 1e18f},
-    {"roughness", 1, 0, 1},
-    {"metallic", 1, 0, 1},
-    {"clearcoat", 1, 0, 1},
-    {"clearcoat_roughness", 1, 0, 1},
-    {"opacity", 1, 0, 1},
-    {"normal", 3, -1e6f, 1e6f},
-    {"ior", 1, 0.1f, 10},
-    {"diffuse_roughness", 1, 0, 1},
-    {"specular_weight", 1, 0, 100},
-    {"anisotropy", 1, 0, 1},
-    {"rotation", 1, 0, 1},
-    {"transmission_weight", 1, 0, 1},
-    {"transmission_tint", 3, 0, 1},
-    {"extinction", 3, 0, 1e6f},
-    {"subsurface_weight", 1, 0, 1},
-    {"subsurface_color", 3, 0, 1},
-    {"subsurface_anisotropy", 1, -1, 1},
-    {"fuzz_weight", 1, 0, 1},
-    {"fuzz_color", 3, 0, 1},
-    {"fuzz_roughness", 1, 0, 1},
-    {"coat_color", 3, 0, 1},
-    {"coat_ior", 1, 0.1f, 10},
-    {"coat_darkening", 1, 0, 1},
-    {"film_weight", 1, 0, 1},
-    {"film_thickness", 1, 0, 1e5f},
-    {"film_ior", 1, 1, 10},
+inline constexpr GraphParameter kGraphParameters[] = {{"base_color", 3, 0, 1},
+                                                      {"specular_color", 3, 0, 1},
+                                                      {"emission", 3, 0, 1e18f},
+                                                      {"roughness", 1, 0, 1},
+                                                      {"metallic", 1, 0, 1},
+                                                      {"clearcoat", 1, 0, 1},
+                                                      {"clearcoat_roughness", 1, 0, 1},
+                                                      {"opacity", 1, 0, 1},
+                                                      {"normal", 3, -1e6f, 1e6f},
+                                                      {"ior", 1, 0.1f, 10},
+#define WAVECOMB_PARAMETER(kind, name, standard, least, most) \
+  {#name, sizeof(OpenPbrInputs<float>::kind) / 4, least, most},
+                                                      WAVECOMB_OPENPBR_INPUTS(WAVECOMB_PARAMETER)
+#undef WAVECOMB_PARAMETER
 };
 
 /// Number of the first component of a parameter; of the one after all for an unknown name.

@@ -187,10 +187,11 @@ void make_shaping(Made& made, LightSet& set, const Light& light,
     rows[i] = cross(axes[(i + 1) % 3], axes[(i + 2) % 3]) * side;
     largest = std::max(largest, length(rows[i]));
   }
+  float* const to_light[3] = {r.to_light_x, r.to_light_y, r.to_light_z};
   for (size_t i = 0; i < 3; ++i) {
     const Double3 row = rows[i] * (largest > 0 ? 1 / largest : 0);
     const double values[3] = {row.x, row.y, row.z};
-    for (size_t j = 0; j < 3; ++j) r.to_light[3 * i + j] = static_cast<float>(values[j]);
+    for (size_t j = 0; j < 3; ++j) to_light[i][j] = static_cast<float>(values[j]);
   }
   const auto tint = [](float x) { return std::max(0.0, double{x}); };
   put(r.tint, {tint(s.focus_tint.x), tint(s.focus_tint.y), tint(s.focus_tint.z)});

@@ -129,9 +129,10 @@ static_assert(sizeof(LightRecord) == 128);
 
 /// Shaping as lanes read it.
 struct alignas(64) ShapingRecord {
-  float axis[3];      ///< unit, world: the middle of the emission
-  float to_light[9];  ///< rows of the map from world directions to the light's space
-  float focus;        ///< 0: none
+  float axis[3];  ///< unit, world: the middle of the emission
+  /// Rows of the map from world directions to the light's space.
+  float to_light_x[3], to_light_y[3], to_light_z[3];
+  float focus;  ///< 0: none
   float tint[3];
   float cone, cone_start;  ///< radians: where light ends, and where it begins to fall
   float ies_scale;

@@ -39,34 +39,26 @@ void check_material(const Material& material, size_t texture_count, size_t graph
     if (graph != kNoGraph && graph >= graph_count)
       throw Error(name + " has a graph that was never added; add graphs before materials");
   const OpenPbr& o = material.openpbr;
-  for (const Vec3<float>& v :
-       {material.base_color, material.specular_color, material.emission, material.conductor_eta,
-        material.conductor_k, o.transmission_color, o.subsurface_color, o.fuzz_color, o.coat_color})
+  bool good = std::isfinite(o.transmission_depth);
+  for (float x :
+       {material.roughness, material.metallic, material.clearcoat, material.clearcoat_roughness,
+        material.opacity, material.ior, material.opacity_threshold})
+    good = good && std::isfinite(x);
+  const auto check_color = [&](const Vec3<float>& v) {
     if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
-  for (float x : {material.roughness,
-                  material.metallic,
-                  material.clearcoat,
-                  material.clearcoat_roughness,
-                  material.opacity,
-                  material.ior,
-                  material.opacity_threshold,
-                  o.diffuse_roughness,
-                  o.specular_weight,
-                  o.anisotropy,
-                  o.rotation,
-                  o.transmission_weight,
-                  o.transmission_depth,
-                  o.subsurface_weight,
-                  o.subsurface_anisotropy,
-                  o.fuzz_weight,
-                  o.fuzz_roughness,
-                  o.coat_ior,
-                  o.coat_darkening,
-                  o.film_weight,
-                  o.film_thickness,
-                  o.film_ior})
-    if (!std::isfinite(x))
-      throw Error(name + " has a parameter that is not finite; give finite numbers");
+  };
+  for (const Vec3<float>& v : {material.base_color, material.specular_color, material.emission,
+                               material.conductor_eta, material.conductor_k, o.transmission_color})
+    check_color(v);
+  const auto check = [&](const auto& value) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, float>)
+      good = good && std::isfinite(value);
+    else
+      check_color(value);
+  };
+  std::apply([&](const auto&... input) { (check(input), ...); },
+             static_cast<const OpenPbrInputs<float>&>(o).fields());
+  if (!good) throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
   if (material.evaluations < 1 || material.evaluations > kMaxEvaluations)
     throw Error(name + " has " + std::to_string(material.evaluations) + " evaluations; from 1 to " +

@@ -60,35 +60,28 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
 
 OpenPbrRecord make_openpbr_record(const OpenPbr& m) {
   OpenPbrRecord r{};
-  const auto unit = [](float x) { return std::clamp(x, 0.f, 1.f); };
-  const auto put = [&unit](float* to, const Vec3<float>& v) {
-    to[0] = unit(v.x);
-    to[1] = unit(v.y);
-    to[2] = unit(v.z);
+  auto& inputs = static_cast<OpenPbrInputs<float>&>(r);
+  inputs = m;
+  inputs.rotation = m.rotation - std::floor(m.rotation);
+  inputs.transmission_tint = m.transmission_color;
+  inputs.extinction = Vec3<float>(0.f);
+  const auto bring_to_range = [&] {
+    detail::for_each_word<0, float>(inputs, [](auto at, float& value) {
+      constexpr uint32_t kAt = kFirstOpenPbrOutput + at;
+      value = std::clamp(value, kGraphRanges.low[kAt], kGraphRanges.high[kAt]);
+    });
   };
-  r.diffuse_roughness = unit(m.diffuse_roughness);
-  r.specular_weight = std::clamp(m.specular_weight, 0.f, 100.f);
-  r.anisotropy = unit(m.anisotropy);
-  r.rotation = m.rotation - std::floor(m.rotation);
-  r.transmission_weight = unit(m.transmission_weight);
-  put(r.transmission_tint, m.transmission_color);
-  if (m.transmission_depth > 0)
-    for (int c = 0; c < 3; ++c) {
-      r.extinction[c] = -std::log(std::max(r.transmission_tint[c], 1e-6f)) / m.transmission_depth;
-      r.transmission_tint[c] = 1;
-    }
-  r.subsurface_weight = unit(m.subsurface_weight);
-  put(r.subsurface_color, m.subsurface_color);
-  r.subsurface_anisotropy = std::clamp(m.subsurface_anisotropy, -1.f, 1.f);
-  r.fuzz_weight = unit(m.fuzz_weight);
-  put(r.fuzz_color, m.fuzz_color);
-  r.fuzz_roughness = unit(m.fuzz_roughness);
-  put(r.coat_color, m.coat_color);
-  r.coat_ior = std::clamp(m.coat_ior, 0.1f, 10.f);
-  r.coat_darkening = unit(m.coat_darkening);
-  r.film_weight = unit(m.film_weight);
-  r.film_thickness = std::clamp(m.film_thickness, 0.f, 1e5f);
-  r.film_ior = std::clamp(m.film_ior, 1.f, 10.f);
+  bring_to_range();
+  if (m.transmission_depth > 0) {
+    const auto extinction = [&](float& tint) {
+      const float sigma = -std::log(std::max(tint, 1e-6f)) / m.transmission_depth;
+      tint = 1;
+      return sigma;
+    };
+    inputs.extinction = {extinction(inputs.transmission_tint.x),
+                         extinction(inputs.transmission_tint.y),
+                         extinction(inputs.transmission_tint.z)};
+  }
   r.thin_walled = m.thin_walled ? 1.f : 0.f;
   return r;
 }

@@ -3,6 +3,7 @@
 /// light samples that aim at one.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/surface/surface_reader.h"
 #include "wavecomb/surface/values.h"
 
@@ -13,10 +14,7 @@ template <typename F>
 inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
                             const Mask<F>& active) {
   using U = UInt<F>;
-  const U flags = gather<U>(view.materials,
-                            material * static_cast<uint32_t>(sizeof(MaterialRecord) / 4) +
-                                static_cast<uint32_t>(offsetof(MaterialRecord, flags) / 4),
-                            Mask<U>(active));
+  const U flags = gather_member<F>(view.materials, &MaterialRecord::flags, material, active);
   return active & Mask<F>((flags & uint32_t{kPresence}) != U(0u));
 }
 

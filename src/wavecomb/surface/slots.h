@@ -2,9 +2,9 @@
 /// Reads the slots of materials at hits: constants from records, or textures.
 #pragma once
 
-#include <cstddef>
 #include <cstring>
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/scene/material_data.h"
@@ -26,24 +26,49 @@ struct RecordReader {
   const std::byte* shared;  ///< the record of all active lanes, or null
   Mask<F> active;
 
-  F real(size_t offset_bytes) const { return word<F, float>(offset_bytes); }
-  UInt<F> bits(size_t offset_bytes) const { return word<UInt<F>, uint32_t>(offset_bytes); }
-  Vec3<F> vec3(size_t offset_bytes) const {
-    return {real(offset_bytes), real(offset_bytes + 4), real(offset_bytes + 8)};
+  /// A member of the record: reader[&MaterialRecord::roughness].
+  template <typename Record>
+  F operator[](float Record::* member) const {
+    return word<F, float>(word_of(member));
+  }
+  template <typename Record>
+  UInt<F> operator[](uint32_t Record::* member) const {
+    return word<UInt<F>, uint32_t>(word_of(member));
+  }
+  template <typename Record>
+  Vec3<F> operator[](float (Record::*member)[3]) const {
+    const uint32_t first = word_of(member);
+    return {word<F, float>(first), word<F, float>(first + 1), word<F, float>(first + 2)};
+  }
+  /// One of an array's.
+  template <typename Record, size_t N>
+  F at(float (Record::*member)[N], size_t i) const {
+    return word<F, float>(word_of(member) + static_cast<uint32_t>(i));
+  }
+  /// The fields of a row that the record begins with.
+  template <template <typename> class Row>
+  Row<F> row() const {
+    Row<F> row;
+    for_each_word<0, F>(row, [&](auto at, auto& value) WAVECOMB_INLINE_LAMBDA {
+      value = word<std::remove_cvref_t<decltype(value)>,
+                   std::conditional_t<std::is_same_v<std::remove_cvref_t<decltype(value)>, F>,
+                                      float, uint32_t>>(at);
+    });
+    return row;
   }
 
  private:
   template <typename T, typename Scalar>
-  T word(size_t offset_bytes) const {
+  T word(uint32_t at) const {
     if (shared) {
       Scalar value;
-      std::memcpy(&value, shared + offset_bytes, sizeof(value));
+      std::memcpy(&value, shared + size_t{at} * 4, sizeof(value));
       return T(value);
     }
     if constexpr (kIsScalar<F>)
       return T(0);  // not active: a lane alone shares its record with itself
     else
-      return gather<T>(base, first_word + static_cast<uint32_t>(offset_bytes / 4), Mask<T>(active));
+      return gather<T>(base, first_word + at, Mask<T>(active));
   }
 };
 
@@ -64,22 +89,22 @@ inline Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use
                             const F& uv_width, const Mask<F>& active) {
   using R = TextureUseRecord;
   F m[6];
-  for (size_t i = 0; i < 6; ++i) m[i] = use.real(offsetof(R, uv) + 4 * i);
+  for (size_t i = 0; i < 6; ++i) m[i] = use.at(&R::uv, i);
   const F s = fma(m[0], uv.x, fma(m[1], uv.y, m[2]));
   const F t = fma(m[3], uv.x, fma(m[4], uv.y, m[5]));
   // The footprint grows as the longer image of the two axes.
   const F stretch = sqrt(max(fma(m[0], m[0], F(m[3] * m[3])), fma(m[1], m[1], F(m[4] * m[4]))));
   const F width = uv_width * stretch;
-  const UInt<F> id = use.bits(offsetof(R, texture));
+  const UInt<F> id = use[&R::texture];
   const Texel<F> texel =
       use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t, width, active)
                  : lookup<F>(view.textures, id, s, t, width, active);
   const auto channel = [&](const F& value, size_t i) {
-    return fma(value, use.real(offsetof(R, scale) + 4 * i), use.real(offsetof(R, bias) + 4 * i));
+    return fma(value, use.at(&R::scale, i), use.at(&R::bias, i));
   };
   const F c[4] = {channel(texel.r, 0), channel(texel.g, 1), channel(texel.b, 2),
                   channel(texel.a, 3)};
-  const UInt<F> which = use.bits(offsetof(R, channel));
+  const UInt<F> which = use[&R::channel];
   F one = c[0];
   for (uint32_t i = 1; i < 4; ++i) one = select(Mask<F>(which == UInt<F>(i)), c[i], one);
   const Mask<F> rgb = Mask<F>(which >= UInt<F>(4u));
@@ -107,7 +132,7 @@ struct SlotReader {
         active(active_),
         uniform(any(active_) && is_uniform<F>(material_, active_)),
         record(make_reader<MaterialRecord, F>(view_.materials, material_, uniform, active_)),
-        texture_slots(record.bits(offsetof(MaterialRecord, texture_slots))) {}
+        texture_slots(record[&MaterialRecord::texture_slots]) {}
 
   /// The value of slot `s`: `constant`, or the texture's in the lanes that have one.
   Vec3<F> value(Slot s, const Vec3<F>& constant) const {
@@ -139,7 +164,7 @@ inline Color<F> sane_emission(const Color<F>& c) {
 /// Lanes whose opacity is presence: it says how much of the surface is there, not how it transmits.
 template <typename F>
 inline Mask<F> opacity_is_presence(const SlotReader<F>& slots, const F& threshold) {
-  const UInt<F> flags = slots.record.bits(offsetof(MaterialRecord, flags));
+  const UInt<F> flags = slots.record[&MaterialRecord::flags];
   return Mask<F>((flags & UInt<F>(uint32_t{kPresence})) != UInt<F>(0u)) | (threshold > 0.f);
 }
 

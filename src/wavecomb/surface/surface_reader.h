@@ -2,6 +2,7 @@
 /// What a hit and a surface are, and how lanes read the meshes and instances they are on.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/frame.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows.h"
@@ -43,10 +44,7 @@ class MeshReader {
     const uint32_t bits = lane_bits<F>(active);
     for (size_t i = 0; i < kWidth<F>; ++i)
       records_[i] = meshes + ((bits >> i & 1u) != 0 ? index.value[i] : 0u);
-    flags = gather<UInt<F>>(meshes,
-                            mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
-                                static_cast<uint32_t>(offsetof(MeshRecord, flags) / 4),
-                            Mask<UInt<F>>(active));
+    flags = gather_member<F>(meshes, &MeshRecord::flags, mesh, active);
   }
 
   /// Row `index` of N words of one of a mesh's arrays.
@@ -133,10 +131,7 @@ struct InstanceMaps {
 /// Whether the lanes' meshes are curves or points.
 template <typename F>
 inline Mask<F> is_curved(const SceneView& scene, const UInt<F>& mesh, const Mask<F>& active) {
-  const UInt<F> flags = gather<UInt<F>>(scene.meshes,
-                                        mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
-                                            static_cast<uint32_t>(offsetof(MeshRecord, flags) / 4),
-                                        Mask<UInt<F>>(active));
+  const UInt<F> flags = gather_member<F>(scene.meshes, &MeshRecord::flags, mesh, active);
   return active & Mask<F>((flags & uint32_t{kIsCurved}) != UInt<F>(0u));
 }
 

@@ -36,9 +36,9 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
                                const F& uv_width, const MakePoint& make_point,
                                const Mask<F>& active) {
   const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
-  const Vec3<F> constant = slots.record.vec3(offsetof(MaterialRecord, emission));
+  const Vec3<F> constant = slots.record[&MaterialRecord::emission];
   const Color<F> plain = detail::sane_emission(slots.value(Slot::kEmission, constant));
-  const UInt<F> graph = slots.record.bits(offsetof(MaterialRecord, emission_graph));
+  const UInt<F> graph = slots.record[&MaterialRecord::emission_graph];
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
   if (none(driven)) return plain;
   return graph_value<F>(view, graph, kEmissionOutput, make_point(driven), driven, plain);
@@ -58,14 +58,13 @@ inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const 
                        const F& uv_width, const MakePoint& make_point, const Mask<F>& active) {
   using R = MaterialRecord;
   const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
-  F opacity =
-      detail::saturate(slots.value(Slot::kOpacity, slots.record.real(offsetof(R, opacity))));
-  const UInt<F> graph = slots.record.bits(offsetof(R, opacity_graph));
+  F opacity = detail::saturate(slots.value(Slot::kOpacity, slots.record[&R::opacity]));
+  const UInt<F> graph = slots.record[&R::opacity_graph];
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
   if (any(driven))
     opacity =
         graph_value<F>(view, graph, kOpacityOutput, make_point(driven), driven, Vec3<F>(opacity)).x;
-  const F threshold = slots.record.real(offsetof(R, opacity_threshold));
+  const F threshold = slots.record[&R::opacity_threshold];
   const F cut = select(opacity < threshold, F(0.f), F(1.f));
   const F present = select(threshold > 0.f, cut, opacity);
   return select(detail::opacity_is_presence(slots, threshold), present, F(1.f));

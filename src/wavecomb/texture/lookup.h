@@ -2,6 +2,7 @@
 /// Texture lookup in lanes.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows.h"
 #include "wavecomb/core/vec.h"
@@ -49,14 +50,13 @@ inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& ind
                                   const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TextureLevel) / 4;
   const UInt<F> word = index * kWords;
-  const auto read = [&](size_t offset_bytes) {
-    return float_bits<F>(
-        gather<F>(texture.levels, word + static_cast<uint32_t>(offset_bytes / 4), active));
+  const auto read = [&](uint32_t at) {
+    return float_bits<F>(gather<F>(texture.levels, word + at, active));
   };
   // Offsets fit in 32 bits: lay_out refuses more texels. The low half of a 64-bit number comes
   // first on the machines that we build for.
-  return {read(offsetof(TextureLevel, width)), read(offsetof(TextureLevel, height)),
-          read(offsetof(TextureLevel, tiles_x)), read(offsetof(TextureLevel, offset))};
+  return {read(word_of(&TextureLevel::width)), read(word_of(&TextureLevel::height)),
+          read(word_of(&TextureLevel::tiles_x)), read(word_of(&TextureLevel::offset))};
 }
 
 /// Two neighbouring texels along one axis and how far the point is from the first to the second.

@@ -2,6 +2,7 @@
 /// Stage 3b: the policy gives the shading queue its order.
 #pragma once
 
+#include "wavecomb/core/fields.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/morton.h"
 #include "wavecomb/integrate/wave.h"
@@ -28,10 +29,7 @@ UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone
   const U tile = (U(to_int<F>(fu)) + U(to_int<F>(fv)) * 10u) & 0x7fu;
   const U cell = morton_2<U>(U(to_int<F>(F((u - fu) * 128.f))) & 0x7fu,
                              U(to_int<F>(F((v - fv) * 128.f))) & 0x7fu);
-  const F density = gather<F>(scene.meshes,
-                              hit.mesh * static_cast<uint32_t>(sizeof(MeshRecord) / 4) +
-                                  static_cast<uint32_t>(offsetof(MeshRecord, uv_density) / 4),
-                              active);
+  const F density = gather_member<F>(scene.meshes, &MeshRecord::uv_density, hit.mesh, active);
   // Level of a 2^15-texel texture, from the exponent of the footprint: floor(log2(width)) + 15.
   const F width = clamp(F(cone_width * density), F(0x1p-15f), F(1.f));
   const U level = ((float_bits<F>(width) >> 23) - 112u) & 0xfu;

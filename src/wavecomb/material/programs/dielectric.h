@@ -9,12 +9,13 @@ namespace wavecomb {
 
 /// base_color tints each crossing.
 template <typename F>
-class DielectricBsdf {
+class DielectricBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kDielectric;
+  static constexpr bool kTransmits = true;
+  static constexpr bool kHasTerminator = false;
   static constexpr uint32_t kSlots =
       slot_bit(Slot::kBaseColor) | slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
-  static constexpr bool kHasNonDelta = true;
 
   DielectricBsdf(const ShadingParams<F>& params, bool schlick)
       : tint_(params.base_color),

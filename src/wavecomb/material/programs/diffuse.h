@@ -9,11 +9,10 @@ namespace wavecomb {
 
 /// f = base_color / pi.
 template <typename F>
-class DiffuseBsdf {
+class DiffuseBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kDiffuse;
   static constexpr uint32_t kSlots = slot_bit(Slot::kBaseColor) | slot_bit(Slot::kNormal);
-  static constexpr bool kHasNonDelta = true;
 
   DiffuseBsdf(const ShadingParams<F>& params, bool /*schlick*/) : base_(params.base_color) {}
 

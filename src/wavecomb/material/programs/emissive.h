@@ -7,11 +7,12 @@
 namespace wavecomb {
 
 template <typename F>
-class EmissiveBsdf {
+class EmissiveBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kEmissive;
-  static constexpr uint32_t kSlots = 0;
+  static constexpr bool kEmits = true;
   static constexpr bool kHasNonDelta = false;
+  static constexpr uint32_t kSlots = 0;
 
   EmissiveBsdf(const ShadingParams<F>& /*params*/, bool /*schlick*/) {}
 

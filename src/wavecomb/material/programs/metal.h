@@ -14,12 +14,11 @@ namespace wavecomb {
 /// the measured index where kConductorIndex is set. A black tint (the unset value) counts as white,
 /// which is Schlick's formula.
 template <typename F>
-class MetalBsdf {
+class MetalBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kMetal;
   static constexpr uint32_t kSlots = slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) |
                                      slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
-  static constexpr bool kHasNonDelta = true;
 
   MetalBsdf(const ShadingParams<F>& params, bool schlick)
       : eta_(params.conductor_eta), k_(params.conductor_k), roughness_(params.roughness) {

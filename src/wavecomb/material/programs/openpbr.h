@@ -22,15 +22,17 @@ namespace wavecomb {
 /// inside without fuzz and without the coat's reflection. Subsurface scattering is approximated as
 /// diffuse.
 template <typename F>
-class OpenPbrBsdf {
+class OpenPbrBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kOpenPbr;
+  static constexpr bool kEmits = true;
+  static constexpr bool kAbsorbs = true;
+  static constexpr bool kTransmits = true;
   using Params = OpenPbrParams<F>;
   static constexpr uint32_t kSlots =
       slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) | slot_bit(Slot::kRoughness) |
       slot_bit(Slot::kMetallic) | slot_bit(Slot::kClearcoat) | slot_bit(Slot::kClearcoatRoughness) |
       slot_bit(Slot::kNormal) | kNeedsTangent;
-  static constexpr bool kHasNonDelta = true;
 
   /// Fresnel's formulas are always exact.
   OpenPbrBsdf(const Params& p, bool /*schlick*/)

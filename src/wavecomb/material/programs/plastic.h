@@ -14,12 +14,11 @@ namespace wavecomb {
 /// f = coat + base_color / pi * seen_through_coat, by the coat's albedos: those of its roughness,
 /// with what is lost between its facets, so that a white base under a lossless coat loses nothing.
 template <typename F>
-class PlasticBsdf {
+class PlasticBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kPlastic;
   static constexpr uint32_t kSlots =
       slot_bit(Slot::kBaseColor) | slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
-  static constexpr bool kHasNonDelta = true;
 
   PlasticBsdf(const ShadingParams<F>& params, bool schlick)
       : base_(params.base_color),

@@ -25,14 +25,14 @@ namespace wavecomb {
 ///                  gains energy.
 /// docs/decisions/preview-surface.md compares it with the specification and other renderers.
 template <typename F>
-class PrincipledBsdf {
+class PrincipledBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
+  static constexpr bool kEmits = true;
   static constexpr uint32_t kSlots =
       slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) | slot_bit(Slot::kRoughness) |
       slot_bit(Slot::kMetallic) | slot_bit(Slot::kClearcoat) | slot_bit(Slot::kClearcoatRoughness) |
       slot_bit(Slot::kOpacity) | slot_bit(Slot::kNormal);
-  static constexpr bool kHasNonDelta = true;
 
   PrincipledBsdf(const ShadingParams<F>& params, bool schlick)
       : roughness_(params.roughness),

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What paths carry from vertex to vertex, and what the steps of a vertex (steps/) are given and
+/// give.
+#pragma once
+
+#include "wavecomb/core/fields.h"
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/settings.h"
+#include "wavecomb/core/vec.h"
+#include "wavecomb/light/light.h"
+#include "wavecomb/surface/hit.h"
+#include "wavecomb/surface/surface.h"
+
+namespace wavecomb {
+
+/// The settings that shading reads.
+struct ShadeSettings {
+  SamplerKind sampler;
+  uint32_t max_depth;
+  bool roulette;    ///< by throughput, after a vertex
+  bool cost_aware;  ///< by throughput and cost, before a vertex
+  uint32_t roulette_depth;
+  float clamp_indirect;  ///< 0: off
+  bool schlick_fresnel;
+  bool cosine_sampling;
+
+  explicit ShadeSettings(const Settings& s)
+      : sampler(s.sampler),
+        max_depth(s.max_depth),
+        roulette(s.roulette == RouletteKind::kThroughput),
+        cost_aware(s.roulette == RouletteKind::kCostAware),
+        roulette_depth(s.roulette_depth),
+        clamp_indirect(s.clamp_indirect),
+        schlick_fresnel(s.schlick_fresnel),
+        cosine_sampling(s.cosine_sampling) {}
+};
+
+/// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the
+/// hit.
+template <typename F>
+struct PathState {
+  Vec3<F> dir;
+  Color<F> throughput;
+  F pdf;  ///< of the bounce before; 0: delta or camera
+  F eta_scale;
+  F cone_width, cone_spread;
+  Vec3<F> o;         ///< origin of the ray that arrived
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex before
+  UInt<F> link{0u};  ///< class of the surface that the ray left, where lights are linked
+
+  LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
+};
+
+/// What shading a vertex gives. Lanes outside the masks hold anything.
+template <typename F>
+struct VertexResult {
+  Color<F> emitted;    ///< to add to the path's radiance, clamped
+  Mask<F> has_shadow;  ///< a shadow ray is wanted
+  Vec3<F> shadow_o, shadow_d;
+  F shadow_tfar;
+  UInt<F> shadow_set;  ///< of shadow_set, 0 where nothing is linked
+  Color<F> direct;     ///< to add where the shadow ray is free, clamped
+  Mask<F> alive;       ///< the path goes on
+  PathState<F> next;   ///< the next ray and what goes with it
+};
+
+/// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
+/// and values that live to the end of shading cost registers.
+template <typename F>
+struct VertexAovs {
+  bool wants_uv = false, wants_lights = false;  ///< asked for; the others are always given
+  Color<F> albedo;
+  Vec3<F> normal;
+  Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
+  Vec2<F> uv;
+  UInt<F> emitter, lit_by;  ///< lights behind `emitted` and `direct`, or kNoLight
+  // With wants_lights: where a light was chosen for, and the MIS weight in `direct`; weight -1: no
+  // choice was made.
+  Vec3<F> lit_at;
+  F light_weight;
+};
+
+/// What guides a denoiser.
+template <typename F>
+struct Guides {
+  Color<F> albedo;
+  Vec3<F> normal;
+};
+
+/// That of a path that has reached a vertex: albedo, tinted by the mirrors and glass before it, and
+/// normal. Both are replaced by the next vertex where this one is clear.
+template <typename F>
+inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
+  const auto tinted = [&](const F& albedo, const F& throughput) {
+    // Without the scaling of radiance by indices of refraction; roulette may have made it larger.
+    return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
+  };
+  return {{tinted(v.albedo.x, path.throughput.x), tinted(v.albedo.y, path.throughput.y),
+           tinted(v.albedo.z, path.throughput.z)},
+          v.normal};
+}
+
+/// What all steps of a vertex are told of it. `depth` 0 is the camera's first hit. `material` and
+/// `geom` (geometry within the instance's group) belong to `hit`; `t` is the length of the ray.
+template <typename F>
+struct Vertex {
+  const SceneView& scene;
+  const ShadeSettings& settings;
+  const SampleKey<F>& key;
+  uint32_t depth;
+  const MeshHit<F>& hit;
+  const UInt<F>& geom;
+  const F& t;
+  const UInt<F>& material;
+  const PathState<F>& path;
+  VertexAovs<F>* aovs;  ///< null where none are wanted
+  const Mask<F>& active;
+
+  bool wants_lights() const { return aovs && aovs->wants_lights; }
+};
+
+/// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
+/// NaN-free: a contribution that is not finite is dropped.
+template <typename F>
+inline Color<F> clean(const Color<F>& c, float limit) {
+  const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
+  Color<F> r = select<F>(ok, c, Color<F>(F(0.f)));
+  if (limit > 0) {
+    const F y = luminance(r);
+    r = r * select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
+  }
+  return r;
+}
+
+/// The limit for a contribution that light brings after `bounces` scatterings: direct light is
+/// free.
+inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
+  return bounces > 1 ? s.clamp_indirect : 0.f;
+}
+
+/// Where geometry `geom` of instance `inst` is in the arrays that have an entry for each of an
+/// instance's geometries.
+template <typename F>
+inline UInt<F> placed_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                               const Mask<F>& active) {
+  return gather_member<F>(scene.instances, &InstanceRecord::emissive, inst, active) + geom;
+}
+
+/// The class that linking knows geometry `geom` of instance `inst` by.
+template <typename F>
+inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                          const Mask<F>& active) {
+  return gather<UInt<F>>(scene.lights.links.classes, placed_geometry<F>(scene, inst, geom, active),
+                         Mask<UInt<F>>(active));
+}
+
+}  // namespace wavecomb

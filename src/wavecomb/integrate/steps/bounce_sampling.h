@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+/// How bounces are sampled: by the BSDF's own lobes, or, with the setting cosine_sampling, all that
+/// are not deltas by cosine (the dissertation's way).
+///
+/// A delta lobe keeps the probability q of its choice, so that the density of a bounce by cosine is
+///   p(wi) = (1 - q) |cos theta_i| / pi
+/// on wo's side. It is for programs whose lobes stay there.
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/warp.h"
+#include "wavecomb/integrate/path_state.h"
+#include "wavecomb/material/bsdf.h"
+
+namespace wavecomb {
+
+/// Whether bounces of program `Bsdf` are sampled by cosine.
+template <typename Bsdf>
+inline bool samples_by_cosine(const ShadeSettings& settings) {
+  return settings.cosine_sampling && !Bsdf::kTransmits;
+}
+
+/// Density of a bounce by cosine.
+template <typename Bsdf, typename F>
+inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
+  const F rest = max(F(1.f - bsdf.delta_probability(wo)), F(0.f));
+  return select(F(wo.z * wi.z) > 0.f, F(rest * cosine_hemisphere_pdf(abs(wi.z))), F(0.f));
+}
+
+/// Density with which a bounce would have gone along wi, where the BSDF is `e`.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE F bounce_pdf(const ShadeSettings& settings, const Bsdf& bsdf, const Vec3<F>& wo,
+                             const Vec3<F>& wi, const BsdfEval<F>& e) {
+  return samples_by_cosine<Bsdf>(settings) ? cosine_bounce_pdf(bsdf, wo, wi) : e.pdf;
+}
+
+/// A bounce, by the numbers of `r`.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE BsdfSample<F> sample_bounce(const ShadeSettings& settings, const Bsdf& bsdf,
+                                            const Vec3<F>& wo, const Sample4<F>& r) {
+  BsdfSample<F> b = bsdf.sample(wo, r.x, r.y, r.z);
+  if (samples_by_cosine<Bsdf>(settings)) {
+    Vec3<F> wi = square_to_cosine_hemisphere(r.y, r.z);
+    wi.z = select(wo.z < 0.f, F(-wi.z), wi.z);
+    const F pdf = cosine_bounce_pdf(bsdf, wo, wi);
+    const BsdfEval<F> e = bsdf.eval(wo, wi);
+    const Mask<F> use = not_(b.is_delta) & (pdf > 0.f);
+    const F inv = 1.f / select(pdf > 0.f, pdf, F(1.f));
+    b.wi = select<F>(use, wi, b.wi);
+    b.weight = select<F>(use, e.f_cos * inv, b.weight);
+    b.pdf = select(use, pdf, b.pdf);
+  }
+  return b;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `emit`: light that a path meets by itself.
+///
+/// With throughput T_k at x_k, where emission Le is met by a bounce of density p_bsdf (0: a mirror
+/// or the camera), which light sampling would have found with p_light:
+///   L += T_k Le(x_k) w,   w = p_bsdf / (p_bsdf + p_light)   (balance heuristic, Veach 1997, 9.2)
+#pragma once
+
+#include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/light/light.h"
+
+namespace wavecomb {
+
+/// Balance heuristic for the technique with density `a` against `b`; 1 where a was a delta (a = 0).
+template <typename F>
+inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
+  return select(bsdf_pdf > 0.f,
+                F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
+}
+
+/// What a path gets of surfaces that glow with `glow`, before MIS, where there are mesh lights.
+template <typename F>
+[[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
+                                               const UInt<F>& geom, const Color<F>& glow,
+                                               const PathState<F>& path, bool from_camera,
+                                               const Mask<F>& active) {
+  using U = UInt<F>;
+  const U place = placed_geometry<F>(scene, inst, geom, active);
+  const U record =
+      select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)), U(kNoLight));
+  return mesh_light_radiance<F>(scene.lights, record, glow, path.dir, path.link,
+                                not_(path.pdf > 0.f), from_camera, active);
+}
+
+/// Radiance of a light's own shape met by a path.
+template <typename F>
+inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
+                               uint32_t depth, const UInt<F>& light, const F& t,
+                               const PathState<F>& path, const Mask<F>& active) {
+  const LightHit<F> hit =
+      light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
+  F w = bounce_weight<F>(path.pdf, hit.pdf);
+  if (scene.lights.has_sampled_only)
+    w *= LightEffect<F>(scene.lights, light, active).of_hit(not_(path.pdf > 0.f), depth == 0);
+  if (scene.lights.links.members)
+    w = select(shines_on<F>(scene.lights, path.link, light, active), w, F(0.f));
+  return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
+}
+
+/// Radiance of the environment met by a path that left the scene.
+template <typename F>
+inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings& settings,
+                                     uint32_t depth, const PathState<F>& path,
+                                     const Mask<F>& active) {
+  const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
+  const Color<F> le = escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
+                                          depth == 0, path.link);
+  return clean<F>(path.throughput * le, clamp_limit(settings, depth));
+}
+
+/// What a path gets of the surface at a vertex that glows itself. Notes the emitter for AOVs.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Color<F> emit(const Vertex<F>& v, const Interaction<Bsdf, F>& at) {
+  using U = UInt<F>;
+  const SceneView& scene = v.scene;
+  Color<F> emission = at.params.emission;
+  if (scene.mesh_lights) [[unlikely]]
+    emission =
+        mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);
+  const Mask<F> emits = v.active & not_(is_black(emission));
+  if (none(emits)) return Color<F>(F(0.f));
+  F light_pdf(0.f);
+  if (scene.has_emissive_meshes) {
+    const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
+    const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
+    if (v.wants_lights())
+      v.aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + v.hit.prim));
+    const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (v.path.pdf > 0.f);
+    if (any(sampled))
+      light_pdf = select(sampled,
+                         triangle_light_pdf<F>(scene.lights, base + v.hit.prim,
+                                               v.path.vertex_before(), v.path.dir, v.t, sampled),
+                         F(0.f));
+  }
+  const F w = bounce_weight<F>(v.path.pdf, light_pdf);
+  const Color<F> e = clean<F>(at.throughput * emission * w, clamp_limit(v.settings, v.depth));
+  return select<F>(emits, e, Color<F>(F(0.f)));
+}
+
+}  // namespace wavecomb

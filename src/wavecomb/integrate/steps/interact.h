@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `interact`: from a hit to a surface with its BSDF, and the frame that it is seen in.
+///
+/// Where the way to x_k leads through what absorbs, with extinction sigma over the length t of the
+/// ray, T_k <- T_k exp(-sigma t) (Beer and Lambert).
+#pragma once
+
+#include "wavecomb/core/frame.h"
+#include "wavecomb/integrate/path_state.h"
+#include "wavecomb/material/params.h"
+#include "wavecomb/surface/graph_point.h"
+#include "wavecomb/surface/surface.h"
+
+namespace wavecomb {
+
+/// Slots that a vertex of program `Bsdf` reads: those of its BSDF, and emission.
+template <typename Bsdf>
+inline constexpr uint32_t kVertexSlots =
+    Bsdf::kSlots | (Bsdf::kEmits ? slot_bit(Slot::kEmission) : 0u);
+
+/// A surface as a path has met it.
+template <typename Bsdf, typename F>
+struct Interaction {
+  UInt<F> slots;          ///< MaterialRecord::texture_slots
+  Mask<F> reads_texture;  ///< lanes that need uv and a frame along it
+  bool textured;          ///< whether any does
+  Surface<F> s;
+  ParamsOf<Bsdf, F> params;
+  Bsdf bsdf;
+  Color<F> throughput;  ///< of the path, up to the surface
+};
+
+/// The surface with the values of its material. Texture coordinates are worked out only where a
+/// texture or an AOV asks for them.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Interaction<Bsdf, F> interact(const Vertex<F>& v) {
+  using U = UInt<F>;
+  const SceneView& scene = v.scene;
+  const PathState<F>& path = v.path;
+  const U slots = gather_member<F>(scene.materials.materials, &MaterialRecord::texture_slots,
+                                   v.material, v.active);
+  const Mask<F> reads_texture =
+      v.active & Mask<F>((slots & (kVertexSlots<Bsdf> | kReadsGraph)) != U(0u));
+  const bool textured = any(reads_texture);
+  const bool wants_uv = textured || (v.aovs && v.aovs->wants_uv);
+  const Surface<F> s =
+      setup_surface<F>(scene, v.hit, path.dir, wants_uv, Bsdf::kHasTerminator, v.active);
+  const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
+  const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
+
+  MaterialView materials = scene.materials;
+  materials.schlick_fresnel = v.settings.schlick_fresnel;
+  const auto make_point = [&](const Mask<F>& lanes) {
+    // Copies, as everything is that only graphs are given.
+    const MeshHit<F> at = v.hit;
+    const Surface<F> surface = s;
+    const Vec3<F> dir = path.dir;
+    const F width = uv_width;
+    return graph_point<F>(scene, at, surface, dir, width, lanes);
+  };
+  const auto params = fetch_for<Bsdf, kVertexSlots<Bsdf>, F>(materials, v.material, s.uv, uv_width,
+                                                             make_point, v.active);
+  Color<F> throughput = path.throughput;
+  if constexpr (Bsdf::kAbsorbs) throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
+  return {slots,     reads_texture, textured, s, params, Bsdf(params, v.settings.schlick_fresnel),
+          throughput};
+}
+
+/// The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing
+/// but its own hit, whatever its neighbours are.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Frame<F> shading_frame(const Vertex<F>& v, const Interaction<Bsdf, F>& at) {
+  using U = UInt<F>;
+  if (!at.textured) return make_frame<F>(at.s.ns);
+  const Vec3<F>& dir = v.path.dir;
+  Vec3<F> n = at.s.ns;
+  const Vec3<F> tangent = select<F>(at.reads_texture, at.s.dpdu, Vec3<F>(F(0.f)));
+  const Mask<F> mapped =
+      v.active & Mask<F>((at.slots & (slot_bit(Slot::kNormal) | kGraphNormal)) != U(0u));
+  if (any(mapped)) {
+    // A normal that looks away is bent until it is seen edge-on.
+    Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(at.params.normal));
+    const F towards = select(dot(dir, at.s.ng) < 0.f, F(1.f), F(-1.f));
+    const F seen = -dot(dir, bumped) * towards;
+    bumped =
+        select<F>(seen < 1e-3f, normalize(fma(dir, F(-towards * (1e-3f - seen)), bumped)), bumped);
+    n = select<F>(mapped, bumped, n);
+  }
+  return make_frame<F>(n, tangent);
+}
+
+/// Notes for AOVs what is seen at a vertex.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE void note_surface(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
+                                  const Frame<F>& frame) {
+  if (!v.aovs) return;
+  v.aovs->albedo = at.bsdf.albedo();
+  v.aovs->normal = select<F>(dot(v.path.dir, at.s.ng) > 0.f, -frame.n, frame.n);
+  v.aovs->is_clear = not_(at.bsdf.has_non_delta());
+  if (v.aovs->wants_uv) v.aovs->uv = at.s.uv;
+}
+
+/// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light leaks.
+template <typename Bsdf, typename F>
+inline Mask<F> is_consistent(const Interaction<Bsdf, F>& at, const Vec3<F>& world,
+                             const Vec3<F>& local) {
+  return F(dot(world, at.s.ng) * local.z) > 0.f;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `sample_light`: next event estimation, one light sample a vertex.
+///
+/// A light, and a point of it in direction wi, chosen with density p_light over solid angle:
+///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bsdf + p_light)
+/// (balance heuristic, Veach 1997, 9.2; w = 1 for deltas, which no bounce finds). V is the shadow
+/// ray's to find.
+#pragma once
+
+#include "wavecomb/integrate/steps/bounce_sampling.h"
+#include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/light/light.h"
+
+namespace wavecomb {
+
+/// The class that linking knows the surface at a vertex by.
+template <typename F>
+WAVECOMB_INLINE UInt<F> link_class(const Vertex<F>& v) {
+  return link_class<F>(v.scene, v.hit.inst, v.geom, v.active);
+}
+
+/// Who light is chosen for; its place is set where light is sampled.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F>& v, const Frame<F>& frame,
+                                                const Vec3<F>& wo) {
+  LightReceiver<F> receiver(Vec3<F>(F(0.f)));
+  if (v.scene.lights.by_tree) {
+    // What reflects alone is lit on the side that it is seen from.
+    if (!Bsdf::kTransmits)
+      receiver.normal = pack_normal<F>(select<F>(wo.z < 0.f, -frame.n, frame.n));
+    receiver.seed =
+        hash_u32<UInt<F>>(v.key.pixel_hash, UInt<F>(v.key.sample + 0x632be5abu * (v.depth + 1)));
+  }
+  return receiver;
+}
+
+/// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
+/// known.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE void sample_light(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
+                                  const Frame<F>& frame, const Vec3<F>& wo, const Sample4<F>& r,
+                                  LightReceiver<F>& receiver, VertexResult<F>& out) {
+  using U = UInt<F>;
+  const LightView& lights = v.scene.lights;
+  const Mask<F> lit = v.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
+  // Light is gathered where reflected rays will start, so that both techniques agree.
+  receiver.p = spawn_origin<F>(at.s, -v.path.dir);
+  const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, lit);
+  const Vec3<F> wi = frame.to_local(l.wi);
+  const BsdfEval<F> e = at.bsdf.eval(wo, wi);
+  const F p_bsdf = bounce_pdf(v.settings, at.bsdf, wo, wi, e);
+  F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bsdf), F(1e-30f))));
+  Color<F> f_cos = e.f_cos;
+  U light(kNoLight);
+  if (lights.has_sampled_only || lights.links.members || v.wants_lights()) [[unlikely]]
+    light = chosen_light<F>(lights, receiver, r.x, lit);
+  if (lights.has_sampled_only) [[unlikely]] {
+    const LightEffect<F> effect(lights, light, lit);
+    const Color<F> diffuse = at.bsdf.diffuse_f_cos(wo, wi);
+    f_cos = select<F>(effect.sampled_only,
+                      fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
+    w = select(effect.sampled_only, F(1.f), w);
+  }
+  if (lights.links.members) [[unlikely]] {
+    w = select(shines_on<F>(lights, out.next.link, light, lit), w, F(0.f));
+    out.shadow_set = shadow_set<F>(lights, light, lit);
+  }
+  const Color<F> c =
+      clean<F>(at.throughput * f_cos * l.weight * w, clamp_limit(v.settings, v.depth + 1));
+  out.has_shadow = lit & l.valid & is_consistent(at, l.wi, wi) & (max_component(c) > 0.f);
+  out.direct = c;
+  if (v.wants_lights()) {
+    v.aovs->lit_by = light;
+    v.aovs->lit_at = receiver.p;
+    v.aovs->light_weight = w;
+  }
+  out.shadow_o = spawn_origin<F>(at.s, l.wi);
+  out.shadow_d = l.wi;
+  out.shadow_tfar = l.distance * 0.9999f;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `scatter`: the bounce, and the ray that goes on.
+///
+///   T_{k+1} = T_k f(wo, wi) |cos theta_i| / p_bsdf(wi)
+#pragma once
+
+#include "wavecomb/integrate/steps/bounce_sampling.h"
+#include "wavecomb/integrate/steps/interact.h"
+
+namespace wavecomb {
+
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE void scatter(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
+                             const Frame<F>& frame, const Vec3<F>& wo, const Sample4<F>& r,
+                             const LightReceiver<F>& receiver, VertexResult<F>& out) {
+  const PathState<F>& path = v.path;
+  const BsdfSample<F> b = sample_bounce<Bsdf, F>(v.settings, at.bsdf, wo, r);
+  const Vec3<F> d = normalize(frame.to_world(b.wi));
+  out.next.dir = d;
+  out.next.throughput = at.throughput * b.weight;
+  out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
+  out.next.eta_scale = path.eta_scale * b.eta * b.eta;
+  out.next.receiver = receiver.normal;
+  out.next.cone_width = path.cone_width;
+  // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
+  out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
+  out.next.o = spawn_origin<F>(at.s, d);
+  const F largest = max_component(out.next.throughput);
+  out.alive =
+      v.active & (b.pdf > 0.f) & is_consistent(at, d, b.wi) & (largest > 0.f) & is_finite(largest);
+}
+
+}  // namespace wavecomb

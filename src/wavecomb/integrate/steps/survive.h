@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `survive`: Russian roulette.
+///
+/// A path goes on with probability q, and then counts 1 / q times:
+///   T_{k+1} <- T_{k+1} / q
+/// so that its mean is what it would be without (Arvo and Kirk 1990).
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/integrate/path_state.h"
+#include "wavecomb/schedule/cost_snapshot.h"
+
+namespace wavecomb {
+
+/// Roulette ends paths whose throughput is below 1 / kRouletteGain. With a gain of 1 it saves rays
+/// and costs more noise than they are worth: on Cornell, 3 has the least product of relMSE and rays
+/// (docs/decisions/roulette.md).
+inline constexpr float kRouletteGain = 3.f;
+
+/// Cost-aware roulette: the probability of shading a vertex that a path has reached.
+///
+/// The efficiency 1 / (variance x cost) is greatest when a path goes on with a probability
+/// proportional to
+///   sqrt(E[contribution^2] / cost)
+/// of what comes next (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The contribution is
+/// throughput times an unknown incident radiance, taken to be alike everywhere, so that
+///   q = kRouletteGain T / sqrt(cost of this material / mean cost),
+/// clamped to [0.05, 1]. Surfaces that shine are always shaded.
+template <typename F>
+inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
+                             const UInt<F>& material, const PathState<F>& path,
+                             const Mask<F>& active) {
+  using U = UInt<F>;
+  const F cost = gather<F>(costs.material_ns.data(), material, active);
+  const F relative = max(F(cost * (1.f / costs.mean_ns)), F(1e-3f));
+  const F t = max_component(path.throughput) * path.eta_scale * kRouletteGain;
+  const U flags =
+      gather_member<F>(scene.materials.materials, &MaterialRecord::flags, material, active);
+  const Mask<F> shines = Mask<F>((flags & static_cast<uint32_t>(kEmits)) != U(0u));
+  return select(active & not_(shines), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
+}
+
+/// The random number that cost_aware_survival is compared with; none of the sampler's.
+template <typename F>
+inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
+  using U = UInt<F>;
+  const U path = hash_u32<U>(key.pixel_hash, key.sample);
+  return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
+}
+
+/// Roulette by throughput, after a vertex; `u` in [0, 1).
+template <typename F>
+WAVECOMB_INLINE void survive(const Vertex<F>& v, const F& u, VertexResult<F>& out) {
+  if (!v.settings.roulette || v.depth + 1 < v.settings.roulette_depth) return;
+  const F largest = max_component(out.next.throughput);
+  const F q = min(F(largest * out.next.eta_scale * kRouletteGain), F(1.f));
+  out.alive = out.alive & (u < q);
+  out.next.throughput *= F(1.f / max(q, F(1e-10f)));
+}
+
+}  // namespace wavecomb
