@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What it costs to live on when a library crashes (docs/decisions/isolation.md).
+"""What isolation costs (docs/decisions/isolation.md, docs/decisions/reading-in-a-box.md).
 
     .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
 
 For each stage, in turns, so that a busy machine hits all alike: ``wavecomb info`` with --isolate
 off and on (with the sandbox, where the system has it), with --sandbox off and on, and
 ``wavecomb.load`` without and with isolate=True. Medians; CPU seconds are of the process with its
-children, and memory is that of the largest of them.
+children, and memory is that of the largest of them. Of ``load`` there is a second table: the call
+alone, which is what a program waits for the first time and later, and the peaks of the program and
+of the process that reads for it.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import os
 import statistics
@@ -21,10 +24,20 @@ import tempfile
 import time
 from pathlib import Path
 
-LOAD = (
-    "import sys, wavecomb, wavecomb.usd; from wavecomb import _core; "
-    "wavecomb.load(sys.argv[1], isolate=sys.argv[2] == 'on')"
-)
+LOAD = """
+import json, resource, sys, time, wavecomb
+started, times = time.perf_counter(), []
+for _ in range(2):
+    loaded = wavecomb.load(sys.argv[1], isolate=sys.argv[2] == "on")
+    times.append(time.perf_counter() - started)
+    started = time.perf_counter()
+    peaks = [resource.getrusage(who).ru_maxrss / 1024
+             for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    if len(times) == 1:
+        first = peaks
+    del loaded
+print(json.dumps([*times, *first]))
+"""
 NOTHING = "import sys; from wavecomb.run.isolate import supervisor; "
 WAYS = {
     "nothing": lambda stage, how: [
@@ -59,10 +72,17 @@ def many_prims(path: Path, count: int) -> None:
     layer.Save()
 
 
-def seconds(arguments: list[str]) -> tuple[float, float, float]:
-    """(wall, CPU, peak memory in MB of the largest process) of Python with these arguments."""
+def seconds(arguments: list[str], said: list[str] | None = None) -> tuple[float, float, float]:
+    """(wall, CPU, peak memory in MB of the largest process) of Python with these arguments.
+
+    ``said``: is given what it printed.
+    """
     start = time.perf_counter()
-    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    text = process.stdout.read()
+    if said is not None:
+        said.append(text)
     _, status, usage = os.wait4(process.pid, 0)
     if status:
         raise SystemExit(f"{arguments} failed")
@@ -74,8 +94,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="*")
     parser.add_argument("--prims", type=int, default=0, help="a stage of so many prims, too")
-    parser.add_argument("--turns", type=int, default=9)
+    parser.add_argument("--turns", type=int, default=9, help="at least 5")
     options = parser.parse_args()
+    if options.turns < 5:
+        parser.error("--turns: at least 5")
     with tempfile.TemporaryDirectory() as folder:
         stages = list(options.stages)
         if options.prims:
@@ -92,11 +114,17 @@ def main() -> None:
         ]
         print("| what | off: s | CPU s | MB | on: s | CPU s | MB | more CPU s (pairs) |")
         print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+        found: dict[tuple[str, str], list[list[tuple[float, float, float]]]] = {}
+        said: dict[tuple[str, str], list[str]] = {}
+        for _ in range(options.turns):
+            for way, stage in jobs:
+                pair = []
+                for how in ("off", "on"):
+                    words = said.setdefault((stage, how), []) if way == "load" else None
+                    pair.append(seconds(WAYS[way](stage, how), words))
+                found.setdefault((way, stage), []).append(pair)
         for way, stage in jobs:
-            pairs = [
-                [seconds(WAYS[way](stage, how)) for how in ("off", "on")]
-                for _ in range(options.turns)
-            ]
+            pairs = found[way, stage]
             cells = [
                 f"{statistics.median(pair[side][figure] for pair in pairs):.3f}"
                 for side in (0, 1)
@@ -105,6 +133,14 @@ def main() -> None:
             more = statistics.median(pair[1][1] - pair[0][1] for pair in pairs)
             name = f"{way} {Path(stage).name}".strip()
             print(f"| {name} | {' | '.join(cells)} | {more:.3f} |", flush=True)
+        print()
+        print("| wavecomb.load | first: s | again: s | peak MB: program | its process |")
+        print("| --- | --- | --- | --- | --- |")
+        for (stage, how), texts in said.items():
+            figures = zip(*map(json.loads, texts), strict=True)
+            medians = [statistics.median(column) for column in figures]
+            cells = [f"{value:.3f}" for value in medians[:2]] + [f"{v:.0f}" for v in medians[2:]]
+            print(f"| {Path(stage).name}, isolate={how == 'on'} | {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":

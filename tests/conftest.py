@@ -3,10 +3,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator
 
 import parts
 import pytest
+
+# Tests look into the loader, which has to be in their process for that; and each of the hundreds of
+# stages that they load would wait for a Python. What is read in a sandbox says so (isolate=True).
+os.environ.setdefault("WAVECOMB_ISOLATE", "0")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import time
@@ -14,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.machine import memory_bytes
 from wavecomb.run import aovs as aov_names
+from wavecomb.run.isolate.memory import machine_limit
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
     from wavecomb.picture.exr import Compression
     from wavecomb.picture.image import Transfer
+    from wavecomb.run.boxed.reader import Reader
     from wavecomb.run.watcher import Watcher
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
@@ -232,13 +234,15 @@ def load(
             size of their edges in the picture (docs/subdivision.md).
         size: Width and height of the picture that automatic levels are for.
         progress: Called now and then as progress(prims read, prims found so far).
-        isolate: Reads the stage in a process of its own first. Where USD or an image library
-            crashes on a broken file, that process dies, and this one gets the exception. It takes
-            as long as loading, and 0.3 s; for files that you do not trust. It is in a sandbox
-            (docs/decisions/sandbox.md). By default where WAVECOMB_ISOLATE=1 is set.
-        load_limit: With ``isolate``: seconds that USD may compose the stage, 0: any; None: 6, and 1
+        isolate: Whether a process of its own reads the stage, in a sandbox, and this one builds the
+            scene of what comes out of it. Where USD or an image library crashes on a broken file,
+            that process dies, and this one gets the exception. By default it does, on Linux,
+            unless WAVECOMB_ISOLATE=0. What this process alone has is not there: layers that were
+            changed and not saved, plugins and resolvers that were registered from Python. For
+            these: False. (docs/decisions/reading-in-a-box.md)
+        load_limit: Of that process: seconds that USD may compose the stage, 0: any; None: 6, and 1
             for each MB of layers.
-        memory_limit: With ``isolate``: MB that the process may take; None: what the machine has.
+        memory_limit: Of that process, and of what comes out of it: MB; None: what the machine has.
         shutter: When it opens and closes, time codes from the frame; by default the camera's.
         motion_blur: Whether what moves while the shutter is open is blurred; by default unless the
             render settings disable it.
@@ -264,9 +268,6 @@ def load(
     Raises:
         WavecombError: The stage cannot be rendered; one line that names the file or prim.
     """
-    import_usd()
-    from wavecomb.usd import load_stage
-
     options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
     options |= {
         "camera": camera,
@@ -289,10 +290,14 @@ def load(
         "working_space": working_space,
         "lights": lights,
     }
-    from wavecomb.run.isolate.probe import check, is_wanted
+    from wavecomb.run.boxed.reader import Reader, is_wanted
 
     if is_wanted(isolate):
-        check(Path(path), options, load_limit, memory_limit)
+        with Reader(path, load_limit=load_limit, memory_limit=memory_limit) as reader:
+            return reader.load(options, progress=progress)
+    import_usd()
+    from wavecomb.usd import load_stage
+
     return load_stage(Path(path), progress=progress, **options)
 
 
@@ -305,7 +310,7 @@ def import_usd() -> None:
     from wavecomb.run.progress import Interrupt
 
     with Interrupt() as interrupt:
-        import wavecomb.usd  # noqa: F401
+        import wavecomb.usd.stage.load  # noqa: F401
     if interrupt.signal is not None:
         signal.raise_signal(interrupt.signal)
 
@@ -370,17 +375,18 @@ def render(
     """
     from wavecomb.run.stats import make_stats
 
-    if isinstance(source, (str, os.PathLike)):
-        from wavecomb.run.isolate.probe import check, is_wanted
+    with contextlib.ExitStack() as while_reading:
+        reader: Reader | None = None
+        if isinstance(source, (str, os.PathLike)):
+            from wavecomb.run.boxed.reader import Reader, is_wanted
 
-        if is_wanted(isolate):
-            # Before this process composes anything of it.
-            options = {"camera": camera, "frame": frame, "threads": int(settings.get("threads", 0))}
-            check(Path(source), options)
-            isolate = False
-        size, aovs = _asked_for(source, size, aovs, settings)
-    own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)
-    scene, loaded, stage = _resolve(source, camera, frame, subdivision, isolate, chosen)
+            if is_wanted(isolate):
+                reader = while_reading.enter_context(Reader(source))
+            size, aovs = _asked_for(source, size, aovs, settings, reader)
+        own, profile, names, chosen = prepare(
+            size or DEFAULT_SIZE, spp, policy, costs, aovs, settings
+        )
+        scene, loaded, stage = _resolve(source, camera, frame, subdivision, isolate, chosen, reader)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
@@ -394,12 +400,16 @@ def _asked_for(
     size: tuple[int, int] | None,
     aovs: Iterable[str] | None,
     settings: dict[str, Any],
+    reader: Reader | None,
 ) -> tuple[tuple[int, int], Iterable[str] | None]:
     """Size and AOVs, and the region in ``settings``: as the first render product says, if none."""
-    import_usd()
-    from wavecomb.usd import peek_products
+    if reader is None:
+        import_usd()
+        from wavecomb.usd import peek_products
 
-    choice = peek_products(os.fspath(path))[0][0]
+        choice = peek_products(os.fspath(path))[0][0]
+    else:
+        choice = reader.peek()[0]
     chosen = size or choice.resolution or DEFAULT_SIZE
     region = choice.region(*chosen)
     if region is not None:
@@ -515,7 +525,7 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
     others = [name for name in aovs if name not in aov_names.ERRORS]
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
-    needed, there = settings.width * settings.height * each, memory_bytes()
+    needed, there = settings.width * settings.height * each, machine_limit()
     if there is not None and needed > 0.8 * there:
         raise WavecombError(
             f"size {settings.width} x {settings.height}: needs about {needed / 2**30:.0f} GiB of "
@@ -565,13 +575,15 @@ def _resolve(
     subdivision: str | int | None,
     isolate: bool | None,
     settings: Settings,
+    reader: Reader | None,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
-        loaded = load(
-            source, camera=camera, frame=frame, threads=settings.threads,
-            subdivision="auto" if subdivision is None else subdivision,
-            size=(settings.width, settings.height), isolate=isolate,
-        )  # fmt: skip
+        options: dict[str, Any] = {
+            "camera": camera, "frame": frame, "threads": settings.threads,
+            "subdivision": "auto" if subdivision is None else subdivision,
+            "size": (settings.width, settings.height),
+        }  # fmt: skip
+        loaded = load(source, isolate=False, **options) if reader is None else reader.load(options)
         return loaded.scene, loaded, os.fspath(source)
     if isolate or camera is not None or frame is not None or subdivision is not None:
         raise TypeError(

@@ -333,8 +333,8 @@ sys.addaudithook(hook)
 
 @with_landlock
 @with_seccomp
-@pytest.mark.parametrize("how", ["load", "render", "variable", "window"])
-def test_python_reads_it_first_in_such_a_process(
+@pytest.mark.parametrize("how", ["load", "render", "default", "frames", "window"])
+def test_python_reads_it_in_such_a_process(
     place: Path, monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
     import wavecomb
@@ -348,12 +348,15 @@ def test_python_reads_it_first_in_such_a_process(
         wavecomb.load(stage, isolate=True)
     elif how == "render":
         wavecomb.render(stage, size=(4, 4), spp=1, isolate=True)
-    elif how == "variable":
-        monkeypatch.setenv("WAVECOMB_ISOLATE", "1")
+    elif how == "default":
+        monkeypatch.delenv("WAVECOMB_ISOLATE")
         wavecomb.load(stage)
+    elif how == "frames":
+        next(wavecomb.render_frames(stage, "1", size=(4, 4), spp=1, isolate=True))
     else:
         loader = pytest.importorskip("wavecomb.gui.loader")
-        monkeypatch.setenv("WAVECOMB_ISOLATE", "1")
+        monkeypatch.delenv("WAVECOMB_ISOLATE")
+        monkeypatch.setattr(loader._spare, "prepare", lambda: None)
         loader.read(loader.Request(loader.Source(stage)))
     assert (place / "said").read_text() == "PermissionError PermissionError done"
     assert os.listdir(place / "secret") == ["key"] and not os.listdir(place / "tmp")

@@ -12,7 +12,7 @@ import click
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
-    from wavecomb.usd.stage.render_settings import RenderChoice
+    from wavecomb.usd.stage.choice import RenderChoice
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -304,7 +304,10 @@ class StageOptions:
         from wavecomb.api import load
 
         options = self.for_load(size)
-        return load(stage, frame=self.frame, threads=threads, progress=progress, **options)
+        # The whole command is in a child, or is not to be (--isolate).
+        return load(
+            stage, frame=self.frame, threads=threads, progress=progress, isolate=False, **options
+        )
 
     def for_load(self, size: tuple[int, int] | None) -> dict[str, Any]:
         """Arguments of ``wavecomb.load``, but for the frame."""

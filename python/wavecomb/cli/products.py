@@ -17,7 +17,7 @@ from wavecomb.run import aovs as aov_names
 
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd.stage.render_settings import RenderChoice
+    from wavecomb.usd.stage.choice import RenderChoice
 
 
 @dataclass(frozen=True)

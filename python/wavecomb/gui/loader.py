@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +11,10 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
-from wavecomb.run.isolate.probe import check, is_wanted
+from wavecomb.run.boxed.process import Process
+from wavecomb.run.boxed.reader import Reader, is_wanted
 from wavecomb.usd import LoadedStage
-from wavecomb.usd.looks.texture import TextureStock
+from wavecomb.usd.looks.stock import TextureStock
 
 
 @dataclass(frozen=True)
@@ -64,41 +66,91 @@ def copied(layer: Sdf.Layer) -> Sdf.Layer:
     return copy
 
 
+class Spare:
+    """A process that waits to read a stage: USD's libraries are there when one is asked for."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._process: Process | None = None
+
+    def take(self) -> Process | None:
+        """The process, if there is one."""
+        with self._lock:
+            process, self._process = self._process, None
+        return process if process is not None and process.is_alive() else None
+
+    def prepare(self) -> None:
+        """Starts one, if there is none; it ends with this program."""
+        with self._lock:
+            if self._process is None:
+                self._process = Process()
+
+
+_spare = Spare()
+
+
 def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     """The stage, open, and its scene.
+
+    The scene is read in a sandbox, before this process opens anything: what it then looks at and
+    edits was composed there. Images, and files that the stage names in values, are read there only.
 
     Raises:
         WavecombError: It cannot be rendered.
     """
-    from wavecomb.usd import LoadReport, load_stage, open_editable, open_stage
+    from wavecomb.usd import LoadReport, open_editable
     from wavecomb.usd.materialx import references as mtlx
     from wavecomb.usd.stage.diagnostics import captured
 
-    source = request.source
-    usd = request.usd
+    usd, loaded = request.usd, None
+    if is_wanted() and (usd is None or request.fresh):
+        overrides = request.overrides
+        if overrides is None and usd is not None:
+            overrides = usd.GetSessionLayer()
+        loaded = _read_elsewhere(request, overrides)
     if usd is None:
-        if is_wanted():
-            chosen = {"variants": source.variants, "purposes": source.purposes}
-            check(source.path, {key: value for key, value in chosen.items() if value is not None})
-        usd = open_editable(source.path, source.variants)
+        usd = open_editable(request.source.path, request.source.variants)
     elif request.fresh:
         with captured(LoadReport()):
             mtlx.reload(usd)
     overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()
-    options: dict[str, Any] = {} if source.purposes is None else {"purposes": source.purposes}
+    if loaded is None:
+        how = _read_elsewhere if is_wanted() else _read_here
+        loaded = how(request, overrides)
+    return usd, loaded
+
+
+def _options(request: Request) -> dict[str, Any]:
+    source = request.source
+    options = {
+        "frame": source.time, "camera": source.camera, "threads": request.threads,
+        "editable": True, "size": request.size,
+    }  # fmt: skip
+    return options if source.purposes is None else {**options, "purposes": source.purposes}
+
+
+def _read_elsewhere(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
+    """The scene of a file, with what a session layer holds; None: with the variants asked for."""
+    source, options = request.source, _options(request)
+    text = None if overrides is None else overrides.ExportToString()
+    if overrides is None and source.variants:
+        options["variants"] = dict(source.variants)
+    try:
+        with Reader(source.path, process=_spare.take()) as reader:
+            return reader.load(options, overrides=text, reuse=request.textures)
+    finally:
+        _spare.prepare()
+
+
+def _read_here(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
+    """Likewise, in this process."""
+    from wavecomb.usd import LoadReport, load_stage, open_stage
+    from wavecomb.usd.stage.diagnostics import captured
+
     said = LoadReport()
     with captured(said):
         # A stage of its own, so that the window can go on with the other.
-        stage = open_stage(source.path, overrides=overrides)
-    loaded = load_stage(
-        stage,
-        frame=source.time,
-        camera=source.camera,
-        threads=request.threads,
-        editable=True,
-        reuse=request.textures,
-        size=request.size,
-        **options,
-    )
+        stage = open_stage(request.source.path, overrides=overrides)
+    loaded = load_stage(stage, reuse=request.textures, **_options(request))
     loaded.report.absorb(said)
-    return usd, loaded
+    return loaded

@@ -6,45 +6,21 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from pxr import UsdGeom
-
 from wavecomb import _core
 from wavecomb.api import check_memory, picture_of, prepare
+from wavecomb.run.boxed.reader import Reader, is_wanted
 from wavecomb.run.frame_names import parse_frames
 from wavecomb.run.stats import make_stats
-from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.cameras.camera import camera_motion, read_camera
-from wavecomb.usd.geometry.shutter import find_motion
-from wavecomb.usd.materialx import references as mtlx
-from wavecomb.usd.stage.diagnostics import captured
-from wavecomb.usd.stage.shared import FrameStock
-from wavecomb.usd.stage.times import frame_number, time_code
-from wavecomb.usd.stage.view_options import ViewOptions
 
 if TYPE_CHECKING:
-    from pxr import Usd
-
     from wavecomb._core import Result, Settings
     from wavecomb.api import Picture
+    from wavecomb.run.frame_reader import FrameReader
     from wavecomb.usd import LoadedStage
-
-_CAMERA: dict[str, Any] = {
-    "lens_radius": 0.0,
-    "focus_distance": 1.0,
-    "near_clip": 0.0,
-    "far_clip": 1e30,
-    "projection": "perspective",
-    "conform": "expandAperture",
-    "pixel_aspect": 1.0,
-    "clip_planes": [],
-    "exposure": 1.0,
-}
-"""What ``SceneBuilder.set_camera`` takes where a camera says nothing."""
 
 
 class Frames:
@@ -64,31 +40,58 @@ class Frames:
         mask: Iterable[str] = (),
         session_layer: str | os.PathLike[str] | None = None,
         threads: int = 0,
+        isolate: bool | None = None,
         **options: Any,
     ) -> None:
-        """Opens the stage; options: of ``load_stage``. Raises WavecombError."""
+        """Opens the stage.
+
+        Args:
+            path: .usd, .usda, .usdc or .usdz.
+            variants: As of ``wavecomb.load``, like what follows.
+            mask: Likewise.
+            session_layer: Likewise.
+            threads: Likewise.
+            isolate: Likewise.
+            **options: Of ``load_stage``.
+
+        Raises:
+            WavecombError: It cannot be opened.
+        """
         self._path = Path(path)
-        self._threads = threads
         self._options = options
-        self._view(options).check()
-        opening = LoadReport()
-        started = time.perf_counter()
-        layer = None if session_layer is None else Path(session_layer)
-        with captured(opening):
-            self._stage: Usd.Stage = open_stage(
-                self._path, variants, mask=tuple(mask), session_layer=layer
-            )
-            mtlx.tell(self._stage, opening)
-            self._stock = FrameStock(self._stage, opening)
-        self._opening_s = time.perf_counter() - started
+        self._threads = threads
         self._renderer: _core.Renderer | None = None
         self._loaded: LoadedStage | None = None
         self._is_built = False
+        layer = None if session_layer is None else os.fspath(session_layer)
+        opening = {**options, "variants": dict(variants or {}), "mask": tuple(mask),
+                   "session_layer": layer, "threads": threads}  # fmt: skip
+        started = time.perf_counter()
+        self._boxed: Reader | None = None
+        self._here: FrameReader | None = None
+        if is_wanted(isolate):
+            self._boxed = Reader(self._path)
+            try:
+                self._boxed.open(opening)
+            except BaseException:
+                self._boxed.close()
+                raise
+        else:
+            from wavecomb.run.frame_reader import FrameReader
 
-    @staticmethod
-    def _view(options: Mapping[str, Any]) -> ViewOptions:
-        names = {field.name for field in fields(ViewOptions)}
-        return ViewOptions(**{name: options[name] for name in names if name in options})
+            self._here = FrameReader(self._path, **opening)
+        self._opening_s = time.perf_counter() - started
+
+    def close(self) -> None:
+        """Ends the process that reads the stage, if there is one; what was loaded stays."""
+        if self._boxed is not None:
+            self._boxed.close()
+
+    def __enter__(self) -> Frames:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
     def load(self, frame: float | None, **options: Any) -> LoadedStage:
         """The stage at a frame; None: its start, else default values.
@@ -102,53 +105,38 @@ class Frames:
         """
         started = time.perf_counter()
         options = {**self._options, **options}
-        when = time_code(self._stage, frame)
-        loaded = self._seen_anew(when, options)
+        progress = options.pop("progress", None)
+        loaded = None if self._renderer is None else self._seen_anew(frame, options)
         if loaded is None:
             # Let go of first: two hierarchies at a time would be twice the memory.
             self._renderer, self._loaded = None, None
-            loaded = load_stage(
-                self._stage, frame=frame, threads=self._threads, stock=self._stock, **options
-            )
+            options["threads"] = self._threads
+            if self._here is None:
+                assert self._boxed is not None
+                loaded = self._boxed.frame(frame, options, progress)
+            else:
+                loaded = self._here.read(frame, {**options, "progress": progress})
         seconds = time.perf_counter() - started + self._opening_s
         self._opening_s = 0.0
-        self._loaded = replace(
-            loaded, seconds=seconds, stage_path=self._path, frame=frame_number(when)
-        )
+        self._loaded = replace(loaded, seconds=seconds, stage_path=self._path)
         return self._loaded
 
-    def _seen_anew(self, when: Usd.TimeCode, options: Mapping[str, Any]) -> LoadedStage | None:
+    def _seen_anew(self, frame: float | None, options: dict[str, Any]) -> LoadedStage | None:
         """The scene that is there with its camera at a frame; None where more may be other."""
         before, renderer = self._loaded, self._renderer
-        if before is None or renderer is None:
+        assert before is not None and renderer is not None
+        if self._here is None:
+            assert self._boxed is not None
+            found = self._boxed.look(frame, options)
+        else:
+            seen = self._here.look(frame, options)
+            found = None if seen is None else seen.as_dict()
+        if found is None:
             return None
-        if not self._stock.varying.is_view_only and before.frame != frame_number(when):
-            return None
-        if before.leaves_out_levels:
-            return None  # another view shows other textures near
-        told = LoadReport()
-        seen = self._view(options).on(self._stage, told)
-        if before.camera_path is None or seen.camera is None:
-            # What is drawn is framed; not where a camera is no good.
-            is_same = before.camera_path is None and seen.camera is None
-            return before if is_same and before.render == seen.choice else None
-        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))
-        view = read_camera(seen.camera, to_world, when, told, seen.lens)
-        motion = find_motion(seen.camera, when, seen.blur, told)
-        shutter = None if motion is None else motion.shutter
-        if view is None or not {*told.lines()} <= {*before.report.lines()}:
-            return None
-        if not self._stock.varying.is_view_only and shutter != before.shutter:
-            return None
-        if not self._stock.has_same_levels(view, options.get("size")):
-            return None
-        moves = camera_motion(seen.camera, motion)
-        lens = {**_CAMERA, **view.options, "motion": moves}
-        renderer.edit(camera={"transform": view.transform, **lens})
-        path = str(seen.camera.GetPath())
-        return replace(
-            before, scene=renderer.scene, shutter=shutter, camera_path=path, render=seen.choice
-        )
+        camera = found.pop("camera")
+        if camera is not None:
+            renderer.edit(camera=camera)
+        return replace(before, scene=renderer.scene, **found)
 
     def render(
         self,
@@ -202,6 +190,7 @@ def render_frames(
     policy: Any = None,
     costs: Any = None,
     aovs: Iterable[str] | None = None,
+    isolate: bool | None = None,
     **settings: Any,
 ) -> Iterator[tuple[float, Picture]]:
     """Renders frames of a stage one after another, and shares between them what does not change.
@@ -234,6 +223,7 @@ def render_frames(
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
         aovs: Likewise.
+        isolate: As in ``load``; one process reads all frames, and ends after the last.
         **settings: Likewise.
 
     Returns:
@@ -268,6 +258,7 @@ def render_frames(
         working_space=working_space,
         lights=lights,
         size=(chosen.width, chosen.height),
+        isolate=isolate,
         **options,
     )
     return _pictures(shots, numbers, chosen, names, progress, own, profile)
@@ -282,9 +273,10 @@ def _pictures(
     policy: Any,
     profile: Any,
 ) -> Iterator[tuple[float, Picture]]:
-    for frame in frames:
-        scene = shots.load(frame).scene
-        if "light_groups" in names:
-            check_memory(settings, names, len(scene.light_groups))
-        result = shots.render(settings, progress, policy, profile)
-        yield frame, picture_of(result, shots.stats(result), scene=scene, aovs=names)
+    with shots:
+        for frame in frames:
+            scene = shots.load(frame).scene
+            if "light_groups" in names:
+                check_memory(settings, names, len(scene.light_groups))
+            result = shots.render(settings, progress, policy, profile)
+            yield frame, picture_of(result, shots.stats(result), scene=scene, aovs=names)

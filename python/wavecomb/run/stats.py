@@ -18,7 +18,7 @@ from wavecomb.version import version
 
 if TYPE_CHECKING:
     from wavecomb._core import Result
-    from wavecomb.usd.stage.load import LoadedStage
+    from wavecomb.usd.stage.loaded import LoadedStage
 
 SCHEMA = "wavecomb-statistics/1"
 PHASES = (

@@ -4,13 +4,21 @@
 One module for each concept: ``stage`` is the way in; ``traverse`` finds prims and ``groups`` places
 them; ``mesh``, ``shapes``, ``light``, ``camera`` and ``instancing`` read one kind of prim each;
 ``material``, ``preview`` and ``materialx`` turn networks into programs with parameters.
+
+Names are imported when they are first used: OpenUSD comes with those that need it.
 """
 
-from wavecomb.errors import WavecombError
-from wavecomb.usd.stage.load import LoadedStage, load_stage
-from wavecomb.usd.stage.opening import open_editable, open_stage
-from wavecomb.usd.stage.peek import peek_products
-from wavecomb.usd.stage.report import Finding, LoadReport
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wavecomb.errors import WavecombError
+    from wavecomb.usd.stage.load import load_stage
+    from wavecomb.usd.stage.loaded import LoadedStage
+    from wavecomb.usd.stage.opening import open_editable, open_stage
+    from wavecomb.usd.stage.peek import peek_products
+    from wavecomb.usd.stage.report import Finding, LoadReport
 
 __all__ = [
     "Finding",
@@ -22,3 +30,28 @@ __all__ = [
     "open_stage",
     "peek_products",
 ]
+
+_HOMES = {
+    "Finding": "wavecomb.usd.stage.report",
+    "LoadReport": "wavecomb.usd.stage.report",
+    "LoadedStage": "wavecomb.usd.stage.loaded",
+    "WavecombError": "wavecomb.errors",
+    "load_stage": "wavecomb.usd.stage.load",
+    "open_editable": "wavecomb.usd.stage.opening",
+    "open_stage": "wavecomb.usd.stage.opening",
+    "peek_products": "wavecomb.usd.stage.peek",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'wavecomb.usd' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -17,6 +17,7 @@ from wavecomb.picture.output import fitted_window
 from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.looks.network import number, pair, word
+from wavecomb.usd.stage.choice import CONFORMS
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.search import every
 
@@ -37,16 +38,7 @@ MAX_CLIP_PLANES = 16
 _FRAME_TAN = 0.4
 """Half the opening of the default camera, on the plane z = -1."""
 
-
 PROJECTIONS = ("perspective", "orthographic", "latlong")
-CONFORMS = (
-    "expandAperture",
-    "cropAperture",
-    "adjustApertureWidth",
-    "adjustApertureHeight",
-    "adjustPixelAspectRatio",
-)
-"""UsdRender's aspectRatioConformPolicy."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.machine import memory_bytes
+from wavecomb.run.isolate.memory import machine_limit
 from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.attributes import RefinedAttributes
 from wavecomb.usd.geometry.cage import Cage
@@ -253,7 +253,7 @@ class Surfaces:
             for surface in chosen:
                 surface.level = max(self.choice, surface.lowest)
             total = sum(s.cage.triangles_at(s.level) for s in chosen)
-            needed, there = total * BYTES_PER_TRIANGLE, memory_bytes()
+            needed, there = total * BYTES_PER_TRIANGLE, machine_limit()
             if there is not None and needed > 0.8 * there:
                 raise WavecombError(
                     f"subdivision {self.choice}: {total:,} triangles need about "

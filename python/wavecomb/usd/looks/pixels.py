@@ -18,6 +18,7 @@ from pxr import Ar
 from wavecomb.machine import usable_cores
 from wavecomb.picture.files import problem_of
 from wavecomb.run.isolate import trail
+from wavecomb.usd.looks.stock import Image, Stamp
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -27,62 +28,8 @@ MAX_BYTES = 8 << 30
 """Of memory that decoding one image takes."""
 
 
-Stamp = tuple[int, int]
-"""When a file was changed, in ns, and its size in bytes."""
-
-
 class TextureError(ValueError):
     """An image that cannot be used; says why in a few words."""
-
-
-class Image:
-    """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top.
-
-    Attributes:
-        size: Height and width.
-        channels: Channels of each pixel.
-        dtype: Of the pixels.
-        stamp: Of its file before it was read; None: not known.
-        wraps: Modes in s and t that the file asks for: black, clamp, repeat or mirror.
-        encoded: Whether the file says that it is sRGB; None: it does not say.
-    """
-
-    def __init__(
-        self,
-        pixels: NDArray[Any],
-        stamp: Stamp | None = None,
-        wraps: tuple[str, str] = ("black", "black"),
-        encoded: bool | None = None,
-    ) -> None:
-        self.stamp = stamp
-        self.wraps = wraps
-        self.encoded = encoded
-        self._pixels: NDArray[Any] | None = pixels
-        self.size = int(pixels.shape[0]), int(pixels.shape[1])
-        self.channels = int(pixels.shape[2])
-        self.dtype = pixels.dtype
-
-    @property
-    def is_here(self) -> bool:
-        """Whether the pixels were not taken yet."""
-        return self._pixels is not None
-
-    def take(self) -> NDArray[Any]:
-        """Hands the pixels over, once."""
-        pixels, self._pixels = self._pixels, None
-        if pixels is None:
-            raise ValueError("the pixels of this image were taken before")
-        return pixels
-
-    @property
-    def automatic_srgb(self) -> bool:
-        """Whether ``sourceColorSpace = auto`` means sRGB.
-
-        As the file says, else of 8 bits with 3 or 4 channels.
-        """
-        if self.encoded is not None:
-            return self.encoded
-        return self.dtype == np.uint8 and self.channels >= 3
 
 
 def stamp_of(path: str) -> Stamp | None:

@@ -19,7 +19,8 @@ from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import memory
 from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.looks.halve import halve
-from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
+from wavecomb.usd.looks.pixels import ReadAhead, TextureError, read_image, stamp_of
+from wavecomb.usd.looks.stock import Image, TextureStock
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
@@ -122,20 +123,14 @@ class TiledImage:
 
 
 @dataclass(frozen=True)
-class TextureStock:
-    """The textures of a scene, for later ones to share.
+class Prepared:
+    """Arguments of ``SceneBuilder.add_texture``."""
 
-    Attributes:
-        scene: That holds them.
-        images: What they were made of, by file; without pixels.
-        ids: Texture ids by file and options.
-        store: What keeps them within a limit.
-    """
-
-    scene: _core.Scene
-    images: dict[str, Image]
-    ids: dict[tuple[Any, ...], int]
-    store: _core.TextureStore | None = None
+    name: str
+    pixels: NDArray[Any]
+    srgb: bool
+    wrap_s: str
+    wrap_t: str
 
 
 def _converts(space: str) -> bool:
@@ -325,9 +320,9 @@ class TextureTable:
             return CURVE if space == SRGB else RAW
         return RAW if space == OCIO_NAMES[self.working] else space
 
-    def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # Gone from memory once it is in the scene; a second use in another way reads it again.
-        pixels = image.take() if image.is_here else read_image(path).take()
+    def _prepared(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> Prepared:
+        """The pixels of an image, taken, as the core is given them."""
+        pixels = image.take()
         srgb = space == CURVE
         dtype = stored_type(image, space)
         if _converts(space):
@@ -341,19 +336,37 @@ class TextureTable:
             pixels = np.ascontiguousarray(linear, image.dtype)
         for _ in range(self.drops.get((path, space, wrap_s, wrap_t), 0)):
             pixels = halve(pixels, srgb)
+        return Prepared(path, pixels, srgb, wrap_s, wrap_t)
+
+    def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
+        # Gone from memory once it is in the scene; a second use in another way reads it again.
+        here = image if image.is_here else read_image(path)
+        ready = self._prepared(path, here, space, wrap_s, wrap_t)
         if self.store is not None:
             self.store.set_waiting(self._ahead.bytes)
         try:
             return self._builder.add_texture(
-                pixels, srgb=srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path
+                ready.pixels, srgb=ready.srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
         except ValueError as error:  # no room for it
             raise WavecombError(str(error)) from None
         finally:
             if self.store is not None:
                 # Else the allocator keeps what images took.
-                del pixels
+                del ready
                 give_back_memory()
+
+    def again(self, number: int) -> Prepared:
+        """What a texture of an image, by its id, was made of: read once more.
+
+        Raises:
+            TextureError: Its file is no longer what it was.
+        """
+        key = next(key for key, known in self._ids.items() if known == number)
+        if len(key) != 5:
+            return Prepared("missing texture", checker(), False, "repeat", "repeat")
+        path, space, wrap_s, wrap_t, _ = key
+        return self._prepared(path, read_image(path), space, wrap_s, wrap_t)
 
     def missing(self) -> int:
         """Texture id of the checker that stands for a texture that cannot be read."""

@@ -22,7 +22,8 @@ from pxr import Tf, Usd, UsdGeom
 from wavecomb.usd.geometry.mesh import UV_NAMES
 from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.looks.material import MaterialTable, bound_materials
-from wavecomb.usd.looks.pixels import Image, TextureError, read_header
+from wavecomb.usd.looks.pixels import TextureError, read_header
+from wavecomb.usd.looks.stock import Image
 from wavecomb.usd.looks.texture import Key, TextureTable, stored_type
 from wavecomb.usd.looks.texture_store import MEGABYTE
 from wavecomb.usd.stage.identity import LightGroups

@@ -11,7 +11,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.looks.texture import TextureStock
+    from wavecomb.usd.looks.stock import TextureStock
 
 MEGABYTE = 1_000_000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,16 +29,18 @@ from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.light import LIGHT_SHAPES, LightReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.texture import TextureStock, TextureTable
+from wavecomb.usd.looks.stock import TextureStock
+from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
 from wavecomb.usd.materialx import references as mtlx
+from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.stage.group import Group, placed_lights
 from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.named_files import keep_to
 from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
-from wavecomb.usd.stage.render_settings import RenderChoice
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.shared import FrameStock
 from wavecomb.usd.stage.times import frame_number, time_code
@@ -52,50 +54,6 @@ SurfacesOf = Callable[[MaterialTable], Surfaces]
 
 MAX_LIGHTS = 4096
 """Lights that are placed; instances may multiply them."""
-
-
-@dataclass
-class LoadedStage:
-    """A stage that was read.
-
-    Attributes:
-        scene: Ready to render.
-        report: What there is to say about it.
-        camera_path: Prim of the camera; None where the bounds were framed.
-        seconds: Time taken.
-        stage_path: The file.
-        cameras: Prims of all cameras that could be chosen.
-        lights: Prims of all lights that Wavecomb knows, invisible ones too.
-        material_paths: Prim of each material of the scene, by id; "" where the loader made it (of a
-            display colour). One prim has several where meshes bring values of their own.
-        light_paths: Prim of each light of the scene, by index; "" of the soft dome. In instances
-            both are named by the first instance.
-        frame: Time code that was read; None: default values.
-        shutter: When it opens and closes, time codes from the frame; None: no motion blur.
-        render: What the stage's render settings ask for.
-        working_space: What its colours are in: of ``WORKING_SPACES``.
-        textures: What the next read of the stage can share; None unless it was read ``editable``.
-        leaves_out_levels: Whether textures have only the mip levels that its view needs.
-        outline: Points (n, 3) in the world where what is drawn reaches farthest; None unless a view
-            was framed for it.
-    """
-
-    scene: _core.Scene
-    report: LoadReport
-    camera_path: str | None
-    seconds: float
-    stage_path: Path
-    cameras: tuple[str, ...] = ()
-    lights: tuple[str, ...] = ()
-    material_paths: tuple[str, ...] = ()
-    light_paths: tuple[str, ...] = ()
-    frame: float | None = None
-    textures: TextureStock | None = None
-    shutter: tuple[float, float] | None = None
-    render: RenderChoice = field(default_factory=RenderChoice)
-    working_space: str = "rec709"
-    leaves_out_levels: bool = False
-    outline: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -153,6 +111,7 @@ def load_stage(
     working_space: str = "rec709",
     lights: str = "visible",
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
+    store_factory: Callable[[LoadReport], _core.TextureStore | None] | None = None,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
 
@@ -196,6 +155,8 @@ def load_stage(
         lights: Whether rays meet the shapes of lights: "visible" or "hidden"
             (docs/decisions/light-shapes.md).
         builder_factory: Makes the scene builder; None: the native one.
+        store_factory: With ``builder_factory``: gives what keeps its textures within the limit,
+            and tells the report; None: nothing does, so that levels are left out.
 
     Raises:
         WavecombError: The file or an option is no good.
@@ -226,10 +187,15 @@ def load_stage(
         reuse = stock.textures
     opened = _opener(source, variants or {}, mask, session_layer)
     with captured(report):
-        # A builder of the caller's own has no store, so that levels are left out.
-        store = None if builder_factory else texture_store(texture_limit, reuse, report)
-        builder = _native_builder(threads, store) if builder_factory is None else builder_factory()
+        if builder_factory is None:
+            store = texture_store(texture_limit, reuse, report)
+            builder = _native_builder(threads, store)
+        else:
+            store = None if store_factory is None else store_factory(report)
+            builder = builder_factory()
         textures = TextureTable(builder, report, threads, reuse, working_space, store)
+        if hasattr(builder, "read_again"):  # it has no pixels of its own
+            builder.read_again = textures.again
 
         def surfaces_of(materials: MaterialTable) -> Surfaces:
             return Surfaces(

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from pxr import Usd
 
+from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import captured
 from wavecomb.usd.stage.opening import open_render_settings
-from wavecomb.usd.stage.render_settings import RenderChoice, read_choices
+from wavecomb.usd.stage.render_settings import read_choices
 from wavecomb.usd.stage.report import LoadReport
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,6 +70,34 @@ class LoadReport:
         self._unsupported: dict[str, Finding] = {}
         self.counts: dict[str, int] = {}
         self._aliases: dict[str, str] = {}
+
+    @classmethod
+    def of(
+        cls,
+        notes: Iterable[Finding] = (),
+        warnings: Iterable[Finding] = (),
+        unsupported: Iterable[Finding] = (),
+        counts: Mapping[str, int] | None = None,
+        aliases: Mapping[str, str] | None = None,
+    ) -> LoadReport:
+        """A report that another process was told."""
+        report = cls()
+        for to, findings in (
+            (report._notes, notes),
+            (report._warnings, warnings),
+            (report._unsupported, unsupported),
+        ):
+            for finding in findings:
+                finding._known.update(finding.all_places[:MAX_KEPT])
+                to[finding.what] = finding
+        report.counts.update(counts or {})
+        report._aliases.update(aliases or {})
+        return report
+
+    @property
+    def aliases(self) -> dict[str, str]:
+        """Names of prototypes of USD's own: those of their first instances."""
+        return dict(self._aliases)
 
     def alias(self, prototype: object, instance: object) -> None:
         """Makes places in a prototype of USD's own be named by the first instance of it."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Gf, Usd
 
-from wavecomb.usd.looks.texture import TextureStock
+from wavecomb.usd.looks.stock import TextureStock
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.varying import Varying
 

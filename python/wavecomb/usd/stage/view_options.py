@@ -12,7 +12,8 @@ from wavecomb.errors import WavecombError
 from wavecomb.usd.cameras.camera import PROJECTIONS, Lens, find_camera
 from wavecomb.usd.geometry.shutter import Blur
 from wavecomb.usd.looks.material import BINDING_PURPOSES
-from wavecomb.usd.stage.render_settings import RenderChoice, read_choices
+from wavecomb.usd.stage.choice import RenderChoice
+from wavecomb.usd.stage.render_settings import read_choices
 from wavecomb.usd.stage.report import LoadReport
 
 PURPOSES = ("default", "render", "proxy", "guide")

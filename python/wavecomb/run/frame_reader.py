@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads frames of one stage, which stays open between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pxr import UsdGeom
+
+from wavecomb.usd.cameras.camera import camera_motion, read_camera
+from wavecomb.usd.geometry.shutter import find_motion
+from wavecomb.usd.materialx import references as mtlx
+from wavecomb.usd.stage.choice import RenderChoice
+from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.load import load_stage
+from wavecomb.usd.stage.opening import open_stage
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.shared import FrameStock
+from wavecomb.usd.stage.times import frame_number, time_code
+from wavecomb.usd.stage.view_options import ViewOptions
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+    from wavecomb.usd.stage.loaded import LoadedStage
+
+_CAMERA: dict[str, Any] = {
+    "lens_radius": 0.0,
+    "focus_distance": 1.0,
+    "near_clip": 0.0,
+    "far_clip": 1e30,
+    "projection": "perspective",
+    "conform": "expandAperture",
+    "pixel_aspect": 1.0,
+    "clip_planes": [],
+    "exposure": 1.0,
+}
+"""What ``SceneBuilder.set_camera`` takes where a camera says nothing."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What another frame shows of the scene of the one before.
+
+    Attributes:
+        camera: For ``Renderer.edit``; None: it stays.
+        camera_path: As of a ``LoadedStage``, like what follows.
+        shutter: Likewise.
+        render: Likewise.
+        frame: Likewise.
+    """
+
+    camera: dict[str, Any] | None
+    camera_path: str | None
+    shutter: tuple[float, float] | None
+    render: RenderChoice
+    frame: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its attributes by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+class FrameReader:
+    """The stage, open, and what frames of it share.
+
+    Contract: files of the stage must not change meanwhile, but for images.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        variants: Mapping[str, str] | None = None,
+        mask: Iterable[str] = (),
+        session_layer: str | None = None,
+        threads: int = 0,
+        **options: Any,
+    ) -> None:
+        """Opens the stage; options: of ``load_stage``. Raises WavecombError."""
+        self._threads = threads
+        _view(options).check()
+        opening = LoadReport()
+        layer = None if session_layer is None else Path(session_layer)
+        with captured(opening):
+            self._stage: Usd.Stage = open_stage(
+                path, variants, mask=tuple(mask), session_layer=layer
+            )
+            mtlx.tell(self._stage, opening)
+            self._stock = FrameStock(self._stage, opening)
+        self._before: LoadedStage | None = None
+
+    def read(self, frame: float | None, options: Mapping[str, Any]) -> LoadedStage:
+        """The stage at a frame; None: its start, else default values.
+
+        Args:
+            frame: Time code.
+            options: Of ``load_stage``.
+
+        Raises:
+            WavecombError: It cannot be rendered.
+        """
+        self._before = None
+        options = {"threads": self._threads, **options}
+        self._before = load_stage(self._stage, frame=frame, stock=self._stock, **options)
+        return self._before
+
+    def look(self, frame: float | None, options: Mapping[str, Any]) -> Seen | None:
+        """What is other at a frame, where that is the camera at most; None where more may be."""
+        before, when = self._before, time_code(self._stage, frame)
+        if before is None:
+            return None
+        seen = self._look(before, when, options)
+        if seen is not None:
+            changes = {name: value for name, value in seen.as_dict().items() if name != "camera"}
+            self._before = replace(before, **changes)
+        return seen
+
+    def _look(
+        self, before: LoadedStage, when: Usd.TimeCode, options: Mapping[str, Any]
+    ) -> Seen | None:
+        number = frame_number(when)
+        if not self._stock.varying.is_view_only and before.frame != number:
+            return None
+        if before.leaves_out_levels:
+            return None  # another view shows other textures near
+        told = LoadReport()
+        seen = _view(options).on(self._stage, told)
+        if before.camera_path is None or seen.camera is None:
+            # What is drawn is framed; not where a camera is no good.
+            is_same = before.camera_path is None and seen.camera is None
+            if not is_same or before.render != seen.choice:
+                return None
+            return Seen(None, before.camera_path, before.shutter, before.render, number)
+        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))
+        view = read_camera(seen.camera, to_world, when, told, seen.lens)
+        motion = find_motion(seen.camera, when, seen.blur, told)
+        shutter = None if motion is None else motion.shutter
+        if view is None or not {*told.lines()} <= {*before.report.lines()}:
+            return None
+        if not self._stock.varying.is_view_only and shutter != before.shutter:
+            return None
+        if not self._stock.has_same_levels(view, options.get("size")):
+            return None
+        moves = camera_motion(seen.camera, motion)
+        camera = {"transform": view.transform, **_CAMERA, **view.options, "motion": moves}
+        return Seen(camera, str(seen.camera.GetPath()), shutter, seen.choice, number)
+
+
+def _view(options: Mapping[str, Any]) -> ViewOptions:
+    names = {field.name for field in fields(ViewOptions)}
+    return ViewOptions(**{name: options[name] for name in names if name in options})

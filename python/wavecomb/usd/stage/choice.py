@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What render settings ask for, as plain data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from wavecomb.errors import WavecombError
+
+CONFORMS = (
+    "expandAperture",
+    "cropAperture",
+    "adjustApertureWidth",
+    "adjustApertureHeight",
+    "adjustPixelAspectRatio",
+)
+"""UsdRender's aspectRatioConformPolicy."""
+
+
+@dataclass(frozen=True)
+class RenderChoice:
+    """What render settings and one of their products ask for; None: nothing is authored.
+
+    Attributes:
+        settings: Path of the RenderSettings.
+        product: Path of the RenderProduct.
+        camera: Path of the camera.
+        resolution: Width and height.
+        pixel_aspect: Width of a pixel / its height.
+        conform: One of ``CONFORMS``.
+        data_window: (xmin, ymin, xmax, ymax), 0 to 1 over the picture, y up.
+        purposes: Of the geometry.
+        material_purposes: Of material bindings, the first that a prim has counts.
+        motion_blur: False: none is wanted.
+        depth_of_field: Likewise.
+        aovs: Layers, as ``--aov`` takes them.
+        output: Name of the file.
+    """
+
+    settings: str | None = None
+    product: str | None = None
+    camera: str | None = None
+    resolution: tuple[int, int] | None = None
+    pixel_aspect: float = 1.0
+    conform: str = CONFORMS[0]
+    data_window: tuple[float, float, float, float] | None = None
+    purposes: tuple[str, ...] | None = None
+    material_purposes: tuple[str, ...] | None = None
+    motion_blur: bool = True
+    depth_of_field: bool = True
+    aovs: tuple[str, ...] | None = None
+    output: str | None = None
+
+    def region(self, width: int, height: int) -> tuple[int, int, int, int] | None:
+        """Pixels whose centres are in the data window: x0, y0, x1, y1, y down, the end excluded.
+
+        None where that is all of them.
+
+        Raises:
+            WavecombError: It holds no pixel.
+        """
+        if self.data_window is None:
+            return None
+        left, low, right, high = self.data_window
+        x0, x1 = (math.ceil(edge * width - 0.5) for edge in (left, right))
+        y0, y1 = (math.ceil((1.0 - edge) * height - 0.5) for edge in (high, low))
+        x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
+        if x0 >= x1 or y0 >= y1:
+            raise WavecombError(
+                f"{self.product or self.settings}: dataWindowNDC holds no pixel of the picture; "
+                "mend it or give --region"
+            )
+        return None if (x0, y0, x1, y1) == (0, 0, width, height) else (x0, y0, x1, y1)
