@@ -87,13 +87,13 @@ test-fast: ## Lint, C++ tests, pytest without the slow ones
 
 test-cpp: build build/.setup-test ## C++ tests
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
-	$(VENV)/ctest --test-dir $(BUILD) --verbose --output-on-failure --no-tests=error
+	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
 test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
 	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=ON -DWAVECOMB_TESTS=ON
 	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
-	$(VENV)/ctest --test-dir $(ASAN) --verbose --output-on-failure --no-tests=error
+	$(VENV)/ctest --test-dir $(ASAN) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
 test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
 	@test -e $(TSAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(TSAN) -G Ninja --log-level=NOTICE \
@@ -111,7 +111,7 @@ test-py: build-naive build/.setup-test ## Python and statistical tests
 
 test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
-	WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) --verbose --output-on-failure --no-tests=error
+	WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
 
 test-wheel: wheel ## Install that wheel into a fresh environment and render with each of its libraries
