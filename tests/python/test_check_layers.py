@@ -140,3 +140,22 @@ def test_nothing_but_the_command_imports_it(tmp_path):
     result = run(python_tree(tmp_path, files))
     assert result.returncode == 1
     assert "wavecomb.run may not import wavecomb.cli" in result.stderr
+
+
+def test_materialx_is_behind_its_door(tmp_path):
+    files = {
+        "usd/__init__.py": "",
+        "usd/materialx/__init__.py": "",
+        "usd/materialx/nodes.py": "def late():\n    import MaterialX as mx\n",
+        "usd/materialx/files.py": "from wavecomb.usd.materialx import nodes\n",
+        "usd/mtlx.py": "def late():\n    from wavecomb.usd.materialx import files\n",
+        "usd/load.py": "from wavecomb.usd import mtlx\n",
+    }
+    result = run(python_tree(tmp_path / "clean", files))
+    assert result.returncode == 0, result.stderr
+    files["usd/load.py"] = "def late():\n    from wavecomb.usd.materialx import files\n"
+    files["usd/look.py"] = "import MaterialX.PyMaterialXCore\n"
+    result = run(python_tree(tmp_path / "other", files))
+    assert result.returncode == 1
+    assert "wavecomb.usd.load may not import wavecomb.usd.materialx" in result.stderr
+    assert "wavecomb.usd.look may not import MaterialX" in result.stderr

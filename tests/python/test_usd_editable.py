@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stages that are open and read again: what is known of them, and what is shared."""
 
-import dataclasses
 import os
 import shutil
 
@@ -13,12 +12,12 @@ from usd_recorder import QUAD, Recorder, write
 import wavecomb
 from wavecomb.picture.image import write_png
 from wavecomb.usd import load_stage, open_stage
-from wavecomb.usd.looks.materialx_surface import MODELS
-from wavecomb.usd.looks.openpbr import layers_of
 from wavecomb.usd.looks.parameters import light_radiance, material_parameters
 from wavecomb.usd.looks.surface import DEFAULTS
-from wavecomb.usd.looks.surface_inputs import definitions
 from wavecomb.usd.looks.surface_values import surface_values
+from wavecomb.usd.materialx.surfaces.inputs import definitions
+from wavecomb.usd.materialx.surfaces.models import MODELS
+from wavecomb.usd.materialx.surfaces.openpbr import layers_of
 
 MATERIAL = """
 def Material "%s" {
@@ -232,10 +231,10 @@ def test_defaults_of_the_loader_are_materialx_s(model):
     assert inputs.found.keys() <= known.keys()
     for name, default in inputs.found.items():
         assert known[name].default == pytest.approx(default), name
-    for field in dataclasses.fields(MODELS[model]):
-        spec = getattr(MODELS[model], field.name)
-        if field.name != "normal" and spec[0]:
-            assert definitions(model)[spec[0]].default == pytest.approx(spec[1]), spec[0]
+    for row in MODELS[model].slots.values():
+        for name, default in ((row.input, row.default), row.weight):
+            if name:
+                assert definitions(model)[name].default == pytest.approx(default), name
     assert all(one.soft_low < one.soft_high <= one.high for one in definitions(model).values())
     groups = [one.group for one in definitions(model).values()]
     assert len(set(groups)) >= 6 and groups == sorted(groups, key=groups.index)

@@ -14,8 +14,7 @@ from pxr import Sdf, Usd, UsdShade
 from usd_recorder import Recorder
 
 from wavecomb.picture.image import write_png
-from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.materialx import references as mtlx
+from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
 from wavecomb.usd.materialx.layer import translate
 from wavecomb.usd.stage.diagnostics import captured

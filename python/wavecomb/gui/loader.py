@@ -98,8 +98,7 @@ def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
     Raises:
         WavecombError: It cannot be rendered.
     """
-    from wavecomb.usd import LoadReport, open_editable
-    from wavecomb.usd.materialx import references as mtlx
+    from wavecomb.usd import LoadReport, mtlx, open_editable
     from wavecomb.usd.stage.diagnostics import captured
 
     usd, loaded = request.usd, None

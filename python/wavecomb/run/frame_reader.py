@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import UsdGeom
 
+from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
-from wavecomb.usd.materialx import references as mtlx
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import captured
 from wavecomb.usd.stage.load import load_stage

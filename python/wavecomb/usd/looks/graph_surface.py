@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from pxr import UsdShade
+from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.graph_call import BASE, COLOUR, COLOURS, NORMAL, NUMBER
 from wavecomb.usd.looks.graph_code import (
     PARAMETERS,
     POINT_SIZE,
@@ -17,6 +16,7 @@ from wavecomb.usd.looks.graph_code import (
     Expressions,
     Graph,
     GraphTooLarge,
+    Linear,
     Node,
     Part,
     Value,
@@ -27,12 +27,55 @@ from wavecomb.usd.looks.graph_code import (
     nodes_of,
     substituted,
 )
-from wavecomb.usd.looks.graph_images import uv_matrix
-from wavecomb.usd.looks.graph_network import Networks
 from wavecomb.usd.looks.surface import COLOUR_SLOTS, SLOTS, SurfaceGraph
+from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.stage.report import LoadReport
+
+BASE, COLOUR, NUMBER, NORMAL = "base", "colour", "number", "normal"
+"""What a value is for: the base colour, another colour, a number, or a normal in tangent space."""
+COLOURS = (BASE, COLOUR)
 
 _SAMPLES = 8
 """Points along each axis of the texture at which a graph is looked at for what it comes to."""
+
+
+class Networks(Protocol):
+    """What gives values: the networks of shaders of one material."""
+
+    make: Expressions
+    material: Usd.Prim
+    primvars: list[str]
+    report: LoadReport
+    textures: TextureTable
+    uv_names: list[str]
+
+    def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
+        """What feeds an input; None where nothing does, or nothing that can be read."""
+
+    def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
+        """What an output of a node gives."""
+
+    def in_working_space(self) -> Networks:
+        """The same networks with constant colours of the working space; tells nothing."""
+
+
+def uv_matrix(uv: Value) -> tuple[float, ...] | None:
+    """The matrix m: u' = m[0] u + m[1] v + m[2], v' = m[3] u + ...; None where there is none."""
+    rows: list[float] = []
+    for part in uv:
+        found: Linear | None = linear(part, _is_uv)
+        if found is None:
+            return None
+        terms, constant = found
+        weights = [0.0, 0.0]
+        for (_, component), k in terms.items():
+            weights[component] = k
+        rows += [*weights, constant]
+    return tuple(rows)
+
+
+def _is_uv(node: Node) -> bool:
+    return node.code == "input" and node.number == 0
 
 
 def sampled(value: Value) -> Any:

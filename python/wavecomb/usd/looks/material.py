@@ -12,13 +12,17 @@ from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.picture.working_space import from_rec709
+from wavecomb.usd import mtlx
 from wavecomb.usd.looks.graph_attributes import with_attributes
 from wavecomb.usd.looks.graph_code import GraphTooLarge
-from wavecomb.usd.looks.materialx_surface import MaterialXReader, model_of
 from wavecomb.usd.looks.network import shader_id
-from wavecomb.usd.looks.openpbr import OPENPBR_COLOURS
 from wavecomb.usd.looks.preview import PreviewReader
-from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface, fallback_surface
+from wavecomb.usd.looks.surface import (
+    COLOUR_SLOTS,
+    OPENPBR_COLOURS,
+    Surface,
+    fallback_surface,
+)
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 
@@ -74,7 +78,7 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
         name = shader_id(candidate)
         if name.startswith(("ND_UsdPreviewSurface", "UsdPreviewSurface")):
             return PREVIEW, candidate
-        if model := model_of(name):
+        if model := mtlx.model_of(name):
             return model, candidate
     return "", shader
 
@@ -275,8 +279,8 @@ class MaterialTable:
         if kind == PREVIEW:
             return PreviewReader(prim, self.time, self._textures, self._report).read(shader)
         if kind:
-            reader = MaterialXReader(prim, self.time, self._textures, self._report)
-            return reader.read(shader, kind)
+            read = mtlx.surface(prim, self.time, self._textures, self._report, shader, kind)
+            return read or fallback_surface(DEFAULT_COLOUR, name=str(prim.GetPath()))
         what = shader_id(shader) or shader_id(material.ComputeSurfaceSource("mtlx")[0])
         if what:
             self._report.missing(f"surface shader {what} (drawn grey)", prim.GetPath())

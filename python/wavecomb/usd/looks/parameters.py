@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
+from wavecomb.usd import mtlx
 from wavecomb.usd.geometry.mesh import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import LightReader
@@ -23,7 +24,7 @@ from wavecomb.usd.looks.material import PREVIEW, surface_source
 from wavecomb.usd.looks.network import Source, colour, number, shader_id, source_of, value_of
 from wavecomb.usd.looks.preview import INPUTS, USES, constant, program_of
 from wavecomb.usd.looks.surface import COLOUR_SLOTS
-from wavecomb.usd.looks.surface_inputs import COLOUR, SWITCH, InputDefinition, definitions
+from wavecomb.usd.looks.surface_inputs import COLOUR, SWITCH, InputDefinition
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
@@ -105,7 +106,7 @@ class _Tracer:
 
     def materialx(self, model_name: str) -> dict[str, Parameter]:
         """Of a MaterialX surface: its own inputs, of those that Wavecomb reads."""
-        known = definitions(model_name, shader_id(self._shader))
+        known = mtlx.definitions(model_name, shader_id(self._shader))
         return {name: self._own_input(one) for name, one in known.items()}
 
     def _own_input(self, definition: InputDefinition) -> Parameter:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Usd, UsdShade
 
+from wavecomb.usd import mtlx
 from wavecomb.usd.looks.colour_space import SRGB, canonical, linear_colour, space_of
 from wavecomb.usd.looks.graph_code import PARAMETERS
-from wavecomb.usd.looks.graph_network import Networks
 from wavecomb.usd.looks.graph_surface import Drivers
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
@@ -121,7 +121,7 @@ class PreviewReader:
         self.time = time
         self.textures = textures
         self.report = report
-        self.drivers = Drivers(Networks(material, time, textures, report))
+        self.drivers = Drivers(mtlx.networks(material, time, textures, report))
         self.uv_names = self.drivers.networks.uv_names
         self.slots = self.drivers.slots
         self.primvars: dict[str, str] = {}

@@ -35,6 +35,9 @@ class SurfaceGraph:
 
 
 COLOUR_SLOTS = ("base_color", "specular_color", "emission")
+OPENPBR_COLOURS = ("transmission_color", "subsurface_color", "fuzz_color", "coat_color")
+"""Which parameters of program openpbr beside slots are colours."""
+
 SLOTS = (
     *COLOUR_SLOTS,
     "roughness",

@@ -1,28 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of MaterialX's surface shaders, for people: groups, names, defaults and ranges.
-
-The one table of them is MaterialX's own: the node definitions that come with it.
-"""
+"""What an input of a surface shader is for people: its group, label, default and range."""
 
 from __future__ import annotations
 
-import functools
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from wavecomb.usd.looks.materialx_surface import MODELS, Model
-from wavecomb.usd.looks.openpbr import layers_of
-
 NUMBER, COLOUR, SWITCH = "number", "colour", "switch"
-
-_KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
-_MOST = 1e6
-"""Of what MaterialX gives no greatest value."""
-
-_SHORT = (("index of refraction", "ior"), ("diffuse roughness", "roughness"))
-_SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness": 1.0}
-"""Right ends of sliders where MaterialX says nothing."""
 
 
 @dataclass(frozen=True)
@@ -52,122 +36,3 @@ class InputDefinition:
     high: float = 1.0
     soft_low: float = 0.0
     soft_high: float = 1.0
-
-
-class _Names:
-    """Notes which inputs are read, as ``openpbr.Inputs``; 1 makes all of them be asked for."""
-
-    def __init__(self) -> None:
-        self.read: set[str] = set()
-
-    def number(self, name: str, default: float) -> float:
-        self.read.add(name)
-        return 1.0
-
-    def colour(self, name: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
-        self.read.add(name)
-        return (1.0, 1.0, 1.0)
-
-    def ignored(self, *names: str) -> None:
-        pass
-
-    def approximated(self, what: str) -> None:
-        pass
-
-
-@functools.cache
-def read_inputs(model: str) -> frozenset[str]:
-    """Inputs of a shading model that have an effect here, without normals."""
-    names = _Names()
-    layers_of(model, names)
-    specs = [getattr(MODELS[model], field) for field in Model.__dataclass_fields__]
-    return frozenset(names.read | {s[0] for s in specs if isinstance(s, tuple) and s[0]})
-
-
-@functools.cache
-def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
-    """Inputs of a shading model that Wavecomb reads, by name, in MaterialX's order.
-
-    Args:
-        model: A key of ``MODELS``.
-        identifier: The shader's, which may name an older version.
-    """
-    found = _documented(model)
-    definition = found.getNodeDef(identifier) or found.getNodeDef(f"ND_{model}_surfaceshader")
-    read, out = read_inputs(model), {}
-    for one in definition.getActiveInputs():
-        if one.getName() in read and one.getType() in _KINDS:
-            out[one.getName()] = _definition(one, model)
-    return out
-
-
-@functools.cache
-def _documented(model: str) -> Any:
-    """MaterialX's document of a shading model."""
-    import MaterialX as mx
-
-    document = mx.createDocument()
-    file = mx.getDefaultDataSearchPath().find(f"libraries/bxdf/{model}.mtlx")
-    mx.readFromXmlFile(document, file.asString())
-    return document
-
-
-def _definition(one: Any, model: str) -> InputDefinition:
-    name, kind = one.getName(), _KINDS[one.getType()]
-    numbers = _numbers(one.getValueString())
-    default: Any
-    if kind == SWITCH:
-        default = one.getValueString() == "true"
-    elif kind == COLOUR and _is_number(model, name):
-        kind, default = NUMBER, numbers[0]
-    elif kind == COLOUR:
-        default = tuple(numbers)
-    else:
-        default = numbers[0] if numbers else 0.0
-    group = one.getAttribute("uifolder") or "Surface"
-
-    def limit(attribute: str, otherwise: float) -> float:
-        values = _numbers(one.getAttribute(attribute))
-        return values[0] if values else otherwise
-
-    low, high = limit("uimin", 0.0), limit("uimax", 100.0 if "ior" in name.lower() else _MOST)
-    shown = 1.0 if kind == COLOUR else _SLIDERS.get(name, 1.0)
-    soft_low = limit("uisoftmin", low)
-    soft_high = limit("uisoftmax", high if one.getAttribute("uimax") else shown)
-    if name.startswith("emiss") and kind == COLOUR:
-        high = _MOST  # colours of light are often brighter than the interface would have them
-    return InputDefinition(
-        name, group, _label(one.getAttribute("uiname") or name, group), kind, one.getType(),
-        default, low, high, soft_low, soft_high,
-    )  # fmt: skip
-
-
-def _is_number(model: str, name: str) -> bool:
-    """Whether one number is read of a colour: opacity."""
-    return MODELS[model].opacity[0] == name
-
-
-def _label(name: str, group: str) -> str:
-    """A name without that of its group, in small letters.
-
-    >>> _label("Coat Index of Refraction", "Coat"), _label("Base", "Base"), _label("Sheen", "Sheen")
-    ('ior', 'weight', 'weight')
-    """
-    words = name.lower()
-    if words == group.lower():
-        return words if words == "alpha" else "weight"
-    words = words.removeprefix(group.lower()).strip()
-    return dict(_SHORT).get(words, words)
-
-
-def _numbers(text: str) -> list[float]:
-    values = [float(word) for word in text.replace(",", " ").split() if _is_float(word)]
-    return [value for value in values if math.isfinite(value)]
-
-
-def _is_float(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -10,8 +10,8 @@ from typing import Any, cast
 
 from pxr import Tf, Usd, UsdShade
 
+from wavecomb.usd import mtlx
 from wavecomb.usd.looks.material import PREVIEW, surface_source
-from wavecomb.usd.looks.materialx_surface import MaterialXReader
 from wavecomb.usd.looks.surface import DEFAULTS, Surface
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
@@ -70,9 +70,10 @@ def surface_values(
         return None
     textures = cast(TextureTable, _NoTextures())
     try:
-        reader = MaterialXReader(prim, time, textures, LoadReport(), values)
-        surface = reader.read(shader, kind)
+        surface = mtlx.surface(prim, time, textures, LoadReport(), shader, kind, values)
     except (Tf.ErrorException, RecursionError):  # drawn grey
+        return None
+    if surface is None:
         return None
     return SurfaceValues(_constants(surface), _structure(surface))
 

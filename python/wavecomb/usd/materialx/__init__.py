@@ -1,2 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX files as layers in memory."""
+"""All that is read of MaterialX: files as layers in memory, nodes, surface shaders.
+
+Nothing outside of this package imports it but ``wavecomb.usd.mtlx``.
+"""

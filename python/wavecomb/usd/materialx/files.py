@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import posixpath
 from dataclasses import dataclass
@@ -12,6 +11,8 @@ from typing import Any
 from xml.parsers import expat
 
 from pxr import Ar, UsdShade
+
+from wavecomb.usd.materialx.library import library
 
 MAX_DEPTH = 64
 """Elements inside of each other; MaterialX reads them with as many calls inside of each other."""
@@ -47,16 +48,6 @@ class Document:
     file: str
     graphs: tuple[Any, ...]
     definitions: frozenset[str]
-
-
-@functools.cache
-def library() -> Any:
-    """The node definitions that come with MaterialX."""
-    import MaterialX as mx
-
-    document = mx.createDocument()
-    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), document)
-    return document
 
 
 def read_document(path: str) -> Document:

@@ -9,12 +9,9 @@ docs/decisions/materialx-layers.md.
 from __future__ import annotations
 
 import os
-import re
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pxr import Ar, Sdf, Tf, Usd
 
@@ -22,12 +19,10 @@ from wavecomb.run.isolate import trail
 from wavecomb.usd.materialx.files import MtlxError
 from wavecomb.usd.materialx.layer import translate
 from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.unread import unread_mtlx
 
 MAX_ROUNDS = 16
 """Times that a stage is looked through: what one file brings may ask for others."""
-
-NAMED = re.compile(r"@([^@]*\.mtlx\]*)@", re.IGNORECASE)
-"""A MaterialX file in what USD says of a layer that it cannot open."""
 
 
 @dataclass
@@ -66,7 +61,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """
     tried: set[tuple[str, str]] = set()
     for turn in range(MAX_ROUNDS):
-        if not (everywhere and turn == 0) and not any(True for _ in _missing(stage)):
+        if not (everywhere and turn == 0) and not any(True for _ in unread_mtlx(stage)):
             return
         with _lock, Ar.ResolverContextBinder(stage.GetPathResolverContext()):
             changes = _changes(stage, tried)
@@ -95,7 +90,7 @@ def reload(stage: Usd.Stage) -> None:
 
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
     """Says which MaterialX files are missing from a stage, and what of others was left out."""
-    for error, named in _missing(stage):
+    for error, named in unread_mtlx(stage):
         known = next((t for file, t in _translations.items() if _same(file, named)), None)
         why = known.error if known is not None and known.error else _why(named)
         place = str(error.rootSite.path)
@@ -106,14 +101,6 @@ def tell(stage: Usd.Stage, report: LoadReport) -> None:
     for translation in _translations.values():
         if translation.layer is not None and translation.layer.identifier in used:
             report.absorb(translation.report)
-
-
-def _missing(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
-    """Errors of composition that are about MaterialX files, and these."""
-    for error in stage.GetCompositionErrors():
-        found = NAMED.search(str(error))
-        if found is not None:
-            yield error, found[1]
 
 
 def _same(file: str, named: str) -> bool:

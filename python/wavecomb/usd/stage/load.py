@@ -19,6 +19,7 @@ from wavecomb.machine import give_back_memory
 from wavecomb.picture.working_space import WORKING_SPACES, from_rec709
 from wavecomb.run.isolate import trail
 from wavecomb.run.isolate.memory import describe_limit
+from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, frame_planes, frame_points, read_camera
 from wavecomb.usd.cameras.framing import corners, joined
 from wavecomb.usd.geometry.shutter import find_motion
@@ -32,7 +33,6 @@ from wavecomb.usd.looks.material import MaterialTable
 from wavecomb.usd.looks.stock import TextureStock
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
-from wavecomb.usd.materialx import references as mtlx
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.stage.group import Group, placed_lights

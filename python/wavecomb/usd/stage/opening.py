@@ -13,8 +13,8 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
 from wavecomb.run.isolate import patience, trail
+from wavecomb.usd import mtlx
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
-from wavecomb.usd.materialx import references as mtlx
 from wavecomb.usd.stage.diagnostics import captured, commentary
 from wavecomb.usd.stage.population import populate
 from wavecomb.usd.stage.report import LoadReport

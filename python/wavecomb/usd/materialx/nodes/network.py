@@ -6,14 +6,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Sdf, Usd, UsdShade
+from pxr import Gf, Sdf, Usd, UsdShade
 
 from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.looks.graph_call import COLOURS, NodeCall
 from wavecomb.usd.looks.graph_code import Expressions, Value, fit, numbers
-from wavecomb.usd.looks.graph_images import IMAGES
-from wavecomb.usd.looks.graph_nodes import HANDLERS
-from wavecomb.usd.looks.network import shader_id, source_of
+from wavecomb.usd.looks.graph_surface import COLOURS
+from wavecomb.usd.looks.network import Source, shader_id, source_of
+from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
+from wavecomb.usd.materialx.nodes.body import Body
+from wavecomb.usd.materialx.nodes.call import Handler, NodeCall
+from wavecomb.usd.materialx.nodes.table import CATEGORIES, PRIMITIVES
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
@@ -22,37 +24,54 @@ if TYPE_CHECKING:
 MAX_DEPTH = 100
 """Nodes in a row."""
 
-_WIDTHS = {
-    "float": 1, "integer": 1, "boolean": 1, "vector2": 2, "vector3": 3, "color3": 3, "vector4": 4,
-    "color4": 4,
-}  # fmt: skip
+PER_COMPONENT = {"overlay": "ND_overlay_float"}
+"""Graphs that do the same to each component: the one for numbers does it to all at once."""
+
 _WIDTH_OF_TYPE = {
     "float": 1, "half": 1, "double": 1, "int": 1, "bool": 1, "float2": 2, "texCoord2f": 2,
     "float3": 3, "color3f": 3, "vector3f": 3, "normal3f": 3, "point3f": 3, "float4": 4,
-    "color4f": 4,
+    "color4f": 4, "matrix3d": 9, "matrix4d": 16,
 }  # fmt: skip
 _FIRST_CHOICES = ("in", "in1", "bg", "base", "fg", "color1", "color", "value", "default")
+_OF_MATRICES = ("transformmatrix", "transpose", "creatematrix", "constant", "dot")
 
 
 def category_of(identifier: str) -> tuple[str, int]:
     """Category and output width of ``ND_mix_color3``: ("mix", 3); the width is 0 if not said."""
     words = identifier.removeprefix("ND_").split("_")
-    known = HANDLERS.keys() | IMAGES.keys() | _PLACES
-    at = next((n for n in range(len(words), 0, -1) if "_".join(words[:n]) in known), 1)
+    at = next((n for n in range(len(words), 0, -1) if "_".join(words[:n]) in CATEGORIES), 0)
+    if not at and (definition := definition_of(identifier)) is not None:
+        return definition.category, WIDTHS.get(next(iter(definition.outputs.values()), ""), 0)
+    at = at or 1
     widths = [
         width
         for w in words[at:]
-        for name, width in _WIDTHS.items()
+        for name, width in WIDTHS.items()
         # Variants end in FA, I, B, FC ...: of the same output.
         if w.startswith(name) and (w == name or w[len(name) :].isupper())
     ]
     return "_".join(words[:at]), widths[-1] if widths else 0
 
 
-_PLACES = {
-    "texcoord", "geompropvalue", "geompropvalueuniform", "geomcolor", "UsdPrimvarReader",
-    "UsdTransform2d", "normalmap", "gltf_normalmap", "time", "frame",
-}  # fmt: skip
+def primitive(category: str, identifier: str) -> Handler | None:
+    """What compiles a node that is written here; None where none does."""
+    if "_matrix" in identifier and category not in _OF_MATRICES:
+        return None
+    return PRIMITIVES.get(category)
+
+
+def support_of(identifier: str) -> str:
+    """How a node of the library is read: "primitive", "graph", or "" where it is only named."""
+    definition = definition_of(identifier)
+    if definition is None:
+        return ""
+    if primitive(definition.category, identifier) is not None:
+        return "primitive"
+    graph = flat_graph(identifier, CATEGORIES)
+    if graph is None:
+        return ""
+    known = (primitive(node.category, node.identifier) for node in graph.nodes.values())
+    return "graph" if all(one is not None for one in known) else ""
 
 
 class Networks:
@@ -99,7 +118,7 @@ class Networks:
             return None
         self._path.append(key)
         try:
-            value = self._compiled(shader, output, kind)
+            value = self.compiled(self._call(shader, output, kind))
         finally:
             self._path.pop()
         self._done[key] = value
@@ -111,31 +130,33 @@ class Networks:
             self.primvars.append(name)
         return self.make.primvar(self.primvars.index(name), otherwise)
 
-    def _compiled(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
+    def _call(self, shader: UsdShade.Shader, output: str, kind: str) -> NodeCall:
         identifier = shader_id(shader)
-        category, width = category_of(identifier) if identifier else ("", 0)
+        is_known = identifier.startswith("ND_")
+        category, width = category_of(identifier) if is_known else ("", 0)
         declared = shader.GetOutput(output)
         if declared:
             width = _WIDTH_OF_TYPE.get(str(declared.GetTypeName()), width)
-        call = NodeCall(self, shader, category, identifier, output, width, kind)
-        if not identifier.startswith("ND_"):
-            value = self._nearest(call)
-        elif category in _PLACES:
-            value = call.of_surface()
-        elif category in IMAGES:
-            value = IMAGES[category](call)
-        elif category in HANDLERS:
-            value = HANDLERS[category](call)
+        return NodeCall(self, _Authored(self, shader), category, identifier, output, width, kind)
+
+    def compiled(self, call: NodeCall) -> Value | None:
+        """What a node's output gives, of the stage or in a graph of the library."""
+        handler = primitive(call.category, call.identifier)
+        if handler is not None:
+            value = handler(call)
+        elif (graph := _graph_of(call)) is not None:
+            is_wide = call.category in PER_COMPONENT and call.width > 1
+            value = Body(call, graph, call.width if is_wide else 0).output(call.output)
         else:
             value = self._nearest(call)
         return None if value is None else fit(value, call.width or len(value))
 
     def _nearest(self, call: NodeCall) -> Value | None:
         """What stands for a node that is not known: the first of its inputs that gives a value."""
-        given = [item.GetBaseName() for item in call.shader.GetInputs()]
+        given = call.inputs.names()
         first = [name for name in _FIRST_CHOICES if name in given]
         for name in (*first, *(name for name in given if name not in first)):
-            value = self.input(call.shader, name, call.kind)
+            value = call.given(name)
             if value is not None:
                 self._tell(call, f"its input {name} in its place")
                 return value
@@ -144,13 +165,15 @@ class Networks:
 
     def _tell(self, call: NodeCall, instead: str) -> None:
         what = f"MaterialX node {call.identifier or '(no info:id)'} ({instead})"
-        self.report.missing(what, call.shader.GetPath())
+        self.report.missing(what, call.inputs.path)
 
     def _constant(self, value: Any, attribute: Usd.Attribute | None, kind: str) -> Value | None:
         if isinstance(value, bool):
             return numbers(float(value))
         if isinstance(value, (str, Sdf.AssetPath)):
             return None
+        if isinstance(value, (Gf.Matrix3d, Gf.Matrix4d)):
+            return numbers(*(float(x) for row in value for x in row))
         try:
             found = [float(x) for x in value] if hasattr(value, "__len__") else [float(value)]
         except (TypeError, ValueError):
@@ -162,3 +185,49 @@ class Networks:
             there = from_rec709(np.array(found[:3]), self.textures.working)
             found = [*(float(x) for x in there), *found[3:]]
         return numbers(*found)
+
+
+def _graph_of(call: NodeCall) -> FlatGraph | None:
+    """The library's graph for a node whose output is numbers."""
+    if not call.identifier.startswith("ND_"):
+        return None
+    definition = definition_of(call.identifier)
+    if definition is None:
+        return None
+    name = call.output if call.output in definition.outputs else next(iter(definition.outputs), "")
+    width = WIDTHS.get(definition.outputs.get(name, ""), 0)
+    if not width:
+        return None
+    call.output, call.width = name, width
+    is_wide = call.category in PER_COMPONENT and width > 1
+    identifier = PER_COMPONENT[call.category] if is_wide else call.identifier
+    return flat_graph(identifier, CATEGORIES)
+
+
+class _Authored:
+    """Inputs of a shader of a stage, as ``call.Inputs``."""
+
+    def __init__(self, networks: Networks, shader: UsdShade.Shader) -> None:
+        self._networks = networks
+        self._shader = shader
+
+    @property
+    def path(self) -> Sdf.Path:
+        """The shader's."""
+        return self._shader.GetPath()
+
+    def find(self, name: str, kind: str) -> Value | None:
+        """What feeds an input; None where nothing does."""
+        return self._networks.input(self._shader, name, kind)
+
+    def source(self, name: str) -> Source | None:
+        """The same of what is no number."""
+        return source_of(self._shader, name, self._networks.time)
+
+    def has(self, name: str) -> bool:
+        """Whether an input is authored."""
+        return self.source(name) is not None
+
+    def names(self) -> list[str]:
+        """Inputs that are there."""
+        return [item.GetBaseName() for item in self._shader.GetInputs()]

@@ -8,89 +8,21 @@ or driven by a value graph.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
 from wavecomb.usd.looks.graph_code import Value, is_constant, numbers
-from wavecomb.usd.looks.graph_network import Networks
 from wavecomb.usd.looks.graph_surface import Drivers, sampled
 from wavecomb.usd.looks.network import colour, number, source_of
-from wavecomb.usd.looks.openpbr import drive_layers, layers_of
 from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materialx.nodes.network import Networks
+from wavecomb.usd.materialx.surfaces.models import MODELS, Colour, Row
+from wavecomb.usd.materialx.surfaces.openpbr import drive_layers, layers_of
 
 if TYPE_CHECKING:
     from wavecomb.usd.looks.texture import TextureTable
     from wavecomb.usd.stage.report import LoadReport
-
-Colour = tuple[float, float, float]
-
-_WHITE: Colour = (1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Model:
-    """Names and defaults of the inputs of a shading model, each (name, default).
-
-    A slot's value is its input, times its weight where one is named.
-    """
-
-    base_color: tuple[str, Colour]
-    base_weight: tuple[str, float] = ("", 1.0)
-    roughness: tuple[str, float] = ("specular_roughness", 0.2)
-    metallic: tuple[str, float] = ("metalness", 0.0)
-    ior: tuple[str, float] = ("specular_IOR", 1.5)
-    transmission: tuple[str, float] = ("transmission", 0.0)
-    transmission_color: tuple[str, Colour] = ("transmission_color", _WHITE)
-    emission: tuple[str, Colour] = ("emission_color", _WHITE)
-    emission_weight: tuple[str, float] = ("emission", 0.0)
-    clearcoat: tuple[str, float] = ("coat", 0.0)
-    clearcoat_roughness: tuple[str, float] = ("coat_roughness", 0.1)
-    specular_color: tuple[str, Colour] = ("specular_color", _WHITE)
-    opacity: tuple[str, float] = ("opacity", 1.0)
-    normal: str = "normal"
-
-
-MODELS: dict[str, Model] = {
-    "standard_surface": Model(("base_color", (0.8, 0.8, 0.8)), ("base", 1.0)),
-    "open_pbr_surface": Model(
-        ("base_color", (0.8, 0.8, 0.8)),
-        ("base_weight", 1.0),
-        ("specular_roughness", 0.3),
-        ("base_metalness", 0.0),
-        ("specular_ior", 1.5),
-        ("transmission_weight", 0.0),
-        ("transmission_color", _WHITE),
-        ("emission_color", _WHITE),
-        ("emission_luminance", 0.0),
-        ("coat_weight", 0.0),
-        ("coat_roughness", 0.0),
-        ("specular_color", _WHITE),
-        ("geometry_opacity", 1.0),
-        "geometry_normal",
-    ),
-    "gltf_pbr": Model(
-        ("base_color", _WHITE),
-        ("", 1.0),
-        ("roughness", 1.0),
-        ("metallic", 1.0),
-        ("ior", 1.5),
-        ("transmission", 0.0),
-        ("", _WHITE),
-        ("emissive", (0.0, 0.0, 0.0)),
-        ("emissive_strength", 1.0),
-        ("clearcoat", 0.0),
-        ("clearcoat_roughness", 0.0),
-        ("specular_color", _WHITE),
-        ("alpha", 1.0),
-    ),
-}
-
-
-def model_of(identifier: str) -> str:
-    """The shading model of a shader id such as ``ND_standard_surface_surfaceshader``, or ''."""
-    return next((name for name in MODELS if identifier.startswith(f"ND_{name}")), "")
 
 
 class MaterialXReader:
@@ -115,29 +47,16 @@ class MaterialXReader:
         """The surface: slots, and layers beside them."""
         model = MODELS[model_name]
         parameters: dict[str, Any] = {"presence": True}
-        whole = self._value(shader, "", model.base_weight)
-        for parameter, spec, weight in (
-            ("base_color", model.base_color, whole),
-            ("specular_color", model.specular_color, (1.0,)),
-            ("roughness", model.roughness, (1.0,)),
-            ("metallic", model.metallic, (1.0,)),
-            ("ior", model.ior, (1.0,)),
-            ("clearcoat", model.clearcoat, (1.0,)),
-            ("clearcoat_roughness", model.clearcoat_roughness, (1.0,)),
-            ("opacity", model.opacity, (1.0,)),
-        ):
-            self._put(parameters, shader, parameter, spec, weight)
+        for parameter, row in model.slots.items():
+            weight = self._value(shader, "", *row.weight)
+            if parameter == "emission":
+                weight = self._radiance(weight, model.emission_unit)
+                if is_constant(weight) and weight[0] <= 0.0:  # type: ignore[operator]
+                    continue
+            self._put(parameters, shader, parameter, row, weight)
         if parameters.get("ior", 1.5) <= 0.0:
             self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
             parameters["ior"] = 1.5
-        glow = self._value(shader, "", model.emission_weight)
-        if model_name == "open_pbr_surface":
-            # Luminance in nits; 1000 is open_pbr's own scale for a bright display.
-            nits = 1000.0
-            constant = is_constant(glow)
-            glow = (glow[0] / nits,) if constant else self.drivers.scaled(glow, (1 / nits,))  # type: ignore[operator]
-        if not (is_constant(glow) and glow[0] <= 0.0):  # type: ignore[operator]
-            self._put(parameters, shader, "emission", model.emission, glow)
         normal = self.drivers.value(shader, model.normal, "normal")
         if normal is not None:
             self.drivers.put("normal", normal)
@@ -164,12 +83,21 @@ class MaterialXReader:
             return numbers(*value) if isinstance(value, tuple) else numbers(float(value))
         return self.drivers.value(shader, name, parameter)
 
-    def _value(self, shader: UsdShade.Shader, parameter: str, spec: tuple[str, Any]) -> Value:
+    def _radiance(self, glow: Value, unit: float) -> Value:
+        """Emission in its model's unit, as radiance."""
+        if unit == 1.0:
+            return glow
+        if is_constant(glow):
+            return (glow[0] / unit,)  # type: ignore[operator]
+        return self.drivers.scaled(glow, (1.0 / unit,))
+
+    def _value(
+        self, shader: UsdShade.Shader, parameter: str, name: str, default: float | Colour
+    ) -> Value:
         """An input, or its default."""
-        name, default = spec
         value = self.input(shader, name, parameter) if name else None
         if value is None:
-            return tuple(default) if isinstance(default, tuple) else (default,)
+            return default if isinstance(default, tuple) else (float(default),)
         return value
 
     def _put(
@@ -177,14 +105,14 @@ class MaterialXReader:
         parameters: dict[str, Any],
         shader: UsdShade.Shader,
         parameter: str,
-        spec: tuple[str, Any],
+        row: Row,
         weight: Value,
     ) -> None:
-        value = self._value(shader, parameter, spec)
-        if isinstance(spec[1], tuple) and len(value) == 1:
+        width = 3 if isinstance(row.default, tuple) else 1
+        value = self._value(shader, parameter, row.input, row.default)
+        if width == 3 and len(value) == 1:
             value = value * 3
-        value = value[: 3 if isinstance(spec[1], tuple) else 1]
-        constant = self.drivers.put(parameter, self.drivers.scaled(value, weight))
+        constant = self.drivers.put(parameter, self.drivers.scaled(value[:width], weight))
         if constant is not None:
             parameters[parameter] = constant if len(constant) > 1 else constant[0]
 

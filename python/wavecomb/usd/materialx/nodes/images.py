@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX nodes that read images."""
+
+from __future__ import annotations
+
+import math
+
+from wavecomb.usd.looks.colour_space import space_of
+from wavecomb.usd.looks.graph_code import Value, fit, numbers
+from wavecomb.usd.looks.graph_surface import COLOURS, NORMAL, uv_matrix
+from wavecomb.usd.looks.texture import asset_file
+from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
+
+NODES: dict[str, Handler] = {}
+_node = adder(NODES)
+
+_WRAPS = {
+    "periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "black",
+}  # fmt: skip
+
+
+def _stretch(uv: Value) -> float:
+    """Lengths in texture coordinates for one in those of the mesh; 1 where that is not constant."""
+    m = uv_matrix(uv)
+    if m is None:
+        return 1.0
+    return math.sqrt(max(m[0] ** 2 + m[1] ** 2, m[3] ** 2 + m[4] ** 2))
+
+
+def _read(n: NodeCall, uv: Value, wraps: list[str], fallback: str, is_raw: bool) -> Value:
+    """r, g, b, alpha of the node's file; its default where there is none that can be read."""
+    networks = n.networks
+    file = n.inputs.source("file")
+    path = asset_file(file.value, file.attribute) if file is not None and file.is_value else ""
+    image = networks.textures.image(path, n.inputs.path) if path else None
+    if image is None:
+        authored = n.given(fallback) if n.inputs.has(fallback) else None
+        if authored is not None:
+            return fit(authored, 4)
+        if n.kind == "base" and path:
+            return n.make.image(networks.textures.missing(), uv, _stretch(uv))
+        return numbers(0.0, 0.0, 0.0, 1.0)
+    is_colour = n.kind in COLOURS and not is_raw
+    space = space_of(file.attribute if file else None) or ("auto" if is_colour else "raw")
+    if n.kind == NORMAL:
+        space = "raw"
+    texture = networks.textures.add(path, image, space, *wraps, is_colour=is_colour)
+    r, g, b, a = n.make.image(texture, uv, _stretch(uv))
+    return (r, r, r, a) if image.channels < 3 else (r, g, b, a)
+
+
+@_node("image")
+def _image(n: NodeCall) -> Value:
+    wraps = [_WRAPS.get(n.text(f"{axis}addressmode", "periodic"), "repeat") for axis in "uv"]
+    return _read(n, n.coordinates(), wraps, "default", "color" not in n.identifier)
+
+
+@_node("UsdUVTexture")
+def _uv_texture(n: NodeCall) -> Value:
+    """MaterialX's graph of it has no sourceColorSpace, which 1.38 had and stages say."""
+    m = n.make
+    uv = n.coordinates("st")
+    wraps = [n.text(name, "periodic").replace("periodic", "repeat") for name in ("wrapS", "wrapT")]
+    raw = n.text("sourceColorSpace", "auto") == "raw"
+    texel = _read(n, uv, wraps, "fallback", raw)
+    texel = m.op("multiply", texel, n.value("scale", (1.0, 1.0, 1.0, 1.0), 4))
+    texel = m.op("add", texel, n.value("bias", (0.0, 0.0, 0.0, 0.0), 4))
+    n.width = {"rgba": 4, "rgb": 3}.get(n.output, 1)
+    if n.output in ("r", "g", "b", "a"):
+        return (texel["rgba".index(n.output)],)
+    return texel[: n.width]

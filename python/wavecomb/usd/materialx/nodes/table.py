@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX nodes that are written here, by category; all others are graphs of these."""
+
+from __future__ import annotations
+
+from wavecomb.usd.materialx.nodes import (
+    arithmetic,
+    channels,
+    colours,
+    compositing,
+    conditions,
+    images,
+    matrices,
+    places,
+    procedures,
+)
+from wavecomb.usd.materialx.nodes.call import Handler
+
+PRIMITIVES: dict[str, Handler] = {
+    **arithmetic.NODES,
+    **channels.NODES,
+    **colours.NODES,
+    **compositing.NODES,
+    **conditions.NODES,
+    **images.NODES,
+    **matrices.NODES,
+    **places.NODES,
+    **procedures.NODES,
+}
+"""What compiles a category."""
+
+CATEGORIES = frozenset(PRIMITIVES)
+"""Of nodes that graphs of the library keep."""

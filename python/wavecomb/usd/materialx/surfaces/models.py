@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX's surface shaders as parameters of program "openpbr": each is translated here, once.
+
+A parameter is an input times a number, whether that is a constant, a texture or a graph. What is
+no product of one input stands in ``openpbr``. Why Standard Surface does not go through MaterialX's
+own graph, ``standard_surface_to_open_pbr_surface``, is told in docs/decisions/materialx-graphs.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+Colour = tuple[float, float, float]
+
+WHITE: Colour = (1.0, 1.0, 1.0)
+PALE: Colour = (0.8, 0.8, 0.8)
+BLACK: Colour = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Where a parameter comes from.
+
+    Attributes:
+        input: Of the shader; "" where there is none, and the default counts.
+        default: Of that input: a number, a colour, or a bool for a switch.
+        factor: That a number is multiplied by.
+        divisor: That it is divided by.
+        driven: Whether a node may give it; else that node's typical value is one value for all, or
+            ``openpbr`` knows what to do with it.
+        weight: Another input that it is multiplied by, with its default.
+    """
+
+    input: str
+    default: float | bool | Colour
+    factor: float = 1.0
+    divisor: float = 1.0
+    driven: bool = True
+    weight: tuple[str, float] = ("", 1.0)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A shading model.
+
+    Attributes:
+        slots: Parameters that plain textures may drive.
+        emission_unit: Emission in the units of a radiance of 1.
+        normal: The input that tilts the surface.
+        layers: Parameters beside slots: names are those of ``add_material(openpbr=...)``.
+        ignored: Inputs without effect, said where they are authored.
+    """
+
+    slots: dict[str, Row]
+    emission_unit: float
+    normal: str
+    layers: dict[str, Row]
+    ignored: tuple[str, ...]
+
+
+MODELS: dict[str, Model] = {
+    "standard_surface": Model(
+        slots={
+            "base_color": Row("base_color", PALE, weight=("base", 1.0)),
+            "specular_color": Row("specular_color", WHITE),
+            "roughness": Row("specular_roughness", 0.2),
+            "metallic": Row("metalness", 0.0),
+            "ior": Row("specular_IOR", 1.5),
+            "clearcoat": Row("coat", 0.0),
+            "clearcoat_roughness": Row("coat_roughness", 0.1),
+            "opacity": Row("opacity", 1.0),
+            "emission": Row("emission_color", WHITE, weight=("emission", 0.0)),
+        },
+        emission_unit=1.0,
+        normal="normal",
+        layers={
+            "diffuse_roughness": Row("diffuse_roughness", 0.0),
+            "specular_weight": Row("specular", 1.0),
+            "anisotropy": Row("specular_anisotropy", 0.0),
+            "rotation": Row("specular_rotation", 0.0),
+            "transmission_weight": Row("transmission", 0.0),
+            "transmission_color": Row("transmission_color", WHITE, driven=False),
+            "transmission_depth": Row("transmission_depth", 0.0, driven=False),
+            "subsurface_weight": Row("subsurface", 0.0),
+            "subsurface_color": Row("subsurface_color", WHITE),
+            "subsurface_anisotropy": Row("subsurface_anisotropy", 0.0),
+            "fuzz_weight": Row("sheen", 0.0),
+            "fuzz_color": Row("sheen_color", WHITE),
+            "fuzz_roughness": Row("sheen_roughness", 0.3),
+            "coat_color": Row("coat_color", WHITE),
+            "coat_ior": Row("coat_IOR", 1.5),
+            "coat_darkening": Row("coat_affect_color", 0.0),
+            "film_thickness": Row("thin_film_thickness", 0.0),
+            "film_ior": Row("thin_film_IOR", 1.5),
+            "thin_walled": Row("thin_walled", False, driven=False),
+        },
+        ignored=(
+            "transmission_scatter",
+            "transmission_scatter_anisotropy",
+            "transmission_dispersion",
+            "transmission_extra_roughness",
+            "coat_anisotropy",
+            "coat_rotation",
+            "coat_affect_roughness",
+            "coat_normal",
+            "tangent",
+        ),
+    ),
+    "open_pbr_surface": Model(
+        slots={
+            "base_color": Row("base_color", PALE, weight=("base_weight", 1.0)),
+            "specular_color": Row("specular_color", WHITE),
+            "roughness": Row("specular_roughness", 0.3),
+            "metallic": Row("base_metalness", 0.0),
+            "ior": Row("specular_ior", 1.5),
+            "clearcoat": Row("coat_weight", 0.0),
+            "clearcoat_roughness": Row("coat_roughness", 0.0),
+            "opacity": Row("geometry_opacity", 1.0),
+            "emission": Row("emission_color", WHITE, weight=("emission_luminance", 0.0)),
+        },
+        emission_unit=1000.0,  # of nits: open_pbr's own scale for a bright display
+        normal="geometry_normal",
+        layers={
+            "diffuse_roughness": Row("base_diffuse_roughness", 0.0),
+            "specular_weight": Row("specular_weight", 1.0),
+            "anisotropy": Row("specular_roughness_anisotropy", 0.0),
+            "transmission_weight": Row("transmission_weight", 0.0),
+            "transmission_color": Row("transmission_color", WHITE, driven=False),
+            "transmission_depth": Row("transmission_depth", 0.0, driven=False),
+            "subsurface_weight": Row("subsurface_weight", 0.0),
+            "subsurface_color": Row("subsurface_color", PALE),
+            "subsurface_anisotropy": Row("subsurface_scatter_anisotropy", 0.0),
+            "fuzz_weight": Row("fuzz_weight", 0.0),
+            "fuzz_color": Row("fuzz_color", WHITE),
+            "fuzz_roughness": Row("fuzz_roughness", 0.5),
+            "coat_color": Row("coat_color", WHITE),
+            "coat_ior": Row("coat_ior", 1.6),
+            "coat_darkening": Row("coat_darkening", 1.0),
+            "film_weight": Row("thin_film_weight", 0.0),
+            "film_thickness": Row("thin_film_thickness", 0.5, 1000.0),
+            "film_ior": Row("thin_film_ior", 1.4),
+            "thin_walled": Row("geometry_thin_walled", False, driven=False),
+        },
+        ignored=(
+            "transmission_scatter",
+            "transmission_scatter_anisotropy",
+            "transmission_dispersion_scale",
+            "coat_roughness_anisotropy",
+            "geometry_tangent",
+            "geometry_coat_normal",
+            "geometry_coat_tangent",
+        ),
+    ),
+    "gltf_pbr": Model(
+        slots={
+            "base_color": Row("base_color", WHITE),
+            "specular_color": Row("specular_color", WHITE),
+            "roughness": Row("roughness", 1.0),
+            "metallic": Row("metallic", 1.0),
+            "ior": Row("ior", 1.5),
+            "clearcoat": Row("clearcoat", 0.0),
+            "clearcoat_roughness": Row("clearcoat_roughness", 0.0),
+            "opacity": Row("alpha", 1.0),
+            "emission": Row("emissive", BLACK, weight=("emissive_strength", 1.0)),
+        },
+        emission_unit=1.0,
+        normal="normal",
+        layers={
+            "specular_weight": Row("specular", 1.0),
+            "anisotropy": Row("anisotropy_strength", 0.0),
+            "rotation": Row("anisotropy_rotation", 0.0, divisor=2.0 * math.pi),
+            "transmission_weight": Row("transmission", 0.0),
+            "fuzz_roughness": Row("sheen_roughness", 0.0),
+            "film_weight": Row("iridescence", 0.0),
+            "film_thickness": Row("iridescence_thickness", 100.0),
+            "film_ior": Row("iridescence_ior", 1.3),
+        },
+        ignored=("occlusion", "clearcoat_normal", "dispersion", "tangent"),
+    ),
+}
+"""Shading models by the name in their shaders' ids."""

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The door to MaterialX: the one module that imports ``wavecomb.usd.materialx``.
+
+Without that package, or without the ``materialx`` wheel, stages load as they are: what asks for
+MaterialX is drawn grey or left out, and said once.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pxr import Usd, UsdShade
+
+from wavecomb.usd.looks.graph_code import Expressions, Value
+from wavecomb.usd.stage.unread import unread_mtlx
+
+if TYPE_CHECKING:
+    from wavecomb.usd.looks.graph_surface import Networks
+    from wavecomb.usd.looks.surface import Surface
+    from wavecomb.usd.looks.surface_inputs import InputDefinition
+    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.stage.report import LoadReport
+
+ABSENT = "MaterialX without the Python package materialx (pip install materialx)"
+"""What is said where a stage asks for MaterialX and it is not there."""
+
+MODELS = ("standard_surface", "open_pbr_surface", "gltf_pbr")
+"""Shading models that are read."""
+
+
+def is_there() -> bool:
+    """Whether MaterialX can be read; imports nothing."""
+    try:
+        return all(
+            importlib.util.find_spec(name) is not None
+            for name in ("MaterialX", "wavecomb.usd.materialx")
+        )
+    except (ImportError, ValueError):
+        return False
+
+
+def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
+    """Makes a stage see the MaterialX files that its layers name.
+
+    Those layers are changed in memory, and cannot be saved from then on. What cannot be read stays
+    missing; ``tell`` says so. Costs next to nothing where no such file is missing.
+
+    Args:
+        stage: The stage.
+        everywhere: Also where variants are not selected, so that selecting them later, on whatever
+            thread, changes no layer. Looks through all layers.
+    """
+    if (everywhere or any(True for _ in unread_mtlx(stage))) and is_there():
+        from wavecomb.usd.materialx import references
+
+        references.resolve(stage, everywhere=everywhere)
+
+
+def reload(stage: Usd.Stage) -> None:
+    """Reads the files of a stage again that changed, MaterialX files among them."""
+    if not is_there():
+        stage.Reload()
+        return
+    from wavecomb.usd.materialx import references
+
+    references.reload(stage)
+
+
+def tell(stage: Usd.Stage, report: LoadReport) -> None:
+    """Says which MaterialX files are missing from a stage, and what of others was left out."""
+    if is_there():
+        from wavecomb.usd.materialx import references
+
+        references.tell(stage, report)
+        return
+    for error, _ in unread_mtlx(stage):
+        report.warn(f"{ABSENT}: files left out", str(error.rootSite.path))
+
+
+def model_of(identifier: str) -> str:
+    """The shading model of a shader id such as ``ND_standard_surface_surfaceshader``, or ''."""
+    return next((name for name in MODELS if identifier.startswith(f"ND_{name}")), "")
+
+
+def surface(
+    material: Usd.Prim,
+    time: Usd.TimeCode,
+    textures: TextureTable,
+    report: LoadReport,
+    shader: UsdShade.Shader,
+    model: str,
+    values: Mapping[str, Any] | None = None,
+) -> Surface | None:
+    """The surface of a shader; None, and said, without MaterialX.
+
+    Args:
+        material: That the shader is in.
+        time: Of evaluation.
+        textures: Of the scene.
+        report: Is told what is not supported.
+        shader: The surface shader.
+        model: One of ``MODELS``.
+        values: Constants of the shader in place of what the stage says.
+    """
+    if not is_there():
+        report.missing(f"{ABSENT}: drawn grey", material.GetPath())
+        return None
+    from wavecomb.usd.materialx.surfaces.reader import MaterialXReader
+
+    return MaterialXReader(material, time, textures, report, values).read(shader, model)
+
+
+def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
+    """Inputs of a shading model that are read, by name, in MaterialX's order; none without it.
+
+    Args:
+        model: One of ``MODELS``.
+        identifier: The shader's, which may name an older version.
+    """
+    if not is_there():
+        return {}
+    from wavecomb.usd.materialx.surfaces import inputs
+
+    return inputs.definitions(model, identifier)
+
+
+def networks(
+    material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
+) -> Networks:
+    """What compiles the networks of a material's nodes."""
+    if not is_there():
+        return _NoNodes(material, textures, report)
+    from wavecomb.usd.materialx.nodes import network
+
+    return network.Networks(material, time, textures, report)
+
+
+class _NoNodes:
+    """Networks of a material where no node can be read, as ``graph_surface.Networks``."""
+
+    def __init__(self, material: Usd.Prim, textures: TextureTable, report: LoadReport) -> None:
+        self.make = Expressions()
+        self.material = material
+        self.primvars: list[str] = []
+        self.report = report
+        self.textures = textures
+        self.uv_names: list[str] = []
+
+    def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
+        """Nothing, and said."""
+        return self.node(shader, name, kind)
+
+    def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
+        """Nothing, and said."""
+        self.report.missing(f"{ABSENT}: nodes left out", shader.GetPath())
+        return None
+
+    def in_working_space(self) -> Networks:
+        """The same."""
+        return self

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Single MaterialX nodes on a stage in memory, compiled and run."""
+
+from __future__ import annotations
+
+import functools
+import random
+import zlib
+from types import SimpleNamespace
+
+import numpy as np
+from pxr import Usd, UsdShade
+
+from wavecomb.usd.looks.graph_code import POINT_SIZE, assemble, fit
+from wavecomb.usd.materialx.library import WIDTHS, library
+from wavecomb.usd.materialx.nodes.call import NodeCall
+from wavecomb.usd.materialx.nodes.network import Networks
+from wavecomb.usd.materialx.values import usd_type, usd_value
+from wavecomb.usd.stage.report import LoadReport
+
+
+class Textures:
+    """Every file is there, of four channels; the uses are told apart."""
+
+    working = "rec709"
+
+    def __init__(self):
+        self.uses = []
+
+    def image(self, path, prim):
+        return SimpleNamespace(channels=4)
+
+    def add(self, path, image, space, *wraps, is_colour=True):
+        use = (path, space, *wraps, is_colour)
+        if use not in self.uses:
+            self.uses.append(use)
+        return self.uses.index(use)
+
+    def missing(self):
+        return 99
+
+
+class Node:
+    """A node of a definition; ``report``: what is said of it."""
+
+    def __init__(self, identifier):
+        self.stage = Usd.Stage.CreateInMemory()
+        self.material = self.stage.DefinePrim("/M", "Material")
+        self.shader = UsdShade.Shader.Define(self.stage, "/M/N")
+        self.shader.CreateIdAttr(identifier)
+        self.definition = library().getNodeDef(identifier)
+        assert self.definition is not None, identifier
+        for output in self.definition.getActiveOutputs():
+            self.shader.CreateOutput(output.getName(), usd_type(output.getType()))
+        self.report = LoadReport()
+        self.textures = Textures()
+        self.networks = Networks(self.material, Usd.TimeCode.Default(), self.textures, self.report)
+
+    def give(self, **values):
+        """Constants: text as MaterialX writes it."""
+        for name, text in values.items():
+            kind = self.definition.getActiveInput(name).getType()
+            self.shader.CreateInput(name, usd_type(kind)).Set(usd_value(str(text), kind))
+        return self
+
+    def feed(self, name, identifier, output="out", **values):
+        """Lets another node feed an input."""
+        source = UsdShade.Shader.Define(self.stage, f"/M/{name}")
+        source.CreateIdAttr(identifier)
+        definition = library().getNodeDef(identifier)
+        for item, text in values.items():
+            kind = definition.getActiveInput(item).getType()
+            source.CreateInput(item, usd_type(kind)).Set(usd_value(str(text), kind))
+        kind = usd_type(self.definition.getActiveInput(name).getType())
+        source.CreateOutput(output, kind)
+        self.shader.CreateInput(name, kind).ConnectToSource(source.ConnectableAPI(), output)
+        return self
+
+    def feed_at_random(self):
+        """Numbers, and noise of several scales, for all inputs that are not settings."""
+        chance = random.Random(zlib.crc32(self.definition.getName().encode()))
+        for item in self.definition.getActiveInputs():
+            kind, name = item.getType(), item.getName()
+            is_setting = kind in ("integer", "boolean") or item.getIsUniform()
+            if kind not in WIDTHS or WIDTHS[kind] > 4 or is_setting:
+                continue
+            if item.getDefaultGeomPropString():
+                continue
+            if chance.random() < 0.6:
+                size = ",".join([f"{chance.uniform(0.3, 2.0):.3f}"] * WIDTHS[kind])
+                pivot = f"{chance.uniform(-0.2, 0.8):.3f}"
+                self.feed(name, f"ND_noise3d_{kind}", amplitude=size, pivot=pivot)
+            elif chance.random() < 0.7:
+                numbers = [f"{chance.uniform(-0.5, 1.5):.3f}" for _ in range(WIDTHS[kind])]
+                self.give(**{name: ",".join(numbers)})
+        return self
+
+    def value(self, output="out", kind="number"):
+        """What an output is compiled to."""
+        return self.networks.node(self.shader, output, kind)
+
+    def call(self, output, kind="number"):
+        """The call of the node, as ``Networks`` would make it."""
+        call = self.networks._call(self.shader, output, kind)
+        assert isinstance(call, NodeCall)
+        width = next(
+            o.getType() for o in self.definition.getActiveOutputs() if o.getName() == output
+        )
+        call.width = WIDTHS[width]
+        return call
+
+    def run(self, points, output="out", kind="number"):
+        """What it comes to at points."""
+        return run(self.value(output, kind), points)
+
+
+def run(value, points):
+    """A value at points (n, components), and how many operations it takes."""
+    return assemble(dict(enumerate(fit(value, len(value))))).run(points)
+
+
+def points(n=200):
+    """Points at random: uv in 0..1, places in -1.5..1.5, unit directions."""
+    chance = np.random.default_rng(3)
+    table = chance.uniform(-1.5, 1.5, (n, POINT_SIZE)).astype(np.float32)
+    table[:, :2] = chance.uniform(0, 1, (n, 2))
+    table[:, 2] = 1e-3
+    for first in (9, 12, 15, 18):
+        table[:, first : first + 3] /= np.linalg.norm(table[:, first : first + 3], axis=1)[:, None]
+    return table
+
+
+@functools.cache
+def patterns():
+    """Definitions of the library whose outputs are numbers, by name, with those outputs."""
+    found = {}
+    for definition in library().getNodeDefs():
+        outputs = [o.getName() for o in definition.getActiveOutputs() if o.getType() in WIDTHS]
+        if outputs:
+            found[definition.getName()] = outputs
+    return found

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX's own library: which of its nodes are read, and that what is written here is the same.
+
+The list of docs/material-graphs.md is held to what is so.
+"""
+
+from __future__ import annotations
+
+import collections
+import functools
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from materialx_nodes import Node, patterns, points, run
+
+from wavecomb.usd.materialx.library import WIDTHS, definition_of, flat_graph, library
+from wavecomb.usd.materialx.nodes.body import Body
+from wavecomb.usd.materialx.nodes.network import PER_COMPONENT, primitive, support_of
+from wavecomb.usd.materialx.nodes.table import CATEGORIES
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "material-graphs.md"
+
+CODE = "code in the library, which value graphs have no operation for"
+SPACES = "spaces of a mesh are known only where it is placed"
+HEIGHT = "differences between texels of a height"
+MATRIX = "matrices are made, transposed and applied only"
+HAIR = "inputs of hair"
+REASONS = {
+    "hextiledimage": CODE, "hextilednormalmap": CODE, "flake2d": CODE, "flake3d": CODE,
+    "heighttonormal": HEIGHT, "bump": HEIGHT,
+    "transformpoint": SPACES, "transformvector": SPACES, "transformnormal": SPACES,
+    "determinant": MATRIX, "invertmatrix": MATRIX,
+    "roughness_anisotropy": "inputs of BSDF nodes", "roughness_dual": "inputs of BSDF nodes",
+    "glossiness_anisotropy": "inputs of BSDF nodes", "artistic_ior": "inputs of BSDF nodes",
+    "standard_surface_to_gltf_pbr": "inputs of BSDF nodes",
+    "deon_hair_absorption_from_melanin": HAIR, "chiang_hair_absorption_from_color": HAIR,
+    "chiang_hair_roughness": HAIR,
+}  # fmt: skip
+"""Why nodes are only named, by category."""
+
+
+def library_of(identifier):
+    return library().getNodeDef(identifier).getSourceUri().split("libraries/")[-1].split("/")[0]
+
+
+def reason(identifier):
+    if "_matrix" in identifier:
+        return MATRIX
+    return REASONS[definition_of(identifier).category]
+
+
+@functools.cache
+def by_category(*support):
+    """Definitions that are read in one of these ways, by category."""
+    found = collections.defaultdict(list)
+    for identifier in patterns():
+        if support_of(identifier) in support:
+            found[definition_of(identifier).category].append(identifier)
+    return found
+
+
+def test_all_nodes_are_read_or_named_with_a_reason():
+    counts, named = collections.Counter(), collections.defaultdict(set)
+    for identifier in patterns():
+        support = support_of(identifier)
+        counts[library_of(identifier), support or "named"] += 1
+        if not support:
+            named[reason(identifier)].add(definition_of(identifier).category)
+    text = DOCS.read_text()
+    for folder in ("stdlib", "nprlib", "pbrlib", "cmlib", "bxdf"):
+        row = [counts[folder, how] for how in ("primitive", "graph", "named")]
+        assert f"| {folder} | {row[0]} | {row[1]} | {row[2]} |" in text, (folder, row)
+    for why, categories in named.items():
+        line = f"- {', '.join(f'`{name}`' for name in sorted(categories))}: {why}"
+        assert re.sub(r"\s+", " ", line) in re.sub(r"\s+", " ", text), line
+    assert not REASONS.keys() - {name for names in named.values() for name in names}
+
+
+@pytest.mark.parametrize("category", sorted(by_category("primitive", "graph")))
+def test_no_node_that_is_read_says_anything(category):
+    """And its output has as many components as it says: of the first and last types of each."""
+    variants = by_category("primitive", "graph")[category]
+    for identifier in {variants[0], variants[-1]}:
+        node = Node(identifier).feed_at_random()
+        for output in patterns()[identifier]:
+            value = node.value(output)
+            kind = definition_of(identifier).outputs[output]
+            assert value is not None and len(value) == WIDTHS[kind], (identifier, output)
+        assert "MaterialX" not in "\n".join(node.report.lines()), identifier
+
+
+def both_ways():
+    """Nodes that are written here though the library has a graph for them."""
+    for identifier in patterns():
+        category = definition_of(identifier).category
+        is_here = primitive(category, identifier) is not None or category in PER_COMPONENT
+        if is_here and flat_graph(identifier, CATEGORIES) is not None:
+            yield identifier
+
+
+@pytest.mark.parametrize("identifier", sorted(both_ways()))
+def test_what_is_written_here_is_the_library_s_graph(identifier):
+    """Bit for bit, on inputs at random; and no operation more."""
+    at = points()
+    node = Node(identifier).feed_at_random()
+    if identifier.startswith("ND_UsdUVTexture"):
+        node.give(file="a.png", wrapS="clamp")
+    if identifier.startswith("ND_UsdPrimvarReader"):
+        node.give(varname="wear")
+    for output in patterns()[identifier]:
+        ours = node.value(output)
+        graph = flat_graph(identifier, CATEGORIES)
+        theirs = Body(node.call(output), graph).output(output)
+        if ours == theirs:  # the very same nodes
+            continue
+        assert np.array_equal(run(ours, at), run(theirs, at), equal_nan=True), output
+
+
+@pytest.mark.parametrize("category", sorted(by_category("primitive")))
+def test_defaults_of_primitives_are_the_library_s(category):
+    """A node without inputs is one with all inputs at what its definition says."""
+    for identifier in by_category("primitive")[category]:
+        bare, full = Node(identifier), Node(identifier)
+        full.networks.make = bare.networks.make
+        for item in full.definition.getActiveInputs():
+            kind, text = item.getType(), item.getValueString()
+            if kind in WIDTHS and text and not item.getDefaultGeomPropString():
+                full.give(**{item.getName(): text})
+        if identifier in ("ND_image_color4", "ND_image_vector4"):
+            full.give(default="0, 0, 0, 1")  # a file that is missing is drawn opaque
+        for output in patterns()[identifier]:
+            assert bare.value(output) == full.value(output), (identifier, output)
+
+
+def test_definitions_are_made_flat_once():
+    first = flat_graph("ND_ramp", CATEGORIES)
+    assert first is flat_graph("ND_ramp", CATEGORIES)
+    order = list(first.nodes)
+    for name, inner in first.nodes.items():
+        assert inner.category in CATEGORIES
+        for feed in inner.inputs.values():
+            assert not feed.node or order.index(feed.node) < order.index(name)
