@@ -17,6 +17,7 @@ from bench_results import everything, runs_of, write_folder
 from wavecomb.bench.report import build
 from wavecomb.bench.report_html import nested, number, table
 from wavecomb.bench.report_markdown import LARGEST_PNG, LARGEST_SVG
+from wavecomb.bench.report_parts import Markup, read_report
 from wavecomb.picture.image import read_image
 
 HTML = "{http://www.w3.org/1999/xhtml}"
@@ -154,6 +155,26 @@ def test_markdown_page(folder: Path, tmp_path: Path) -> None:
         assert len({line.count(" | ") for line in lines.splitlines() if "---" not in line}) == 1
     assert "| dragon, 16 lanes | oracle |" in text
     assert not re.search(r"</?(p|td|th|tr|table|details|span|svg)\b", text)
+
+
+def test_parts_are_kept_beside_the_page(folder: Path, tree: ElementTree.Element) -> None:
+    """What the window shows is what the page says, section by section and figure by figure."""
+    report = read_report(folder)
+    assert report is not None
+    headings = [text for text in texts(tree, "h2") if text != "Read the figures with care"]
+    assert [section.title for section in report.sections] == headings
+    captions = texts(tree, "figcaption")
+    titles = [title.strip() for title in texts(tree, "p")]
+    for figure in report.figures():
+        assert (folder / "figures" / f"{figure.name}.png").is_file()
+        assert figure.title in titles
+        assert figure.caption.split("n = ")[0] in "".join(captions).replace("\u00a0", " ")
+    told = texts(tree, "li")
+    assert report.figures() and report.warnings and set(report.warnings) <= set(told)
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    for section in report.sections:
+        for part in section.parts:
+            assert not isinstance(part, Markup) or part.html in text
 
 
 def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:

@@ -60,6 +60,7 @@ class Results:
         failed: The others.
         machine: machine.json; empty where there is none.
         suite_text: suite.toml; "" where there is none.
+        rows: All of runs.csv, typed.
     """
 
     folder: Path
@@ -67,6 +68,7 @@ class Results:
     failed: pd.DataFrame
     machine: dict[str, Any]
     suite_text: str
+    rows: Sequence[dict[str, Any]]
 
     def experiments(self) -> list[tuple[str, pd.DataFrame]]:
         """Names and runs, in the order of the suite."""
@@ -121,6 +123,7 @@ def load(folder: Path) -> Results:
         failed=frame[~ended].reset_index(drop=True),
         machine=_json(folder / "machine.json"),
         suite_text=_text(folder / "suite.toml"),
+        rows=rows,
     )
 
 

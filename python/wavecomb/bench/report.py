@@ -11,8 +11,8 @@ from wavecomb.bench import report_pictures
 from wavecomb.bench.analysis_data import load
 from wavecomb.bench.figures_style import style
 from wavecomb.bench.report_experiment import experiment
+from wavecomb.bench.report_facts import equality, machine_parts, warnings_of
 from wavecomb.bench.report_html import (
-    Section,
     escape,
     folded,
     nested,
@@ -22,6 +22,7 @@ from wavecomb.bench.report_html import (
     table,
 )
 from wavecomb.bench.report_markdown import copy_figures, write_page
+from wavecomb.bench.report_parts import Markup, Report, Section, Viewer
 from wavecomb.bench.report_suite import suite
 from wavecomb.bench.report_writer import Writer
 from wavecomb.picture.files import replacing
@@ -29,11 +30,9 @@ from wavecomb.picture.files import replacing
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results
 
-FEW_ROUNDS = 5
-
 
 def build(folder: Path, markdown: Path | None = None) -> Path:
-    """Writes DIR/report.html, and DIR/figures with each figure as SVG and PNG.
+    """Writes DIR/report.html, its parts as DIR/report.json, and DIR/figures, SVG and PNG.
 
     Args:
         folder: DIR.
@@ -58,44 +57,15 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
         lines = "".join(f"<li>{prose(line)}</li>" for line in out.findings)
         out.sections.insert(0, _findings(f'<ul class="findings">{lines}</ul>'))
     target = folder / "report.html"
-    words = (_title(results), _lead(results), warnings_of(results), out.sections)
+    warnings = warnings_of(results.machine, results.rows)
+    report = Report(_title(results), _lead(results), warnings, out.sections)
     with replacing(target) as part:
-        part.write_text(page(*words), encoding="utf-8")
+        part.write_text(page(report), encoding="utf-8")
+    report.write(folder)
     if markdown is not None:
-        write_page(markdown, *words)
+        write_page(markdown, report)
         copy_figures(figures, markdown)
     return target
-
-
-def warnings_of(results: Results) -> list[str]:
-    """Why the figures deserve care, most serious first."""
-    lines: list[str] = []
-    _, different = report_pictures.equality(results)
-    if different:
-        lines.append(
-            f"Pictures that must be equal differ, in {len(different)} groups: times of unequal "
-            f"work are compared. {different[0]}."
-        )
-    noise = results.machine.get("noise")
-    told = noise.get("lines", ()) if isinstance(noise, dict) else ()
-    lines += [f"Noisy machine: {line}." for line in told]
-    noisy = int(results.runs["noisy"].fillna(False).astype(bool).sum())
-    if noisy and not told:
-        lines.append(
-            f"{noisy} of {len(results.runs)} runs were disturbed by other work on the machine."
-        )
-    least = int(results.runs.groupby("config").size().min())
-    if least < FEW_ROUNDS:
-        some = "once" if least == 1 else f"{least} times"
-        lines.append(
-            f"Some configurations ran only {some}: their intervals are wide, or there is none."
-        )
-    if len(results.failed):
-        first = results.failed.iloc[0]
-        lines.append(f"{len(results.failed)} runs failed; the first: {first.run_id}: {first.error}")
-    if results.machine.get("dirty"):
-        lines.append("The source was changed after the commit that is named.")
-    return lines
 
 
 def _title(results: Results) -> str:
@@ -126,11 +96,11 @@ def _findings(inside: str) -> Section:
         "where its p-value, corrected for all comparisons of its table, is below 5 %.",
         "note",
     )
-    return Section("findings", "What the figures say", [inside, note])
+    return Section("findings", "What the figures say", [Markup(inside), Markup(note)])
 
 
 def _pictures(out: Writer, results: Results) -> None:
-    groups, different = report_pictures.equality(results)
+    groups, different = equality(results.rows)
     found = report_pictures.shots(results)
     if not groups and not found:
         return
@@ -144,7 +114,8 @@ def _pictures(out: Writer, results: Results) -> None:
         out.add(paragraph(text + ("." if same == groups else "; these did not:")))
         out.add("".join(paragraph(line, "worse") for line in different[:10]))
     for shot in found:
-        out.add(report_pictures.viewer(shot))
+        if shown := report_pictures.viewer(shot):
+            out.add(Viewer(shown))
         out.draw(report_pictures.differences(shot))
 
 
@@ -173,20 +144,9 @@ def _about(out: Writer, results: Results) -> None:
         rows = [[str(row.run_id), str(row.error)] for row in results.failed.itertuples()]
         out.add(folded("Runs that failed", table("Runs that failed", ["run", "why"], rows)))
     out.begin("Machine")
-    out.add(_no_counters(results.machine))
-    out.add(nested({k: v for k, v in results.machine.items() if k not in ("schema", "noise")}))
+    out.add(*machine_parts(results.machine))
     out.begin("Words")
     out.add(nested(WORDS))
-
-
-def _no_counters(machine: dict[str, Any]) -> str:
-    """Which hardware counters there are not, and why."""
-    missing = (machine.get("counters") or {}).get("missing") or {}
-    reasons: dict[str, list[str]] = {}
-    for name, why in missing.items():
-        reasons.setdefault(str(why), []).append(name.replace("_", " "))
-    text = "; ".join(f"{', '.join(names)}: {why}" for why, names in reasons.items())
-    return paragraph(f"Hardware counters that are not available here: {text}.") if text else ""
 
 
 def _configurations(results: Results) -> list[Any]:

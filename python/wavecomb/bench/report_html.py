@@ -8,29 +8,15 @@ import itertools
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wavecomb.bench.figures_style import Drawn, fixed
+from wavecomb.bench.figures_style import fixed
+from wavecomb.bench.report_parts import Figure, Part, Report
 
 _WORD = ' class="word"'
 _HERE = Path(__file__).parent
-
-
-@dataclass
-class Section:
-    """A part of the page.
-
-    Attributes:
-        key: Of its address in the page; letters, digits and hyphens.
-        title: In words.
-        parts: HTML, in order.
-    """
-
-    key: str
-    title: str
-    parts: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -107,15 +93,20 @@ def _cell(cell: Cell) -> str:
     return f"<td{mark}>{escape(cell.text)}{note}</td>"
 
 
-def figure(drawn: Drawn, drawing: str) -> str:
+def part_html(part: Part) -> str:
+    """A part of a page that needs nothing else."""
+    return _figure(part) if isinstance(part, Figure) else part.html
+
+
+def _figure(part: Figure) -> str:
     """A figure with title and caption, drawn in the page as SVG."""
-    name = f"figure-{key_of(drawn.name)}"
-    picture = drawing.replace(
+    name = f"figure-{key_of(part.name)}"
+    picture = part.drawing.replace(
         "<svg", f'<svg role="img" aria-labelledby="{name}-title {name}-text"', 1
     )
     return (
-        f'<figure id="{name}"><p class="title" id="{name}-title">{escape(drawn.title)}</p>'
-        f'{picture}<figcaption id="{name}-text">{prose(drawn.caption)}</figcaption></figure>'
+        f'<figure id="{name}"><p class="title" id="{name}-title">{escape(part.title)}</p>'
+        f'{picture}<figcaption id="{name}-text">{prose(part.caption)}</figcaption></figure>'
     )
 
 
@@ -172,22 +163,20 @@ def interval(low: float, high: float, digits: int = 3) -> str:
     return f"[{fixed(low, digits)}, {fixed(high, digits)}]"
 
 
-def page(title: str, lead: str, warnings: Sequence[str], sections: Sequence[Section]) -> str:
+def page(report: Report) -> str:
     """The whole document; styles and scripts are inside, nothing is fetched."""
     style = (_HERE / "report.css").read_text(encoding="utf-8")
     script = (_HERE / "report.js").read_text(encoding="utf-8")
-    links = "".join(
-        f'<li><a href="#{s.key}">{escape(s.title)}</a></li>' for s in sections if s.parts
-    )
+    title, sections = report.title, report.sections
+    links = "".join(f'<li><a href="#{s.key}">{escape(s.title)}</a></li>' for s in sections)
     body = "".join(
         f'<section id="{s.key}" aria-labelledby="{s.key}-title">'
-        f'<h2 id="{s.key}-title">{escape(s.title)}</h2>{"".join(s.parts)}</section>'
+        f'<h2 id="{s.key}-title">{escape(s.title)}</h2>{"".join(map(part_html, s.parts))}</section>'
         for s in sections
-        if s.parts
     )
     alert = ""
-    if warnings:
-        lines = "".join(f"<li>{escape(line)}</li>" for line in warnings)
+    if report.warnings:
+        lines = "".join(f"<li>{escape(line)}</li>" for line in report.warnings)
         alert = (
             '<aside class="warning" aria-labelledby="warning-title">'
             f'<h2 id="warning-title">Read the figures with care</h2><ul>{lines}</ul></aside>'
@@ -197,7 +186,7 @@ def page(title: str, lead: str, warnings: Sequence[str], sections: Sequence[Sect
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
         f"<title>{escape(title)}</title><style>{style}</style></head><body>"
-        f'<a class="skip" href="#content">To the content</a><header><h1>{escape(title)}</h1>{lead}'
-        f'</header><nav aria-label="Contents"><ol>{links}</ol></nav>'
+        f'<a class="skip" href="#content">To the content</a><header><h1>{escape(title)}</h1>'
+        f'{report.lead}</header><nav aria-label="Contents"><ol>{links}</ol></nav>'
         f'<main id="content">{alert}{body}</main><script>{script}</script></body></html>\n'
     )

@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 
-from wavecomb.bench.report_html import Section
+from wavecomb.bench.report_html import part_html
+from wavecomb.bench.report_parts import Report
 from wavecomb.picture.files import replacing
 
 LARGEST_SVG = 150_000
@@ -25,24 +26,19 @@ _LEFT_OUT = ("details", "div.viewer", "script", "style", "svg")
 _BLOCKS = ("p", "h3", "li", "pre", "caption", "figcaption")
 
 
-def write_page(
-    target: Path, title: str, lead: str, warnings: Sequence[str], sections: Sequence[Section]
-) -> None:
+def write_page(target: Path, report: Report) -> None:
     """Writes the page, and beside it a folder of its name with the figures that it shows.
 
     Args:
         target: The .md file.
-        title: Of the page.
-        lead: HTML below the title.
-        warnings: Lines of text.
-        sections: Of the report; their figures are files of the folder ``figures`` of the results.
+        report: Its figures are files of the folder ``figures`` of the results.
     """
-    body = [f"# {title}", markdown(lead)]
-    if warnings:
+    body = [f"# {report.title}", markdown(report.lead)]
+    if report.warnings:
         body.append("Read the figures with care:")
-        body.append("\n".join(f"- {line}" for line in warnings))
-    for section in sections:
-        text = markdown("".join(section.parts), target.stem)
+        body.append("\n".join(f"- {line}" for line in report.warnings))
+    for section in report.sections:
+        text = markdown("".join(map(part_html, section.parts)), target.stem)
         if text:
             body += [f"## {section.title}", text]
     target.parent.mkdir(parents=True, exist_ok=True)

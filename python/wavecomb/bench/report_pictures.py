@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pictures of the report: what is equal bit for bit, viewers, difference maps."""
+"""The pictures of the report: viewers, difference maps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.bench.analysis_data import SETTINGS, in_order
+from wavecomb.bench.analysis_data import in_order
 from wavecomb.bench.figures_style import Drawn
 from wavecomb.bench.figures_verdicts import difference_figure
 from wavecomb.bench.report_html import escape, key_of
@@ -27,8 +27,6 @@ MOST_STAGES = 12
 MOST_PICTURES = 8
 LARGEST = 720
 """Side of a picture in the page, in pixels; a larger one is made smaller by averaging."""
-
-_CHANGES_NOTHING = ("policy", "threads", "lanes", "wave_size", "ray_order", "shadow_order")
 
 
 @dataclass(frozen=True)
@@ -51,30 +49,6 @@ class Shot:
     stage: str
     golden: NDArray[Any] | None
     kept: Sequence[Kept]
-
-
-def equality(results: Results) -> tuple[int, list[str]]:
-    """Runs that must have equal pictures: how many groups there are, and those that differ.
-
-    A group agrees in all settings but those that only order or spread the work, and in the seed.
-    """
-    runs = results.runs[results.runs["renderer"] == "wavecomb"]
-    runs = runs[runs["picture_sha256"] != ""]
-    keys = [name for name in SETTINGS if name not in (*_CHANGES_NOTHING, "experiment")]
-    keys = [*(key for key in keys if not key.startswith("factor")), "seed"]
-    different = []
-    groups = 0
-    for values, group in runs.groupby(keys, dropna=False, sort=False):
-        if len(group) < 2:
-            continue
-        groups += 1
-        if group["picture_sha256"].nunique() > 1:
-            place = dict(zip(keys, values, strict=True))
-            different.append(
-                f"{place['stage']}, roulette {place['roulette']}, {place['spp']:.0f} spp, seed "
-                f"{place['seed']:.0f}: {group['picture_sha256'].nunique()} different pictures"
-            )
-    return groups, different
 
 
 def shots(results: Results) -> list[Shot]:

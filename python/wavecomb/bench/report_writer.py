@@ -6,7 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from wavecomb.bench.figures_style import Drawn, lay_out, save, svg
-from wavecomb.bench.report_html import Section, figure, folded, key_of
+from wavecomb.bench.report_html import folded, key_of
+from wavecomb.bench.report_parts import Figure, Markup, Part, Section
 
 MOST_ROWS = 60
 """Longer tables are folded."""
@@ -24,9 +25,11 @@ class Writer:
         """A new section."""
         self.sections.append(Section(key_of(title), title))
 
-    def add(self, *parts: str) -> None:
-        """HTML to the section."""
-        self.sections[-1].parts += [part for part in parts if part]
+    def add(self, *parts: str | Part) -> None:
+        """HTML, or other parts, to the section; empty HTML is left out."""
+        self.sections[-1].parts += [
+            Markup(part) if isinstance(part, str) else part for part in parts if part
+        ]
 
     def draw(self, drawn: Drawn | None) -> None:
         """A figure to the section, if there is one."""
@@ -34,7 +37,7 @@ class Writer:
             lay_out(drawn)
             drawing = svg(drawn)
             save(drawn, drawing, self.figures)
-            self.add(figure(drawn, drawing))
+            self.add(Figure(drawn.name, drawn.title, drawn.caption, drawing))
 
     def rows(self, count: int, summary: str, text: str) -> None:
         """A table, folded if it is long."""

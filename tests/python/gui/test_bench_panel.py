@@ -17,12 +17,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench_results import policy_rows, write_folder
 
 from wavecomb.bench.columns import Column
+from wavecomb.bench.report_parts import Figure, Markup, Report, Section
 from wavecomb.gui.bench import tables as bench_tables
 from wavecomb.gui.bench.panel import BenchPanel
 from wavecomb.gui.bench.recent_folders import recent_folders
 from wavecomb.picture.image import write_png
 
 LEFT = Qt.MouseButton.LeftButton
+FIGURES = {"first": 0.25, "second": 1.0}
 TINY = """
 name = "tiny"
 title = "a box"
@@ -51,9 +53,15 @@ def folder(tmp_path_factory):
         tmp_path_factory.mktemp("made") / "results", policy_rows(repetitions=3), pictures=True
     )
     (made / "figures").mkdir()
-    for name, value in (("first", 0.25), ("second", 1.0)):
+    for name, value in FIGURES.items():
         write_png(made / "figures" / f"{name}.png", np.full((20, 40, 3), value, np.float32))
-    (made / "report.html").write_text("<h1>Findings</h1><p>none</p>")
+    figures = [Figure(name, f"The {name}", f"Caption of the {name}") for name in FIGURES]
+    sections = [
+        Section("findings", "Findings", [Markup("<p>none is faster</p>")]),
+        Section("figures", "Experiment a", [*figures]),
+    ]
+    Report("Made up", "<p>One machine</p>", [], sections).write(made)
+    (made / "notes.md").write_text("# Notes\n\nof the sitting")
     return made
 
 
@@ -79,16 +87,25 @@ def test_a_folder_is_shown(qtbot, opened, folder):
     assert "made-up - Times that were made up" in browser.findChild(QLabel, "benchTitle").text()
     assert "vary by 12%" in browser.findChild(QLabel, "benchWarnings").text()
     figures = browser.findChild(QListWidget, "figureList")
-    assert [figures.item(k).text() for k in range(figures.count())] == ["first", "second"]
+    titles = [figures.item(k).text() for k in range(figures.count())]
+    assert titles == ["Experiment a", "The first", "The second"]
+    assert figures.currentRow() == 1, "a heading cannot be chosen"
     qtbot.waitUntil(lambda: browser.figures.view.image is not None)
     figures.setFocus()
     QTest.keyClick(figures, Qt.Key.Key_Down)
     qtbot.waitUntil(lambda: browser.figures.view.image.pixelColor(5, 5).lightness() == 255)
     target = browser.figures.view.target()
     assert target.width() / target.height() == pytest.approx(2.0)
+    assert browser.figures.caption.text() == "Caption of the second"
+    report = browser.report_view
+    browser.tabs.setCurrentWidget(report)
+    assert "none is faster" in report.text.toPlainText() and "One machine" in report.lead.text()
+    report.list.setFocus()
+    QTest.keyClick(report.list, Qt.Key.Key_Down)
+    assert "Caption of the first" in report.text.toPlainText()
     browser.tabs.setCurrentWidget(browser.pages)
-    qtbot.waitUntil(lambda: "Findings" in browser.pages.text.toPlainText())
-    assert browser.facts.model.rowCount() > 5
+    qtbot.waitUntil(lambda: "of the sitting" in browser.pages.text.toPlainText())
+    assert "Made-up CPU <4 GHz> & friends" in browser.machine.toPlainText()
     assert recent_folders() == [folder.resolve()]
 
 

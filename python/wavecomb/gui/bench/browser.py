@@ -22,22 +22,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from wavecomb.bench.columns import Column
 from wavecomb.gui import theme
 from wavecomb.gui.bench.figures import Figures
 from wavecomb.gui.bench.folder import BenchFolder, Shot, read_folder
-from wavecomb.gui.bench.pages import Pages
+from wavecomb.gui.bench.page import plain_html
+from wavecomb.gui.bench.pages import Pages, TextView
 from wavecomb.gui.bench.recent_folders import recent_folders, remember_folder
+from wavecomb.gui.bench.report_view import ReportView
 from wavecomb.gui.bench.tables import RunsTable
 from wavecomb.gui.bench.two import TwoFolders
 from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import set_text_colour
 from wavecomb.gui.worker import Worker
-
-_FACTS = (
-    Column("fact", "text", "", "What."),
-    Column("value", "text", "", "As recorded by the first sitting; commands of all."),
-)
 
 
 class BenchBrowser(QWidget):
@@ -64,6 +60,7 @@ class BenchBrowser(QWidget):
         self._report = Command(self)
         self._report.finished.connect(self._reported)
         self._reported_folder: Path | None = None
+        self.report_view = ReportView(self)
         self.figures = Figures(self)
         self.runs = RunsTable("runs", self)
         self.pages = Pages(self)
@@ -72,7 +69,9 @@ class BenchBrowser(QWidget):
         self.shots.setAccessibleName("Pictures")
         self.shots.setToolTip("Double click compares a picture with its converged one")
         self.shots.itemActivated.connect(self._compare)
-        self.facts = RunsTable("facts", self)
+        self.machine = TextView(self)
+        self.machine.setObjectName("machine")
+        self.machine.setAccessibleName("Machine")
         self.two = TwoFolders(self)
         self.tabs = QTabWidget(self)
         self.tabs.setObjectName("benchTabs")
@@ -80,11 +79,12 @@ class BenchBrowser(QWidget):
 
     def _lay_out(self) -> None:
         for widget, title, tip in (
+            (self.report_view, "Report", "What `wavecomb bench report` says"),
             (self.figures, "Figures", "Figures of the report"),
             (self.runs, "Runs", "All runs, as in runs.csv"),
-            (self.pages, "Pages", "The report, the suite and other texts"),
+            (self.pages, "Pages", "The suite and other texts"),
             (self.shots, "Pictures", "Pictures of runs, and converged ones"),
-            (self.facts, "Machine", "What the figures were made on and with"),
+            (self.machine, "Machine", "What the figures were made on and with"),
             (self.two, "Two folders", "What changed from another folder to this one"),
         ):
             self.tabs.setTabToolTip(self.tabs.addTab(widget, title), tip)
@@ -182,16 +182,18 @@ class BenchBrowser(QWidget):
     def _show(self, folder: BenchFolder) -> None:
         self.folder = folder
         remember_folder(folder.path)
-        counts = f"{len(folder.runs)} runs, {len(folder.figures)} figures"
+        figures = folder.report.figures() if folder.report is not None else []
+        counts = f"{len(folder.runs)} runs, {len(figures)} figures"
         title = f" - {folder.title}" if folder.title else ""
         self._title.setText(f"{folder.name}{title}\n{folder.path}: {counts}")
         self._warnings.setText("\n".join(folder.warnings))
         self._warnings.setVisible(bool(folder.warnings))
         set_text_colour(self._warnings, theme.warning())
-        self.figures.set_figures(folder.figures)
+        self.report_view.set_report(folder.report, folder.path)
+        self.figures.set_report(folder.report, folder.path / "figures")
         self.runs.set_rows(folder.columns, folder.runs)
         self.pages.set_pages(folder.pages)
-        self.facts.set_rows(_FACTS, [{"fact": k, "value": v} for k, v in folder.facts])
+        self.machine.setHtml(plain_html(folder.machine, folder.path / "figures"))
         self.shots.clear()
         for shot in folder.shots:
             item = QListWidgetItem(shot.name, self.shots)

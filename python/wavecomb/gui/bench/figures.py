@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -12,13 +11,13 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSize, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QImage, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSplitter, QWidget
+from PySide6.QtWidgets import QLabel, QListWidget, QListWidgetItem, QSplitter, QVBoxLayout, QWidget
 
+from wavecomb.bench.report_parts import Figure, Report
 from wavecomb.gui import theme
-from wavecomb.gui.bench.folder import Figure
 from wavecomb.gui.viewport.qimages import to_qimage
 from wavecomb.gui.worker import Worker
-from wavecomb.picture.image import display, read_image
+from wavecomb.picture.image import read_codes
 
 
 class FigureView(QWidget):
@@ -119,48 +118,73 @@ def _read(path: Path) -> NDArray[np.uint8] | bytes:
     """A drawing as its file is; a picture as codes on white, (height, width, 3)."""
     if path.suffix.lower() == ".svg":
         return path.read_bytes()
-    pixels = read_image(path)
-    colours = pixels[:, :, :3] if pixels.shape[2] >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
-    if pixels.shape[2] in (2, 4):
-        alpha = pixels[:, :, -1:]
-        colours = alpha * colours + (1.0 - alpha)
-    return display(colours)
+    return read_codes(path)
 
 
 class Figures(QSplitter):
-    """List and figure."""
+    """The figures of a report: a list, the chosen one and its caption."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(Qt.Orientation.Horizontal, parent)
         self.setObjectName("figures")
+        self._folder: Path | None = None
         self.list = QListWidget(self)
         self.list.setObjectName("figureList")
         self.list.setAccessibleName("Figures")
         self.list.setToolTip("Figures of the report")
         self.view = FigureView(self)
+        self.caption = QLabel(self)
+        self.caption.setObjectName("figureCaption")
+        self.caption.setWordWrap(True)
+        self.caption.setTextFormat(Qt.TextFormat.PlainText)
+        self.caption.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        right = QWidget(self)
+        column = QVBoxLayout(right)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.view, 1)
+        column.addWidget(self.caption)
         self.addWidget(self.list)
-        self.addWidget(self.view)
+        self.addWidget(right)
         self.setStretchFactor(1, 1)
         self.setSizes([theme.em(14), theme.em(46)])
-        self.list.currentItemChanged.connect(lambda item, before: self._show(item))
-        self.set_figures(())
+        self.list.currentItemChanged.connect(self._show)
+        self.set_report(None, None)
 
-    def set_figures(self, figures: Sequence[Figure]) -> None:
-        """Lists them and shows the first."""
+    def set_report(self, report: Report | None, folder: Path | None) -> None:
+        """Lists the figures of a report, by section; ``folder`` holds their files."""
+        self._folder = folder
         self.list.clear()
-        for figure in figures:
-            item = QListWidgetItem(figure.name.replace("-", " "), self.list)
-            item.setData(Qt.ItemDataRole.UserRole, figure)
-        if figures:
-            self.list.setCurrentRow(0)
-        else:
-            self.view.show_words('No figures yet: "Make the report" draws them.')
+        self.caption.setText("")
+        self.view.show_words('No figures yet: "Make the report" draws them.')
+        first = None
+        for section in report.sections if report is not None else ():
+            figures = [part for part in section.parts if isinstance(part, Figure)]
+            if figures:
+                self._add_heading(section.title)
+            for figure in figures:
+                item = QListWidgetItem(figure.title, self.list)
+                item.setData(Qt.ItemDataRole.UserRole, figure)
+                first = first or item
+        if first is not None:
+            self.list.setCurrentItem(first)
 
-    def _show(self, item: QListWidgetItem | None) -> None:
+    def _add_heading(self, title: str) -> None:
+        item = QListWidgetItem(title, self.list)
+        item.setFlags(Qt.ItemFlag.NoItemFlags)
+        font = item.font()
+        font.setBold(True)
+        item.setFont(font)
+
+    def _show(self, item: QListWidgetItem | None, before: QListWidgetItem | None) -> None:
         figure = item.data(Qt.ItemDataRole.UserRole) if item is not None else None
-        if isinstance(figure, Figure):
-            # Qt's SVG has no clip paths and style sheets, which these drawings use.
-            path = figure.png or figure.svg
-            if path is not None:
+        if not isinstance(figure, Figure) or self._folder is None:
+            return
+        self.caption.setText(figure.caption)
+        self.view.setAccessibleName(f"Figure {figure.title}")
+        # Qt's SVG has no clip paths and style sheets, which these drawings use.
+        for suffix in (".png", ".svg"):
+            path = self._folder / f"{figure.name}{suffix}"
+            if path.is_file():
                 self.view.show_file(path)
-                self.view.setAccessibleName(f"Figure {figure.name}")
+                return
+        self.view.show_words(f"{self._folder / figure.name}.png: is not there; make the report")

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.bench.columns import COLUMNS, Column, read_rows
+from wavecomb.bench.report_facts import machine_parts, warnings_of
+from wavecomb.bench.report_parts import Report, read_report
 from wavecomb.errors import WavecombError
 from wavecomb.gui.compare.picture_sides import SUFFIXES
 from wavecomb.picture.files import reason
@@ -26,29 +28,6 @@ _FIRST = (
     *("shade_and_order_s", "samples_per_s", "rel_mse", "efficiency", "noisy"),
 )
 """Columns that a table of runs begins with, after the name of the run."""
-_FACTS = {
-    "cpu": "CPU",
-    "isa": "Instruction set",
-    "cores": "Cores",
-    "memory_bytes": "Memory",
-    "kernel": "Kernel",
-    "frequency_mhz": "Frequency, MHz",
-    "caches_bytes": "Caches, bytes",
-    "commit": "Commit",
-    "dirty": "Source changed after it",
-    "versions": "Versions",
-    "pinning": "Pinning",
-    "load_before": "Load before",
-}
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure: its name and the files that hold it."""
-
-    name: str
-    png: Path | None
-    svg: Path | None
 
 
 @dataclass(frozen=True)
@@ -74,23 +53,23 @@ class BenchFolder:
         path: Where it is.
         name: Of the suite.
         title: Of the suite, one line.
-        facts: Of the machine: name and value.
-        warnings: Why its figures deserve care.
+        machine: What the figures were made on, HTML as the report has it.
+        warnings: Why its figures deserve care, as the report says it.
         columns: Of runs.csv: those that hold anything, those of interest first.
         runs: Rows of runs.csv, typed.
-        figures: In figures/, by name.
-        pages: Texts, the report first.
+        report: Its parts; None: none was made yet.
+        pages: Texts beside the report.
         shots: Pictures of runs, then converged ones.
     """
 
     path: Path
     name: str
     title: str
-    facts: tuple[tuple[str, str], ...]
+    machine: str
     warnings: tuple[str, ...]
     columns: tuple[Column, ...]
     runs: tuple[Mapping[str, Any], ...]
-    figures: tuple[Figure, ...]
+    report: Report | None
     pages: tuple[Path, ...]
     shots: tuple[Shot, ...]
 
@@ -117,17 +96,23 @@ def read_folder(path: Path) -> BenchFolder:
         why = reason(error) if isinstance(error, OSError) else str(error)
         raise WavecombError(f"{file}: cannot be read: {why}") from error
     machine = _json(path / "machine.json")
+    warnings = warnings_of(machine, rows)
+    report = None
+    try:
+        report = read_report(path)
+    except WavecombError as error:
+        warnings.append(str(error))
     name, title = _suite(path)
     return BenchFolder(
         path=path,
         name=name or (str(rows[0]["suite"]) if rows else path.name),
         title=title,
-        facts=tuple(_facts(machine)),
-        warnings=tuple(_warnings(machine, rows)),
+        machine="".join(machine_parts(machine)),
+        warnings=tuple(warnings),
         columns=_columns(rows),
         runs=tuple(rows),
-        figures=_figures(path / "figures"),
-        pages=_pages(path),
+        report=report,
+        pages=_pages(path, report is not None),
         shots=_shots(path),
     )
 
@@ -149,67 +134,16 @@ def _json(path: Path) -> dict[str, Any]:
     return document if isinstance(document, dict) else {}
 
 
-def _facts(machine: Mapping[str, Any]) -> list[tuple[str, str]]:
-    found = []
-    for key, what in _FACTS.items():
-        value = machine.get(key)
-        if value not in (None, "", {}, []):
-            found.append((what, _text(key, value)))
-    for number, sitting in enumerate(machine.get("sittings") or (), 1):
-        if isinstance(sitting, dict):
-            when = str(sitting.get("started", ""))[:16].replace("T", " ")
-            found.append((f"Sitting {number}, {when} UTC", str(sitting.get("command", ""))))
-    return found
-
-
-def _text(key: str, value: Any) -> str:
-    if key == "memory_bytes":
-        return f"{value / 2**30:.1f} GiB"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, Mapping):
-        return ", ".join(f"{k} {_text('', v)}" for k, v in value.items())
-    if isinstance(value, (list, tuple)):
-        return ", ".join(_text("", v) for v in value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _warnings(machine: Mapping[str, Any], rows: list[dict[str, Any]]) -> list[str]:
-    noise = machine.get("noise")
-    lines = [f"Noisy machine: {line}" for line in (noise or {}).get("lines", ())]
-    noisy = sum(bool(row["noisy"]) for row in rows)
-    if noisy and not lines:
-        lines.append(f"{noisy} of {len(rows)} runs were disturbed by other work on the machine")
-    failed = [row for row in rows if row["status"] != "ok"]
-    if failed:
-        lines.append(
-            f"{len(failed)} runs failed; the first: {failed[0]['run_id']}: {failed[0]['error']}"
-        )
-    if not rows:
-        lines.append("No run has come to an end yet")
-    return lines
-
-
 def _columns(rows: list[dict[str, Any]]) -> tuple[Column, ...]:
     held = [c for c in COLUMNS if any(row[c.name] not in (None, "") for row in rows)]
     order = {name: place for place, name in enumerate(("run_id", *_FIRST))}
     return tuple(sorted(held, key=lambda c: order.get(c.name, len(order))))
 
 
-def _figures(folder: Path) -> tuple[Figure, ...]:
-    if not folder.is_dir():
-        return ()
-    names = sorted({p.stem for p in folder.iterdir() if p.suffix in (".png", ".svg")})
-
-    def file(name: str, suffix: str) -> Path | None:
-        path = folder / f"{name}{suffix}"
-        return path if path.is_file() else None
-
-    return tuple(Figure(name, file(name, ".png"), file(name, ".svg")) for name in names)
-
-
-def _pages(folder: Path) -> tuple[Path, ...]:
+def _pages(folder: Path, reported: bool) -> tuple[Path, ...]:
+    """Texts; the page of a report whose parts are known is not one of them."""
     found = [p for p in folder.iterdir() if p.is_file() and p.suffix.lower() in PAGES]
+    found = [p for p in found if not (reported and p.name == "report.html")]
     place = {suffix: k for k, suffix in enumerate(PAGES)}
     return tuple(sorted(found, key=lambda p: (place[p.suffix.lower()], p.name)))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of a results folder as a text browser can show them. No Qt.
+"""Pages and parts of a report as a text browser can show them. No Qt.
 
 A report draws its figures as SVG within the page and has scripts; a text browser knows neither, so
 figures become those of figures/, and what only a script fills is left out.
@@ -10,6 +10,8 @@ from __future__ import annotations
 import html
 from html.parser import HTMLParser
 from pathlib import Path
+
+from wavecomb.bench.report_parts import Figure, Part, Section
 
 _DROPPED = ("script", "style", "svg", "canvas", "select", "nav", "fieldset", "head", "output")
 _VOID = ("br", "hr", "img", "input", "meta", "link", "col")
@@ -26,10 +28,30 @@ def page_html(path: Path) -> str:
     Raises:
         OSError: It cannot be read.
     """
-    filtered = _Filter(path.parent / "figures")
-    filtered.feed(path.read_text(encoding="utf-8", errors="replace"))
+    return plain_html(path.read_text(encoding="utf-8", errors="replace"), path.parent / "figures")
+
+
+def plain_html(text: str, figures: Path) -> str:
+    """HTML without what a text browser cannot show; ``figures`` holds those of SVG in it."""
+    filtered = _Filter(figures)
+    filtered.feed(text)
     filtered.close()
     return "".join(filtered.out)
+
+
+def section_html(section: Section, folder: Path) -> str:
+    """A section of the report that a folder keeps."""
+    parts = (_part(part, folder / "figures") for part in section.parts)
+    return f"<h2>{html.escape(section.title)}</h2>{''.join(parts)}"
+
+
+def _part(part: Part, figures: Path) -> str:
+    if not isinstance(part, Figure):
+        return plain_html(part.html, figures)
+    name = f"{part.name}.png"
+    shown = f'<p><img src="figures/{html.escape(name)}"></p>' if (figures / name).is_file() else ""
+    title, caption = html.escape(part.title), html.escape(part.caption)
+    return f"<p><b>{title}</b></p>{shown}<p>{caption}</p>"
 
 
 class _Filter(HTMLParser):

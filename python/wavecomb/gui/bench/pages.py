@@ -23,7 +23,7 @@ from wavecomb.gui.bench.page import page_html
 from wavecomb.gui.worker import Worker
 
 
-class _Browser(QTextBrowser):
+class TextView(QTextBrowser):
     """Pictures of the page's own folder, no wider than the view."""
 
     def loadResource(self, kind: int, name: Any) -> Any:
@@ -56,7 +56,7 @@ class Pages(QWidget):
         self.outside = QPushButton("Open in the browser", self)
         self.outside.setObjectName("pageOutside")
         self.outside.setToolTip("The whole page with what a text view cannot show")
-        self.text = _Browser(self)
+        self.text = TextView(self)
         self.text.setObjectName("pageText")
         self.text.setAccessibleName("Text of the page")
         self.text.setOpenLinks(False)
