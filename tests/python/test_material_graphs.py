@@ -310,6 +310,26 @@ def test_networks_in_circles_end(tmp_path):
     assert scene.material_of("M")["base_color"] is not None
 
 
+@pytest.mark.parametrize("category", ["power", "screen", "contrast", "safepower", "overlay"])
+def test_networks_too_deep_are_cut(tmp_path, category):
+    """At a node, and said; the material keeps all else, however its nodes are made."""
+    first = {"power": "in1", "safepower": "in1", "contrast": "in"}.get(category, "fg")
+    nodes = "".join(
+        node(
+            f"N{i}", f"ND_{category}_float",
+            f"float inputs:{first}.connect = </Mat/N{i + 1}.outputs:out>", "float outputs:out",
+        )
+        for i in range(300)
+    )  # fmt: skip
+    text = (
+        "float inputs:specular_roughness.connect = </Mat/N0.outputs:out>\nfloat inputs:base = 1\n"
+    )
+    text += "color3f inputs:base_color = (0.25, 0.5, 1)"
+    scene, loaded = load(tmp_path, standard(text, nodes))
+    assert "too deep (cut there): /Mat/N101" in said(loaded)
+    assert scene.material_of("M")["base_color"] == (0.25, 0.5, 1)
+
+
 def test_networks_too_large_are_said_and_leave_parameters_out(tmp_path):
     nodes = UV
     names = []

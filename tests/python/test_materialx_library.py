@@ -75,6 +75,8 @@ def test_all_nodes_are_read_or_named_with_a_reason():
     for why, categories in named.items():
         line = f"- {', '.join(f'`{name}`' for name in sorted(categories))}: {why}"
         assert re.sub(r"\s+", " ", line) in re.sub(r"\s+", " ", text), line
+    table = text[text.index("| | primitives |") : text.index("All others are graphs")]
+    assert set(re.findall(r"`(\w+)`", table)) == CATEGORIES
     assert not REASONS.keys() - {name for names in named.values() for name in names}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from graph_reference import perlin
 from materialx_nodes import Node, points, run
+from pxr import Gf, Sdf, UsdShade
 
 from wavecomb.usd.looks.graph_surface import plain_use
 from wavecomb.usd.materialx.nodes import images
@@ -307,7 +308,7 @@ def test_triplanar_projection_mixes_three_images(monkeypatch):
 def test_coordinates_by_an_image_are_no_colours():
     """What only says where to look is read once, as data."""
     node = Node("ND_tiledimage_color3").give(file="a.png")
-    node.feed("texcoord", "ND_image_vector2", file="b.png")
+    node.feed("texcoord", "ND_image_color3", file="b.png")  # whatever the type
     node.value(kind="base")
     assert sorted(node.textures.uses) == [
         ("a.png", "auto", "repeat", "repeat", True),
@@ -317,8 +318,6 @@ def test_coordinates_by_an_image_are_no_colours():
 
 def test_long_networks_of_graphs_are_no_deep_calls():
     """90 contrasts in a row, each a graph; all count."""
-    from pxr import Sdf, UsdShade
-
     node = Node("ND_contrast_float").give(amount="1.01", pivot="0")
     shader = node.shader
     for i in range(90):
@@ -334,3 +333,32 @@ def test_long_networks_of_graphs_are_no_deep_calls():
     shader.CreateInput("in", Sdf.ValueTypeNames.Float).Set(1.0)
     assert node.value()[0] == pytest.approx(1.01**91, rel=1e-4)
     assert not node.report.lines()
+
+
+@pytest.mark.parametrize("is_driven", [False, True])
+@pytest.mark.parametrize(
+    ("identifier", "name"),
+    [
+        ("ND_add_color3", "in1"), ("ND_noise2d_color3", "texcoord"), ("ND_contrast_color3", "in"),
+        ("ND_dotproduct_vector3", "in1"), ("ND_rgbtohsv_color3", "in"), ("ND_overlay_color4", "bg"),
+        ("ND_ifgreater_color3", "value1"), ("ND_transformmatrix_vector3", "in"),
+        ("ND_creatematrix_vector3_matrix33", "in1"),
+    ],
+)  # fmt: skip
+def test_a_matrix_in_the_place_of_numbers_is_cut(identifier, name, is_driven):
+    """Files may connect anything with anything."""
+    node = Node(identifier)
+    port = node.shader.CreateInput(name, Sdf.ValueTypeNames.Matrix4d)
+    if is_driven:
+        for prim, kind, output in (
+            ("C", "ND_creatematrix_vector4_matrix44", Sdf.ValueTypeNames.Matrix4d),
+            ("K", "ND_noise3d_vector4", Sdf.ValueTypeNames.Float4),
+        ):
+            source = UsdShade.Shader.Define(node.stage, f"/M/{prim}")
+            source.CreateIdAttr(kind)
+            source.CreateOutput("out", output)
+            port.ConnectToSource(source.ConnectableAPI(), "out")
+            port = source.CreateInput("in1", Sdf.ValueTypeNames.Float4)
+    else:
+        port.Set(Gf.Matrix4d(2.0))
+    assert np.isfinite(node.run(AT)).all()

@@ -13,6 +13,9 @@ from wavecomb.usd.looks.graph_surface import NORMAL, NUMBER
 from wavecomb.usd.looks.network import Source, word
 from wavecomb.usd.stage.report import LoadReport
 
+OF_MATRICES = ("transformmatrix", "transpose", "creatematrix", "constant", "dot")
+"""Categories whose inputs may be matrices: values of 9 or 16 components."""
+
 
 class Inputs(Protocol):
     """The inputs of a node: of a stage, or of a node graph of the library."""
@@ -89,8 +92,10 @@ class NodeCall:
         return self.networks.make
 
     def given(self, name: str) -> Value | None:
-        """What feeds an input; None where nothing does."""
-        return self.inputs.find(name, self.kind)
+        """What feeds an input; None where nothing does. A matrix is cut where none can be."""
+        found = self.inputs.find(name, self.kind)
+        is_cut = found is not None and len(found) > 4 and self.category not in OF_MATRICES
+        return found[:4] if found is not None and is_cut else found
 
     def value(
         self, name: str, default: float | Sequence[float] | None = 0.0, width: int = 0

@@ -14,7 +14,7 @@ from wavecomb.usd.looks.graph_surface import COLOURS
 from wavecomb.usd.looks.network import Source, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes.body import Body
-from wavecomb.usd.materialx.nodes.call import Handler, NodeCall
+from wavecomb.usd.materialx.nodes.call import OF_MATRICES, Handler, NodeCall
 from wavecomb.usd.materialx.nodes.table import CATEGORIES, PRIMITIVES
 from wavecomb.usd.stage.report import LoadReport
 
@@ -33,7 +33,6 @@ _WIDTH_OF_TYPE = {
     "color4f": 4, "matrix3d": 9, "matrix4d": 16,
 }  # fmt: skip
 _FIRST_CHOICES = ("in", "in1", "bg", "base", "fg", "color1", "color", "value", "default")
-_OF_MATRICES = ("transformmatrix", "transpose", "creatematrix", "constant", "dot")
 
 
 def category_of(identifier: str) -> tuple[str, int]:
@@ -55,7 +54,7 @@ def category_of(identifier: str) -> tuple[str, int]:
 
 def primitive(category: str, identifier: str) -> Handler | None:
     """What compiles a node that is written here; None where none does."""
-    if "_matrix" in identifier and category not in _OF_MATRICES:
+    if "_matrix" in identifier and category not in OF_MATRICES:
         return None
     return PRIMITIVES.get(category)
 
