@@ -7,7 +7,9 @@ MaterialX is drawn grey or left out, and said once.
 
 from __future__ import annotations
 
+import functools
 import importlib.util
+import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -32,13 +34,17 @@ MODELS = ("standard_surface", "open_pbr_surface", "gltf_pbr")
 
 def is_there() -> bool:
     """Whether MaterialX can be read; imports nothing."""
-    try:
-        return all(
-            importlib.util.find_spec(name) is not None
-            for name in ("MaterialX", "wavecomb.usd.materialx")
-        )
-    except (ImportError, ValueError):
-        return False
+    return all(_is_there(name) for name in ("MaterialX", "wavecomb.usd.materialx"))
+
+
+def _is_there(name: str) -> bool:
+    return sys.modules[name] is not None if name in sys.modules else _can_be_found(name)
+
+
+@functools.cache
+def _can_be_found(name: str) -> bool:
+    """Looked for once: there may be thousands of materials."""
+    return importlib.util.find_spec(name) is not None
 
 
 def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
