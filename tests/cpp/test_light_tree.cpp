@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Choosing lights by tree: probabilities, bounds, and agreement of packets with scalars.
+/// Choosing lights by tree: probabilities, bounds, and agreement of packets with scalars. Counts:
+/// test_light_choice.cpp.
 #include "wavecomb/light/light_tree.h"
 
 #include <chrono>
 #include <random>
 
-#include "bsdf_testing.h"
 #include "lane_testing.h"
-#include "light_testing.h"
-#include "wavecomb/core/warp.h"
+#include "light_tree_testing.h"
 #include "wavecomb/scene/light_cluster.h"
 #include "wavecomb/scene/light_tree.h"
 
@@ -16,68 +15,6 @@ namespace wavecomb {
 namespace {
 
 using namespace light_testing;
-using bsdf_testing::chi_square_p;
-using bsdf_testing::sidak;
-
-/// Random numbers by hand: those of the standard library differ between libraries.
-struct Numbers {
-  std::mt19937 rng;
-  explicit Numbers(uint32_t seed) : rng(seed) {}
-  float operator()() { return static_cast<float>(rng() >> 8) * 0x1p-24f; }
-  float between(float lo, float hi) { return lo + (hi - lo) * (*this)(); }
-  Vec3<float> point(float half) {
-    return {between(-half, half), between(-half, half), between(-half, half)};
-  }
-  Vec3<float> direction() { return square_to_sphere<float>((*this)(), (*this)()); }
-};
-
-/// `n` lights of all finite kinds, dark ones and points among them, and `infinite` others.
-Lights random_lights(size_t n, uint32_t seed, size_t infinite = 0) {
-  Numbers number(seed);
-  std::vector<Light> lights;
-  std::vector<EmissiveTriangle> triangles;
-  for (size_t i = 0; i < n; ++i) {
-    const Vec3<float> at = number.point(10);
-    const auto turn =
-        rotate(360 * static_cast<double>(number()), 360 * static_cast<double>(number()));
-    const float power = number() < 0.1f ? 0.f : std::exp(number.between(-4, 4));
-    if (i % 4 == 3) {
-      triangles.push_back(make_triangle(at, at + number.point(0.4f), at + number.point(0.4f)));
-      for (float& x : triangles.back().radiance) x *= power;
-      continue;
-    }
-    const auto kind = static_cast<LightKind>(i % 4);  // rect, disk, sphere
-    Light light = make_light(kind, translate(at.x, at.y, at.z) * turn);
-    light.width = number.between(0.05f, 1);
-    light.height = number.between(0.05f, 1);
-    light.radius = kind == LightKind::kSphere && number() < 0.3f ? 0 : number.between(0.02f, 0.5f);
-    light.color = Vec3<float>{1, 1, 1} * power;
-    lights.push_back(light);
-  }
-  for (size_t i = 0; i < infinite; ++i) {
-    Light light = make_light(i % 2 ? LightKind::kDistant : LightKind::kDome);
-    light.color = Vec3<float>{1e-3f, 1e-3f, 1e-3f} * static_cast<float>(i);
-    lights.push_back(light);
-  }
-  return Lights(lights, triangles);
-}
-
-LightView by_tree(const Lights& lights) {
-  LightView view = lights.view();
-  view.by_tree = true;
-  return view;
-}
-
-LightReceiver<float> random_receiver(Numbers& number) {
-  const Vec3<float> p = number.point(12);
-  const bool any_side = number() < 0.3f;
-  return LightReceiver<float>(p, any_side ? 0u : pack_normal<float>(number.direction()));
-}
-
-float pick_pdf(const LightView& view, uint32_t light, const LightReceiver<float>& to) {
-  return light < view.infinite_count ? view.tree.infinite_pdf[light]
-                                     : detail::tree_pdf<float>(view, light, to, true);
-}
 
 TEST(LightTree, ProbabilitiesAddUpToOne) {
   for (const size_t n : {1, 2, 3, 17, 400}) {
@@ -116,51 +53,6 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
     const LightReceiver<float> to(number.point(20));
     for (uint32_t i = 0; i < 500; ++i) sum += double{pick_pdf(by_tree(all), i, to)};
     ASSERT_NEAR(sum, 1, 1e-5);
-  }
-}
-
-TEST(LightTree, LightsAreChosenAsOftenAsStated) {
-  const Lights lights = random_lights(100, 5, 3);
-  const LightView view = by_tree(lights);
-  Numbers number(6);
-  for (int k = 0; k < 20; ++k) {
-    LightReceiver<float> to = random_receiver(number);
-    constexpr uint32_t kSamples = 200000;
-    std::vector<double> hits(view.count + 1, 0), expected(view.count + 1, 0);
-    double sum = 0;
-    for (uint32_t i = 0; i < view.count; ++i) sum += expected[i] = double{pick_pdf(view, i, to)};
-    expected[view.count] = std::max(0.0, 1 - sum);  // none
-    for (double& e : expected) e *= kSamples;
-    for (uint32_t i = 0; i < kSamples; ++i) {
-      to.seed = hash_u32<uint32_t>(i);
-      const LightChoice<float> c = detail::choose_by_tree<float>(view, to, number(), true);
-      if (c.light != kNoLight) {
-        ASSERT_EQ(c.pdf, pick_pdf(view, c.light, to));
-      }
-      ++hits[c.light == kNoLight ? view.count : c.light];
-    }
-    for (uint32_t i = 0; i <= view.count; ++i)
-      if (expected[i] == 0) {
-        ASSERT_EQ(hits[i], 0) << i;
-      }
-    double statistic = 0, rare = 0, rare_hits = 0;
-    int cells = 0;
-    const auto add = [&](double h, double e) {
-      if (!(e > 0)) return;
-      statistic += (h - e) * (h - e) / e;
-      ++cells;
-    };
-    for (uint32_t i = 0; i <= view.count; ++i) {
-      if (expected[i] >= 5) {
-        add(hits[i], expected[i]);
-      } else {
-        rare += expected[i];
-        rare_hits += hits[i];
-      }
-    }
-    if (rare >= 5) add(rare_hits, rare);
-    ASSERT_GT(cells, 4);
-    EXPECT_GT(chi_square_p(statistic, cells - 1), sidak(1e-3, 20)) << k;
   }
 }
 

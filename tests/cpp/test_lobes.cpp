@@ -146,26 +146,6 @@ TEST(Ggx, VisibleNormalsProjectToTheViewersArea) {
     }
 }
 
-TEST(Ggx, SampledVisibleNormalsFollowTheirDensity) {
-  std::vector<bsdf_testing::ChiSquareResult> results;
-  for (float alpha : {0.02f, 0.1f, 0.4f, 1.f})
-    for (double zo : {1e-3, 0.1, 0.5, 0.9, 1.0}) {
-      const Vec wo = direction(zo, 2.1);
-      const Ggx<float> ggx{alpha};
-      bsdf_testing::Sampler s;
-      s.pdf = [&](const Vec& h) {
-        return h.z <= 0 ? 0.f : ggx.visible_density_over_cos(wo, h) * std::max(0.f, dot(wo, h));
-      };
-      s.sample = [&](float, float u, float v, Vec& h) {
-        h = ggx.sample_visible(wo, u, v);
-        return true;
-      };
-      results.push_back(bsdf_testing::chi_square(s, 7));
-      EXPECT_NEAR(results.back().mass, 1, 2e-3) << alpha << " " << zo;
-    }
-  for (const auto& r : results) EXPECT_GT(r.p_value, bsdf_testing::sidak(0.01, results.size()));
-}
-
 /// Area that a map from the tangent plane at `w` to the sphere gives to a unit area, by central
 /// differences.
 template <typename Map>

@@ -3,11 +3,7 @@
 /// halves of MIS, irradiance by numeric integration, and what the picture is worth.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <functional>
-
-#include "bsdf_testing.h"
-#include "light_testing.h"
+#include "light_charts.h"
 
 namespace wavecomb {
 namespace {
@@ -97,86 +93,17 @@ double hit_density(const LightView& view, const Vec3<float>& from, double a, dou
   return static_cast<double>(hit.pdf);
 }
 
-/// Shares of the edges at which a sample lies.
-Vec2<double> place_of(const LightRecord& r, const Vec3<float>& from, const Vec3<float>& wi,
-                      double t) {
-  double h[3], uu = 0, vv = 0, uv = 0, hu = 0, hv = 0;
-  const double f[3] = {from.x, from.y, from.z}, d[3] = {wi.x, wi.y, wi.z};
-  for (int i = 0; i < 3; ++i) {
-    h[i] = f[i] + t * d[i] - r.p[i];
-    const double u = r.u[i], v = r.v[i];
-    uu += u * u;
-    vv += v * v;
-    uv += u * v;
-    hu += h[i] * u;
-    hv += h[i] * v;
-  }
-  const double det = uu * vv - uv * uv;
-  return {(hu * vv - hv * uv) / det, (hv * uu - hu * uv) / det};
-}
-
 TEST(PicturedRect, PointsFollowTheDensityAndItsMassIs1) {
-  constexpr int kCells = 24, kFine = 20;  // cells are halves and thirds of texels
-  const char* const is_long = std::getenv("WAVECOMB_LONG");
-  const int samples = is_long && is_long[0] == '1' ? 1000000 : 150000;
   const std::vector<float> pictures[] = {spots(), half_dark(), noise()};
-  const double level = bsdf_testing::sidak(0.01, std::size(kPlaces) * std::size(pictures));
+  chi_square::Battery battery("pictured rects");
   for (const Place& place : kPlaces)
     for (size_t picture = 0; picture < std::size(pictures); ++picture) {
-      SCOPED_TRACE(testing::Message() << place.name << ", picture " << picture);
       const Lights lights = make_rect(place, pictures[picture]);
-      const LightView view = lights.view();
-      const LightRecord& r = view.lights[0];
-      ASSERT_NE(r.distribution, kNoDistribution);
-      std::vector<double> expected, observed(kCells * kCells, 0.0);
-      double mass = 0;
-      for (int y = 0; y < kCells; ++y)
-        for (int x = 0; x < kCells; ++x) {
-          double sum = 0;
-          for (int j = 0; j < kFine; ++j)
-            for (int i = 0; i < kFine; ++i) {
-              const double a = (x + (i + 0.5) / kFine) / kCells,
-                           b = (y + (j + 0.5) / kFine) / kCells;
-              sum += hit_density(view, place.from, a, b) * on_rect(r, place.from, a, b).measure;
-            }
-          sum /= double{kFine} * kFine * kCells * kCells;
-          mass += sum;
-          expected.push_back(sum * samples);
-        }
-      EXPECT_NEAR(mass, 1, 3e-3);
-      std::mt19937 rng(17);
-      const auto number = [&rng] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
-      for (int i = 0; i < samples; ++i) {
-        const float u = number(), v = number();
-        const auto s = detail::sample_rect<float>(view, detail::LightReader<float>(r, true),
-                                                  place.from, u, v, true);
-        ASSERT_GT(s.pdf, 0);
-        const Vec2<double> at = place_of(r, place.from, s.wi, static_cast<double>(s.distance));
-        const auto cell = [](double x) {
-          return std::clamp(static_cast<int>(x * kCells), 0, kCells - 1);
-        };
-        observed[static_cast<size_t>(cell(at.y) * kCells + cell(at.x))] += 1;
-      }
-      double statistic = 0, rest_observed = 0, rest_expected = 0;
-      int used = 0;
-      for (size_t i = 0; i < expected.size(); ++i) {
-        if (expected[i] < 10) {
-          rest_observed += observed[i];
-          rest_expected += expected[i];
-          continue;
-        }
-        statistic += (observed[i] - expected[i]) * (observed[i] - expected[i]) / expected[i];
-        ++used;
-      }
-      if (rest_expected >= 10) {
-        statistic +=
-            (rest_observed - rest_expected) * (rest_observed - rest_expected) / rest_expected;
-        ++used;
-      } else {
-        EXPECT_LT(rest_observed, rest_expected + 30);
-      }
-      EXPECT_GT(bsdf_testing::chi_square_p(statistic, used - 1), level) << statistic << " " << used;
+      ASSERT_NE(lights.view().lights[0].distribution, kNoDistribution);
+      battery.run(light_case(std::string(place.name) + ", picture " + std::to_string(picture),
+                             lights.view(), place.from));
     }
+  battery.judge();
 }
 
 TEST(PicturedRect, BothTechniquesSeeOneDensityAndOneRadiance) {

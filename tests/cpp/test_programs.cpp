@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bsdf_testing.h"
-#include "wavecomb/material/program_table.h"
+#include "program_cases.h"
 
 namespace wavecomb {
 namespace {
@@ -17,136 +16,8 @@ using bsdf_testing::direction;
 using bsdf_testing::furnace;
 using bsdf_testing::kronecker;
 using bsdf_testing::plain_params;
+using namespace program_cases;
 using Vec = Vec3<float>;
-
-/// A material as a program sees it.
-struct Case {
-  std::string name;
-  ProgramId program;
-  OpenPbrParams<float> params;
-  bool schlick = false;
-  bool two_sided() const {
-    const bool clear = params.transmission_weight > 0 && params.thin_walled == 0;
-    return program != ProgramId::kDielectric && !(program == ProgramId::kOpenPbr && clear);
-  }
-  /// Whether light that crosses the surface bends. All but thin walls.
-  bool bends() const { return program != ProgramId::kOpenPbr || params.thin_walled == 0; }
-  /// OpenPBR scales what lies below a layer by what the viewer's side loses.
-  bool reciprocal() const {
-    return program != ProgramId::kOpenPbr || name.find("reciprocal") != std::string::npos;
-  }
-  double ior() const { return static_cast<double>(params.ior); }
-};
-
-template <typename Edit>
-Case make_case(std::string name, ProgramId program, Edit edit, bool schlick = false) {
-  Case c{std::move(name), program, plain_params(), schlick};
-  edit(c.params);
-  return c;
-}
-
-using P = OpenPbrParams<float>;
-
-/// OpenPBR lobe by lobe, and all of them.
-void add_openpbr_cases(std::vector<Case>& cases) {
-  const auto add = [&](std::string name, auto edit) {
-    cases.push_back(make_case("openpbr " + std::move(name), ProgramId::kOpenPbr, [&](P& p) {
-      p.specular_color = Vec(1, 1, 1);
-      edit(p);
-    }));
-  };
-  for (float r : {0.f, 0.5f, 1.f})
-    add("reciprocal diffuse", [&](P& p) { p.diffuse_roughness = r, p.specular_weight = 0; });
-  for (float r : {0.f, 0.2f, 0.7f}) {
-    add("metal",
-        [&](P& p) { p.metallic = 1, p.roughness = r, p.specular_color = Vec(0.8f, 0.9f, 1); });
-    add("glossy", [&](P& p) { p.roughness = r, p.diffuse_roughness = 0.5f; });
-    add("glass", [&](P& p) { p.transmission_weight = 1, p.roughness = r; });
-    add("coat", [&](P& p) {
-      p.clearcoat = 0.8f, p.clearcoat_roughness = r, p.coat_color = Vec(1, 0.6f, 0.3f);
-    });
-  }
-  // Facets of this coat often reflect to below, where the base transmits.
-  add("coated glass", [](P& p) {
-    p.transmission_weight = 1, p.roughness = 0.2f, p.clearcoat = 1, p.clearcoat_roughness = 1;
-  });
-  add("brushed",
-      [](P& p) { p.metallic = 1, p.roughness = 0.4f, p.anisotropy = 0.8f, p.rotation = 0.15f; });
-  add("fuzz", [](P& p) { p.fuzz_weight = 0.7f, p.fuzz_roughness = 0.4f; });
-  add("wall", [](P& p) {
-    p.thin_walled = 1, p.transmission_weight = 0.5f, p.roughness = 0.4f;
-    p.subsurface_weight = 0.6f, p.subsurface_anisotropy = 0.2f;
-  });
-  add("film", [](P& p) { p.film_weight = 0.9f, p.metallic = 0.3f, p.transmission_weight = 0.4f; });
-  add("all", [](P& p) {
-    p.metallic = 0.3f, p.transmission_weight = 0.4f, p.roughness = 0.4f, p.anisotropy = 0.3f;
-    p.specular_weight = 0.7f, p.diffuse_roughness = 0.8f, p.clearcoat = 0.6f;
-    p.clearcoat_roughness = 0.2f, p.coat_color = Vec(0.9f, 0.8f, 0.7f), p.fuzz_weight = 0.5f;
-    p.fuzz_color = Vec(0.9f, 0.5f, 0.5f), p.film_weight = 0.5f;
-    p.subsurface_weight = 0.5f, p.specular_color = Vec(0.9f, 0.9f, 0.5f);
-  });
-}
-
-std::vector<Case> all_cases() {
-  std::vector<Case> cases;
-  const auto add = [&](std::string name, ProgramId id, auto edit, bool schlick = false) {
-    cases.push_back(make_case(std::move(name), id, edit, schlick));
-  };
-  add("diffuse", ProgramId::kDiffuse, [](P&) {});
-  add("emissive", ProgramId::kEmissive, [](P&) {});
-  for (float r : {0.f, 0.2f, 0.5f, 1.f}) {
-    const std::string tail = " r" + std::to_string(r).substr(0, 3);
-    add("metal" + tail, ProgramId::kMetal, [&](P& p) { p.roughness = r; });
-    add("gold" + tail, ProgramId::kMetal, [&](P& p) {
-      p.roughness = r;
-      p.flags = kConductorIndex;
-      p.conductor_eta = Vec(0.143f, 0.375f, 1.442f);
-      p.conductor_k = Vec(3.983f, 2.386f, 1.603f);
-    });
-    add("glass" + tail, ProgramId::kDielectric, [&](P& p) {
-      p.roughness = r;
-      p.base_color = Vec(1, 1, 1);
-    });
-    add("plastic" + tail, ProgramId::kPlastic, [&](P& p) { p.roughness = r; });
-    add("principled" + tail, ProgramId::kPrincipled, [&](P& p) { p.roughness = r; });
-  }
-  add("glass schlick", ProgramId::kDielectric, [](P&) {}, true);
-  add("bubble", ProgramId::kDielectric, [](P& p) { p.ior = 0.75f; });
-  add("diamond", ProgramId::kDielectric, [](P& p) { p.ior = 2.4f, p.roughness = 0.6f; });
-  add("plastic schlick", ProgramId::kPlastic, [](P&) {}, true);
-  add("principled metal", ProgramId::kPrincipled,
-      [](P& p) { p.metallic = 0.9f, p.roughness = 0.3f; });
-  add("principled specular", ProgramId::kPrincipled, [](P& p) {
-    p.flags = kSpecularWorkflow;
-    p.specular_color = Vec(0.3f, 0.5f, 0.7f);
-  });
-  add("principled coat", ProgramId::kPrincipled, [](P& p) {
-    p.clearcoat = 1;
-    p.clearcoat_roughness = 0.3f;
-    p.roughness = 0.7f;
-  });
-  add("principled smooth coat", ProgramId::kPrincipled, [](P& p) { p.clearcoat = 0.5f; });
-  add("principled pane", ProgramId::kPrincipled,
-      [](P& p) { p.opacity = 0.3f, p.clearcoat = 0.7f; });
-  add("principled schlick", ProgramId::kPrincipled, [](P&) {}, true);
-  add_openpbr_cases(cases);
-  return cases;
-}
-
-/// Calls f(bsdf) with the scalar class of the case's program.
-template <typename Function>
-void with_bsdf(const Case& c, Function f) {
-  visit_program<float>(c.program, [&]<typename Bsdf>() { f(Bsdf(c.params, c.schlick)); });
-}
-
-std::vector<Vec> views(const Case& c) {
-  std::vector<Vec> all;
-  for (double z : {0.02, 0.25, 0.6, 1.0}) {
-    all.push_back(direction(z, 0.4));
-    if (!c.two_sided() || z == 0.6) all.push_back(direction(-z, 2.5));
-  }
-  return all;
-}
 
 TEST(Programs, TableFindsEachProgram) {
   for (uint32_t i = 0; i < kProgramCount; ++i) {
@@ -159,39 +30,10 @@ TEST(Programs, TableFindsEachProgram) {
   }
 }
 
-TEST(Programs, SamplesFollowTheirDensity) {
-  struct Result {
-    std::string name;
-    bsdf_testing::ChiSquareResult r;
-  };
-  std::vector<Result> results;
-  uint32_t seed = 1;
-  for (const Case& c : all_cases())
-    with_bsdf(c, [&](const auto& bsdf) {
-      if (!bsdf.has_non_delta()) return;
-      for (const Vec& wo : views(c)) {
-        bsdf_testing::Sampler s;
-        s.pdf = [&](const Vec& wi) { return bsdf.eval(wo, wi).pdf; };
-        s.sample = [&](float l, float u, float v, Vec& wi) {
-          const auto b = bsdf.sample(wo, l, u, v);
-          wi = b.wi;
-          return b.pdf > 0 && !b.is_delta;
-        };
-        results.push_back(
-            {c.name + " z " + std::to_string(wo.z), bsdf_testing::chi_square(s, seed++, 60000)});
-      }
-    });
-  ASSERT_GT(results.size(), 100u);
-  for (const auto& [name, r] : results) {
-    EXPECT_GT(r.p_value, bsdf_testing::sidak(0.01, results.size())) << name;
-    EXPECT_NEAR(r.mass, r.accepted, 0.01) << name;  // 5 sigma of 60000 samples
-  }
-}
-
 TEST(Programs, DeltaLobesAreChosenAsOftenAsStated) {
   // What cosine_sampling weighs all other lobes by. Numbers are stratified: the share errs by a
   // stratum for each lobe.
-  for (const Case& c : all_cases())
+  for (const Case& c : usual_cases())
     with_bsdf(c, [&](const auto& bsdf) {
       for (const Vec& wo : views(c)) {
         constexpr int kSamples = 1000;
@@ -206,7 +48,7 @@ TEST(Programs, DeltaLobesAreChosenAsOftenAsStated) {
 }
 
 TEST(Programs, WeightIsValueOverDensity) {
-  for (const Case& c : all_cases())
+  for (const Case& c : usual_cases())
     with_bsdf(c, [&](const auto& bsdf) {
       for (const Vec& wo : views(c))
         for (uint32_t i = 0; i < 500; ++i) {
@@ -235,7 +77,7 @@ TEST(Programs, WeightIsValueOverDensity) {
 }
 
 TEST(Programs, DiffusePartIsOfTheWhole) {
-  for (const Case& c : all_cases())
+  for (const Case& c : usual_cases())
     with_bsdf(c, [&](const auto& bsdf) {
       double diffuse = 0, rest = 0;
       for (const Vec& wo : views(c))
@@ -266,7 +108,7 @@ TEST(Programs, ReciprocityHolds) {
   // f(o, i) / n_o^2 = f(i, o) / n_i^2 (Veach 1997, eq. 5.14).
   std::mt19937 rng(11);
   std::uniform_real_distribution<double> unit(-1, 1);
-  for (const Case& c : all_cases()) {
+  for (const Case& c : usual_cases()) {
     if (!c.reciprocal()) continue;
     with_bsdf(c, [&](const auto& bsdf) {
       int compared = 0;
@@ -290,7 +132,7 @@ TEST(Programs, ReciprocityHolds) {
 }
 
 TEST(Programs, WhiteFurnaceNeverGains) {
-  for (Case c : all_cases()) {
+  for (Case c : usual_cases()) {
     c.params.base_color = Vec(1, 1, 1);
     with_bsdf(c, [&](const auto& bsdf) {
       // Of brushed surfaces the energy is known less well.

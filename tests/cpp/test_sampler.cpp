@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "bsdf_testing.h"
+#include "chi_square.h"
 #include "lane_testing.h"
 
 namespace wavecomb {
@@ -256,7 +256,7 @@ TEST(Sampler, PixelsAverageToUniform) {
     for (const auto& c : count) {
       double statistic = 0;
       for (const int k : c) statistic += (k - kN / 100.0) * (k - kN / 100.0) / (kN / 100.0);
-      EXPECT_GT(bsdf_testing::chi_square_p(statistic, 99), 0.001);
+      EXPECT_GT(chi_square::chi_square_p(statistic, 99), 0.001);
     }
   }
 }

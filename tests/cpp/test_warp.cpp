@@ -9,110 +9,65 @@ namespace wavecomb {
 namespace {
 
 using namespace lane_testing;
-using bsdf_testing::chi_square_p;
-constexpr double kPiD = 3.14159265358979323846;
+using bsdf_testing::kPiD;
 
-/// p-value of a histogram of a warp. `cell` gives the bin of a sample, all bins are equally
-/// probable.
-template <typename Cell>
-double uniformity(int cells, const Cell& cell, uint32_t seed) {
-  std::mt19937 rng(seed);
-  const int n = 400 * cells;
-  std::vector<int> count(static_cast<size_t>(cells), 0);
-  for (int i = 0; i < n; ++i) {
-    const float u = static_cast<float>(rng() >> 8) * 0x1p-24f,
-                v = static_cast<float>(rng() >> 8) * 0x1p-24f;
-    const int c = cell(u, v);
-    EXPECT_TRUE(c >= 0 && c < cells);
-    ++count[static_cast<size_t>(std::clamp(c, 0, cells - 1))];
-  }
-  double statistic = 0;
-  for (const int c : count) statistic += (c - 400.0) * (c - 400.0) / 400.0;
-  return chi_square_p(statistic, cells - 1);
+using chi_square::Draw;
+using chi_square::Place;
+using chi_square::Random;
+
+/// A warp to a place of charts, on each of which it has a density.
+template <typename Density, typename Map>
+chi_square::Case warp_case(std::string name, std::vector<chi_square::Chart> charts,
+                           const Density& density, const Map& map) {
+  chi_square::Case c{std::move(name), std::move(charts), density, {}};
+  c.draw = [map](Random& random, bool) {
+    const float u = random(), v = random();
+    return Draw::at(map(u, v));
+  };
+  return c;
+}
+/// (x, angle of (a, b) in turns).
+Place with_turn(double x, double a, double b) {
+  return {0, x, std::atan2(b, a) / (2 * kPiD) + 0.5};
 }
 
-/// Bin of (x in [0, 1], angle of (a, b)) in a grid of 16 x 32.
-int grid_cell(double x, double a, double b) {
-  const double turn = std::atan2(b, a) / (2 * kPiD);
-  const int row = std::clamp(static_cast<int>(x * 16), 0, 15);
-  return row * 32 + std::clamp(static_cast<int>((turn < 0 ? turn + 1 : turn) * 32), 0, 31);
-}
-
-const double kLevel = bsdf_testing::sidak(0.01, 6);
-
-TEST(Warp, DiskIsUniform) {
+TEST(Warp, SamplesFollowTheirDensity) {
+  chi_square::Battery battery("warps");
+  const std::vector<chi_square::Chart> square{{0, 1, 0, 1}};
+  const auto even = [](const Place&) { return 1.0; };
   // Equal areas: equal steps in r^2.
-  EXPECT_GT(uniformity(
-                512,
-                [](float u, float v) {
-                  const auto d = square_to_disk(u, v);
-                  const double x = d.x, y = d.y;
-                  return grid_cell(x * x + y * y, x, y);
-                },
-                1),
-            kLevel);
-}
-
-TEST(Warp, CosineHemisphere) {
-  // The cumulative of cos / pi over the polar angle is sin^2.
-  EXPECT_GT(uniformity(
-                512,
-                [](float u, float v) {
-                  const auto w = square_to_cosine_hemisphere(u, v);
-                  return grid_cell(1 - static_cast<double>(w.z) * w.z, w.x, w.y);
-                },
-                2),
-            kLevel);
+  battery.run(warp_case("disk", square, even, [](float u, float v) {
+    const auto d = square_to_disk(u, v);
+    const double x = d.x, y = d.y;
+    return with_turn(x * x + y * y, x, y);
+  }));
+  battery.run(warp_case(
+      "cosine hemisphere", bsdf_testing::direction_charts(),
+      [](const Place& p) { return double{cosine_hemisphere_pdf(bsdf_testing::direction_at(p).z)}; },
+      [](float u, float v) { return bsdf_testing::place_of(square_to_cosine_hemisphere(u, v)); }));
+  battery.run(warp_case(
+      "sphere", bsdf_testing::direction_charts(), [](const Place&) { return 1 / (4 * kPiD); },
+      [](float u, float v) { return bsdf_testing::place_of(square_to_sphere(u, v)); }));
+  for (const double one_minus_cos : {2.0, 0.5, 1e-5, 1e-9})
+    battery.run(
+        warp_case("cone of " + std::to_string(one_minus_cos), square, even, [=](float u, float v) {
+          const auto w = square_to_cone(u, v, static_cast<float>(one_minus_cos));
+          // 1 - cos from the sine, for narrow cones: h (2 - h) = sin^2.
+          const double x = w.x, y = w.y, sin2 = x * x + y * y;
+          const double h = w.z > 0 ? sin2 / (1 + std::sqrt(std::max(0.0, 1 - sin2)))
+                                   : 1 - static_cast<double>(w.z);
+          return with_turn(h / one_minus_cos, x, y);
+        }));
+  // Of equal triangles: P(b1 + b2 < s) = s^2, and b1 / (b1 + b2) is uniform.
+  battery.run(warp_case("triangle", square, even, [](float u, float v) {
+    const auto b = square_to_triangle(u, v);
+    const double b1 = b.x, b2 = b.y, sum = b1 + b2;
+    EXPECT_TRUE(b1 >= 0 && b2 >= 0 && sum <= 1 + 1e-6);
+    return Place{0, sum * sum, b1 / std::max(sum, 1e-30)};
+  }));
+  battery.judge();
   EXPECT_EQ(cosine_hemisphere_pdf(-0.5f), 0.f);
   EXPECT_FLOAT_EQ(cosine_hemisphere_pdf(1.f), kInvPi);
-}
-
-TEST(Warp, Sphere) {
-  EXPECT_GT(uniformity(
-                512,
-                [](float u, float v) {
-                  const auto w = square_to_sphere(u, v);
-                  return grid_cell((1 - static_cast<double>(w.z)) / 2, w.x, w.y);
-                },
-                3),
-            kLevel);
-}
-
-TEST(Warp, Cones) {
-  for (const double one_minus_cos : {2.0, 0.5, 1e-5}) {
-    EXPECT_GT(uniformity(
-                  512,
-                  [&](float u, float v) {
-                    const auto w = square_to_cone(u, v, static_cast<float>(one_minus_cos));
-                    // 1 - cos from the sine, for narrow cones: h (2 - h) = sin^2.
-                    const double sin2 =
-                        static_cast<double>(w.x) * w.x + static_cast<double>(w.y) * w.y;
-                    const double h = w.z > 0 ? sin2 / (1 + std::sqrt(std::max(0.0, 1 - sin2)))
-                                             : 1 - static_cast<double>(w.z);
-                    return grid_cell(h / one_minus_cos, w.x, w.y);
-                  },
-                  4),
-              kLevel)
-        << one_minus_cos;
-  }
-}
-
-TEST(Warp, TriangleIsUniform) {
-  // Square root parametrization gives equal areas: (1 - sqrt-ish) cells of s = 1 - b0', t.
-  EXPECT_GT(uniformity(
-                256,
-                [](float u, float v) {
-                  const auto b = square_to_triangle(u, v);
-                  const double b1 = b.x, b2 = b.y, sum = b1 + b2;
-                  EXPECT_TRUE(b1 >= 0 && b2 >= 0 && sum <= 1 + 1e-6);
-                  // P(b1 + b2 < s) = s^2, and b1 / sum is uniform.
-                  const int row = std::clamp(static_cast<int>(sum * sum * 16), 0, 15);
-                  const int column =
-                      std::clamp(static_cast<int>(b1 / std::max(sum, 1e-30) * 16), 0, 15);
-                  return row * 16 + column;
-                },
-                5),
-            kLevel);
 }
 
 /// Area of the image of a small square around (u, v), by its two edges, over the square's.

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Camera rays go through the picture as the pixel filter says, and evenly through the lens.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "chi_square.h"
+#include "parts.h"
+#include "wavecomb/integrate/camera_ray.h"
+
+namespace wavecomb {
+namespace {
+
+using chi_square::Battery;
+using chi_square::Draw;
+using chi_square::Place;
+using chi_square::Random;
+
+constexpr double kPiD = 3.14159265358979323846;
+constexpr uint32_t kWidth = 8, kHeight = 6;
+constexpr float kX = 5, kY = 2;  ///< the pixel
+
+/// A filter at x in [-1, 1], not normalized: the functions that Settings documents.
+double filter_at(FilterKind kind, double x) {
+  switch (kind) {
+    case FilterKind::kBox:
+      return 1;
+    case FilterKind::kGaussian:  // sigma is a third of the half width; lowered so as to end at 0
+      return std::exp(-4.5 * x * x) - std::exp(-4.5);
+    case FilterKind::kBlackmanHarris:
+      return 0.35875 + 0.48829 * std::cos(kPiD * x) + 0.14128 * std::cos(2 * kPiD * x) +
+             0.01168 * std::cos(3 * kPiD * x);
+  }
+  return 0;
+}
+/// Density over offsets in pixels of a filter so wide.
+std::function<double(double)> filter_density(FilterKind kind, double width) {
+  constexpr int kSteps = 4000;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) sum += filter_at(kind, 2 * (i + 0.5) / kSteps - 1);
+  const double scale = kSteps / (sum * width);
+  return [=](double offset) { return scale * filter_at(kind, 2 * offset / width); };
+}
+
+Camera make_camera(Projection projection, float lens) {
+  Camera camera;
+  camera.projection = projection;
+  camera.lens_radius = lens;
+  camera.focus_distance = 7;
+  if (projection == Projection::kLatlong) {
+    camera.window[0] = -1;
+    camera.window[1] = 1;
+  }
+  return camera;
+}
+
+/// A ray of the pixel, and where on the picture (in pixels from the pixel's centre) and on the lens
+/// (in radii) it passes.
+struct Passed {
+  double x, y, lens_x, lens_y;
+};
+Passed pass(const CameraSetup& setup, Random& random) {
+  const float a = random(), b = random(), c = random(), d = random();
+  const CameraRay<float> ray = camera_ray<float>(setup, kX, kY, {a, b, c, d}, true);
+  const double o[3] = {ray.o.x, ray.o.y, ray.o.z}, w[3] = {ray.d.x, ray.d.y, ray.d.z};
+  double window[2], lens[2] = {o[0], o[1]};
+  if (setup.projection == Projection::kLatlong) {
+    window[0] = std::atan2(w[0], -w[2]);
+    window[1] = std::asin(w[1]);
+  } else {
+    // All rays of a point of the picture meet in the plane in focus.
+    const double f = setup.focus_distance, t = -f / w[2];
+    const bool parallel = setup.projection == Projection::kOrthographic;
+    for (int i = 0; i < 2; ++i) window[i] = (o[i] + t * w[i]) / (parallel ? 1 : f);
+    if (parallel)
+      for (int i = 0; i < 2; ++i) lens[i] -= window[i];
+  }
+  const auto centred = [](double at, double first, double step, double pixel) {
+    return (at - first) / step - pixel - 0.5;
+  };
+  return {centred(window[0], setup.x0, setup.step_x, kX),
+          centred(window[1], setup.y1, -double{setup.step_y}, kY),
+          setup.lens_radius > 0 ? lens[0] / setup.lens_radius : 0,
+          setup.lens_radius > 0 ? lens[1] / setup.lens_radius : 0};
+}
+
+struct FilterCase {
+  const char* name;
+  FilterKind kind;
+  float width;
+};
+const FilterCase kFilters[] = {{"box of 1 pixel", FilterKind::kBox, 1},
+                               {"box of 2.5 pixels", FilterKind::kBox, 2.5f},
+                               {"gaussian of 3 pixels", FilterKind::kGaussian, 3},
+                               {"gaussian of 1.5 pixels", FilterKind::kGaussian, 1.5f},
+                               {"Blackman-Harris of 4 pixels", FilterKind::kBlackmanHarris, 4},
+                               {"Blackman-Harris of 12 pixels", FilterKind::kBlackmanHarris, 12}};
+struct CameraCase {
+  const char* name;
+  Projection projection;
+  float lens;
+};
+const CameraCase kCameras[] = {{"pinhole", Projection::kPerspective, 0},
+                               {"lens", Projection::kPerspective, 0.3f},
+                               {"orthographic", Projection::kOrthographic, 0},
+                               {"orthographic lens", Projection::kOrthographic, 0.3f},
+                               {"latlong", Projection::kLatlong, 0}};
+
+TEST(CameraSamples, FollowThePixelFilter) {
+  Battery battery("pixel filters");
+  for (const CameraCase& seen : kCameras)
+    for (const FilterCase& filter : kFilters) {
+      const FilterTable table(filter.kind, filter.width);
+      const CameraSetup setup(make_camera(seen.projection, seen.lens), kWidth, kHeight, table);
+      const double half = 0.5 * double{filter.width};
+      const auto density = filter_density(filter.kind, double{filter.width});
+      battery.run({std::string(filter.name) + ", " + seen.name,
+                   {{-half, half, -half, half}},
+                   [&](const Place& p) { return density(p.x) * density(p.y); },
+                   [&](Random& random, bool) {
+                     const Passed at = pass(setup, random);
+                     return Draw::at({0, at.x, at.y});
+                   }});
+    }
+  battery.judge();
+}
+
+TEST(CameraSamples, FillTheLensEvenly) {
+  // Square of the distance from the lens' middle, and azimuth in turns; then the former beside the
+  // place on the picture, which it has nothing to do with.
+  Battery battery("lens");
+  const FilterTable table(FilterKind::kGaussian, 3);
+  const auto density = filter_density(FilterKind::kGaussian, 3);
+  for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic})
+    for (const float radius : {0.001f, 0.3f, 5.f}) {
+      const CameraSetup setup(make_camera(projection, radius), kWidth, kHeight, table);
+      const std::string name =
+          (projection == Projection::kPerspective ? "lens of " : "orthographic lens of ") +
+          std::to_string(radius);
+      battery.run({name,
+                   {{}},
+                   [](const Place&) { return 1.0; },
+                   [&](Random& random, bool) {
+                     const Passed at = pass(setup, random);
+                     const double r2 = at.lens_x * at.lens_x + at.lens_y * at.lens_y;
+                     const double turn = std::atan2(at.lens_y, at.lens_x) / (2 * kPiD) + 0.5;
+                     return Draw::at({0, r2, turn});
+                   }});
+      battery.run({name + " beside the picture",
+                   {{0, 1, -1.5, 1.5}},
+                   [&](const Place& p) { return density(p.y); },
+                   [&](Random& random, bool) {
+                     const Passed at = pass(setup, random);
+                     const double r2 = at.lens_x * at.lens_x + at.lens_y * at.lens_y;
+                     return Draw::at({0, r2, projection == Projection::kPerspective ? at.x : at.y});
+                   }});
+    }
+  battery.judge();
+}
+
+}  // namespace
+}  // namespace wavecomb
