@@ -21,24 +21,6 @@ def named(widget: W, name: str, title: str, tip: str) -> W:
     return widget
 
 
-def whole(
-    name: str,
-    title: str,
-    tip: str,
-    low: int,
-    high: int,
-    value: int,
-    changed: Callable[[int], object],
-) -> QSpinBox:
-    """A whole number that is taken when editing ends, not with every key."""
-    box = named(QSpinBox(), name, title, tip)
-    box.setKeyboardTracking(False)
-    box.setRange(low, high)
-    box.setValue(value)
-    box.valueChanged.connect(changed)
-    return box
-
-
 def real(
     name: str,
     title: str,

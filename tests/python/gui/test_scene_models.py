@@ -21,6 +21,7 @@ from wavecomb.gui.scene.ranges import Range
 from wavecomb.gui.scene.scene_edits import SceneEdits
 from wavecomb.gui.scene.scene_model import VISIBILITY, SceneModel, StateRole
 from wavecomb.gui.scene.variants import VariantsModel
+from wavecomb.gui.viewport.cameras_model import CamerasModel
 
 KEY, BULB, SKY = (f"/World/Lights/{name}" for name in ("Key", "Bulb", "Sky"))
 RED, WOOD = "/World/Looks/Red", "/World/Looks/Wood"
@@ -202,6 +203,21 @@ def test_prims_as_data(edits):
     edits.set_visible([KEY], False)
     assert model.data(eye, StateRole) == "hidden" and kept.isValid()
     assert model.data(model.index_of(Sdf.Path(KEY)), ToneRole) == "dim"
+
+
+def test_cameras_as_data(edits):
+    session = edits.session
+    model = CamerasModel(session)
+    paths = [model.index(row).data(Qt.ItemDataRole.UserRole) for row in range(model.rowCount())]
+    assert paths == [None, "/World/Cam", "/World/Side"] and model.row == 1
+    assert [model.index(row).data() for row in range(3)] == ["Free camera", "Cam", "Side"]
+    told = Told(model.moved)
+    model.choose(2)
+    assert session.pose.path == "/World/Side" and model.row == 2 and told.counts == [1]
+    model.choose(0)
+    assert session.pose.path is None and model.row == 0
+    model.paths = [None, "/A/Cam", "/B/Cam", "/B/Other"]
+    assert [model.index(row).data() for row in (1, 2, 3)] == ["/A/Cam", "/B/Cam", "Other"]
 
 
 def test_notes_are_filtered(edits):

@@ -3,23 +3,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QGridLayout,
     QLabel,
-    QSpinBox,
     QWidget,
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.scheduling.choices import choice
-from wavecomb.options import Setting, settings
+from wavecomb.gui.scheduling.choices import Choice, Number, choice, number
+from wavecomb.gui.scheduling.setting_controls import (
+    ChoiceBox,
+    Control,
+    control_of,
+    show_control,
+)
+from wavecomb.options import settings
 
 if TYPE_CHECKING:
     from wavecomb.gui.compare.source import SideSource
@@ -32,14 +34,20 @@ NOTE = (
 
 _CHOSEN = ("policy", "ray_order", "roulette", "sampler", "integrator", "lanes")
 _NUMBERS = ("spp", "max_depth", "seed", "wave_size", "adaptive", "clamp_indirect")
-_HIGHEST = {"max_depth": 64, "seed": 2**31 - 1, "adaptive": 1.0, "clamp_indirect": 1000.0}
-_STEPS = {"adaptive": 0.005, "clamp_indirect": 1.0}
+_SHOWN: dict[str, dict[str, Any]] = {
+    "max_depth": {"most": 64},
+    "seed": {"most": 2**31 - 1},
+    "adaptive": {"least": 0.0, "most": 1.0},
+    "clamp_indirect": {"most": 1000.0, "step": 1.0, "decimals": 2},
+}
+SAME = "Changes no bit of the picture."
 
 
-def _tip(row: Setting) -> str:
+def _row(name: str) -> Choice | Number:
     """What it is, and whether the picture depends on it."""
-    zero = f" 0: {row.zero}." if row.zero else ""
-    return row.help + zero + ("" if row.changes_picture else " Changes no bit of the picture.")
+    setting = settings()[name]
+    row = choice(name) if name in _CHOSEN else replace(number(name), **_SHOWN.get(name, {}))
+    return row if setting.changes_picture else replace(row, tip=f"{row.tip} {SAME}")
 
 
 class LiveSettings(QWidget):
@@ -48,8 +56,7 @@ class LiveSettings(QWidget):
     def __init__(self, source: SideSource, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._source = source
-        self._showing = False
-        self._widgets: dict[str, QWidget] = {}
+        self._widgets: dict[str, Control] = {}
         self.setObjectName(f"live{source.name}")
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -57,66 +64,29 @@ class LiveSettings(QWidget):
         for column, form in enumerate(forms):
             form.setVerticalSpacing(theme.em(0.2))
             grid.addLayout(form, 0, column)
-        rows = settings()
-        for name in _CHOSEN:
-            offered = tuple(choice(name).values)
-            self._add(forms[len(self._widgets) % 3], rows[name], self._combo(name, offered))
-        for name in _NUMBERS:
-            self._add(forms[len(self._widgets) % 3], rows[name], self._spin(rows[name]))
+        for place, name in enumerate((*_CHOSEN, *_NUMBERS)):
+            self._add(forms[place % 3], _row(name))
         note = QLabel(NOTE, self)
         note.setObjectName("sharing")
         note.setWordWrap(True)
         grid.addWidget(note, 1, 0, 1, 3)
 
-    def _combo(self, name: str, values: Sequence[Any]) -> QComboBox:
-        combo = QComboBox(self)
-        for value in values:
-            combo.addItem(str(value), value)
-        combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        combo.setMinimumContentsLength(8)
-        combo.activated.connect(lambda index, name=name: self._change(name, combo.itemData(index)))
-        return combo
-
-    def _spin(self, row: Setting) -> QSpinBox | QDoubleSpinBox:
-        spin: QSpinBox | QDoubleSpinBox
-        least, most = row.least or 0.0, _HIGHEST.get(row.name, row.most or 0.0)
-        if row.zero:
-            least = 0
-        if row.kind == "integer":
-            spin = QSpinBox(self)
-            spin.setRange(int(least), int(most))
-        else:
-            spin = QDoubleSpinBox(self)
-            spin.setDecimals(4 if most <= 1.0 else 2)
-            spin.setRange(least, most)
-            spin.setSingleStep(_STEPS.get(row.name, 0.1))
-        spin.setKeyboardTracking(False)
-        spin.valueChanged.connect(lambda value, name=row.name: self._change(name, value))
-        return spin
-
-    def _add(self, form: QFormLayout, row: Setting, widget: QWidget) -> None:
-        widget.setObjectName(f"{row.name}{self._source.name}")
-        widget.setAccessibleName(f"{row.label} of {self._source.name}")
-        widget.setToolTip(_tip(row))
-        widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._widgets[row.name] = widget
-        form.addRow(row.label, widget)
+    def _add(self, form: QFormLayout, row: Choice | Number) -> None:
+        control = control_of(row, self._change)
+        control.setObjectName(f"{row.field}{self._source.name}")
+        control.setAccessibleName(f"{row.label} of {self._source.name}")
+        self._widgets[row.field] = control
+        form.addRow(row.label, control)
 
     def _change(self, name: str, value: Any) -> None:
-        if not self._showing:
-            self._source.change(**{name: value})
-            self.show_setup()
+        self._source.change(**{name: value})
+        self.show_setup()
 
     def show_setup(self) -> None:
         """What the render uses."""
         live = self._source.live
         if live is None:
             return
-        self._showing = True
-        for name, widget in self._widgets.items():
-            value = getattr(live.setup, name)
-            if isinstance(widget, QComboBox):
-                widget.setCurrentIndex(max(widget.findData(value), 0))
-            elif isinstance(widget, (QSpinBox, QDoubleSpinBox)) and not widget.hasFocus():
-                widget.setValue(value)
-        self._showing = False
+        for name, control in self._widgets.items():
+            if isinstance(control, ChoiceBox) or not control.hasFocus():
+                show_control(control, getattr(live.setup, name))

@@ -109,8 +109,22 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
     box.setKeyboardTracking(False)
     box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
     calm(box)
+    box.setProperty("field", number.field)
     box.valueChanged.connect(lambda value: changed(number.field, value))
     return box
+
+
+def control_of(row: Choice | Number, changed: Changed) -> Control:
+    """The control of a setting, whatever it is: all bars and panels have theirs from here."""
+    return ChoiceBox(row, changed) if isinstance(row, Choice) else number_box(row, changed)
+
+
+def show_control(control: Control, value: Any) -> None:
+    """Shows what is set, without changing anything."""
+    if isinstance(control, ChoiceBox):
+        control.show_value(value)
+    else:
+        show_number(control, value)
 
 
 def show_number(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
@@ -120,6 +134,9 @@ def show_number(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
             box.setValue(int(value))
         else:
             box.setValue(value)
+
+
+Control = ChoiceBox | QSpinBox | QDoubleSpinBox
 
 
 def value_text(value: Any) -> str:

@@ -3,19 +3,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 from PySide6.QtCore import QSize, Signal
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QToolBar, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QLabel,
+    QSizePolicy,
+    QSpinBox,
+    QToolBar,
+    QWidget,
+)
 
 from wavecomb.api import MAX_EDGE
 from wavecomb.gui import theme
-from wavecomb.gui.viewport.orbit import Pose
+from wavecomb.gui.scheduling.choices import number
+from wavecomb.gui.scheduling.setting_controls import control_of, show_control
+from wavecomb.gui.viewport.cameras_model import CamerasModel
 from wavecomb.gui.viewport.session import Session, Setup
-from wavecomb.gui.widgets import caption, named, set_quietly, whole
-from wavecomb.usd import LoadedStage
+from wavecomb.gui.widgets import caption, named
 
-FREE = "Free camera"
-MOST_SPP = 1 << 20
-MOST_DEPTH = 1024
+_MOST: dict[str, dict[str, Any]] = {"width": {"most": MAX_EDGE}, "height": {"most": MAX_EDGE}}
+_NAMES = {"max_depth": "depth"}
+"""Of controls, where they are not those of the settings."""
 
 
 class RenderBar(QToolBar):
@@ -38,33 +50,19 @@ class RenderBar(QToolBar):
         )  # fmt: skip
         self.camera.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self.camera.setMinimumContentsLength(14)
-        self.camera.addItem(FREE, None)
-        self.camera.activated.connect(self._camera_chosen)
-        change = session.change
-        self.wide = whole(
-            "render.width", "Width", "Of the picture, pixels", 1, MAX_EDGE, setup.width,
-            lambda value: change(width=value),
-        )  # fmt: skip
-        self.high = whole(
-            "render.height", "Height", "Of the picture, pixels", 1, MAX_EDGE, setup.height,
-            lambda value: change(height=value),
-        )  # fmt: skip
-        self.spp = whole(
-            "render.spp", "Samples per pixel", "Samples per pixel; with adaptive sampling the most",
-            1, MOST_SPP, setup.spp, lambda value: change(spp=value),
-        )  # fmt: skip
-        self.depth = whole(
-            "render.depth", "Depth", "Longest path, in scatterings", 0, MOST_DEPTH, setup.max_depth,
-            lambda value: change(max_depth=value),
-        )  # fmt: skip
+        self.cameras = CamerasModel(session, self)
+        self.camera.setModel(self.cameras)
+        self.camera.activated.connect(self.cameras.choose)
+        self.cameras.moved.connect(self._camera_changed)
+        self.wide, self.high, self.spp, self.depth = (
+            self._box(name) for name in ("width", "height", "spp", "max_depth")
+        )
         self.denoise = named(
             QCheckBox("Denoise"), "render.denoise", "Denoise",
             "Show the picture without its noise, by Open Image Denoise (Shift+D)",
         )  # fmt: skip
         self.denoise.toggled.connect(self._denoise_toggled)
         self._fill()
-        session.opened.connect(self._opened)
-        session.camera_changed.connect(self._camera_changed)
         session.setup_changed.connect(self._setup_changed)
         self._setup_changed(setup)
 
@@ -85,24 +83,22 @@ class RenderBar(QToolBar):
 
     # ---- cameras ---------------------------------------------------------------------------------
 
-    def _opened(self, stage: LoadedStage) -> None:
-        self.camera.clear()
-        self.camera.addItem(FREE, None)
-        names = [path.rpartition("/")[2] for path in stage.cameras]
-        for path, name in zip(stage.cameras, names, strict=True):
-            self.camera.addItem(name if names.count(name) == 1 else path, path)
-        self._camera_changed(self._session.pose)
-
-    def _camera_chosen(self, index: int) -> None:
-        self._session.use_camera(self.camera.itemData(index))
-
-    def _camera_changed(self, pose: Pose | None) -> None:
-        index = self.camera.findData(pose.path) if pose is not None and pose.path else 0
-        self.camera.setCurrentIndex(max(index, 0))
-        path = self.camera.currentData()
-        self.camera.setStatusTip(path or "")
+    def _camera_changed(self) -> None:
+        self.camera.setCurrentIndex(self.cameras.row)
+        self.camera.setStatusTip(self.camera.currentData() or "")
 
     # ---- settings --------------------------------------------------------------------------------
+
+    def _box(self, name: str) -> QSpinBox:
+        box = control_of(replace(number(name), **_MOST.get(name, {})), self._change)
+        assert isinstance(box, QSpinBox)
+        box.setObjectName(f"render.{_NAMES.get(name, name)}")
+        box.setGroupSeparatorShown(False)
+        box.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        return box
+
+    def _change(self, name: str, value: Any) -> None:
+        self._session.change(**{name: value})
 
     def _denoise_toggled(self, on: bool) -> None:
         if on:
@@ -118,11 +114,8 @@ class RenderBar(QToolBar):
         self._session.change(denoise=on)
 
     def _setup_changed(self, setup: Setup) -> None:
-        for box, value in (
-            (self.wide, setup.width), (self.high, setup.height), (self.spp, setup.spp),
-            (self.depth, setup.max_depth),
-        ):  # fmt: skip
-            set_quietly(box, value)
+        for box in (self.wide, self.high, self.spp, self.depth):
+            show_control(box, getattr(setup, str(box.property("field"))))
         self.denoise.blockSignals(True)
         self.denoise.setChecked(setup.denoise)
         self.denoise.blockSignals(False)

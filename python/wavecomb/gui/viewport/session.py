@@ -25,19 +25,26 @@ from wavecomb.gui.viewport.display import Look
 from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import Live
+from wavecomb.gui.viewport.lives import Lives
 from wavecomb.gui.viewport.orbit import Pose, pose_of_scene
 from wavecomb.gui.viewport.saving import save_frame
-from wavecomb.gui.worker import Errands, Worker
+from wavecomb.gui.viewport.scene_lookup import (
+    camera_pose,
+    edits_again,
+    light_key,
+    make_renderer,
+    prim_bounds,
+)
+from wavecomb.gui.viewport.tasks import Tasks
+from wavecomb.gui.worker import Worker
 
 if TYPE_CHECKING:
     from pxr import Usd
 
-    from wavecomb._core import Renderer, Scene
+    from wavecomb._core import Scene
     from wavecomb.usd import LoadedStage, LoadReport
 
 __all__ = ["Frame", "Live", "Pose", "Session", "Setup"]
-
-RenderedBy = Callable[["Scene", int], "Renderer"]
 
 
 class Session(QObject):
@@ -94,21 +101,23 @@ class Session(QObject):
         self.material_edits: dict[str, dict[str, Any]] = {}
         self.light_edits: dict[tuple[str, int], dict[str, Any]] = {}
         self.selection: str | None = None
-        self._live = Live(setup, self)
-        for name in ("frame", "statistics", "setup_changed", "edited", "state_changed"):
+        self._lives = Lives(setup, self)
+        self._live = self._lives.first
+        for name in (
+            *("frame", "statistics", "setup_changed", "edited", "state_changed", "failed"),
+            "warned",
+        ):
             getattr(self._live, name).connect(getattr(self, name))
-        self._live.failed.connect(self.failed)
-        self._live.warned.connect(self.warned)
         self._loader = Worker("load", self)
         self._loader.done.connect(self._take)
         self._loader.failed.connect(self._take_failure)
-        self._errands = Errands("work", self)
+        self._tasks = Tasks(self)
+        self._tasks.busy.connect(self.busy)
+        self._tasks.failed.connect(self.failed)
         self._request: Request | None = None
         self._request_wanted: Request | None = None
         self._numbers = itertools.count(1)
         self._reading = 0
-        self._jobs: list[tuple[str, str]] = []
-        self._twins: list[Live] = []
         self._closed = False
 
     # ---- what there is -------------------------------------------------------------------------
@@ -150,11 +159,6 @@ class Session(QObject):
     def path(self) -> Path | None:
         """The stage's file."""
         return self.stage.stage_path if self.stage is not None else None
-
-    @property
-    def source(self) -> Source | None:
-        """How the stage was asked for."""
-        return self._request.source if self._request is not None else None
 
     # ---- stages --------------------------------------------------------------------------------
 
@@ -203,7 +207,7 @@ class Session(QObject):
             request = replace(request, textures=self.stage.textures)
         request = replace(request, size=(self.setup.width, self.setup.height))
         self._request_wanted, self._reading = request, next(self._numbers)
-        self._work("load", what)
+        self._tasks.begin("load", what)
         self._loader.submit(partial(read, request), self._reading)
 
     def _take(self, number: int, found: tuple[Usd.Stage, LoadedStage]) -> None:
@@ -221,18 +225,14 @@ class Session(QObject):
             self.select(None)
         usd.SetEditTarget(usd.GetSessionLayer())
         self.up_axis = str(UsdGeom.GetStageUpAxis(usd))
-        read = pose_of_scene(loaded.scene.camera, loaded.camera_path)
-        kept = again and self.pose is not None and self.pose.path is None
-        if not kept:
-            if again and self.pose is not None and self.pose.path is not None:
-                read = self._pose_of(self.pose.path) or read
-            self.pose = read
-        edit = self._edits_again(loaded.scene)
+        before = self.pose if again else None
+        if before is None or before.path is not None:
+            there = self._pose_of(before.path) if before is not None and before.path else None
+            self.pose = there or pose_of_scene(loaded.scene.camera, loaded.camera_path)
+        edit = edits_again(loaded.scene, self.material_edits, self.light_edits)
         edit.camera = self.pose.options() if self.pose is not None else None
-        threads, scene = self.setup.threads, loaded.scene
-        for live in (self._live, *self._twins):
-            live.begin(lambda: make_renderer(scene, threads), loaded, edit)
-        self._done("load")
+        self._lives.begin(partial(make_renderer, loaded.scene, self.setup.threads), loaded, edit)
+        self._tasks.end("load")
         self.opened.emit(loaded)
         self.camera_changed.emit(self.pose)
         for line in loaded.scene.warnings:
@@ -242,24 +242,11 @@ class Session(QObject):
         request = self._request_wanted
         if self._closed or request is None or number != self._reading:
             return
-        self._done("load")
+        self._tasks.end("load")
         if request.fresh and request.usd is not None:
             self.usd = request.usd
             self.opened.emit(self.stage)
         self.failed.emit(message)
-
-    def _edits_again(self, scene: Scene) -> Edit:
-        """Edits made here, for the numbers of a scene that was read again."""
-        numbers = {name: i for i, (name, _) in enumerate(scene.materials)}
-        edit = Edit()
-        for name, values in self.material_edits.items():
-            if name in numbers:
-                edit.materials[numbers[name]] = dict(values)
-        for i in range(len(scene.lights)):
-            values = self.light_edits.get(light_key(scene, i), {})
-            if values:
-                edit.lights[i] = dict(values)
-        return edit
 
     def note_words(self, report: LoadReport | None) -> None:
         """Adds what USD said meanwhile to the report of the stage that is open."""
@@ -285,13 +272,12 @@ class Session(QObject):
             moving: More follows at once: pictures are reduced until ``settle``.
         """
         self.pose = pose
-        self._edit(Edit(camera=pose.options()), moving)
+        self._lives.edit(Edit(camera=pose.options()), moving=moving)
         self.camera_changed.emit(pose)
 
     def settle(self) -> None:
         """A movement has ended."""
-        for live in (self._live, *self._twins):
-            live.settle()
+        self._lives.settle()
 
     def use_camera(self, path: str | None) -> None:
         """Looks through a camera prim; None: a free camera where the view is now."""
@@ -308,21 +294,9 @@ class Session(QObject):
         self.set_camera(pose)
 
     def _pose_of(self, path: str) -> Pose | None:
-        from pxr import Sdf, UsdGeom
-
-        from wavecomb.usd.cameras.camera import read_camera
-        from wavecomb.usd.stage.report import LoadReport
-        from wavecomb.usd.stage.times import time_code
-
-        if self.usd is None or self._request is None or not Sdf.Path.IsValidPathString(path):
+        if self.usd is None or self._request is None:
             return None
-        prim = self.usd.GetPrimAtPath(path)
-        if not prim or not prim.IsA(UsdGeom.Camera):
-            return None
-        time: Usd.TimeCode = time_code(self.usd, self._request.source.time)
-        to_world = np.array(UsdGeom.XformCache(time).GetLocalToWorldTransform(prim))
-        view = read_camera(prim, to_world, time, LoadReport())
-        return None if view is None else Pose(view.transform, path=path, **view.options)
+        return camera_pose(self.usd, path, self._request.source.time)
 
     def edit_material(self, material: int, *, moving: bool = False, **values: Any) -> None:
         """Changes parameters of a material by number: keyword arguments of ``add_material``."""
@@ -330,18 +304,14 @@ class Session(QObject):
             return
         name = self.scene.materials[material][0]
         self.material_edits.setdefault(name, {}).update(values)
-        self._edit(Edit(materials={material: values}), moving)
+        self._lives.edit(Edit(materials={material: values}), moving=moving)
 
     def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
         """Changes parameters of a light by number: keyword arguments of ``add_light``."""
         if self.scene is None:
             return
         self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
-        self._edit(Edit(lights={light: values}), moving)
-
-    def _edit(self, edit: Edit, moving: bool) -> None:
-        for live in (self._live, *self._twins):
-            live.edit(Edit(edit.camera, dict(edit.materials), dict(edit.lights)), moving=moving)
+        self._lives.edit(Edit(lights={light: values}), moving=moving)
 
     # ---- the render ------------------------------------------------------------------------------
 
@@ -366,13 +336,11 @@ class Session(QObject):
 
     def pause(self) -> None:
         """The render and its twins stand still."""
-        for live in (self._live, *self._twins):
-            live.pause()
+        self._lives.pause()
 
     def resume(self) -> None:
         """Goes on, or begins again where it was stopped; so do twins."""
-        for live in (self._live, *self._twins):
-            live.resume()
+        self._lives.resume()
 
     def stop(self) -> None:
         """Ends the render; the picture stays."""
@@ -396,7 +364,6 @@ class Session(QObject):
             self.failed.emit("there is no picture to save yet: open a stage first")
             return
         scene, stage, name = self.scene, self.stage, os.fspath(path)
-
         work = partial(save_frame, frame, name, scene, stage, look or Look(), options)
         self.run(f"writing {Path(name).name}", work, lambda: self.saved.emit(name))
 
@@ -405,103 +372,29 @@ class Session(QObject):
 
         It follows all edits. Give it back with ``drop_twin``.
         """
-        live = Live(setup, self)
-        self._twins.append(live)
-        renderer = self._live.renderer
-        if renderer is not None:
-            edit = Edit(camera=self.pose.options() if self.pose is not None else None)
-            live.begin(renderer.twin, self.stage, edit)
-        return live
+        edit = Edit(camera=self.pose.options() if self.pose is not None else None)
+        return self._lives.add_twin(setup, self.stage, edit)
 
     def drop_twin(self, live: Live) -> None:
         """Ends a twin."""
-        if live in self._twins:
-            self._twins.remove(live)
-            live.shutdown()
-            live.deleteLater()
-
-    # ---- other threads ---------------------------------------------------------------------------
+        self._lives.drop_twin(live)
 
     def run(
         self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
     ) -> None:
-        """Does something on another thread, after what was asked before; errors end in ``failed``.
+        """Does something plain on another thread, then something here: ``Tasks.run``."""
+        self._tasks.run(what, work, then)
 
-        Args:
-            what: For ``busy``: "writing a.exr".
-            work: Plain, without objects of Qt's.
-            then: Called on the window's thread when it went well.
-        """
-        key = f"{what} {next(self._numbers)}"
-        self._work(key, what)
-
-        def done(result: object) -> None:
-            if then is not None:
-                then()
-            self._done(key)
-
-        def failed(line: str) -> None:
-            self.failed.emit(line)
-            self._done(key)
-
-        self._errands.submit(work, done, failed)
-
-    def _work(self, key: str, what: str) -> None:
-        self._jobs = [job for job in self._jobs if job[0] != key] + [(key, what)]
-        self.busy.emit(what)
-
-    def _done(self, key: str) -> None:
-        self._jobs = [job for job in self._jobs if job[0] != key]
-        self.busy.emit(self._jobs[-1][1] if self._jobs else "")
+    @property
+    def _jobs(self) -> list[tuple[str, str]]:
+        return self._tasks.jobs
 
     def shutdown(self) -> None:
         """Ends all threads."""
         if self._closed:
             return
         self._closed = True
-        for live in (*self._twins, self._live):
-            live.shutdown()
-        self._twins.clear()
+        self._lives.shutdown()
         self._loader.close(0.5)
-        self._errands.close()
+        self._tasks.close()
         self.stage = self.usd = None
-
-
-def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.float64] | None:
-    """World bounds of a prim, (2, 3); None where it has none.
-
-    Args:
-        usd: The stage.
-        path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
-            "/World/Forest".
-        time: Time code; None: the stage's start.
-    """
-    from pxr import Sdf, UsdGeom
-
-    from wavecomb.usd.stage.times import time_code
-
-    plain = path.partition("[")[0]
-    if not Sdf.Path.IsValidPathString(plain):
-        return None
-    prim = usd.GetPrimAtPath(plain)
-    if not prim:
-        return None
-    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
-    box = UsdGeom.BBoxCache(time_code(usd, time), purposes).ComputeWorldBound(prim)
-    aligned = box.ComputeAlignedRange()
-    if aligned.IsEmpty():
-        return None
-    return np.array([aligned.GetMin(), aligned.GetMax()], np.float64)
-
-
-def light_key(scene: Scene, index: int) -> tuple[str, int]:
-    """A light by its name and its number among those of that name."""
-    names = [name for name, _ in scene.lights[: index + 1]]
-    return names[-1], names.count(names[-1]) - 1
-
-
-def make_renderer(scene: Scene, threads: int) -> Renderer:
-    """The core's renderer."""
-    from wavecomb import _core
-
-    return _core.Renderer(scene, threads)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from enum import Enum, auto
 from functools import partial
 
 import numpy as np
@@ -22,6 +21,7 @@ from wavecomb.gui import theme
 from wavecomb.gui.viewport import navigate
 from wavecomb.gui.viewport.develop import Developed, develop_frame
 from wavecomb.gui.viewport.display import Look
+from wavecomb.gui.viewport.drags import Control, Drag, Left, Shift, drag_of
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.orbit import Pose, Vector
 from wavecomb.gui.viewport.picture_view import PictureView
@@ -42,41 +42,6 @@ EMPTY = (
     "Open a stage: Ctrl+O, or drop a USD file here\n\n"
     "wavecomb scene cornell -o cornell.usda   writes one to begin with"
 )
-
-
-class Drag(Enum):
-    """What a pressed button does."""
-
-    NONE = auto()
-    ORBIT = auto()
-    PAN = auto()
-    DOLLY = auto()
-    SHIFT = auto()
-    REGION = auto()
-    PICK = auto()
-
-
-Left, Middle, Right = (
-    Qt.MouseButton.LeftButton,
-    Qt.MouseButton.MiddleButton,
-    Qt.MouseButton.RightButton,
-)
-Alt, Control, Shift = (
-    Qt.KeyboardModifier.AltModifier,
-    Qt.KeyboardModifier.ControlModifier,
-    Qt.KeyboardModifier.ShiftModifier,
-)
-
-
-def drag_of(button: Qt.MouseButton, modifiers: Qt.KeyboardModifier) -> Drag:
-    """As in Blender (middle button) and usdview (Alt)."""
-    if button == Middle:
-        if modifiers & Shift:
-            return Drag.PAN
-        return Drag.DOLLY if modifiers & Control else Drag.ORBIT
-    if modifiers & Alt:
-        return {Left: Drag.ORBIT, Right: Drag.DOLLY}.get(button, Drag.NONE)
-    return {Left: Drag.PICK, Right: Drag.SHIFT}.get(button, Drag.NONE)
 
 
 class Viewport(PictureView):

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a session looks up on the stage and in the scene. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.gui.viewport.engine import Edit
+from wavecomb.gui.viewport.orbit import Pose
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+    from wavecomb._core import Renderer, Scene
+
+
+def camera_pose(usd: Usd.Stage, path: str, time: float | None) -> Pose | None:
+    """Where a camera prim looks from; None where there is none that can be looked through.
+
+    Args:
+        usd: The stage.
+        path: Of the prim.
+        time: Time code; None: the stage's start.
+    """
+    from pxr import Sdf, UsdGeom
+
+    from wavecomb.usd.cameras.camera import read_camera
+    from wavecomb.usd.stage.report import LoadReport
+    from wavecomb.usd.stage.times import time_code
+
+    if not Sdf.Path.IsValidPathString(path):
+        return None
+    prim = usd.GetPrimAtPath(path)
+    if not prim or not prim.IsA(UsdGeom.Camera):
+        return None
+    code: Usd.TimeCode = time_code(usd, time)
+    to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
+    view = read_camera(prim, to_world, code, LoadReport())
+    return None if view is None else Pose(view.transform, path=path, **view.options)
+
+
+def edits_again(
+    scene: Scene,
+    materials: Mapping[str, Mapping[str, Any]],
+    lights: Mapping[tuple[str, int], Mapping[str, Any]],
+) -> Edit:
+    """Edits made before, for the numbers of a scene that was read again.
+
+    Args:
+        scene: The new one.
+        materials: By name.
+        lights: By ``light_key``.
+    """
+    numbers = {name: i for i, (name, _) in enumerate(scene.materials)}
+    edit = Edit()
+    for name, values in materials.items():
+        if name in numbers:
+            edit.materials[numbers[name]] = dict(values)
+    for i in range(len(scene.lights)):
+        found = lights.get(light_key(scene, i), {})
+        if found:
+            edit.lights[i] = dict(found)
+    return edit
+
+
+def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.float64] | None:
+    """World bounds of a prim, (2, 3); None where it has none.
+
+    Args:
+        usd: The stage.
+        path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
+            "/World/Forest".
+        time: Time code; None: the stage's start.
+    """
+    from pxr import Sdf, UsdGeom
+
+    from wavecomb.usd.stage.times import time_code
+
+    plain = path.partition("[")[0]
+    if not Sdf.Path.IsValidPathString(plain):
+        return None
+    prim = usd.GetPrimAtPath(plain)
+    if not prim:
+        return None
+    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+    box = UsdGeom.BBoxCache(time_code(usd, time), purposes).ComputeWorldBound(prim)
+    aligned = box.ComputeAlignedRange()
+    if aligned.IsEmpty():
+        return None
+    return np.array([aligned.GetMin(), aligned.GetMax()], np.float64)
+
+
+def light_key(scene: Scene, index: int) -> tuple[str, int]:
+    """A light by its name and its number among those of that name."""
+    names = [name for name, _ in scene.lights[: index + 1]]
+    return names[-1], names.count(names[-1]) - 1
+
+
+def make_renderer(scene: Scene, threads: int) -> Renderer:
+    """The core's renderer."""
+    from wavecomb import _core
+
+    return _core.Renderer(scene, threads)
