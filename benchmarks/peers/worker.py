@@ -40,7 +40,7 @@ def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     import wavecomb
     from wavecomb import _core
 
-    stage = wavecomb.load(args.stage)
+    stage = wavecomb.load(args.stage, isolate=False)
     settings = {
         "filter": "box",
         "filter_width": 1.0,

@@ -130,7 +130,7 @@ def big_mesh(path: Path, side: int, smooth: bool) -> None:
 
 MEASURE = """
 import json, os, sys
-import wavecomb.usd
+import wavecomb.usd.stage.load
 from wavecomb import _core, api
 
 def memory(key):
@@ -145,7 +145,7 @@ def cpu():
     return tasks
 
 imports = memory("VmRSS")
-loaded = wavecomb.load(sys.argv[1])
+loaded = wavecomb.load(sys.argv[1], isolate=False)
 after = memory("VmRSS")
 shares = {}
 for threads in (1, 2):
