@@ -180,7 +180,7 @@ def test_what_is_held_is_limited_and_given_back() -> None:
     for _ in range(4):
         assert receiver.receive() is not None
         receiver.give_back(array.nbytes)
-    assert receiver.held == 0
+    assert 0 < receiver.held < 1000, "what JSON holds stays"
 
 
 def test_arrays_of_the_frame_before_are_not_sent_again() -> None:
@@ -199,7 +199,7 @@ def test_arrays_of_the_frame_before_are_not_sent_again() -> None:
         assert message is not None and len(message.arrays) == count
         assert all(np.array_equal(array, kept) for array in message.arrays)
         receiver.end_frame()
-        assert receiver.held == kept.nbytes
+        assert receiver.held == kept.nbytes, "arrays of the frame, and nothing before"
 
 
 @pytest.mark.parametrize("name", ["build", "make_surfaces", "__init__", "__class__", "", "render"])

@@ -74,6 +74,8 @@ class Reader:
             memory_limit: Likewise.
             process: One that was started before.
         """
+        if memory_limit is not None and not math.isfinite(memory_limit):
+            raise WavecombError(f"memory limit {memory_limit:g} MB: must be a number")
         self._path = Path(path)
         self._limits: dict[str, Any] | None = {"load": load_limit, "memory": memory_limit}
         self._process = Process() if process is None else process
@@ -171,6 +173,8 @@ class Reader:
                 progress(*_counts(message))
             else:
                 return False
+            if message.kind != "call":
+                self._receiver.give_back(message.size)
             return True
 
         answer = self._ask(kind, body, "stage", take)

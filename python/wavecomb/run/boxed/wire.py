@@ -44,11 +44,12 @@ class Refused(Exception):
 
 @dataclass
 class Message:
-    """What was sent: a kind, JSON, and arrays that the JSON names by their numbers."""
+    """What was sent: a kind, JSON of so many bytes, and arrays that it names by their numbers."""
 
     kind: str
     body: dict[str, Any] = field(default_factory=dict)
     arrays: list[Array] = field(default_factory=list)
+    size: int = 0
 
 
 def packed(value: Any, arrays: list[Array]) -> Any:
@@ -164,13 +165,14 @@ class Receiver:
         (length,) = _LENGTH.unpack(start)
         if length > MOST_HEAD:
             raise Refused(f"a head of {length:,} bytes")
-        # Taken for a moment only; JSON as objects is some times as large.
+        # JSON as objects is some times as large, for a moment; names and numbers in it stay.
         self._allow(8 * length)
+        self.held += length
         text = self._file.read(length)
         if len(text) < length:
             raise Refused("a message that ends in its head")
         kind, body, entries = _parsed(text)
-        return Message(kind, body, [self._array(entry) for entry in entries])
+        return Message(kind, body, [self._array(entry) for entry in entries], length)
 
     def _allow(self, more: int) -> None:
         if self.limit is not None and self.held + more > self.limit:
