@@ -456,8 +456,10 @@ def test_memory_is_limited_on_both_sides(good: Path, does: Any) -> None:
     )
     with pytest.raises(WavecombError, match=r"good\.usda: out of memory.*limit is 400 MB"):
         wavecomb.load(good, isolate=True, memory_limit=400)
-    does("for i in range(10**9): send('call', {'call': 'add_group', 'with': {'name': 'x' * 10**6},\n"
-         "'id': i + 1})")  # fmt: skip
+    does(
+        "for i in range(1, 10**9):\n"
+        "    send('call', {'call': 'add_group', 'with': {'name': 'x' * 10**6}, 'id': i})"
+    )
     with pytest.raises(WavecombError, match=r"good\.usda: out of memory.*limit is 300 MB"):
         wavecomb.load(good, isolate=True, memory_limit=300)
     with pytest.raises(WavecombError, match="memory limit nan MB"):

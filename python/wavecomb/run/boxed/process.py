@@ -71,7 +71,8 @@ class Process:
             temporary = tempfile.mkdtemp(prefix="wavecomb-", dir=temporary_folder())
         held = self.channel, (self._page, self._words, other), temporary
         start = {
-            "path": [str(place) for place in sys.path], "channel": its.fileno(), "page": self._page, "life": life,
+            "path": [str(place) for place in sys.path], "channel": its.fileno(),
+            "page": self._page, "life": life,
             "temporary": temporary,
         }  # fmt: skip
         flags = sys.flags
