@@ -75,6 +75,10 @@ class LiveSettings(QWidget):
         control = control_of(row, self._change)
         control.setObjectName(f"{row.field}{self._source.name}")
         control.setAccessibleName(f"{row.label} of {self._source.name}")
+        if isinstance(control, ChoiceBox):
+            control.setMinimumContentsLength(7)  # three of them are side by side
+        else:
+            control.setGroupSeparatorShown(False)
         self._widgets[row.field] = control
         form.addRow(row.label, control)
 
