@@ -8,21 +8,11 @@ from typing import Any
 
 from PySide6.QtCore import QModelIndex, QObject, Qt
 from PySide6.QtGui import QColor, QFont
-from PySide6.QtWidgets import QTableView
 
 from wavecomb.gui.headed_model import HeadedModel
 
 Cell = tuple[str, Any]
 """What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``), whole in a tooltip."""
-
-
-def compact(view: QTableView) -> None:
-    """Rows of one line; long texts are cut in the middle, where paths say least."""
-    view.setWordWrap(False)
-    view.setTextElideMode(Qt.TextElideMode.ElideMiddle)
-    view.verticalHeader().hide()
-    view.verticalHeader().setDefaultSectionSize(round(1.5 * view.fontMetrics().height()))
-    view.setShowGrid(False)
 
 
 class Table(HeadedModel):

@@ -13,8 +13,8 @@ from scene_stage import write_stage
 import wavecomb
 from wavecomb.gui.scene.scene_model import NAME, VARIANTS, VISIBILITY
 from wavecomb.gui.scene.scene_panel import ScenePanel
-from wavecomb.gui.scene.swatch import from_display, to_display
 from wavecomb.gui.scene.value_fields import DrivenField
+from wavecomb.gui.swatch import from_display, to_display
 
 SIZE, SPP = 40, 2
 LEFT = Qt.MouseButton.LeftButton

@@ -174,6 +174,8 @@ class BenchBrowser(QWidget):
     def shutdown(self) -> None:
         """Ends what runs."""
         self._reader.close()
+        self.figures.view.shutdown()
+        self.pages.shutdown()
         self._report.shutdown()
         self.two.shutdown()
 

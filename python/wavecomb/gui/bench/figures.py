@@ -41,6 +41,10 @@ class FigureView(QWidget):
         self._path = path
         self._reader.submit(partial(_read, path), path)
 
+    def shutdown(self) -> None:
+        """Ends what is read."""
+        self._reader.close()
+
     def show_words(self, words: str) -> None:
         """In place of a figure."""
         self._reader.cancel()

@@ -75,6 +75,10 @@ class Pages(QWidget):
         column.addLayout(row)
         column.addWidget(self.text, 1)
 
+    def shutdown(self) -> None:
+        """Ends what is read."""
+        self._reader.close()
+
     def set_pages(self, paths: Sequence[Path]) -> None:
         """Lists them and shows the first."""
         self._paths = paths

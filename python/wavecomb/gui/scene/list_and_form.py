@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QSplitter, QTableView, QVBoxLayout, QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.headed_model import HeadedModel
+from wavecomb.gui.list_view import lay_out_rows
 from wavecomb.gui.scene.form_model import FormModel
 from wavecomb.gui.scene.form_view import FormView
-from wavecomb.gui.scene.list_view import lay_out_rows
 from wavecomb.gui.scene.value_fields import Field
 
 

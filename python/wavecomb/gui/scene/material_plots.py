@@ -22,11 +22,12 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.list_view import compact
 from wavecomb.gui.scene.material_costs import ORDERS, MaterialCost, material_costs
 from wavecomb.gui.scheduling.plots import Bar, Bars, Legend
 from wavecomb.gui.scheduling.run_log import Series
 from wavecomb.gui.scheduling.run_table import amount
-from wavecomb.gui.table_model import Cell, Table, compact
+from wavecomb.gui.table_model import Cell, Table
 
 _HEADER = {
     "material": "",

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.scene.list_view import RowDelegate
+from wavecomb.gui.list_view import RowDelegate
 from wavecomb.gui.scene.notes_model import KIND, KINDS, WHAT, NotesFilter, NotesModel, Row, rows_of
 
 if TYPE_CHECKING:

@@ -33,8 +33,8 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.list_view import RowDelegate
 from wavecomb.gui.scene.eye import EyeDelegate
-from wavecomb.gui.scene.list_view import RowDelegate
 from wavecomb.gui.scene.scene_model import (
     HEADERS,
     NAME,

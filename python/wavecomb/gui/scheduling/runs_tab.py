@@ -18,11 +18,12 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.list_view import compact
 from wavecomb.gui.scheduling.render_rounds import Rounds
 from wavecomb.gui.scheduling.run_log import RunLog, Series
 from wavecomb.gui.scheduling.run_rates import MIN_REPEATS, MIN_SECONDS
 from wavecomb.gui.scheduling.run_table import COLUMNS, LEFT, TIPS, Row, as_csv, as_text, rows
-from wavecomb.gui.table_model import Table, compact
+from wavecomb.gui.table_model import Table
 from wavecomb.gui.viewport.session import Session
 from wavecomb.picture.files import reason, replacing
 

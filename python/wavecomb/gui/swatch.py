@@ -7,7 +7,8 @@ import numpy as np
 from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
 
 from wavecomb.gui import theme
-from wavecomb.gui.scene.ranges import Colour
+
+Colour = tuple[float, float, float]
 
 
 def to_display(colour: Colour) -> QColor:

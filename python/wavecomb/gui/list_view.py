@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import theme
 from wavecomb.gui.headed_model import ColourRole, ToneRole
-from wavecomb.gui.scene.swatch import swatch
+from wavecomb.gui.swatch import swatch
 from wavecomb.gui.widgets import named
 
 Index = QModelIndex | QPersistentModelIndex
@@ -78,3 +78,12 @@ def lay_out_rows(
     header.setSectionResizeMode(stretch, QHeaderView.ResizeMode.Stretch)
     for column, wide in widths.items():
         header.resizeSection(column, theme.em(wide))
+
+
+def compact(view: QTableView) -> None:
+    """Rows of one line; long texts are cut in the middle, where paths say least."""
+    view.setWordWrap(False)
+    view.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+    view.verticalHeader().hide()
+    view.verticalHeader().setDefaultSectionSize(round(1.5 * view.fontMetrics().height()))
+    view.setShowGrid(False)
