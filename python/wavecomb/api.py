@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb.load_options import LoadOptions, split
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.isolate.memory import machine_limit
 
@@ -191,48 +192,19 @@ class Picture:
 
 def load(
     path: str | os.PathLike[str],
+    options: LoadOptions | None = None,
     *,
-    camera: str | None = None,
-    frame: float | None = None,
-    purposes: Sequence[str] | None = None,
-    variants: Mapping[str, str] | None = None,
-    mask: Sequence[str] = (),
-    session_layer: str | os.PathLike[str] | None = None,
-    threads: int = 0,
-    subdivision: str | int = "auto",
-    size: tuple[int, int] = (600, 600),
     progress: Callable[[int, int], None] | None = None,
     isolate: bool | None = None,
     load_limit: float | None = None,
     memory_limit: float | None = None,
-    shutter: tuple[float, float] | None = None,
-    motion_blur: bool | None = None,
-    motion_steps: int | None = None,
-    depth_of_field: bool | None = None,
-    projection: str | None = None,
-    exposure: bool = True,
-    render_settings: str | None = None,
-    product: str | None = None,
-    texture_limit: float | None = None,
-    working_space: str = "rec709",
-    lights: str = "visible",
+    **changes: Any,
 ) -> LoadedStage:
     """Reads a USD stage.
 
     Args:
         path: .usd, .usda, .usdc or .usdz.
-        camera: Path of a camera prim; by default the stage's render settings, or its first camera,
-            or one that sees everything.
-        frame: Time code; by default the stage's start.
-        purposes: Of the geometry, as in USD; by default as the stage's render settings say, else
-            "default" and "render".
-        variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
-        mask: Prims to draw with all below them, and what they need; by default all.
-        session_layer: File with opinions that are stronger than the stage's.
-        threads: For images, textures and subdivision; 0: all.
-        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
-            size of their edges in the picture (docs/subdivision.md).
-        size: Width and height of the picture that automatic levels are for.
+        options: How it is read.
         progress: Called now and then as progress(prims read, prims found so far).
         isolate: Whether a process of its own reads the stage, in a sandbox, and this one builds the
             scene of what comes out of it. Where USD or an image library crashes on a broken file,
@@ -243,20 +215,8 @@ def load(
         load_limit: Of that process: seconds that USD may compose the stage, 0: any; None: 6, and 1
             for each MB of layers.
         memory_limit: Of that process, and of what comes out of it: MB; None: what the machine has.
-        shutter: When it opens and closes, time codes from the frame; by default the camera's.
-        motion_blur: Whether what moves while the shutter is open is blurred; by default unless the
-            render settings disable it.
-        motion_steps: Steps of every motion, 2 to 64; by default as many as each needs, up to 8.
-        depth_of_field: Whether the camera's lens blurs; by default likewise.
-        projection: "perspective", "orthographic" or "latlong"; by default the camera's.
-        exposure: Whether the camera's exposure multiplies light in the picture.
-        render_settings: Path or name of a RenderSettings prim; by default those that the stage
-            names, else the only ones under /Render (docs/cameras.md).
-        product: Path or name of one of their products; by default the first.
-        texture_limit: MB (10^6 bytes) that all textures together may take; by default any.
-        working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
-        lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
-            (docs/decisions/light-shapes.md).
+        **changes: Fields of ``LoadOptions`` (camera, frame, purposes, variants, subdivision ...),
+            in place of those of ``options``.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -268,37 +228,17 @@ def load(
     Raises:
         WavecombError: The stage cannot be rendered; one line that names the file or prim.
     """
-    options: dict[str, Any] = {} if purposes is None else {"purposes": purposes}
-    options |= {
-        "camera": camera,
-        "frame": frame,
-        "variants": variants,
-        "mask": tuple(mask),
-        "session_layer": None if session_layer is None else os.fspath(session_layer),
-        "threads": threads,
-        "subdivision": subdivision,
-        "size": size,
-        "shutter": shutter,
-        "motion_blur": motion_blur,
-        "motion_steps": motion_steps,
-        "depth_of_field": depth_of_field,
-        "projection": projection,
-        "exposure": exposure,
-        "render_settings": render_settings,
-        "product": product,
-        "texture_limit": texture_limit,
-        "working_space": working_space,
-        "lights": lights,
-    }
+    chosen = LoadOptions.of(options, changes)
+    chosen.check()
     from wavecomb.run.boxed.reader import Reader, is_wanted
 
     if is_wanted(isolate):
         with Reader(path, load_limit=load_limit, memory_limit=memory_limit) as reader:
-            return reader.load(options, progress=progress)
+            return reader.load(chosen.as_dict(), progress=progress)
     import_usd()
     from wavecomb.usd import load_stage
 
-    return load_stage(Path(path), progress=progress, **options)
+    return load_stage(Path(path), chosen, progress=progress)
 
 
 def import_usd() -> None:
@@ -310,7 +250,7 @@ def import_usd() -> None:
     from wavecomb.run.progress import Interrupt
 
     with Interrupt() as interrupt:
-        import wavecomb.usd.stage.load  # noqa: F401
+        from wavecomb.usd import load_stage  # noqa: F401
     if interrupt.signal is not None:
         signal.raise_signal(interrupt.signal)
 
@@ -321,9 +261,6 @@ def render(
     size: tuple[int, int] | None = None,
     spp: int = 64,
     progress: Progress | None = None,
-    camera: str | None = None,
-    frame: float | None = None,
-    subdivision: str | int | None = None,
     policy: str | SchedulingPolicy | None = None,
     costs: str | Mapping[str, Mapping[str, float]] | None = None,
     aovs: Iterable[str] | None = None,
@@ -331,7 +268,7 @@ def render(
     every: float = 120.0,
     resume: str | os.PathLike[str] | None = None,
     isolate: bool | None = None,
-    **settings: Any,
+    **options: Any,
 ) -> Picture:
     """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
 
@@ -341,9 +278,6 @@ def render(
         spp: Samples per pixel; with ``adaptive`` or ``noise`` the most of them.
         progress: Called as progress(samples_done, samples_total) about ten times a second; return
             False to stop and keep what is done.
-        camera: As in ``load``; for a path only.
-        frame: As in ``load``; for a path only.
-        subdivision: As in ``load``; for a path only.
         policy: Order of shading: a name, or an object of a ``SchedulingPolicy`` of your own. No
             policy changes the picture.
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
@@ -355,8 +289,9 @@ def render(
         resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
             is, bit for bit, that of a render that nothing stopped.
         isolate: As in ``load``; for a path only.
-        **settings: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed,
-            adaptive, noise, min_spp, time_limit ...
+        **options: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed, adaptive,
+            noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera,
+            frame, subdivision ...
 
     >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
     >>> picture.beauty.shape  # doctest: +SKIP
@@ -375,6 +310,7 @@ def render(
     """
     from wavecomb.run.stats import make_stats
 
+    loading, settings = split(options, without=("size", "threads"))
     with contextlib.ExitStack() as while_reading:
         reader: Reader | None = None
         if isinstance(source, (str, os.PathLike)):
@@ -382,11 +318,11 @@ def render(
 
             if is_wanted(isolate):
                 reader = while_reading.enter_context(Reader(source))
-            size, aovs = _asked_for(source, size, aovs, settings, reader)
+            size, aovs = _asked_for(source, size, aovs, settings, loading, reader)
         own, profile, names, chosen = prepare(
             size or DEFAULT_SIZE, spp, policy, costs, aovs, settings
         )
-        scene, loaded, stage = _resolve(source, camera, frame, subdivision, isolate, chosen, reader)
+        scene, loaded, stage = _resolve(source, loading, isolate, chosen, reader)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
@@ -400,16 +336,19 @@ def _asked_for(
     size: tuple[int, int] | None,
     aovs: Iterable[str] | None,
     settings: dict[str, Any],
+    loading: Mapping[str, Any],
     reader: Reader | None,
 ) -> tuple[tuple[int, int], Iterable[str] | None]:
     """Size and AOVs, and the region in ``settings``: as the first render product says, if none."""
+    names = ("render_settings", "product", "session_layer")
+    asked = {name: loading[name] for name in names if loading.get(name) is not None}
     if reader is None:
         import_usd()
         from wavecomb.usd import peek_products
 
-        choice = peek_products(os.fspath(path))[0][0]
+        choice = peek_products(os.fspath(path), **asked)[0][0]
     else:
-        choice = reader.peek()[0]
+        choice = reader.peek(**asked)[0]
     chosen = size or choice.resolution or DEFAULT_SIZE
     region = choice.region(*chosen)
     if region is not None:
@@ -570,25 +509,24 @@ def _warn(line: str) -> None:
 
 def _resolve(
     source: str | os.PathLike[str] | LoadedStage | Scene,
-    camera: str | None,
-    frame: float | None,
-    subdivision: str | int | None,
+    loading: Mapping[str, Any],
     isolate: bool | None,
     settings: Settings,
     reader: Reader | None,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
-        options: dict[str, Any] = {
-            "camera": camera, "frame": frame, "threads": settings.threads,
-            "subdivision": "auto" if subdivision is None else subdivision,
-            "size": (settings.width, settings.height),
-        }  # fmt: skip
-        loaded = load(source, isolate=False, **options) if reader is None else reader.load(options)
+        size = settings.width, settings.height
+        options = LoadOptions.of(None, {**loading, "size": size, "threads": settings.threads})
+        if reader is None:
+            loaded = load(source, options, isolate=False)
+        else:
+            options.check()
+            loaded = reader.load(options.as_dict())
         return loaded.scene, loaded, os.fspath(source)
-    if isolate or camera is not None or frame is not None or subdivision is not None:
+    if isolate or loading:
         raise TypeError(
-            "camera, frame, subdivision and isolate are chosen when the stage is loaded: "
-            "give them to load()"
+            f"{', '.join(loading) or 'isolate'}: how a stage is read is chosen when it is loaded: "
+            "give it to load()"
         )
     loaded_scene: Any = getattr(source, "scene", None)
     if loaded_scene is not None:

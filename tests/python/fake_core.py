@@ -15,6 +15,7 @@ import pytest
 
 import wavecomb
 from wavecomb.errors import WavecombError
+from wavecomb.load_options import LoadOptions
 from wavecomb.options import settings
 
 
@@ -59,12 +60,13 @@ class Fake:
         self.costs: list[Any] = []
         self.stats: dict[str, Any] = {}
 
-    def load_stage(self, path: Path, **options: Any) -> Any:
+    def load_stage(self, path: Path, chosen: LoadOptions, **how: Any) -> Any:
+        options = chosen.as_dict()
         if not Path(path).exists():
             raise WavecombError(f"{path}: no such file")
         if options.get("camera") == "/Nowhere":
             raise WavecombError("no camera /Nowhere\nthere are: /Camera")
-        self.loaded.append({"path": path, **options})
+        self.loaded.append({"path": path, **options, **how})
         scene = SimpleNamespace(
             triangles=1000,
             instanced_triangles=90000,
@@ -95,7 +97,7 @@ class Fake:
             cameras=("/Camera", "/Closeup"),
         )
 
-    def peek_products(self, stage: Any, *options: Any) -> tuple[list[Any], Any]:
+    def peek_products(self, stage: Any, *options: Any, **named: Any) -> tuple[list[Any], Any]:
         nothing = dict.fromkeys(("settings", "product", "resolution", "aovs", "output"))
         return [SimpleNamespace(**nothing, region=lambda width, height: None)], None
 
@@ -170,6 +172,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     fake = Fake()
     core = ModuleType("wavecomb._core")
     usd = ModuleType("wavecomb.usd")
+    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]  # its modules are the real ones
     for name, value in {
         "Error": Error,
         "Settings": Settings,

@@ -13,6 +13,7 @@ from fake_core import Fake, install
 
 import wavecomb
 from wavecomb.errors import WavecombError
+from wavecomb.load_options import LoadOptions
 from wavecomb.picture.image import read_image, read_layers
 from wavecomb.run.costs import load_costs, save_costs
 from wavecomb.run.stats import COUNTS, MEMORY, PHASES, write_stats
@@ -60,15 +61,8 @@ def test_render_a_path(fake: Fake, stage: Path, tmp_path: Path) -> None:
     picture = wavecomb.render(
         stage, size=(32, 16), spp=2, progress=progress, camera="/C", frame=3.0, max_depth=4
     )
-    chosen = {"camera": "/C", "frame": 3.0, "variants": None, "threads": 0}
-    chosen |= {"size": (32, 16), "subdivision": "auto"}
-    chosen |= {"mask": (), "session_layer": None, "progress": None}
-    chosen |= {"shutter": None, "motion_blur": None, "motion_steps": None}
-    chosen |= {"depth_of_field": None, "projection": None, "exposure": True}
-    chosen |= {"render_settings": None, "product": None}
-    chosen |= {"texture_limit": None, "working_space": "rec709"}
-    chosen |= {"lights": "visible"}
-    assert fake.loaded[0] == {"path": stage, **chosen}
+    chosen = LoadOptions(camera="/C", frame=3.0, size=(32, 16)).as_dict()
+    assert fake.loaded[0] == {"path": stage, "progress": None, **chosen}
     assert fake.rendered[0]["max_depth"] == 4
     assert picture.beauty.shape == picture.albedo.shape == picture.normal.shape == (16, 32, 3)
     assert picture.depth.shape == picture.samples.shape == (16, 32)

@@ -100,7 +100,7 @@ def test_defaults(fake: Fake, stage: str, tmp_path: Path) -> None:
     defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}
     assert fake.rendered == [defaults]
     assert fake.loaded[0]["camera"] is None
-    assert "purposes" not in fake.loaded[0]
+    assert fake.loaded[0]["purposes"] is None
 
 
 def test_summary_and_warnings(fake: Fake, stage: str, tmp_path: Path) -> None:

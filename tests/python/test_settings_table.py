@@ -41,13 +41,9 @@ def with_rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The table with a few rows more, as if the core had them."""
     rows = MappingProxyType({**settings(), **{row.name: row for row in ADDED}})
     own = options.settings
-    kept = [
-        name
-        for name, module in sys.modules.items()
-        if name.startswith("wavecomb.") and getattr(module, "settings", None) is own
-    ]
-    for name in kept:
-        monkeypatch.setattr(sys.modules[name], "settings", lambda: rows)
+    for module in [one for name, one in sys.modules.items() if name.startswith("wavecomb.")]:
+        for name in [name for name, value in vars(module).items() if value is own]:
+            monkeypatch.setattr(module, name, lambda: rows)
     yield
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -107,7 +106,7 @@ def render_sequence(
                 stock = open_frames(job, source)
             here = purpose_at(purpose, frame)
             picture, stopped, report = job.run(
-                FrameShot(stock, frame), replace(source, frame=frame), here
+                FrameShot(stock, frame), source.changed(frame=frame), here
             )
             if stopped is not None:
                 done = f"{number - 1} of {len(wanted)} frames are written"

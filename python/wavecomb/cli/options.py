@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from wavecomb.load_options import Row, given, rows
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
@@ -123,119 +125,35 @@ def isolation_options(command: F) -> F:
 
 
 def stage_options(command: F) -> F:
-    """STAGE, --camera, --frame, --variant, --purpose, --mask, --subdivision, --shutter ..."""
-    for option in (
-        click.option(
-            "--subdivision",
-            metavar="off|LEVEL|auto",
-            help="Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their "
-            "size in the picture.  [default: auto]",
-        ),
-        click.option(
-            "--working-space",
-            type=click.Choice(["rec709", "acescg"]),
-            help="Linear colours that the picture is computed in.  [default: rec709]",
-        ),
-        click.option(
-            "--texture-limit",
-            type=Real(0),
-            metavar="MB",
-            help="Memory of all textures; what does not fit waits in a temporary file.  "
-            "[default: any]",
-        ),
-        click.option(
-            "--session-layer",
-            type=click.Path(),
-            metavar="FILE",
-            help="Layer with opinions stronger than the stage's.",
-        ),
-        click.option(
-            "--mask",
-            multiple=True,
-            metavar="PATH",
-            help="Prim to draw, with all below it and what it needs; may be given again.  "
-            "[default: all]",
-        ),
-        click.option(
-            "--depth-of-field",
-            type=click.Choice(["on", "off"]),
-            help="What is out of focus is blurred, as the camera's fStop says.  "
-            "[default: unless the render settings disable it]",
-        ),
-        click.option(
-            "--camera-exposure",
-            type=click.Choice(["on", "off"]),
-            help="The camera's exposure multiplies light in the picture.  [default: on]",
-        ),
-        click.option(
-            "--camera-projection",
-            type=click.Choice(["perspective", "orthographic", "latlong"]),
-            help="latlong: all directions in one picture.  [default: the camera's]",
-        ),
-        click.option(
-            "--product",
-            metavar="PATH",
-            help="Render product, by path or name.  [default: of render all, else the first]",
-        ),
-        click.option(
-            "--render-settings",
-            metavar="PATH",
-            help="Render settings prim, by path or name.  "
-            "[default: the stage's, else the only ones under /Render]",
-        ),
-        click.option(
-            "--motion-steps",
-            type=click.IntRange(2, 64),
-            metavar="N",
-            help="Steps of every motion over the shutter.  [default: as many as it needs, 2 to 8]",
-        ),
-        click.option(
-            "--no-motion-blur", is_flag=True, help="What moves is drawn as it is at the frame."
-        ),
-        click.option(
-            "--shutter",
-            type=Real(),
-            nargs=2,
-            metavar="OPEN CLOSE",
-            help="When the shutter opens and closes, time codes from the frame.  "
-            "[default: the camera's]",
-        ),
-        click.option(
-            "--lights",
-            type=click.Choice(["visible", "hidden"]),
-            help="Whether rays meet the shapes of lights; hidden ones shine all the same.  "
-            "[default: visible]",
-        ),
-        click.option(
-            "--variant",
-            "variants",
-            multiple=True,
-            metavar="PRIM{SET}=NAME",
-            help="Variant to select, may be given again; SET=NAME is of the default prim.",
-        ),
-        click.option(
-            "--purpose",
-            "purposes",
-            multiple=True,
-            type=click.Choice(["default", "render", "proxy", "guide"]),
-            help="Geometry to take, may be given again.  "
-            "[default: of the render settings, else default and render]",
-        ),
-        click.option(
-            "--frame",
-            type=Real(),
-            metavar="T",
-            help="Time code.  [default: the stage's start]",
-        ),
-        click.option(
-            "--camera",
-            metavar="PATH",
-            help="Camera prim.  [default: of the render settings, else the first]",
-        ),
-        click.argument("stage", type=click.Path()),
-    ):
-        command = option(command)
-    return command
+    """STAGE, and an option for each row of ``LoadOptions``."""
+    for row in reversed(rows().values()):
+        command = _load_option(row)(command)
+    return click.argument("stage", type=click.Path())(command)
+
+
+def _load_option(row: Row) -> Callable[[F], F]:
+    text = row.help + (f"  [default: {row.unset}]" if row.unset else "")
+    if row.kind == "not":
+        return click.option(row.option, row.key, is_flag=True, help=text)
+    kinds: dict[str, Any] = {
+        "text": str,
+        "file": click.Path(),
+        "number": Real(row.least),
+        "pair": Real(),
+        "choice": click.Choice(row.choices),
+        "switch": click.Choice(["on", "off"]),
+    }
+    if row.kind == "integer":
+        kinds["integer"] = click.IntRange(int(row.least), int(row.most))
+    return click.option(
+        row.option,
+        row.key,
+        type=kinds[row.kind],
+        metavar=row.metavar,
+        multiple=row.many,
+        nargs=2 if row.kind == "pair" else 1,
+        help=text,
+    )
 
 
 def optional_stage(command: Any) -> Any:
@@ -249,49 +167,46 @@ def optional_stage(command: Any) -> Any:
 
 @dataclass(frozen=True)
 class StageOptions:
-    """What ``stage_options`` gave."""
+    """What ``stage_options`` gave: values by ``Row.key``."""
 
-    camera: str | None
-    frame: float | None
-    purposes: tuple[str, ...]
-    variants: tuple[str, ...]
-    mask: tuple[str, ...] = ()
-    session_layer: str | None = None
-    subdivision: str | None = None
-    shutter: tuple[float, float] | None = None
-    no_motion_blur: bool = False
-    motion_steps: int | None = None
-    depth_of_field: str | None = None
-    camera_exposure: str | None = None
-    camera_projection: str | None = None
-    product: str | None = None
-    render_settings: str | None = None
-    texture_limit: float | None = None
-    working_space: str | None = None
-    lights: str | None = None
+    values: Mapping[str, Any]
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
         """Moves them out of a command's arguments."""
-        return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
+        return cls({row.key: options.pop(row.key) for row in rows().values()})
+
+    def __getitem__(self, key: str) -> Any:
+        return self.values[key]
+
+    @property
+    def frame(self) -> float | None:
+        """--frame."""
+        frame: float | None = self.values["frame"]
+        return frame
+
+    def changed(self, **values: Any) -> StageOptions:
+        """With other values."""
+        return StageOptions({**self.values, **values})
 
     def as_dict(self) -> dict[str, Any]:
         """For a file: what ``completed`` takes."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
         """With what was chosen before in place of what is not chosen here."""
-        mine = self.as_dict()
-        for name in mine:
-            _check_kept(name, before.get(name))
-        values: dict[str, Any] = {name: mine[name] or before.get(name) for name in mine}
-        if self.frame is not None:
-            values["frame"] = self.frame
-        for name in ("purposes", "variants", "mask"):
-            values[name] = tuple(values[name] or ())
-        values["shutter"] = tuple(values["shutter"]) if values["shutter"] else None
-        values["no_motion_blur"] = bool(values["no_motion_blur"])
-        return StageOptions(**values)
+        values: dict[str, Any] = {}
+        for row in rows().values():
+            key, mine, other = row.key, self.values[row.key], before.get(row.key)
+            _check_kept(row, other)
+            values[key] = mine if mine is not None and mine not in ((), False) else other
+            if row.many:
+                values[key] = tuple(values[key] or ())
+            elif row.kind == "pair" and values[key]:
+                values[key] = tuple(values[key])
+            elif row.kind == "not":
+                values[key] = bool(values[key])
+        return StageOptions(values)
 
     def load(
         self,
@@ -310,31 +225,10 @@ class StageOptions:
         )
 
     def for_load(self, size: tuple[int, int] | None) -> dict[str, Any]:
-        """Arguments of ``wavecomb.load``, but for the frame."""
-        from wavecomb.errors import WavecombError
-
-        if self.camera == "":
-            raise WavecombError("--camera is empty: give the path of a camera prim")
-        return {
-            "camera": self.camera,
-            "purposes": self.all_purposes(),
-            "variants": self.selections() or None,
-            "mask": self.mask,
-            "session_layer": self.session_layer,
-            "subdivision": "auto" if self.subdivision is None else self.subdivision,
-            **({} if size is None else {"size": size}),
-            "shutter": self.shutter,
-            "motion_blur": False if self.no_motion_blur else None,
-            "motion_steps": self.motion_steps,
-            "depth_of_field": None if self.depth_of_field is None else self.depth_of_field == "on",
-            "exposure": self.camera_exposure != "off",
-            "projection": self.camera_projection,
-            "product": self.product,
-            "render_settings": self.render_settings,
-            "texture_limit": self.texture_limit,
-            "working_space": self.working_space or "rec709",
-            "lights": self.lights or "visible",
-        }
+        """Arguments of ``wavecomb.load``, but for the frame. Raises WavecombError."""
+        options = given(self.values)
+        options.pop("frame", None)
+        return options if size is None else {**options, "size": size}
 
     def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:
         """What the stage's render settings ask for, a choice for each product.
@@ -346,45 +240,30 @@ class StageOptions:
         import_usd()
         from wavecomb.usd import peek_products
 
-        return peek_products(stage, self.render_settings, self.product, self.session_layer)
-
-    def selections(self) -> dict[str, str]:
-        """Variants as ``wavecomb.load`` takes them."""
-        from wavecomb.errors import WavecombError
-
-        variants: dict[str, str] = {}
-        for text in self.variants:
-            key, equals, value = text.rpartition("=")
-            if not (key and equals and value):
-                raise WavecombError(f"--variant {text}: must be PRIM{{SET}}=NAME or SET=NAME")
-            variants[key] = value
-        return variants
-
-    def all_purposes(self) -> tuple[str, ...] | None:
-        """Purposes with "default"; None where none was chosen."""
-        return tuple(dict.fromkeys(("default", *self.purposes))) if self.purposes else None
+        values = self.values
+        return peek_products(
+            stage, values["render_settings"], values["product"], values["session_layer"]
+        )
 
 
-_NUMBERS = ("frame", "texture_limit", "shutter", "motion_steps")
-_LISTS = ("purposes", "variants", "mask", "shutter")
-
-
-def _check_kept(name: str, value: Any) -> None:
+def _check_kept(row: Row, value: Any) -> None:
     """Raises WavecombError where an option, as a file kept it, is not of its type."""
     from wavecomb.errors import WavecombError
 
     if value is None or value is False:
         return
-    wanted: tuple[type, ...] = (int, float) if name in _NUMBERS else (str,)
-    if name == "no_motion_blur":
+    wanted: tuple[type, ...] = (str,)
+    if row.kind in ("number", "integer", "pair"):
+        wanted = (int, float)
+    elif row.kind == "not":
         wanted = (bool,)
-    good = isinstance(value, list) == (name in _LISTS)
+    good = isinstance(value, list) == (row.many or row.kind == "pair")
     for item in value if isinstance(value, list) else [value]:
         good = good and isinstance(item, wanted) and item == item
-    if name == "shutter":
+    if row.kind == "pair":
         good = good and len(value) == 2
     if not good:
-        raise WavecombError(f"the checkpoint's {name} is no good: it is damaged; start anew")
+        raise WavecombError(f"the checkpoint's {row.key} is no good: it is damaged; start anew")
 
 
 def warn(lines: list[str]) -> None:

@@ -87,7 +87,7 @@ class Plan:
 
     def source(self, source: StageOptions) -> StageOptions:
         """Options that load the stage for this product."""
-        return replace(source, product=self.choice.product or source.product)
+        return source.changed(product=self.choice.product or source["product"])
 
     def shot(self, frames: Frames, frame: float | None, settings: Any) -> FrameShot:
         """For a stage that is open."""

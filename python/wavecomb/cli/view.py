@@ -49,8 +49,9 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
     from wavecomb.gui.setup import Setup
 
     source = StageOptions.take(options)
-    if source.texture_limit is not None or source.working_space not in (None, "rec709"):
-        name = "--working-space" if source.texture_limit is None else "--texture-limit"
+    loading = source.for_load(None)
+    if source["texture_limit"] is not None or source["working_space"] not in (None, "rec709"):
+        name = "--working-space" if source["texture_limit"] is None else "--texture-limit"
         raise WavecombError(f"{name} is not for the window: leave it out, or use wavecomb render")
     chosen = {name: value for name, value in options.items() if value is not None}
     setup = Setup().changed(width=size[0], height=size[1], denoise=denoise, **chosen)
@@ -59,9 +60,9 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
     code = run(
         stage,
         setup,
-        camera=source.camera,
+        camera=loading.get("camera"),
         time=source.frame,
-        variants=source.selections() or None,
-        purposes=source.all_purposes(),
+        variants=loading.get("variants"),
+        purposes=loading.get("purposes"),
     )
     raise click.exceptions.Exit(code)

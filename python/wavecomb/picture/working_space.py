@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-WORKING_SPACES = ("rec709", "acescg")
 """Linear Rec.709 (the default), and ACEScg: the primaries AP1 with the white of ACES."""
 
 CHROMATICITIES = {

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import UsdGeom
 
+from wavecomb.load_options import LoadOptions
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
@@ -21,7 +21,7 @@ from wavecomb.usd.stage.opening import open_stage
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.shared import FrameStock
 from wavecomb.usd.stage.times import frame_number, time_code
-from wavecomb.usd.stage.view_options import ViewOptions
+from wavecomb.usd.stage.view_options import check_view, seen_on
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -71,47 +71,38 @@ class FrameReader:
     Contract: files of the stage must not change meanwhile, but for images.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        *,
-        variants: Mapping[str, str] | None = None,
-        mask: Iterable[str] = (),
-        session_layer: str | None = None,
-        threads: int = 0,
-        **options: Any,
-    ) -> None:
-        """Opens the stage; options: of ``load_stage``. Raises WavecombError."""
-        self._threads = threads
-        _view(options).check()
+    def __init__(self, path: Path, options: LoadOptions) -> None:
+        """Opens the stage. Raises WavecombError."""
+        check_view(options)
         opening = LoadReport()
-        layer = None if session_layer is None else Path(session_layer)
+        layer = None if options.session_layer is None else Path(options.session_layer)
         with captured(opening):
             self._stage: Usd.Stage = open_stage(
-                path, variants, mask=tuple(mask), session_layer=layer
+                path, options.variants, mask=options.mask, session_layer=layer
             )
             mtlx.tell(self._stage, opening)
             self._stock = FrameStock(self._stage, opening)
         self._before: LoadedStage | None = None
 
-    def read(self, frame: float | None, options: Mapping[str, Any]) -> LoadedStage:
-        """The stage at a frame; None: its start, else default values.
+    def read(self, options: LoadOptions, **how: Any) -> LoadedStage:
+        """The stage at a frame.
 
         Args:
-            frame: Time code.
-            options: Of ``load_stage``.
+            options: With the frame.
+            **how: Of ``load_stage``, beside options.
 
         Raises:
             WavecombError: It cannot be rendered.
         """
         self._before = None
-        options = {"threads": self._threads, **options}
-        self._before = load_stage(self._stage, frame=frame, stock=self._stock, **options)
+        # Those were chosen when it was opened.
+        here = replace(options, mask=(), session_layer=None, variants=None)
+        self._before = load_stage(self._stage, here, stock=self._stock, **how)
         return self._before
 
-    def look(self, frame: float | None, options: Mapping[str, Any]) -> Seen | None:
+    def look(self, options: LoadOptions) -> Seen | None:
         """What is other at a frame, where that is the camera at most; None where more may be."""
-        before, when = self._before, time_code(self._stage, frame)
+        before, when = self._before, time_code(self._stage, options.frame)
         if before is None:
             return None
         seen = self._look(before, when, options)
@@ -120,16 +111,14 @@ class FrameReader:
             self._before = replace(before, **changes)
         return seen
 
-    def _look(
-        self, before: LoadedStage, when: Usd.TimeCode, options: Mapping[str, Any]
-    ) -> Seen | None:
+    def _look(self, before: LoadedStage, when: Usd.TimeCode, options: LoadOptions) -> Seen | None:
         number = frame_number(when)
         if not self._stock.varying.is_view_only and before.frame != number:
             return None
         if before.leaves_out_levels:
             return None  # another view shows other textures near
         told = LoadReport()
-        seen = _view(options).on(self._stage, told)
+        seen = seen_on(self._stage, options, told)
         if before.camera_path is None or seen.camera is None:
             # What is drawn is framed; not where a camera is no good.
             is_same = before.camera_path is None and seen.camera is None
@@ -144,13 +133,8 @@ class FrameReader:
             return None
         if not self._stock.varying.is_view_only and shutter != before.shutter:
             return None
-        if not self._stock.has_same_levels(view, options.get("size")):
+        if not self._stock.has_same_levels(view, options.size):
             return None
         moves = camera_motion(seen.camera, motion)
         camera = {"transform": view.transform, **_CAMERA, **view.options, "motion": moves}
         return Seen(camera, str(seen.camera.GetPath()), shutter, seen.choice, number)
-
-
-def _view(options: Mapping[str, Any]) -> ViewOptions:
-    names = {field.name for field in fields(ViewOptions)}
-    return ViewOptions(**{name: options[name] for name in names if name in options})

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb import _core
 from wavecomb.api import check_memory, picture_of, prepare
+from wavecomb.load_options import LoadOptions, split
 from wavecomb.run.boxed.reader import Reader, is_wanted
 from wavecomb.run.frame_names import parse_frames
 from wavecomb.run.stats import make_stats
@@ -35,51 +36,41 @@ class Frames:
     def __init__(
         self,
         path: str | os.PathLike[str],
+        options: LoadOptions | None = None,
         *,
-        variants: Mapping[str, str] | None = None,
-        mask: Iterable[str] = (),
-        session_layer: str | os.PathLike[str] | None = None,
-        threads: int = 0,
         isolate: bool | None = None,
-        **options: Any,
+        **changes: Any,
     ) -> None:
         """Opens the stage.
 
         Args:
             path: .usd, .usda, .usdc or .usdz.
-            variants: As of ``wavecomb.load``, like what follows.
-            mask: Likewise.
-            session_layer: Likewise.
-            threads: Likewise.
-            isolate: Likewise.
-            **options: Of ``load_stage``.
+            options: How it is read.
+            isolate: As of ``wavecomb.load``.
+            **changes: Fields of ``LoadOptions``, in place of those of ``options``.
 
         Raises:
             WavecombError: It cannot be opened.
         """
         self._path = Path(path)
-        self._options = options
-        self._threads = threads
+        self._options = LoadOptions.of(options, changes)
         self._renderer: _core.Renderer | None = None
         self._loaded: LoadedStage | None = None
         self._is_built = False
-        layer = None if session_layer is None else os.fspath(session_layer)
-        opening = {**options, "variants": dict(variants or {}), "mask": tuple(mask),
-                   "session_layer": layer, "threads": threads}  # fmt: skip
         started = time.perf_counter()
         self._boxed: Reader | None = None
         self._here: FrameReader | None = None
         if is_wanted(isolate):
             self._boxed = Reader(self._path)
             try:
-                self._boxed.open(opening)
+                self._boxed.open(self._options.as_dict())
             except BaseException:
                 self._boxed.close()
                 raise
         else:
             from wavecomb.run.frame_reader import FrameReader
 
-            self._here = FrameReader(self._path, **opening)
+            self._here = FrameReader(self._path, self._options)
         self._opening_s = time.perf_counter() - started
 
     def close(self) -> None:
@@ -93,43 +84,42 @@ class Frames:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def load(self, frame: float | None, **options: Any) -> LoadedStage:
+    def load(self, frame: float | None, *, progress: Any = None, **changes: Any) -> LoadedStage:
         """The stage at a frame; None: its start, else default values.
 
         Args:
             frame: Time code.
-            **options: Of ``load_stage``, in place of those that were given at first.
+            progress: As of ``wavecomb.load``.
+            **changes: Fields of ``LoadOptions``, in place of those that were given at first.
 
         Raises:
             WavecombError: It cannot be rendered.
         """
         started = time.perf_counter()
-        options = {**self._options, **options}
-        progress = options.pop("progress", None)
-        loaded = None if self._renderer is None else self._seen_anew(frame, options)
+        options = LoadOptions.of(self._options, {**changes, "frame": frame})
+        loaded = None if self._renderer is None else self._seen_anew(options)
         if loaded is None:
             # Let go of first: two hierarchies at a time would be twice the memory.
             self._renderer, self._loaded = None, None
-            options["threads"] = self._threads
             if self._here is None:
                 assert self._boxed is not None
-                loaded = self._boxed.frame(frame, options, progress)
+                loaded = self._boxed.frame(options.as_dict(), progress)
             else:
-                loaded = self._here.read(frame, {**options, "progress": progress})
+                loaded = self._here.read(options, progress=progress)
         seconds = time.perf_counter() - started + self._opening_s
         self._opening_s = 0.0
         self._loaded = replace(loaded, seconds=seconds, stage_path=self._path)
         return self._loaded
 
-    def _seen_anew(self, frame: float | None, options: dict[str, Any]) -> LoadedStage | None:
+    def _seen_anew(self, options: LoadOptions) -> LoadedStage | None:
         """The scene that is there with its camera at a frame; None where more may be other."""
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None
         if self._here is None:
             assert self._boxed is not None
-            found = self._boxed.look(frame, options)
+            found = self._boxed.look(options.as_dict())
         else:
-            seen = self._here.look(frame, options)
+            seen = self._here.look(options)
             found = None if seen is None else seen.as_dict()
         if found is None:
             return None
@@ -169,29 +159,12 @@ def render_frames(
     *,
     size: tuple[int, int] = (600, 600),
     spp: int = 64,
-    camera: str | None = None,
-    purposes: Iterable[str] | None = None,
-    variants: Mapping[str, str] | None = None,
-    mask: Iterable[str] = (),
-    session_layer: str | os.PathLike[str] | None = None,
-    subdivision: str | int = "auto",
-    shutter: tuple[float, float] | None = None,
-    motion_blur: bool | None = None,
-    motion_steps: int | None = None,
-    depth_of_field: bool | None = None,
-    projection: str | None = None,
-    exposure: bool = True,
-    render_settings: str | None = None,
-    product: str | None = None,
-    texture_limit: float | None = None,
-    working_space: str = "rec709",
-    lights: str = "visible",
     progress: Any = None,
     policy: Any = None,
     costs: Any = None,
     aovs: Iterable[str] | None = None,
     isolate: bool | None = None,
-    **settings: Any,
+    **options: Any,
 ) -> Iterator[tuple[float, Picture]]:
     """Renders frames of a stage one after another, and shares between them what does not change.
 
@@ -200,31 +173,14 @@ def render_frames(
     Args:
         path: .usd, .usda, .usdc or .usdz.
         frames: "1-48", "1-48x2", "1,5,9", or numbers.
-        size: As in ``render``, like spp, progress, policy, costs, aovs and settings.
+        size: As in ``render``, like spp, progress, policy, costs and aovs.
         spp: Likewise.
-        camera: As in ``load``, like what follows.
-        purposes: Likewise.
-        variants: Likewise.
-        mask: Likewise.
-        session_layer: Likewise.
-        subdivision: Likewise.
-        shutter: Likewise.
-        motion_blur: Likewise.
-        motion_steps: Likewise.
-        depth_of_field: Likewise.
-        projection: Likewise.
-        exposure: Likewise.
-        render_settings: Likewise.
-        product: Likewise.
-        texture_limit: Likewise.
-        working_space: Likewise.
-        lights: Likewise.
         progress: As in ``render``, for each frame.
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
         aovs: Likewise.
         isolate: As in ``load``; one process reads all frames, and ends after the last.
-        **settings: Likewise.
+        **options: Fields of ``LoadOptions`` but the frame, and of ``wavecomb.Settings``.
 
     Returns:
         An iterator of (frame, picture); each is rendered when it is asked for.
@@ -236,30 +192,14 @@ def render_frames(
         WavecombError: Frames, options or the stage are no good.
     """
     numbers = parse_frames(frames)
+    loading, settings = split(options, without=("size", "threads", "frame"))
     own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
-    options: dict[str, Any] = {} if purposes is None else {"purposes": tuple(purposes)}
     shots = Frames(
         path,
-        camera=camera,
-        variants=variants,
-        mask=mask,
-        session_layer=session_layer,
-        threads=chosen.threads,
-        subdivision=subdivision,
-        shutter=shutter,
-        motion_blur=motion_blur,
-        motion_steps=motion_steps,
-        depth_of_field=depth_of_field,
-        projection=projection,
-        exposure=exposure,
-        render_settings=render_settings,
-        product=product,
-        texture_limit=texture_limit,
-        working_space=working_space,
-        lights=lights,
-        size=(chosen.width, chosen.height),
         isolate=isolate,
-        **options,
+        size=(chosen.width, chosen.height),
+        threads=chosen.threads,
+        **loading,
     )
     return _pictures(shots, numbers, chosen, names, progress, own, profile)
 

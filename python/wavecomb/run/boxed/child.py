@@ -13,6 +13,7 @@ import socket
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from wavecomb.load_options import LoadOptions
 from wavecomb.run.isolate import box, memory, patience, trail
 from wavecomb.run.isolate.broker import Outputs
 
@@ -169,7 +170,9 @@ class Child:
         from wavecomb.run.frame_reader import FrameReader
 
         body = message.body
-        self._frames = FrameReader(_path(body["path"]), **_options(body["with"]))
+        self._frames = FrameReader(
+            _path(body["path"]), LoadOptions.of(None, _options(body["with"]))
+        )
         self._sender.send("opened", {})
 
     def _look(self, message: Message) -> None:
@@ -177,7 +180,7 @@ class Child:
 
         assert self._frames is not None
         body = message.body
-        seen = self._frames.look(body["frame"], _options(body["options"]))
+        seen = self._frames.look(LoadOptions.of(None, _options(body["options"])))
         found = None if seen is None else plain.of_seen(seen.as_dict())
         self._sender.send("seen", {"seen": found})
 
@@ -185,7 +188,7 @@ class Child:
         assert self._frames is not None
         body = message.body
         options = _options(body["options"])
-        loaded = self._frames.read(body["frame"], {**options, **self._factories(body, options)})
+        loaded = self._frames.read(LoadOptions.of(None, options), **self._factories(body, options))
         self._answer(loaded)
 
 

@@ -100,9 +100,9 @@ class Reader:
         self._sender.close()
         self._receiver.close()
 
-    def peek(self) -> list[RenderChoice]:
-        """What render settings ask for, as ``peek_products`` finds it."""
-        answer = self._ask("peek", {"with": {"file": os.fspath(self._path)}}, "choices")
+    def peek(self, **asked: str) -> list[RenderChoice]:
+        """What render settings ask for; the arguments are those of ``peek_products``."""
+        answer = self._ask("peek", {"with": {"file": os.fspath(self._path), **asked}}, "choices")
         return self._checked(lambda: _choices(answer))
 
     def load(
@@ -116,8 +116,8 @@ class Reader:
         """The stage with its scene.
 
         Args:
-            options: Of ``load_stage``.
-            progress: Likewise.
+            options: Fields of ``LoadOptions``, and ``editable`` of ``load_stage``.
+            progress: As of ``load_stage``.
             overrides: What the session layer holds, as .usda.
             reuse: Textures to share; the answer has some only for ``editable``.
         """
@@ -129,19 +129,17 @@ class Reader:
         return self._stage("load", body, options, progress)
 
     def open(self, options: Mapping[str, Any]) -> None:
-        """Opens the stage, for frames of it; options: of ``FrameReader``."""
+        """Opens the stage, for frames of it; options: of ``LoadOptions``."""
         self._ask("open", {"path": os.fspath(self._path), "with": options}, "opened")
 
-    def look(self, frame: float | None, options: Mapping[str, Any]) -> dict[str, Any] | None:
+    def look(self, options: Mapping[str, Any]) -> dict[str, Any] | None:
         """What ``FrameReader.look`` sees, as a dict."""
-        answer = self._ask("look", {"frame": frame, "options": options}, "seen")
+        answer = self._ask("look", {"options": options}, "seen")
         return self._checked(lambda: plain.read_seen(answer.body.get("seen"), answer.arrays))
 
-    def frame(
-        self, frame: float | None, options: Mapping[str, Any], progress: Progress | None = None
-    ) -> LoadedStage:
+    def frame(self, options: Mapping[str, Any], progress: Progress | None = None) -> LoadedStage:
         """The stage at a frame."""
-        return self._stage("frame", {"frame": frame}, options, progress)
+        return self._stage("frame", {}, options, progress)
 
     def _stage(
         self, kind: str, body: dict[str, Any], options: Mapping[str, Any], progress: Any

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
+from wavecomb.load_options import PROJECTIONS
 from wavecomb.picture.output import fitted_window
 from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
 from wavecomb.usd.geometry.shutter import Motion
@@ -37,8 +38,6 @@ MAX_CLIP_PLANES = 16
 
 _FRAME_TAN = 0.4
 """Half the opening of the default camera, on the plane z = -1."""
-
-PROJECTIONS = ("perspective", "orthographic", "latlong")
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,6 @@ KINDS = {
 }
 """Lights that are drawn, by prim type."""
 
-LIGHT_SHAPES = ("visible", "hidden")
 """Whether rays meet the shapes of lights."""
 
 

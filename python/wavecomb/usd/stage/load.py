@@ -4,19 +4,20 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.load_options import LoadOptions
 from wavecomb.machine import give_back_memory
-from wavecomb.picture.working_space import WORKING_SPACES, from_rec709
+from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import trail
 from wavecomb.run.isolate.memory import describe_limit
 from wavecomb.usd import mtlx
@@ -27,7 +28,7 @@ from wavecomb.usd.geometry.surfaces import Surfaces, parse_level
 from wavecomb.usd.geometry.view_size import ViewSize
 from wavecomb.usd.lights.dome import soft_dome, up_rotation
 from wavecomb.usd.lights.ies import IesTable
-from wavecomb.usd.lights.light import LIGHT_SHAPES, LightReader
+from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.material import MaterialTable
 from wavecomb.usd.looks.stock import TextureStock
@@ -45,7 +46,7 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.shared import FrameStock
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.traverse import Traversal
-from wavecomb.usd.stage.view_options import Seen, ViewOptions
+from wavecomb.usd.stage.view_options import Seen, check_view, seen_on
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -75,135 +76,77 @@ class _Choice:
     """What is read, and how."""
 
     opened: Callable[[], Usd.Stage]
-    frame: float | None
-    view: ViewOptions
+    options: LoadOptions
     editable: bool
-    texture_limit: float | None
-    size: tuple[int, int]
-    lights: str
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Of the picture."""
+        return self.options.size
 
 
 def load_stage(
     source: str | Path | Usd.Stage,
+    options: LoadOptions | None = None,
     *,
-    frame: float | None = None,
-    camera: str | None = None,
-    purposes: Sequence[str] | None = None,
-    variants: Mapping[str, str] | None = None,
-    mask: Sequence[str] = (),
-    session_layer: str | Path | None = None,
-    threads: int = 0,
     editable: bool = False,
     reuse: TextureStock | None = None,
-    subdivision: str | int = "auto",
-    size: tuple[int, int] = (600, 600),
     stock: FrameStock | None = None,
     progress: LoadProgress | None = None,
-    shutter: tuple[float, float] | None = None,
-    motion_blur: bool | None = None,
-    motion_steps: int | None = None,
-    depth_of_field: bool | None = None,
-    projection: str | None = None,
-    exposure: bool = True,
-    render_settings: str | None = None,
-    product: str | None = None,
-    texture_limit: float | None = None,
-    working_space: str = "rec709",
-    lights: str = "visible",
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
     store_factory: Callable[[LoadReport], _core.TextureStore | None] | None = None,
+    **changes: Any,
 ) -> LoadedStage:
     """Reads a USD stage into a scene.
 
     Args:
         source: A .usd, .usda, .usdc or .usdz file, or a stage that is open. That stays open, and is
             only written to where ``variants`` are chosen. It must not change meanwhile.
-        frame: Time code; None: the stage's start, else default values.
-        camera: Prim path or unique name of a camera; None: the render settings', the stage's first,
-            or a view that frames all.
-        purposes: Of the geometry to draw: default, render, proxy, guide; None: as the render
-            settings say, else default and render.
-        variants: Selections to make: ``{"/World/Car{paint}": "red"}``; without a path the default
-            prim's.
-        mask: Prims to draw, with all below them; with what they need, all lights and cameras. None:
-            all prims. Of files only.
-        session_layer: File with opinions that are stronger than the stage's. Of files only.
-        threads: For images, textures and subdivision; 0: all.
-        subdivision: Of subdivision surfaces: "off", a level from 0 to 10, or "auto", by the size of
-            edges in the picture (docs/subdivision.md).
-        size: Of the picture that automatic levels are for, width and height.
+        options: How it is read. Mask and session layer are of files only.
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
         stock: Of a stage that is open and was read at another frame: what did not change is
             shared. Changes nothing else.
         progress: Is told how many of the prims found so far are read.
-        shutter: When it opens and closes, time codes from the frame; None: as the camera says.
-        motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
-            render settings disable it.
-        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
-        depth_of_field: Whether the camera's lens blurs; None: unless the render settings disable
-            it.
-        projection: perspective, orthographic or latlong; None: the camera's.
-        exposure: Whether the camera's exposure multiplies light in the picture.
-        render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
-            else the only ones under /Render.
-        product: Path or name of one of their products; None: the first.
-        texture_limit: MB (10^6 bytes) of memory that all textures together may take; None: any.
-            Where it is too little, they wait in a temporary file (docs/textures.md).
-        working_space: What the picture is computed in: "rec709", or "acescg".
-        lights: Whether rays meet the shapes of lights: "visible" or "hidden"
-            (docs/decisions/light-shapes.md).
         builder_factory: Makes the scene builder; None: the native one.
         store_factory: With ``builder_factory``: gives what keeps its textures within the limit,
             and tells the report; None: nothing does, so that levels are left out.
+        **changes: Fields of ``LoadOptions``, in place of those of ``options``.
 
     Raises:
         WavecombError: The file or an option is no good.
     """
     started = clock.perf_counter()
-    if texture_limit is not None and not texture_limit > 0:
-        raise WavecombError(f"texture limit {texture_limit} MB: must be more than 0")
-    if working_space not in WORKING_SPACES:
-        known = ", ".join(WORKING_SPACES)
-        raise WavecombError(f"working space {working_space!r} is none of {known}")
-    if frame is not None and not np.isfinite(frame):
-        raise WavecombError(f"frame must be a number, not {frame}")
-    if isinstance(source, Usd.Stage) and (mask or session_layer is not None):
+    chosen = LoadOptions.of(options, changes)
+    check_view(chosen)
+    if isinstance(source, Usd.Stage) and (chosen.mask or chosen.session_layer is not None):
         raise WavecombError("mask and session_layer are chosen when the stage is opened")
-    if lights not in LIGHT_SHAPES:
-        raise WavecombError(f"lights {lights!r}: there are {', '.join(LIGHT_SHAPES)}")
-    level = parse_level(subdivision)
-    if not (len(size) == 2 and min(size) >= 1):
-        raise WavecombError(f"size {size}: must be a width and a height of at least 1 pixel")
-    view = ViewOptions(
-        camera, purposes, shutter, motion_blur, motion_steps, depth_of_field, projection, exposure,
-        render_settings, product,
-    )  # fmt: skip
-    view.check()
+    level = parse_level(chosen.subdivision)
+    threads = chosen.threads
     report = LoadReport()
     file = _file_of(source)
     if stock is not None:
         reuse = stock.textures
-    opened = _opener(source, variants or {}, mask, session_layer)
+    opened = _opener(source, chosen)
     with captured(report):
         if builder_factory is None:
-            store = texture_store(texture_limit, reuse, report)
+            store = texture_store(chosen.texture_limit, reuse, report)
             builder = _native_builder(threads, store)
         else:
             store = None if store_factory is None else store_factory(report)
             builder = builder_factory()
-        textures = TextureTable(builder, report, threads, reuse, working_space, store)
+        textures = TextureTable(builder, report, threads, reuse, chosen.working_space, store)
         if hasattr(builder, "read_again"):  # it has no pixels of its own
             builder.read_again = textures.again
 
         def surfaces_of(materials: MaterialTable) -> Surfaces:
             return Surfaces(
-                builder, materials, report, subdivision=level, size=size, threads=threads
+                builder, materials, report, subdivision=level, size=chosen.size, threads=threads
             )
 
         try:
-            choice = _Choice(opened, frame, view, editable, texture_limit, size, lights)
+            choice = _Choice(opened, chosen, editable)
             filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -238,8 +181,8 @@ def load_stage(
         textures.stock(scene) if editable else None,
         filled.shutter,
         filled.render,
-        working_space,
-        texture_limit is not None and store is None,
+        chosen.working_space,
+        chosen.texture_limit is not None and store is None,
         filled.outline,
     )
 
@@ -252,24 +195,19 @@ def _file_of(source: str | Path | Usd.Stage) -> Path:
     return Path(layer.realPath or layer.identifier)
 
 
-def _opener(
-    source: str | Path | Usd.Stage,
-    variants: Mapping[str, str],
-    mask: Sequence[str],
-    session_layer: str | Path | None,
-) -> Callable[[], Usd.Stage]:
+def _opener(source: str | Path | Usd.Stage, options: LoadOptions) -> Callable[[], Usd.Stage]:
     """Gives the stage; one that is opened by it is closed when nobody holds it any more."""
     if isinstance(source, Usd.Stage):
         stage = source
 
         def choose() -> Usd.Stage:
-            select_variants(stage, variants)
+            select_variants(stage, options.variants or {})
             return stage
 
         return choose
     file = Path(source)
-    layer = None if session_layer is None else Path(session_layer)
-    return lambda: open_stage(file, variants, mask=mask, session_layer=layer)
+    layer = None if options.session_layer is None else Path(options.session_layer)
+    return lambda: open_stage(file, options.variants or {}, mask=options.mask, session_layer=layer)
 
 
 def _fill(
@@ -286,10 +224,10 @@ def _fill(
     keep_to(stage)
     if stock is None:
         mtlx.tell(stage, report)
-    time = time_code(stage, choice.frame)
+    time = time_code(stage, choice.options.frame)
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
-    seen = choice.view.on(stage, report)
+    seen = seen_on(stage, choice.options, report)
     chosen, lights, shutter, outline = _read(
         stage,
         time,
@@ -332,12 +270,12 @@ def _read(
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = seen.camera
     groups = LightGroups(report)
-    profiles, hidden = IesTable(builder, report), choice.lights == "hidden"
+    profiles, hidden = IesTable(builder, report), choice.options.lights == "hidden"
     links = LinkTable(builder)
     lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, seen.blur, report)
     traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
-    if choice.texture_limit is not None and textures.store is None:
+    if choice.options.texture_limit is not None and textures.store is None:
         _limit_textures(stage, traversal, seen, choice, textures, report)
     view = None
     if view_prim is not None:
@@ -396,7 +334,7 @@ def _limit_textures(
             # The ball inside of the box: the view that is found later is no nearer than this one's.
             points = bounds.mean(axis=0) + (corners(bounds) - bounds.mean(axis=0)) / np.sqrt(3.0)
         view = frame_points(points, str(UsdGeom.GetStageUpAxis(stage)), seen.lens, choice.size)
-    limit = float(choice.texture_limit or 0) * MEGABYTE
+    limit = float(choice.options.texture_limit or 0) * MEGABYTE
     textures.drops = plan_levels(
         stage, traversal.time, ViewSize(view, choice.size), limit, report, textures.working
     )

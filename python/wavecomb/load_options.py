@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a stage is read: one table, whose rows are the fields of ``LoadOptions``.
+
+Keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, options of the commands and
+what checkpoints keep follow from it.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields, replace
+from typing import Any, cast
+
+from wavecomb.errors import WavecombError
+
+PURPOSES = ("default", "render", "proxy", "guide")
+PROJECTIONS = ("perspective", "orthographic", "latlong")
+WORKING_SPACES = ("rec709", "acescg")
+LIGHT_SHAPES = ("visible", "hidden")
+
+
+@dataclass(frozen=True)
+class Row:
+    """How an option of loading stands in commands and files.
+
+    Attributes:
+        help: What it is, a sentence.
+        kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), "not" (a
+            flag that says no).
+        unset: What holds where it is not given.
+        option: Of commands; empty: none.
+        metavar: Of its value.
+        choices: The values that there are.
+        many: May be given again.
+        least: Smallest number.
+        most: Largest number.
+    """
+
+    help: str
+    kind: str
+    unset: str = ""
+    option: str = ""
+    metavar: str | None = None
+    choices: tuple[str, ...] = ()
+    many: bool = False
+    least: float = -math.inf
+    most: float = math.inf
+
+    @property
+    def key(self) -> str:
+        """Its name among the arguments of a command, and in checkpoints."""
+        return self.option.removeprefix("--").replace("-", "_") + "s" * (
+            self.many and self.option != "--mask"
+        )
+
+
+def _row(default: Any, text: str, kind: str, option: str = "", **more: Any) -> Any:
+    return field(default=default, metadata={"row": Row(text, kind, option=option, **more)})
+
+
+@dataclass(frozen=True)
+class LoadOptions:
+    """How a stage is read; None: as the stage says.
+
+    Attributes:
+        camera: Path or unique name of a camera prim; None: of the render settings, else the stage's
+            first, else one that sees everything.
+        frame: Time code; None: the stage's start, else default values.
+        purposes: Of the geometry: "default", "render", "proxy", "guide"; None: as the render
+            settings say, else the first two.
+        variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
+        mask: Prims to draw, with all below them, and what they need; by default all.
+        session_layer: File with opinions that are stronger than the stage's.
+        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
+            size of their edges in the picture (docs/subdivision.md).
+        shutter: When it opens and closes, time codes from the frame; None: the camera's.
+        motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
+            render settings disable it.
+        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
+        depth_of_field: Whether the camera's lens blurs; None: unless the render settings disable
+            it.
+        projection: "perspective", "orthographic" or "latlong"; None: the camera's.
+        exposure: Whether the camera's exposure multiplies light in the picture.
+        render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
+            else the only ones under /Render (docs/cameras.md).
+        product: Path or name of one of their products; None: the first.
+        texture_limit: MB (10^6 bytes) that all textures together may take; None: any. What does not
+            fit waits in a temporary file (docs/textures.md).
+        working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
+        lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
+            (docs/decisions/light-shapes.md).
+        size: Width and height of the picture that automatic levels are for.
+        threads: For images, textures and subdivision; 0: all.
+    """
+
+    camera: str | None = _row(
+        None, "Camera prim.", "text", "--camera", metavar="PATH",
+        unset="of the render settings, else the first",
+    )  # fmt: skip
+    frame: float | None = _row(
+        None, "Time code.", "number", "--frame", metavar="T", unset="the stage's start"
+    )
+    purposes: tuple[str, ...] | None = _row(
+        None, "Geometry to take, may be given again.", "choice", "--purpose", many=True,
+        choices=PURPOSES, unset="of the render settings, else default and render",
+    )  # fmt: skip
+    variants: Mapping[str, str] | None = _row(
+        None, "Variant to select, may be given again; SET=NAME is of the default prim.", "text",
+        "--variant", many=True, metavar="PRIM{SET}=NAME",
+    )  # fmt: skip
+    lights: str = _row(
+        "visible", "Whether rays meet the shapes of lights; hidden ones shine all the same.",
+        "choice", "--lights", choices=LIGHT_SHAPES, unset="visible",
+    )  # fmt: skip
+    shutter: tuple[float, float] | None = _row(
+        None, "When the shutter opens and closes, time codes from the frame.", "pair", "--shutter",
+        metavar="OPEN CLOSE", unset="the camera's",
+    )  # fmt: skip
+    motion_blur: bool | None = _row(
+        None, "What moves is drawn as it is at the frame.", "not", "--no-motion-blur"
+    )
+    motion_steps: int | None = _row(
+        None, "Steps of every motion over the shutter.", "integer", "--motion-steps", metavar="N",
+        least=2, most=64, unset="as many as it needs, 2 to 8",
+    )  # fmt: skip
+    render_settings: str | None = _row(
+        None, "Render settings prim, by path or name.", "text", "--render-settings", metavar="PATH",
+        unset="the stage's, else the only ones under /Render",
+    )  # fmt: skip
+    product: str | None = _row(
+        None, "Render product, by path or name.", "text", "--product", metavar="PATH",
+        unset="of render all, else the first",
+    )  # fmt: skip
+    projection: str | None = _row(
+        None, "latlong: all directions in one picture.", "choice", "--camera-projection",
+        choices=PROJECTIONS, unset="the camera's",
+    )  # fmt: skip
+    exposure: bool = _row(
+        True, "The camera's exposure multiplies light in the picture.", "switch",
+        "--camera-exposure", unset="on",
+    )  # fmt: skip
+    depth_of_field: bool | None = _row(
+        None, "What is out of focus is blurred, as the camera's fStop says.", "switch",
+        "--depth-of-field", unset="unless the render settings disable it",
+    )  # fmt: skip
+    mask: tuple[str, ...] = _row(
+        (), "Prim to draw, with all below it and what it needs; may be given again.", "text",
+        "--mask", many=True, metavar="PATH", unset="all",
+    )  # fmt: skip
+    session_layer: str | None = _row(
+        None, "Layer with opinions stronger than the stage's.", "file", "--session-layer",
+        metavar="FILE",
+    )  # fmt: skip
+    texture_limit: float | None = _row(
+        None, "Memory of all textures; what does not fit waits in a temporary file.", "number",
+        "--texture-limit", metavar="MB", least=0, unset="any",
+    )  # fmt: skip
+    working_space: str = _row(
+        "rec709", "Linear colours that the picture is computed in.", "choice", "--working-space",
+        choices=WORKING_SPACES, unset="rec709",
+    )  # fmt: skip
+    subdivision: str | int = _row(
+        "auto",
+        "Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their size in the "
+        "picture.",
+        "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
+    )  # fmt: skip
+    size: tuple[int, int] = _row((600, 600), "Of the picture.", "pair")
+    threads: int = _row(0, "That read.", "integer")
+
+    @classmethod
+    def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
+        """Options with others in place of some, as Python callers give them.
+
+        Raises:
+            TypeError: There is no such option.
+        """
+        known = {one.name for one in fields(cls)}
+        unknown = [name for name in changes if name not in known]
+        if unknown:
+            raise TypeError(
+                f"no option {unknown[0]!r} of loading; there are {', '.join(sorted(known))}"
+            )
+        plain = dict(changes)
+        if plain.get("session_layer") is not None:
+            plain["session_layer"] = os.fspath(plain["session_layer"])
+        for name in ("purposes", "mask"):
+            if plain.get(name) is not None:
+                plain[name] = tuple(plain[name])
+        return replace(options or cls(), **plain)
+
+    def as_dict(self) -> dict[str, Any]:
+        """By name."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    def check(self) -> None:
+        """Raises WavecombError for what no stage can have."""
+        if self.texture_limit is not None and not self.texture_limit > 0:
+            raise WavecombError(f"texture limit {self.texture_limit} MB: must be more than 0")
+        if self.working_space not in WORKING_SPACES:
+            known = ", ".join(WORKING_SPACES)
+            raise WavecombError(f"working space {self.working_space!r} is none of {known}")
+        if self.frame is not None and not math.isfinite(self.frame):
+            raise WavecombError(f"frame must be a number, not {self.frame}")
+        if self.lights not in LIGHT_SHAPES:
+            raise WavecombError(f"lights {self.lights!r}: there are {', '.join(LIGHT_SHAPES)}")
+        if not (len(self.size) == 2 and min(self.size) >= 1):
+            raise WavecombError(
+                f"size {self.size}: must be a width and a height of at least 1 pixel"
+            )
+        unknown = [name for name in self.purposes or () if name not in PURPOSES]
+        if unknown:
+            raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
+        if self.projection is not None and self.projection not in PROJECTIONS:
+            raise WavecombError(
+                f"no camera projection {self.projection!r}; there are {', '.join(PROJECTIONS)}"
+            )
+
+
+def row_of(option: Field[Any]) -> Row:
+    """How a field of ``LoadOptions`` stands in commands."""
+    return cast(Row, option.metadata["row"])
+
+
+def rows() -> dict[str, Row]:
+    """The rows of options that commands have, by the name of the field."""
+    return {one.name: row_of(one) for one in fields(LoadOptions) if row_of(one).option}
+
+
+def split(
+    options: Mapping[str, Any], without: Iterable[str] = ()
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Keywords that are options of loading, and the others.
+
+    >>> split({"camera": "/Cam", "seed": 3})
+    ({'camera': '/Cam'}, {'seed': 3})
+    """
+    known = {one.name for one in fields(LoadOptions)} - set(without)
+    mine = {name: value for name, value in options.items() if name in known}
+    return mine, {name: value for name, value in options.items() if name not in known}
+
+
+def given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of a command's arguments, by ``Row.key``, as fields: those that are given.
+
+    Raises:
+        WavecombError: A value is no good.
+    """
+    out: dict[str, Any] = {}
+    for name, row in rows().items():
+        value = values.get(row.key)
+        if value is None or value == () or (row.kind == "not" and not value):
+            continue
+        if row.kind == "not":
+            out[name] = False
+        elif row.kind == "switch":
+            out[name] = value == "on"
+        elif name == "variants":
+            out[name] = selections(value)
+        elif name == "purposes":
+            out[name] = tuple(dict.fromkeys(("default", *value)))
+        else:
+            out[name] = value
+    if out.get("camera") == "":
+        raise WavecombError("--camera is empty: give the path of a camera prim")
+    return out
+
+
+def selections(variants: Sequence[str]) -> dict[str, str]:
+    """PRIM{SET}=NAME ... as a mapping. Raises WavecombError."""
+    chosen: dict[str, str] = {}
+    for text in variants:
+        key, equals, value = text.rpartition("=")
+        if not (key and equals and value):
+            raise WavecombError(f"--variant {text}: must be PRIM{{SET}}=NAME or SET=NAME")
+        chosen[key] = value
+    return chosen
