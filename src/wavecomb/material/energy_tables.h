@@ -7,26 +7,40 @@
 #include <vector>
 
 #include "wavecomb/core/math.h"
+#include "wavecomb/core/vec.h"
 
 namespace wavecomb {
 
-/// Directional albedos of GGX for one bounce, by cosine, roughness and index.
+/// Directional albedos of GGX for one bounce, by cosine, roughness and index; rules by which any
+/// reflectance is integrated; and albedos of brushed surfaces, by both roughnesses and azimuth.
 class EnergyTables {
  public:
   /// Nodes by sqrt(cosine), by roughness (alpha = roughness^2) and by the root of
   /// (eta - 1) / (eta + 1): what changes fast is near 0.
-  static constexpr uint32_t kCosines = 20, kRoughnesses = 20, kIndices = 20;
+  static constexpr uint32_t kCosines = 32, kRoughnesses = 24, kIndices = 28;
   /// The last node of indices: 10, kMaxIor.
   static constexpr float kLastIndex = 9.f / 11.f;
   static constexpr uint32_t kPlane = kCosines * kRoughnesses, kVolume = kPlane * kIndices;
+  /// Nodes of the rules: two planes for each, the root of the cosine and the weight.
+  static constexpr uint32_t kRule = 6, kRuleAt = kPlane + 3 * kVolume;
+  /// Of brushed surfaces: nodes by sqrt(cosine), |cos phi|, sqrt(alpha_y / alpha_x) and
+  /// sqrt(alpha_x).
+  static constexpr uint32_t kAzimuths = 8, kRatios = 8, kAlongs = 16;
+  static constexpr uint32_t kBrushed = kCosines * kAzimuths * kRatios * kAlongs;
+  static constexpr uint32_t kBrushedAt = kRuleAt + 2 * kRule * kPlane;
+  static constexpr uint32_t kSize = kBrushedAt + 2 * kBrushed;
+  /// The index that brushed interfaces are tabulated for.
+  static constexpr float kBrushedIndex = 1.5f;
 
-  /// The tables of this process, worked out at the first call (some 0.1 s). Threads may call.
-  static const EnergyTables& shared();
+  /// The tables of this process, worked out at the first call (some 0.1 s), and those of brushed
+  /// surfaces at the first call that asks for them (as long again). Threads may call.
+  static const EnergyTables& shared(bool brushed = true);
 
   const float* data() const { return values_.data(); }
 
  private:
   EnergyTables();
+  void add_brushed();
   std::vector<float> values_;
 };
 
@@ -61,6 +75,18 @@ struct EnergyLookup {
     return select(out, volume(1, eta), volume(2, F(1.f / eta)));
   }
 
+  /// A cosine c between viewer and normal, and a weight w. Over k < EnergyTables::kRule, the sum of
+  /// w R(c) is what facets of reflectance R reflect.
+  struct Seen {
+    F cosine, weight;
+  };
+  Seen rule(uint32_t k) const {
+    const auto at = [&](uint32_t which) {
+      return plane(UInt<F>(T::kRuleAt + (2 * k + which) * T::kPlane));
+    };
+    return {sqr(at(0)), at(1)};
+  }
+
  private:
   using T = EnergyTables;
   F plane(const UInt<F>& first) const {
@@ -79,6 +105,52 @@ struct EnergyLookup {
     const UInt<F> first = UInt<F>(to_int<F>(whole)) * T::kPlane + (T::kPlane + which * T::kVolume);
     const F low = plane(first), high = plane(first + T::kPlane);
     return fma(F(high - low), F(x - whole), low);
+  }
+};
+
+/// Reads the albedos of brushed surfaces: `o` is above, turned along the grain.
+template <typename F>
+struct BrushedLookup {
+  const float* table;
+  UInt<F> node;
+  F at[4];  ///< between nodes: cosine, azimuth, ratio, along
+
+  BrushedLookup(const float* values, const Vec3<F>& o, const F& ax, const F& ay) : table(values) {
+    using T = EnergyTables;
+    const F r2 = max(fma(o.x, o.x, F(o.y * o.y)), F(1e-20f));
+    const F x[4] = {safe_sqrt(o.z), F(abs(o.x) / sqrt(r2)), sqrt(F(ay / ax)), sqrt(ax)};
+    constexpr uint32_t kCounts[4] = {T::kCosines, T::kAzimuths, T::kRatios, T::kAlongs};
+    node = UInt<F>(0u);
+    uint32_t stride = 1;
+    for (size_t k = 0; k < 4; ++k) {
+      const F scaled = clamp(x[k], F(0.f), F(1.f)) * static_cast<float>(kCounts[k] - 1);
+      const F whole = min(floor(scaled), F(static_cast<float>(kCounts[k] - 2)));
+      node = node + UInt<F>(to_int<F>(whole)) * stride;
+      at[k] = scaled - whole;
+      stride *= kCounts[k];
+    }
+  }
+
+  /// A white mirror's.
+  F white() const { return value(0); }
+  /// Reflection by a dielectric of index kBrushedIndex seen from outside.
+  F reflected() const { return value(1); }
+
+ private:
+  F value(uint32_t which) const {
+    using T = EnergyTables;
+    constexpr uint32_t kStrides[4] = {1, T::kCosines, T::kCosines * T::kAzimuths,
+                                      T::kCosines * T::kAzimuths * T::kRatios};
+    F corners[16];
+    for (uint32_t c = 0; c < 16; ++c) {
+      uint32_t offset = T::kBrushedAt + which * T::kBrushed;
+      for (uint32_t k = 0; k < 4; ++k) offset += ((c >> k) & 1) * kStrides[k];
+      corners[c] = gather<F>(table, node + offset, Mask<F>(true));
+    }
+    for (uint32_t k = 0, count = 8; k < 4; ++k, count /= 2)
+      for (uint32_t c = 0; c < count; ++c)
+        corners[c] = fma(F(corners[2 * c + 1] - corners[2 * c]), at[k], corners[2 * c]);
+    return corners[0];
   }
 };
 

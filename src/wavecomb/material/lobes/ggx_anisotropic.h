@@ -24,6 +24,20 @@ struct AnisotropicGgx {
   F g2_over_4cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
     return 0.5f / max(fma(abs(wo.z), s(wi), F(abs(wi.z) * s(wo))), F(1e-20f));
   }
+  /// G2(wo, wi) / G1(wo): the weight that visible-normal sampling leaves.
+  F g2_over_g1(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const F zo = abs(wo.z), zi = abs(wi.z), so = s(wo);
+    return F(zi * F(zo + so)) / max(fma(zo, s(wi), F(zi * so)), F(1e-20f));
+  }
+  /// The alpha of an isotropic surface whose normals a viewer w sees at about the same cosines: the
+  /// root of the mean square at z = 1, that of w's own azimuth at z = 0.
+  F seen_alpha(const Vec3<F>& w) const {
+    const F z2 = w.z * w.z;
+    const F r2 = max(fma(w.x, w.x, F(w.y * w.y)), F(1e-20f));
+    const F x2 = F(w.x * w.x) / r2, ax2 = ax * ax, ay2 = ay * ay;
+    const F along = fma(F(ax2 - ay2), x2, ay2), across = F(ax2 + ay2) - along;
+    return sqrt(fma(F(across - along), F(0.5f * z2), along));
+  }
   /// A normal that wo (z >= 0) sees, in proportion to its visible area (Dupuy and Benyoub,
   /// "Sampling Visible GGX Normals with Spherical Caps", HPG 2023).
   Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {

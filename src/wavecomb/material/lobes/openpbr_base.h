@@ -19,14 +19,22 @@ inline F importance(const Color<F>& c) {
   return 0.5f * F(luminance(c) + max_component(c));
 }
 
+/// G2 / G1 of the light that a facet sends up and of that which it sends down; 1 where the two need
+/// not be known.
+template <typename F>
+struct FacetWays {
+  F up = F(1.f), down = F(1.f);
+};
+
 /// What a facet does with light: colours of reflection and transmission.
 template <typename F>
 struct OpenPbrFacet {
   Color<F> reflect, transmit;
+  FacetWays<F> ways;
 
   /// Probability with which a facet is sampled for reflection.
   F reflect_share() const {
-    const F up = importance(reflect), down = importance(transmit);
+    const F up = importance(reflect) * ways.up, down = importance(transmit) * ways.down;
     return select(F(up + down) > 0.f, F(up / max(F(up + down), F(1e-20f))), F(1.f));
   }
 };
@@ -39,6 +47,13 @@ struct OpenPbrFacet {
 ///   mirrored.
 /// What single scattering loses is given back by scaling (Turquin 2019): metals by
 /// 1 + F0 (1 - E) / E, transmission by 1 / (E_R + E_T).
+///
+/// No table knows E_R + E_T of a film, of a brushed surface or of an interface whose reflectance is
+/// not that of its index (specular_weight). There, each facet's light is scaled, both ways alike,
+/// by s / (R g_R + (1 - R) g_T), g being G2 / G1 of the two directions that the facet sends light
+/// to: s is the same sum for the bare, unbrushed interface whose E_R + E_T the table has, so that a
+/// film changes how a facet shares its light out and not how much there is; for brushed ones s = 1,
+/// and nothing else is given back.
 template <typename F>
 struct OpenPbrBase {
   F metal, opaque, glass;  ///< shares; their sum is 1
@@ -89,8 +104,10 @@ struct OpenPbrBase {
   /// What depends on wo alone.
   struct View {
     Mask<F> inside;
-    F eta;          ///< relative index across the surface
-    F glass_scale;  ///< compensations
+    Mask<F> brushed;   ///< alpha_x is not alpha_y
+    Mask<F> by_facet;  ///< glass that is scaled facet by facet
+    F eta;             ///< relative index across the surface
+    F glass_scale;     ///< compensations
     F gloss_scale;
     Color<F> metal_scale;
     Color<F> gloss;   ///< albedo of the interface over the diffuse base
@@ -103,10 +120,23 @@ struct OpenPbrBase {
     const F z = o.z;
     v.inside = below & (glass > 0.f) & not_(thin);
     v.eta = select(v.inside, F(1.f / ior), ior);
-    // The tables know one roughness: brushed surfaces take the mean of theirs.
-    const F alpha = sqrt(F(ggx.ax * ggx.ay));
+    v.brushed = (ggx.ax != ggx.ay) & not_(smooth);
+    v.by_facet = (v.brushed | (film.weight > 0.f) | (glass_ior != ior)) & (glass > 0.f) &
+                 not_(thin) & not_(smooth);
+    F alpha = sqrt(F(ggx.ax * ggx.ay));
+    if (any(v.brushed)) alpha = select(v.brushed, ggx.seen_alpha(o), alpha);
     const EnergyLookup<F> look(energy, z, sqrt(alpha));
-    const F white = select(smooth, F(1.f), max(look.white(), F(1e-3f)));
+    F one_bounce = look.white(), glossy = look.reflected(gloss_ior);
+    if (any(v.brushed)) {
+      // As much more or less as for the index that is tabulated.
+      const BrushedLookup<F> brush(energy, o, ggx.ax, ggx.ay);
+      constexpr float kIndex = EnergyTables::kBrushedIndex;
+      const F more = brush.reflected() - look.reflected(F(kIndex));
+      const F brushed = fma(more, F(F(1.f - f0_from_ior(gloss_ior)) * (1.f / 0.96f)), glossy);
+      one_bounce = select(v.brushed, brush.white(), one_bounce);
+      glossy = select(v.brushed, max(brushed, F(0.f)), glossy);
+    }
+    const F white = select(smooth, F(1.f), max(one_bounce, F(1e-3f)));
     const F lost = F(1.f - white) / white;
     const Color<F> one(F(1.f));
     v.metal_scale = one + metal_fresnel.f0 * lost;
@@ -114,21 +144,22 @@ struct OpenPbrBase {
     v.glass_scale = F(1.f);
     if (any(Mask<F>(glass > 0.f))) {
       const F scattered = select(thin, white, max(look.scattered(v.eta), F(1e-3f)));
-      v.glass_scale = select(smooth, F(1.f), F(1.f / scattered));
+      v.glass_scale = select(smooth | (v.brushed & not_(thin)), F(1.f), F(1.f / scattered));
     }
     const F mirror = fresnel_dielectric(z, gloss_ior).reflectance;
-    const F rough = look.reflected(gloss_ior) * v.gloss_scale;
+    const F rough = glossy * v.gloss_scale;
     const F gloss = min(select(smooth, mirror, rough), F(1.f));
     v.gloss = Color<F>(gloss);
     if (any(Mask<F>(film.weight > 0.f)))
-      v.gloss = lerp(v.gloss, film.over_dielectric(z, gloss_ior), film.weight);
+      v.gloss = lerp(v.gloss, filmed_gloss(v, z, look), film.weight);
     const OpenPbrFacet<F> f = facet(v, z);
     v.albedo = min(Color<F>(f.reflect + f.transmit), one);
     return v;
   }
 
   /// Of a facet seen at the cosine c, with compensations.
-  OpenPbrFacet<F> facet(const View& v, const F& c) const {
+  OpenPbrFacet<F> facet(const View& v, const F& c,
+                        const FacetWays<F>& ways = FacetWays<F>()) const {
     const Color<F> one(F(1.f));
     const Mask<F> filmed = film.weight > 0.f;
     Color<F> m = metal_fresnel(c);
@@ -138,22 +169,43 @@ struct OpenPbrBase {
       d = lerp(d, film.over_dielectric(c, gloss_ior), film.weight);
     }
     const Color<F> metallic = m * v.metal_scale * F(metal * min(specular_weight, F(1.f)));
-    OpenPbrFacet<F> f{metallic + specular_color * d * F(opaque * v.gloss_scale), Color<F>(F(0.f))};
+    OpenPbrFacet<F> f{metallic + specular_color * d * F(opaque * v.gloss_scale), Color<F>(F(0.f)),
+                      ways};
     if (any(Mask<F>(glass > 0.f))) {
       const F bent = refracted_cos(c, v.eta);
       const F outer = select(v.inside, bent, c);
       const Mask<F> total = not_(thin) & not_(Mask<F>(bent > 0.f));
       Color<F> g(fresnel_dielectric(outer, glass_ior).reflectance);
-      if (any(filmed)) g = lerp(g, film.over_dielectric(outer, glass_ior), film.weight);
+      if (any(filmed)) {
+        // Never all or nothing, so that each facet has a way for its light.
+        const Color<F> r = film.over_dielectric(outer, glass_ior);
+        const Color<F> least(F(1e-3f));
+        g = lerp(g, min(max(r, least), Color<F>(one - least)), film.weight);
+      }
       g = select<F>(total, one, g);
       // Both faces of a wall, and what goes to and fro between them.
       const Color<F> wall(wall_of(g.x), wall_of(g.y), wall_of(g.z));
       g = select<F>(thin, wall, g);
-      const F scale = glass * v.glass_scale;
+      Color<F> scale(F(glass * v.glass_scale));
+      if (any(v.by_facet)) {
+        const F bare = select(total, F(1.f), fresnel_dielectric(outer, ior).reflectance);
+        const auto sum = [&ways](const F& r) { return fma(r, ways.up, F(F(1.f - r) * ways.down)); };
+        const F whole = select(v.brushed, F(1.f), sum(bare));
+        const auto kept = [&](const F& r) { return F(whole / max(sum(r), F(1e-7f))); };
+        scale = select<F>(v.by_facet, scale * Color<F>(kept(g.x), kept(g.y), kept(g.z)), scale);
+      }
       f.reflect += specular_color * g * scale;
       f.transmit = tint * Color<F>(one - g) * scale;
     }
     return f;
+  }
+
+  /// Of a facet h, seen at the cosine c, that sends light to `up` and, from glass, to `down`.
+  FacetWays<F> ways_of(const View& v, const Vec3<F>& wo, const Vec3<F>& up,
+                       const Vec3<F>& down) const {
+    const F g_up = select(up.z > 0.f, ggx.g2_over_g1(wo, up), F(0.f));
+    const F g_down = select(down.z < 0.f, ggx.g2_over_g1(wo, down), F(0.f));
+    return {select(v.by_facet, g_up, F(1.f)), select(v.by_facet, g_down, F(1.f))};
   }
 
   /// Radiance over throughput: 1 / eta^2 where light bends.
@@ -177,7 +229,17 @@ struct OpenPbrBase {
     const F base = select(valid, F(d * jacobian), F(0.f));
     const F g2 = ggx.g2_over_4cos(wo, i) * abs(wi.z);
     const F g1 = 0.5f / max(F(abs(wo.z) + ggx.s(wo)), F(1e-20f));
-    const OpenPbrFacet<F> f = facet(v, clamp(oh, F(0.f), F(1.f)));
+    const F oc = clamp(oh, F(0.f), F(1.f));
+    FacetWays<F> ways;
+    if (any(v.by_facet)) {
+      const F t = refracted_cos(oc, v.eta);
+      const Vec3<F> other = select<F>(up, refract(wo, h, oc, t, v.eta), reflect(wo, h));
+      // Where nothing goes through, refract is of no use.
+      const Vec3<F> none(F(0.f), F(0.f), F(1.f));
+      const Vec3<F> down = select<F>(up, select<F>(t > 0.f, other, none), i);
+      ways = ways_of(v, wo, select<F>(up, i, other), down);
+    }
+    const OpenPbrFacet<F> f = facet(v, oc, ways);
     const F share = f.reflect_share();
     const Color<F> color = select<F>(up, f.reflect, f.transmit * radiance_scale(v));
     return {color * F(base * g2), F(base * g1) * select(up, share, F(1.f - share))};
@@ -192,8 +254,14 @@ struct OpenPbrBase {
     Vec3<F> h(F(0.f), F(0.f), F(1.f));
     if (!all(smooth)) h = select<F>(smooth, h, ggx.sample_visible(wo, u, w));
     const F c = clamp(dot(wo, h), F(0.f), F(1.f));
-    const Mask<F> crosses = not_(Mask<F>(choice < facet(v, c).reflect_share()));
     const Vec3<F> mirrored = reflect(wo, h);
+    FacetWays<F> ways;
+    if (any(v.by_facet)) {
+      const F t = refracted_cos(c, v.eta);
+      const Vec3<F> none(F(0.f), F(0.f), F(1.f));
+      ways = ways_of(v, wo, mirrored, select<F>(t > 0.f, refract(wo, h, c, t, v.eta), none));
+    }
+    const Mask<F> crosses = not_(Mask<F>(choice < facet(v, c, ways).reflect_share()));
     Vec3<F> wi = mirrored;
     if (any(crosses)) {
       const Vec3<F> straight(mirrored.x, mirrored.y, F(-mirrored.z));
@@ -216,6 +284,22 @@ struct OpenPbrBase {
     return select(specular_weight == 1.f, eta, scaled);
   }
   static F wall_of(const F& r) { return F(2.f * r) / F(1.f + r); }
+
+  /// Albedo of the interface over the diffuse base below a film. Rough: that without the film, and
+  /// the rest by a rule over the cosines at which its facets are seen.
+  Color<F> filmed_gloss(const View& v, const F& z, const EnergyLookup<F>& look) const {
+    const Color<F> mirror = film.over_dielectric(z, gloss_ior);
+    const Mask<F> rough = (film.weight > 0.f) & (opaque > 0.f) & not_(smooth);
+    if (none(rough)) return mirror;
+    Color<F> more(F(0.f));
+    for (uint32_t k = 0; k < EnergyTables::kRule; ++k) {
+      const auto [c, weight] = look.rule(k);
+      const Color<F> bare(fresnel_dielectric(c, gloss_ior).reflectance);
+      more += Color<F>(film.over_dielectric(c, gloss_ior) - bare) * weight;
+    }
+    const Color<F> zero(F(0.f)), one(F(1.f));
+    return select<F>(rough, min(max(Color<F>(v.gloss + more * v.gloss_scale), zero), one), mirror);
+  }
 };
 
 }  // namespace wavecomb
