@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stages without a camera: what is seen fills the picture, whatever the shapes of both."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom
@@ -181,6 +183,25 @@ def test_a_group_of_many_things_keeps_few_points():
     found, whole = framing.joined(group.outlines), np.concatenate(every)
     for direction in framing.DIRECTIONS:
         assert (found @ direction).max() == pytest.approx((whole @ direction).max(), rel=1e-5)
+
+
+def test_millions_of_places_are_looked_at_in_parts(monkeypatch):
+    """All distances at once were 4 kB for each instance."""
+    chance = np.random.default_rng(5)
+    transforms = np.tile(np.eye(4), (100_000, 1, 1))
+    transforms[:, :3, :3] *= chance.random((100_000, 1, 1)) + 0.1
+    transforms[:, 3, :3] = chance.normal(size=(100_000, 3)) * 100
+    points = chance.random((30, 3))
+    tracemalloc.start()
+    found = framing.placed(points, transforms)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 150e6
+    monkeypatch.setattr(framing, "_BLOCK", 1 << 20)
+    assert np.array_equal(found, framing.placed(points, transforms))
+    whole = (points @ transforms[:, :3, :3] + transforms[:, 3:, :3]).reshape(-1, 3)
+    reach = framing.DIRECTIONS @ whole.T
+    assert ((framing.DIRECTIONS @ found.T).max(axis=1) > 0.99 * reach.max(axis=1)).all()
 
 
 def test_nothing_and_a_point_are_framed():

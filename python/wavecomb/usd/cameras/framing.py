@@ -129,12 +129,31 @@ def placed(points: Points, transforms: Matrices, more: Points | None = None) -> 
         linear = transforms[:, :3, :3]
         middle = centre @ linear + transforms[:, 3, :3]
         size = radius * np.sqrt(np.einsum("kij,kij->ki", linear, linear).max(axis=1))
-        directions = with_directions(more).T
-        along = middle @ directions
-        bare, whole = np.argmax(along, axis=0), np.argmax(along + size[:, None], axis=0)
+        directions = with_directions(more)
+        bare = _farthest_places(middle, np.zeros(1), directions)
+        whole = _farthest_places(middle, size, directions)
         transforms = transforms[np.unique(np.concatenate([bare, whole]))]
     moved = points @ transforms[:, :3, :3] + transforms[:, 3:, :3]
     return outline(moved.reshape(-1, 3), more)
+
+
+def _farthest_places(
+    middles: Points, sizes: NDArray[np.float64], directions: Points
+) -> NDArray[np.intp]:
+    """Which ball (k, 3) of some sizes (k,), or (1,) for all, reaches farthest in each direction.
+
+    Some of them at a time: distances of millions in all directions would be gigabytes.
+    """
+    columns = np.arange(len(directions))
+    best, found = np.full(len(directions), -np.inf), np.zeros(len(directions), np.intp)
+    for start in range(0, len(middles), _BLOCK):
+        few = slice(start, start + _BLOCK)
+        reach = middles[few] @ directions.T + (sizes if len(sizes) == 1 else sizes[few])[:, None]
+        at = np.argmax(reach, axis=0)
+        farther = reach[at, columns] > best
+        best[farther] = reach[at, columns][farther]
+        found[farther] = start + at[farther]
+    return found
 
 
 def joined(parts: Iterable[Points], more: Points | None = None) -> Points | None:
