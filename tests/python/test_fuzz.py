@@ -38,7 +38,11 @@ def test_broken_stages_end_in_a_line() -> None:
     assert all(v.said for v in verdicts if v.outcome != "rendered")
 
 
-@pytest.mark.parametrize("case", ["checkpoint/3", "merge/16", "costs/49"])
+@pytest.mark.parametrize(
+    "case",
+    ["checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
+     "usda words/148", "usda words/150"],
+)  # fmt: skip
 def test_what_was_found_and_mended(case: str) -> None:
     kind, _, number = case.partition("/")
     (verdict,) = run([(kind, int(number))], seed=1)

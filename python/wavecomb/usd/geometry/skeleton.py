@@ -63,7 +63,10 @@ class Skin:
         Raises:
             SkinError: The skinning data does not fit the mesh.
         """
-        deformed = Vt.Vec3fArray(points)
+        try:
+            deformed = Vt.Vec3fArray(points)
+        except TypeError:
+            raise SkinError("points of another type") from None
         self._blend(deformed, time)
         if not self.query.HasJointInfluences():
             return np.array(deformed, np.float32)

@@ -95,11 +95,29 @@ def captured(report: LoadReport) -> Iterator[None]:
         with _muted_stderr():
             yield
         return
-    with trap_type() as trap:
+    with _hooked(report), trap_type() as trap:
         try:
             yield
         finally:
             _pass_on(trap, report)
+
+
+@contextlib.contextmanager
+def _hooked(report: LoadReport) -> Iterator[None]:
+    """Collects exceptions that USD's C++ side meets in Python, and prints.
+
+    They are of values that have no type in Python.
+    """
+    before = sys.excepthook
+
+    def tell(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        _tell(report, plain(f"{kind.__name__}: {error}"))
+
+    sys.excepthook = tell
+    try:
+        yield
+    finally:
+        sys.excepthook = before
 
 
 def _pass_on(trap: Any, report: LoadReport) -> None:

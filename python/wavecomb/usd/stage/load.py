@@ -129,7 +129,8 @@ def load_stage(
     if stock is not None:
         reuse = stock.textures
     opened = _opener(source, chosen)
-    with captured(report):
+    # What is not finite in a file is found where it is read; NumPy need not say it.
+    with captured(report), np.errstate(all="ignore"):
         if builder_factory is None:
             store = texture_store(chosen.texture_limit, reuse, report)
             builder = _native_builder(threads, store)
