@@ -303,6 +303,16 @@ def test_commands_start_no_other(good: Path, tmp_path: Path, how: str) -> None:
     assert picture.exists()
 
 
+def test_nothing_has_threads_before_the_sandbox_is_entered() -> None:
+    """Landlock is for the thread that asks, and for those that it starts later."""
+    code = (
+        "import os, sys, wavecomb.run.boxed.child\n"
+        "heavy = {'numpy', 'pxr', 'wavecomb._core'} & {*sys.modules}\n"
+        "print(heavy, os.listdir('/proc/self/task')[1:])"
+    )
+    assert script(code) == "set() []\n"
+
+
 # ---- what goes wrong -----------------------------------------------------------------------------
 
 PATCHED = """
