@@ -332,7 +332,8 @@ class Integrator {
                     lit(light, f_cos, diffuse);
       if (is_positive(c) && is_free(ray.o, ray.d, t, i)) sum += c;
     }
-    return view.mesh_lights ? sum + sampled_only_meshes(f_cos, diffuse, ray) : sum;
+    if (!view.mesh_lights) return sum;
+    return sum + sampled_only_meshes(f_cos, diffuse, ray) + hidden_meshes(f_cos, diffuse, ray);
   }
 
   /// The same of mesh lights: all surfaces along the ray are looked at.
@@ -347,7 +348,7 @@ class Integrator {
       const uint32_t i = hit.inst == kLightShape ? kNoLight : mesh_light_of(hit);
       if (i == kNoLight) continue;
       const LightRecord& light = scene_.lights.lights[i];
-      if (light.sampled_only == 0 || !lights_class(i, ray.link)) continue;
+      if (light.sampled_only == 0 || light.hidden != 0 || !lights_class(i, ray.link)) continue;
       Rgb c = triple(light.radiance);
       if (static_cast<MaterialSync>(light.sync) != MaterialSync::kIndependent)
         c = c * glow(hit, ray);
@@ -355,6 +356,26 @@ class Integrator {
         c = detail::shaped<F>(scene_.lights, light.shaping, -ray.d, c, true);
       c = c * lit(light, f_cos, diffuse);
       if (is_positive(c) && is_free(ray.o, ray.d, t, i)) sum += c;
+    }
+    return sum;
+  }
+
+  /// The same of meshes that no ray meets: their triangles, one by one.
+  Rgb hidden_meshes(const Rgb& f_cos, const Rgb& diffuse, const Ray& ray) {
+    const LightView& view = scene_.lights;
+    Rgb sum(0.f);
+    for (uint32_t i = view.first_triangle; i < view.count; ++i) {
+      const uint32_t record = view.mesh_lights[i - view.first_triangle];
+      if (record == kNoLight) continue;
+      const LightRecord& light = view.lights[record];
+      if (light.hidden == 0 || !lights_class(record, ray.link)) continue;
+      const TriangleLight& triangle = view.triangles[i - view.first_triangle];
+      const F t = static_cast<F>(meets(triangle, ray.o, ray.d));
+      if (!(t > 0) || triangle.varies()) continue;
+      Rgb c = triple(triangle.radiance);
+      if (light.shaping != kNoShaping) c = detail::shaped<F>(view, light.shaping, -ray.d, c, true);
+      c = c * lit(light, f_cos, diffuse);
+      if (is_positive(c) && is_free(ray.o, ray.d, t, record)) sum += c;
     }
     return sum;
   }

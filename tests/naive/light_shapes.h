@@ -68,4 +68,18 @@ inline double meets(const LightRecord& light, const Vec3<float>& origin,
   return 0;
 }
 
+/// The same of a triangle, which shines to both sides.
+inline double meets(const TriangleLight& light, const Vec3<float>& origin,
+                    const Vec3<float>& direction) {
+  const Double3n o = of(origin), d = of(direction), p = of(light.p), u = of(light.u),
+                 v = of(light.v), m = of(light.m);
+  const double t = -dot3(o - p, m) / dot3(d, m);
+  if (!(t > 0)) return 0;
+  const Double3n h = along(o, d, t) - p;
+  const double uu = dot3(u, u), uv = dot3(u, v), vv = dot3(v, v), hu = dot3(h, u), hv = dot3(h, v),
+               det = uu * vv - uv * uv;
+  const double a = (hu * vv - hv * uv) / det, b = (hv * uu - hu * uv) / det;
+  return a >= 0 && b >= 0 && a + b <= 1 ? t : 0;
+}
+
 }  // namespace wavecomb
