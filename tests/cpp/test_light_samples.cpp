@@ -3,6 +3,8 @@
 /// several points; so do those of many lights, whose choice and place are tested together.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "light_charts.h"
 #include "light_tree_testing.h"
 #include "parts.h"
@@ -22,9 +24,6 @@ const From kNear{"close by", {0.1f, 0.2f, -0.03f}}, kFront{"in front", {0.3f, -0
     kSide{"at grazing angles", {4, 1, -0.05f}}, kFar{"from afar", {90, -60, -900}},
     kEdge{"on the line of an edge", {1, 0, -0.4f}}, kBehind{"from behind", {0.1f, 0.1f, 1}};
 const From kFlat[] = {kNear, kFront, kSide, kFar, kEdge, kBehind};
-/// Rects that are sampled by solid angle: RectsSeenVeryFlatErrByRounding.
-const From kRect[] = {kNear, kFront, {"at grazing angles", {4, 1, -0.3f}}, kFar, kEdge, kBehind};
-
 void see(Battery& battery, const std::string& name, const Lights& lights,
          std::span<const From> points) {
   for (const From& from : points)
@@ -37,7 +36,7 @@ void see(Battery& battery, const std::string& name, const Light& light,
 
 TEST(LightSamples, OfRectsAndDisksFollowTheirDensity) {
   Battery battery("rects and disks");
-  see(battery, "rect", make_light(LightKind::kRect, scale(2, 3, 1)), kRect);
+  see(battery, "rect", make_light(LightKind::kRect, scale(2, 3, 1)), kFlat);
   const Affine shear{{{1, 0.6f, 0}, {0, 1, 0}, {0, 0, 1}}, {0.2f, 0, 0}};
   see(battery, "sheared rect", make_light(LightKind::kRect, shear * scale(2, 2, 1)), kFlat);
   see(battery, "narrow rect", make_light(LightKind::kRect, scale(40, 0.01f, 1)), kFlat);
@@ -46,10 +45,10 @@ TEST(LightSamples, OfRectsAndDisksFollowTheirDensity) {
   battery.judge();
 }
 
-TEST(LightSamples, RectsSeenVeryFlatErrByRounding) {
+TEST(LightSamples, RectsSeenVeryFlatKeepTheirFarEdge) {
   // Where a rect is 60 to 100 times as far as the point is above its plane, the cosine that places
-  // a sample along its width is within 1e-4 of 1, and the place rounds to 3e-4 of the width: what
-  // falls beyond the far edge is moved to it, 0.13 % of the samples.
+  // a sample along its width is within 1e-4 of 1: computed by it, places rounded to 3e-4 of the
+  // width, and 0.13 % of the samples were moved to the far edge.
   const Lights lights({make_light(LightKind::kRect, scale(2, 3, 1))});
   const chi_square::Case c = light_case("flat", lights.view(), Vec3<float>(4, 1, -0.05f));
   chi_square::Random random(3);
@@ -59,7 +58,8 @@ TEST(LightSamples, RectsSeenVeryFlatErrByRounding) {
   double expected = 0;
   for (int i = 0; i < 100; ++i) expected += c.density({0, 0.998 + 0.002 * (i + 0.5) / 100, 0.5});
   expected *= 0.002 / 100;
-  EXPECT_NEAR(static_cast<double>(at_edge) / samples, expected, 3e-3);
+  const double noise = std::sqrt(expected / static_cast<double>(samples));
+  EXPECT_NEAR(static_cast<double>(at_edge) / samples, expected, 4 * noise);
 }
 
 TEST(LightSamples, OfSpheresAndCylindersFollowTheirDensity) {

@@ -89,10 +89,9 @@ inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, cons
   const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));
   const F good_sin = select(abs(sin_a) > 1e-20f, sin_a, F(1e-20f));
   const F f = fma(cos_a, r.b0, F(-r.b1)) / good_sin;
-  const F f2 = fma(f, f, F(r.b0 * r.b0));
-  const F c = clamp(copysign(F(1.f / sqrt(max(f2, F(1e-30f)))), f), F(-1.f), F(1.f));
-  const F s = sqrt(max(F((1.f - c) * (1.f + c)), F(1e-14f)));
-  const F x = clamp(F(c * r.z / s), r.x0, r.x1);
+  const F n0 = r.z / sqrt(max(fma(r.y0, r.y0, F(r.z * r.z)), F(1e-30f)));
+  const F a2 = F(abs(f) - n0) * F(abs(f) + n0);
+  const F x = clamp(copysign(F(r.z / sqrt(max(a2, F(1e-14f)))), f), r.x0, r.x1);
   const F d2 = fma(x, x, F(r.z * r.z));
   const F h0 = r.y0 / sqrt(fma(r.y0, r.y0, d2)), h1 = r.y1 / sqrt(fma(r.y1, r.y1, d2));
   const F h = fma(v, F(h1 - h0), h0);
