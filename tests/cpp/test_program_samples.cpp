@@ -35,6 +35,8 @@ chi_square::Case sampling_case(std::string name, const Bsdf& bsdf, const Vec& wo
   chi_square::Case c;
   c.name = std::move(name) + ", z " + std::to_string(wo.z).substr(0, 5);
   c.charts = bsdf_testing::direction_charts();
+  // Refraction ends along a line, where rules over large boxes err by 0.4 %.
+  if (Bsdf::kTransmits && is_long()) c.boxes = 60;
   c.density = [&bsdf, wo](const Place& p) {
     return static_cast<double>(bsdf.eval(wo, bsdf_testing::direction_at(p)).pdf);
   };
