@@ -185,7 +185,7 @@ TEST(ChiSquare, FindsDeltaLobesAndNothingMoreOftenThanStated) {
   c = cosine_case();
   c.draw = [draw = c.draw](Random& random, bool check) {
     Draw d = draw(random, check);
-    d.place.chart = random() < 0.001;
+    d.place.chart = random() < 0.001 * kFault;
     return d;
   };
   EXPECT_NE(fault(c), "");
