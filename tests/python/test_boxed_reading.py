@@ -561,7 +561,7 @@ def test_no_process_outlives_who_asked(good: Path, does: Any, number: int, is_de
     time.sleep(1.0)
     process.send_signal(number)
     _, err = process.communicate(timeout=60)
-    assert process.returncode == -number
+    assert process.returncode == -number, err
     assert ("KeyboardInterrupt" in err) == (number == signal.SIGINT)
     end = time.monotonic() + 10
     while stat.exists() and time.monotonic() < end:

@@ -578,7 +578,7 @@ def test_memory_bounds_automatic_levels(tmp_path, monkeypatch):
 
 
 def test_a_level_beyond_memory_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(surfaces, "memory_bytes", lambda: 1 << 30)
+    monkeypatch.setattr(surfaces, "machine_limit", lambda: 1 << 30)
     with pytest.raises(WavecombError, match=r"subdivision 10: .* choose a lower level"):
         load(tmp_path, mesh(*grid(4, 4)), subdivision=10)
 

@@ -2,6 +2,7 @@
 """Threads beside the window's own nothing of Qt's, and no garbage of Python's holds any."""
 
 import gc
+import os
 import subprocess
 import sys
 import threading
@@ -58,6 +59,28 @@ class Saved:
         return [f"{type(one).__name__} {one!r:.80}" for one in owned(gc.garbage)]
 
 
+def alone(test):
+    """Runs a test in a process of its own: what other tests left for the collector is not there.
+
+    Tests make objects of Qt's with no window round them, whose garbage PySide may not survive.
+    """
+    if os.environ.get("WAVECOMB_ALONE"):
+        return test
+
+    def run():
+        done = subprocess.run(
+            [sys.executable, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:xdist",
+             "-p", "no:cacheprovider", f"{__file__}::{test.__name__}"],
+            capture_output=True, text=True, check=False, env={**os.environ, "WAVECOMB_ALONE": "1"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "1 passed" in done.stdout
+
+    run.__name__, run.__doc__ = test.__name__, test.__doc__
+    return run
+
+
+@alone
 def test_garbage_that_holds_qt_is_found(qapp):
     """What the next test relies on."""
 
@@ -71,6 +94,7 @@ def test_garbage_that_holds_qt_is_found(qapp):
         assert len(saved.look()) == 1
 
 
+@alone
 def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
     """Opened, used and closed: whichever thread collects, it has nothing of Qt's to destroy."""
     warm = window_story.new_window(tmp_path, qapp)
@@ -85,6 +109,7 @@ def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
         assert saved.look() == []
 
 
+@alone
 def test_a_session_alone_leaves_no_garbage(qapp, stage_path):
     """Without a parent: it is gone with the last who has it."""
     from wavecomb.gui.setup import Setup
