@@ -115,6 +115,7 @@ TEST(ProgramSamples, OfOpenPbrThatTransmitsFollowTheirDensity) {
 /// A program whose bounces are sampled as the setting cosine_sampling says.
 template <typename Bsdf>
 struct ByCosine {
+  static constexpr bool kTransmits = false;
   const Bsdf& bsdf;
   ShadeSettings settings = [] {
     Settings s;
