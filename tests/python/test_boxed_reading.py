@@ -529,6 +529,8 @@ def test_memory_is_limited_on_both_sides(good: Path, does: Any) -> None:
 
 
 WAITS = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
 import sys, wavecomb
 from wavecomb.run.boxed import process
 process._START = sys.argv[2]
