@@ -169,8 +169,7 @@ class Integrator {
   /// A surface at a hit, with what its material says there.
   template <typename Bsdf>
   struct Point {
-    static constexpr bool kEmits = Bsdf::kEmits;
-    static constexpr uint32_t kSlots = Bsdf::kSlots | (kEmits ? slot_bit(Slot::kEmission) : 0u);
+    static constexpr uint32_t kSlots = kVertexSlots<Bsdf>;
     Surface<F> s;
     MaterialRecord record;
     bool reads_texture;
@@ -248,7 +247,7 @@ class Integrator {
     next.is_seen = false;
     out += delta_lights(bsdf, s, frame, wo, next);
 
-    constexpr bool kOpaque = Bsdf::kHasTerminator && Bsdf::kProgram != ProgramId::kOpenPbr;
+    constexpr bool kOpaque = !Bsdf::kTransmits;
     const uint32_t n = depth == 0 ? settings_.directions : 1u;
     next.cone_spread = std::max(ray.cone_spread, 0.25f);
     for (uint32_t i = 0; i < n; ++i) {
