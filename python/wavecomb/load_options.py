@@ -186,7 +186,7 @@ class LoadOptions:
         plain = dict(changes)
         if plain.get("session_layer") is not None:
             plain["session_layer"] = os.fspath(plain["session_layer"])
-        for name in ("purposes", "mask"):
+        for name in ("purposes", "mask", "size", "shutter"):
             if plain.get(name) is not None:
                 plain[name] = tuple(plain[name])
         return replace(options or cls(), **plain)

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.loaded import LoadedStage
     from wavecomb.usd.stage.report import LoadReport
 
-_TUPLES = ("purposes", "mask", "size", "shutter")
-"""Options that are lists in JSON, and in memory are not."""
-
 
 def main(start: Mapping[str, Any]) -> None:
     """Reads what it is asked for, until nobody asks any more.
@@ -105,7 +102,7 @@ class Child:
         from wavecomb.usd.stage.load import load_stage
         from wavecomb.usd.stage.opening import open_stage
 
-        body, options = message.body, _options(message.body["options"])
+        body, options = message.body, dict(message.body["options"])
         if body.get("stock") is not None:
             store = body["store"].get("limit_bytes")
             options["reuse"] = plain.read_stock(
@@ -170,9 +167,7 @@ class Child:
         from wavecomb.run.frame_reader import FrameReader
 
         body = message.body
-        self._frames = FrameReader(
-            _path(body["path"]), LoadOptions.of(None, _options(body["with"]))
-        )
+        self._frames = FrameReader(_path(body["path"]), LoadOptions.of(None, body["with"]))
         self._sender.send("opened", {})
 
     def _look(self, message: Message) -> None:
@@ -180,24 +175,16 @@ class Child:
 
         assert self._frames is not None
         body = message.body
-        seen = self._frames.look(LoadOptions.of(None, _options(body["options"])))
+        seen = self._frames.look(LoadOptions.of(None, body["options"]))
         found = None if seen is None else plain.of_seen(seen.as_dict())
         self._sender.send("seen", {"seen": found})
 
     def _frame(self, message: Message) -> None:
         assert self._frames is not None
         body = message.body
-        options = _options(body["options"])
+        options = body["options"]
         loaded = self._frames.read(LoadOptions.of(None, options), **self._factories(body, options))
         self._answer(loaded)
-
-
-def _options(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as ``load_stage`` takes them."""
-    return {
-        name: tuple(value) if name in _TUPLES and isinstance(value, list) else value
-        for name, value in values.items()
-    }
 
 
 def _path(name: str) -> Any:
