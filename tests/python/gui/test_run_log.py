@@ -60,6 +60,18 @@ def fill(
                 finished=i == looks - 1)  # fmt: skip
 
 
+def test_time_that_stood_still_counts_nowhere() -> None:
+    log = RunLog()
+    for seconds, held in ((1.0, 0.0), (5.0, 3.0), (6.0, 3.0)):
+        stats = statistics(seconds, 100 * (seconds - held))
+        stats["seconds"]["held"] = held
+        log.add(stats, PROGRAM, 0)
+    (series,) = log.series
+    (run,) = series.runs
+    assert [look.seconds for look in run.looks] == [0.0, 1.0, 2.0, 3.0]
+    assert rate(run, "samples").value == pytest.approx(100.0)
+
+
 def test_counters_of_real_statistics() -> None:
     wavecomb = pytest.importorskip("wavecomb")
     pytest.importorskip("wavecomb._core")
@@ -116,15 +128,6 @@ def test_short_runs_that_were_abandoned_are_forgotten() -> None:
     log.add(statistics(0.02, 1000), PROGRAM, "quick but whole", finished=True)
     log.add(statistics(0.02, 1000), MATERIAL, "quick but whole", finished=True)
     assert [one.picture for one in log.series] == ["quick but whole"] * 2
-
-
-def test_time_on_hold_does_not_count() -> None:
-    log = RunLog()
-    log.add(statistics(1.0, 100), PROGRAM, 0)
-    log.hold(5.0)
-    log.add(statistics(7.0, 200), PROGRAM, 0)
-    assert len(log.series[0].runs) == 1
-    assert rate(log.series[0].run, "samples").value == pytest.approx(100.0)
 
 
 def test_last_statistics_twice_are_one_run() -> None:

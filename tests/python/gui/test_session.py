@@ -196,6 +196,25 @@ def test_pause_stop_and_resume(new_session, qtbot, cornell):
     assert session.state == "rendering" and session.version > version
 
 
+def test_a_pause_that_comes_while_a_frame_is_made_is_told(new_session, qtbot, cornell):
+    session = new_session(width=64, height=64, spp=100_000)
+    engine = session._live._engine
+    take, taken = engine._listener.on_frame, []
+
+    def pause_in_the_third(frame):
+        taken.append(frame)
+        if len(taken) == 3:
+            engine.pause()
+        take(frame)
+
+    engine._listener.on_frame = pause_in_the_third
+    session.open(cornell)
+    qtbot.waitUntil(lambda: len(taken) >= 4, timeout=20000)
+    assert [frame.status.get("paused", False) for frame in taken] == [False] * 3 + [True]
+    engine.resume()
+    qtbot.waitUntil(lambda: len(taken) > 4, timeout=20000)
+
+
 def test_moving_shows_reduced_pictures_then_the_whole_one(new_session, qtbot, cornell, final):
     session = new_session(width=640, height=640, spp=1)
     session.open(cornell)

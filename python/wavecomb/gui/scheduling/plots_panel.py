@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -33,7 +32,6 @@ class PlotsPanel(QWidget):
         super().__init__(parent)
         self._session = session
         self._revision = PictureRevision(session, self)
-        self._paused_at = 0.0
         self.log = RunLog()
         self.phases = PhasePlot()
         self.materials = MaterialsTab()
@@ -71,7 +69,6 @@ class PlotsPanel(QWidget):
         self.runs.changed.connect(self.refresh)
         session.statistics.connect(self._take)
         session.frame.connect(self._finish)
-        session.state_changed.connect(self._look_at_state)
         theme.on_change(self.refresh)
         self.refresh()
 
@@ -146,13 +143,6 @@ class PlotsPanel(QWidget):
         whole = frame.final and frame.scale == 1 and not frame.status.get("cancelled")
         if whole and self.log.finish():
             self.refresh()
-
-    def _look_at_state(self, state: str) -> None:
-        if state == "paused":
-            self._paused_at = time.perf_counter()
-        elif self._paused_at:
-            self.log.hold(time.perf_counter() - self._paused_at)
-            self._paused_at = 0.0
 
     # ---- what is shown --------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ picture are repeats and make up a *series*.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from wavecomb.options import names
@@ -33,7 +33,7 @@ class Look:
     """Counters since the start of a run."""
 
     seconds: float
-    """Of rendering, wall time."""
+    """Of rendering, wall time; not that while it was paused."""
     samples: int = 0
     rays: int = 0
     """Camera, bounce and shadow rays."""
@@ -50,8 +50,9 @@ def take_look(stats: Mapping[str, Any]) -> Look:
     counts = stats.get("counts", {})
     phases = stats.get("phases_s", {})
     coherence = stats.get("coherence", {})
+    seconds = stats.get("seconds", {})
     return Look(
-        seconds=float(stats.get("seconds", {}).get("render", 0.0)),
+        seconds=float(seconds.get("render", 0.0)) - float(seconds.get("held", 0.0)),
         samples=int(counts.get("samples", 0)),
         rays=int(counts.get("rays", 0)) + int(counts.get("shadow_rays", 0)),
         records=int(counts.get("records", 0)),
@@ -69,8 +70,6 @@ class Run:
     stats: Mapping[str, Any] = field(default_factory=dict)
     """The last statistics."""
     finished: bool = False
-    held_s: float = 0.0
-    """Of its time it stood still, paused; no look counts that."""
 
     @property
     def last(self) -> Look:
@@ -80,7 +79,6 @@ class Run:
     def add(self, stats: Mapping[str, Any]) -> None:
         """One more look."""
         look = take_look(stats)
-        look = replace(look, seconds=look.seconds - self.held_s)
         self.stats = stats
         if look.seconds <= self.last.seconds:
             return  # nothing has passed since the one before
@@ -91,11 +89,7 @@ class Run:
     def continues(self, look: Look) -> bool:
         """Whether a look can be a later one of this run: counters only go up."""
         last = self.last
-        return (
-            not self.finished
-            and look.seconds - self.held_s >= last.seconds
-            and look.samples >= last.samples
-        )
+        return not self.finished and look.seconds >= last.seconds and look.samples >= last.samples
 
     def lane_utilisation(self) -> float:
         """Records / (packets x lanes), 0 to 1; 0 before anything was shaded."""
@@ -190,11 +184,6 @@ class RunLog:
             return False
         self._current.run.finished = True
         return True
-
-    def hold(self, seconds: float) -> None:
-        """The render that goes on stood still for so long since the last look."""
-        if self._current is not None and not self._current.run.finished:
-            self._current.run.held_s += seconds
 
     @property
     def current(self) -> Series | None:

@@ -236,17 +236,19 @@ class Engine:
         )  # fmt: skip
         if self._superseded and self._task is not None:
             return
-        statistics = self._statistics(result)
+        statistics = self._statistics(result, watch.held_s)
         self._listener.on_statistics(statistics, task.version)
         if not result.samples.any():
             return
         self._listener.on_frame(self._last_frame(renderer, task, preview, result, statistics))
 
-    def _statistics(self, source: Any) -> dict[str, Any]:
+    def _statistics(self, source: Any, held_s: float) -> dict[str, Any]:
         from wavecomb.run.stats import make_stats
 
         stage = str(self._loaded.stage_path) if self._loaded is not None else None
-        return make_stats(source, stage=stage, loaded=self._loaded)
+        statistics = make_stats(source, stage=stage, loaded=self._loaded)
+        statistics["seconds"]["held"] = held_s
+        return statistics
 
     def _last_frame(
         self,
@@ -334,6 +336,8 @@ class _Watch:
         self._engine = engine
         self._task = task
         self._preview = preview
+        self.held_s = 0.0
+        """For so long it stood still, paused."""
         self._next = 0.0
         self._next_statistics = time.perf_counter() + 0.25
         self._begun = time.perf_counter()
@@ -352,25 +356,36 @@ class _Watch:
         if snapshot.finished or self._engine._superseded:
             return
         start = time.perf_counter()
-        self._send(snapshot)
+        said = self._send(snapshot)
         now = time.perf_counter()
         # Looking costs a tenth at most, unless that were rarer than once a second.
         pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
         self._next = now + min(pause, 1.0)
+        if self._engine.paused:
+            if not said:  # the pause came while the frame was made
+                self._send(snapshot)
+            self._stand_still()
+
+    def _stand_still(self) -> None:
+        start = time.perf_counter()
         while self._engine.paused and not self._engine._superseded:
             self._engine._going.wait(0.02)
+        self.held_s += time.perf_counter() - start
 
-    def _send(self, snapshot: Snapshot) -> None:
+    def _send(self, snapshot: Snapshot) -> bool:
+        """Hands out a frame; gives whether it says that the render is paused."""
+        paused = self._engine.paused
         layers = layers_of_snapshot(snapshot, self._task.setup.layers())
         beauty = filled(snapshot.beauty(), layers["samples"], self._preview)
-        status = {**snapshot.status, "paused": self._engine.paused}
+        status = {**snapshot.status, "paused": paused}
         frame = Frame(beauty, layers, None, status, self._task.version, 1, False, self._task.setup)
         self._engine._listener.on_frame(frame)
         now = time.perf_counter()
-        if now >= self._next_statistics or self._engine.paused:
+        if now >= self._next_statistics or paused:
             self._next_statistics = now + STATISTICS_S
-            statistics = self._engine._statistics(_SoFar(snapshot))
+            statistics = self._engine._statistics(_SoFar(snapshot), self.held_s)
             self._engine._listener.on_statistics(statistics, self._task.version)
+        return paused
 
 
 class _SoFar:
