@@ -77,6 +77,8 @@ TEST(LightSamples, OfSpheresAndCylindersFollowTheirDensity) {
                        {"almost along the axis", {5, 0.8f, 0}},
                        {"beside its end", {1, 0, -0.52f}}};
   see(battery, "cylinder", tube, ends);
+  const From line[] = {{"along a line of it", {5, 0.51f, 0}}, {"and back", {-5, 0.505f, 0.01f}}};
+  see(battery, "cylinder", tube, line);
   tube.length = 40;
   tube.radius = 0.01f;
   see(battery, "thin cylinder", tube, ends);
