@@ -12,6 +12,7 @@ void bind_threads(nanobind::module_& m);
 void bind_scene(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_graphs(nanobind::module_& m);
+void bind_lights(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
 void bind_watching(nanobind::module_& m);
 void bind_settings(nanobind::module_& m);

@@ -16,6 +16,7 @@ NB_MODULE(_core, m) {
   bind_scene(m);
   bind_threads(m);
   bind_geometry(m);
+  bind_lights(m);
   bind_graphs(m);
   bind_recording(m);
   bind_watching(m);

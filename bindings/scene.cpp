@@ -14,10 +14,12 @@
 #include <cstring>
 
 #include "bind.h"
+#include "lights.h"
 #include "scene_values.h"
 #include "statistics.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/fingerprint.h"
+#include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/texture/tile_store.h"
 
@@ -392,79 +394,6 @@ void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
   }
 }
 
-uint32_t add_light(SceneBuilder& builder, const std::string& kind,
-                   const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
-                   const std::string& name, const Color3& color, float width, float height,
-                   float radius, float length, float angle, bool normalize,
-                   std::optional<uint32_t> texture, const std::string& group, float focus,
-                   const Color3& focus_tint, float cone_angle, float cone_softness,
-                   std::optional<uint32_t> ies, float ies_angle_scale, bool ies_normalize,
-                   float diffuse, float specular, bool visible, std::optional<uint32_t> light_link,
-                   std::optional<uint32_t> shadow_link,
-                   const std::optional<Array<double>>& portals) {
-  Light light;
-  light.group = builder.light_group(group);
-  light.name = name;
-  light.kind = choose<LightKind>("light kind", kind,
-                                 {{"rect", LightKind::kRect},
-                                  {"disk", LightKind::kDisk},
-                                  {"sphere", LightKind::kSphere},
-                                  {"cylinder", LightKind::kCylinder},
-                                  {"distant", LightKind::kDistant},
-                                  {"dome", LightKind::kDome}});
-  light.to_world = affine(transform);
-  light.color = vec3(color);
-  light.width = width;
-  light.height = height;
-  light.radius = radius;
-  light.length = length;
-  light.angle = angle;
-  light.normalize = normalize;
-  light.texture = texture.value_or(kNoTexture);
-  light.shaping = {focus,         vec3(focus_tint),     cone_angle,
-                   cone_softness, ies.value_or(kNoIes), ies_angle_scale,
-                   ies_normalize};
-  light.diffuse = diffuse;
-  light.specular = specular;
-  light.visible = visible;
-  light.light_link = light_link.value_or(kNoSet);
-  light.shadow_link = shadow_link.value_or(kNoSet);
-  if (portals) {
-    if (portals->ndim() != 3 || portals->shape(1) != 4 || portals->shape(2) != 4)
-      throw Error("portals of lights must have the shape (k, 4, 4)");
-    for (size_t i = 0; i < portals->shape(0); ++i)
-      light.portals.push_back(affine(portals->data() + 16 * i));
-  }
-  return builder.add_light(std::move(light));
-}
-
-uint32_t add_mesh_light(SceneBuilder& builder,
-                        const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
-                        const std::string& sync, const std::string& name, const Color3& color,
-                        bool normalize, float focus, const Color3& focus_tint, float cone_angle,
-                        float cone_softness, std::optional<uint32_t> ies, float ies_angle_scale,
-                        bool ies_normalize, float diffuse, float specular, bool visible,
-                        std::optional<uint32_t> light_link, std::optional<uint32_t> shadow_link) {
-  Light light;
-  light.name = name;
-  light.sync = choose<MaterialSync>("material sync mode", sync,
-                                    {{"materialGlowTintsLight", MaterialSync::kGlowTintsLight},
-                                     {"independent", MaterialSync::kIndependent},
-                                     {"noMaterialResponse", MaterialSync::kNoResponse}});
-  light.to_world = affine(transform);
-  light.color = vec3(color);
-  light.normalize = normalize;
-  light.shaping = {focus,         vec3(focus_tint),     cone_angle,
-                   cone_softness, ies.value_or(kNoIes), ies_angle_scale,
-                   ies_normalize};
-  light.diffuse = diffuse;
-  light.specular = specular;
-  light.visible = visible;
-  light.light_link = light_link.value_or(kNoSet);
-  light.shadow_link = shadow_link.value_or(kNoSet);
-  return builder.add_mesh_light(std::move(light));
-}
-
 uint32_t add_geometry_set(SceneBuilder& builder, const std::map<std::string, std::string>& rules) {
   GeometrySet set;
   for (const auto& [path, rule] : rules)
@@ -584,7 +513,7 @@ void bind_scene(nb::module_& m) {
         return std::make_pair(Color3{b.lo.x, b.lo.y, b.lo.z}, Color3{b.hi.x, b.hi.y, b.hi.z});
       });
 
-  const Color3 grey{0.18f, 0.18f, 0.18f}, black{0.f, 0.f, 0.f}, white{1.f, 1.f, 1.f};
+  const Color3 grey{0.18f, 0.18f, 0.18f}, black{0.f, 0.f, 0.f};
   nb::class_<SceneBuilder>(m, "SceneBuilder")
       .def(nb::init<uint32_t, std::shared_ptr<TileStore>>(), "threads"_a = 0,
            "store"_a.none() = nb::none())
@@ -622,19 +551,8 @@ void bind_scene(nb::module_& m) {
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
            "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
            "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none())
-      .def("add_light", &add_light, "kind"_a, "transform"_a, nb::kw_only(), "name"_a = "",
-           "color"_a = white, "width"_a = 1.f, "height"_a = 1.f, "radius"_a = 0.5f,
-           "length"_a = 1.f, "angle"_a = 0.53f, "normalize"_a = false, "texture"_a = nb::none(),
-           "group"_a = "", "focus"_a = 0.f, "focus_tint"_a = black, "cone_angle"_a = 180.f,
-           "cone_softness"_a = 0.f, "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f,
-           "ies_normalize"_a = false, "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true,
-           "light_link"_a = nb::none(), "shadow_link"_a = nb::none(), "portals"_a = nb::none())
-      .def("add_mesh_light", &add_mesh_light, "transform"_a, "material_sync"_a, nb::kw_only(),
-           "name"_a = "", "color"_a = white, "normalize"_a = false, "focus"_a = 0.f,
-           "focus_tint"_a = black, "cone_angle"_a = 180.f, "cone_softness"_a = 0.f,
-           "ies"_a = nb::none(), "ies_angle_scale"_a = 0.f, "ies_normalize"_a = false,
-           "diffuse"_a = 1.f, "specular"_a = 1.f, "visible"_a = true, "light_link"_a = nb::none(),
-           "shadow_link"_a = nb::none())
+      .def("add_light", &add_light, "kind"_a, "transform"_a, "values"_a)
+      .def("add_mesh_light", &add_mesh_light, "transform"_a, "material_sync"_a, "values"_a)
       .def("add_geometry_set", &add_geometry_set, "rules"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
       .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "lights.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/graph_parameters.h"
 
@@ -53,19 +54,6 @@ const Members<OpenPbr, Vec3<float>> kOpenPbrColors{
 const Members<OpenPbr, float> kOpenPbrNumbers{{"transmission_depth", &OpenPbr::transmission_depth},
                                               WAVECOMB_OPENPBR_INPUTS(WAVECOMB_NUMBER)};
 const Members<OpenPbr, bool> kOpenPbrSwitches{{"thin_walled", &OpenPbr::thin_walled}};
-const Members<Light, Vec3<float>> kLightColors{{"color", &Light::color}};
-const Members<Light, float> kLightNumbers{
-    {"width", &Light::width},      {"height", &Light::height}, {"radius", &Light::radius},
-    {"length", &Light::length},    {"angle", &Light::angle},   {"diffuse", &Light::diffuse},
-    {"specular", &Light::specular}};
-const Members<Shaping, Vec3<float>> kShapingColors{{"focus_tint", &Shaping::focus_tint}};
-const Members<Shaping, float> kShapingNumbers{{"focus", &Shaping::focus},
-                                              {"cone_angle", &Shaping::cone_angle},
-                                              {"cone_softness", &Shaping::cone_softness},
-                                              {"ies_angle_scale", &Shaping::ies_angle_scale}};
-const Members<Shaping, bool> kShapingSwitches{{"ies_normalize", &Shaping::ies_normalize}};
-const Members<Light, bool> kLightSwitches{{"normalize", &Light::normalize},
-                                          {"visible", &Light::visible}};
 const Members<Camera, float> kCameraNumbers{
     {"lens_radius", &Camera::lens_radius},   {"focus_distance", &Camera::focus_distance},
     {"near_clip", &Camera::near_clip},       {"far_clip", &Camera::far_clip},
@@ -127,14 +115,7 @@ class Reader {
   }
   void take(const char* name, Affine& to) {
     const nb::object value = next(name);
-    if (!value.is_valid()) return;
-    try {
-      const nb::object array =
-          nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float64");
-      to = affine(nb::cast<nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>>(array));
-    } catch (const std::exception&) {
-      fail(name, "4 x 4 numbers");
-    }
+    if (value.is_valid()) to = matrix_of(what_ + ": " + name, value);
   }
   void take(const char* name, std::string& to) {
     const nb::object value = next(name);
@@ -210,26 +191,10 @@ class Reader {
   size_t taken_ = 0;
 };
 
-nb::list matrix(const Affine& m) {
-  nb::list rows;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3<float> axis = m.axis(i);
-    rows.append(std::vector<float>{axis.x, axis.y, axis.z, 0});
-  }
-  rows.append(std::vector<float>{m.t.x, m.t.y, m.t.z, 1});
-  return rows;
-}
-
 void take_openpbr(Reader& reader, OpenPbr& to) {
   reader.take(to, kOpenPbrColors);
   reader.take(to, kOpenPbrNumbers);
   reader.take(to, kOpenPbrSwitches);
-}
-
-void check_index(const char* kind, uint32_t i, size_t count) {
-  if (i >= count)
-    throw Error(std::string(kind) + " " + std::to_string(i) + " is not there; the scene has " +
-                std::to_string(count));
 }
 
 /// Names of the parameters that a graph drives.
@@ -273,6 +238,32 @@ void for_each_change(const char* kind, const nb::dict& changes, const Change& ch
 
 }  // namespace
 
+void check_index(const char* kind, uint32_t i, size_t count) {
+  if (i >= count)
+    throw Error(std::string(kind) + " " + std::to_string(i) + " is not there; the scene has " +
+                std::to_string(count));
+}
+
+nb::list matrix(const Affine& m) {
+  nb::list rows;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<float> axis = m.axis(i);
+    rows.append(std::vector<float>{axis.x, axis.y, axis.z, 0});
+  }
+  rows.append(std::vector<float>{m.t.x, m.t.y, m.t.z, 1});
+  return rows;
+}
+
+Affine matrix_of(const std::string& what, nb::handle value) {
+  try {
+    const nb::object array =
+        nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float64");
+    return affine(nb::cast<nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>>(array));
+  } catch (const std::exception&) {
+    throw Error(what + " must be 4 x 4 numbers");
+  }
+}
+
 OpenPbr openpbr_of(const std::string& material, const nb::dict& values) {
   OpenPbr to;
   Reader reader("openpbr of material '" + material + "'", values);
@@ -286,12 +277,6 @@ Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
   if (m.dtype() == nb::dtype<double>()) return affine(static_cast<const double*>(m.data()));
   if (m.dtype() == nb::dtype<float>()) return affine(static_cast<const float*>(m.data()));
   throw Error("a transform must be of float32 or float64");
-}
-
-const char* light_kind_name(LightKind kind) {
-  constexpr const char* kKinds[kLightKindCount] = {"rect",    "disk", "sphere",  "cylinder",
-                                                   "distant", "dome", "triangle"};
-  return kKinds[static_cast<size_t>(kind)];
 }
 
 nb::dict material_dict(const Scene& scene, uint32_t material) {
@@ -316,26 +301,6 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
     put(openpbr, m.openpbr, kOpenPbrSwitches);
     d["openpbr"] = openpbr;
   }
-  return d;
-}
-
-nb::dict light_dict(const Scene& scene, uint32_t light) {
-  check_index("light", light, scene.lights().size());
-  const Light& l = scene.lights()[light];
-  nb::dict d;
-  d["name"] = l.name;
-  d["kind"] = light_kind_name(l.kind);
-  d["transform"] = matrix(l.to_world);
-  put(d, l, kLightColors);
-  put(d, l, kLightNumbers);
-  put(d, l, kLightSwitches);
-  put(d, l.shaping, kShapingColors);
-  put(d, l.shaping, kShapingNumbers);
-  put(d, l.shaping, kShapingSwitches);
-  d["ies"] = l.shaping.ies == kNoIes ? nb::none() : nb::cast(l.shaping.ies);
-  d["group"] = scene.light_groups()[l.group];
-  d["texture"] =
-      l.texture == kNoTexture ? nb::none() : nb::cast(scene.textures()[l.texture]->name());
   return d;
 }
 
@@ -396,18 +361,7 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     edit.materials[id] = std::move(changed);
   });
   for_each_change("light", lights, [&](uint32_t i, const nb::dict& values) {
-    check_index("light", i, scene.lights().size());
-    Light changed = scene.lights()[i];
-    Reader reader("light '" + changed.name + "'", values);
-    reader.take("transform", changed.to_world);
-    reader.take(changed, kLightColors);
-    reader.take(changed, kLightNumbers);
-    reader.take(changed, kLightSwitches);
-    reader.take(changed.shaping, kShapingColors);
-    reader.take(changed.shaping, kShapingNumbers);
-    reader.take(changed.shaping, kShapingSwitches);
-    reader.end();
-    edit.lights[i] = std::move(changed);
+    edit.lights[i] = edited_light(scene, i, values);
   });
   return edit;
 }

@@ -27,11 +27,16 @@ wavecomb::Conform conform_of(const std::string& name);
 /// The parameters of program "openpbr" by name; throws Error for others.
 wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
 
-const char* light_kind_name(wavecomb::LightKind kind);
+/// Throws Error unless i < count.
+void check_index(const char* kind, uint32_t i, size_t count);
 
-/// As add_material, add_light and set_camera take them. Throw Error for ids that are not there.
+/// A map as USD's row-vector matrix, and back: 4 x 4 numbers. Throws Error that begins with `what`
+/// for anything else.
+nanobind::list matrix(const wavecomb::Affine& m);
+wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
+
+/// As add_material and set_camera take them. Throw Error for ids that are not there.
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
-nanobind::dict light_dict(const wavecomb::Scene& scene, uint32_t light);
 nanobind::dict camera_dict(const wavecomb::Scene& scene);
 
 /// What Renderer.edit() is told. Values that are not given stay as they are. Throws Error that

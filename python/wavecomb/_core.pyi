@@ -303,6 +303,7 @@ class SceneBuilder:
         transform: NDArray[Any],
         *,
         name: str = "",
+        # ---- light_table(), of all kinds: tools/update_stub ----
         color: tuple[float, float, float] = (1, 1, 1),
         width: float = 1,
         height: float = 1,
@@ -312,6 +313,8 @@ class SceneBuilder:
         normalize: bool = False,
         texture: int | None = None,
         group: str = "",
+        diffuse: float = 1,
+        specular: float = 1,
         focus: float = 0,
         focus_tint: tuple[float, float, float] = (0, 0, 0),
         cone_angle: float = 180,
@@ -319,27 +322,25 @@ class SceneBuilder:
         ies: int | None = None,
         ies_angle_scale: float = 0,
         ies_normalize: bool = False,
-        diffuse: float = 1,
-        specular: float = 1,
-        visible: bool = True,
         light_link: int | None = None,
         shadow_link: int | None = None,
+        visible: bool = True,
         portals: NDArray[np.float64] | None = None,
+        # ---- to here ----
     ) -> int:
-        """Kinds: rect, disk, sphere, cylinder, distant, dome, as UsdLux. color = colour *
-        intensity * 2^exposure * colour temperature. The shaping (focus to ies_normalize, angles in
-        degrees, a cone_angle of 180 is none) is UsdLuxShapingAPI's. visible: whether rays meet its
-        shape. light_link, shadow_link: sets of geometry that it shines on, and that casts shadows
-        in its light; None: all. portals: (k, 4, 4), of a dome: maps of the unit square in the xy
-        plane to rectangles that guide its sampling of what is on their -z side."""
+        """Kinds: rect, disk, sphere, cylinder, distant, dome, as UsdLux; a parameter that the kind
+        has not is not looked at. wavecomb.light_table says what each parameter is. Raises Error."""
     def add_mesh_light(
         self,
         transform: NDArray[Any],
         material_sync: str,
         *,
         name: str = "",
+        # ---- light_table(), of meshes: tools/update_stub ----
         color: tuple[float, float, float] = (1, 1, 1),
         normalize: bool = False,
+        diffuse: float = 1,
+        specular: float = 1,
         focus: float = 0,
         focus_tint: tuple[float, float, float] = (0, 0, 0),
         cone_angle: float = 180,
@@ -347,11 +348,10 @@ class SceneBuilder:
         ies: int | None = None,
         ies_angle_scale: float = 0,
         ies_normalize: bool = False,
-        diffuse: float = 1,
-        specular: float = 1,
-        visible: bool = True,
         light_link: int | None = None,
         shadow_link: int | None = None,
+        visible: bool = True,
+        # ---- to here ----
     ) -> int:
         """A light of the triangles of meshes, for add_mesh. transform: from the light's space, by
         whose -z it is shaped, to that of the mesh's group. material_sync: materialGlowTintsLight,
@@ -391,6 +391,9 @@ class SceneBuilder:
         light in the picture. Raises Error for names that are not known."""
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
+
+def light_table() -> list[dict[str, Any]]:
+    """The parameters of lights, as wavecomb.light_table.LightParameter has them."""
 
 def setting_table() -> list[dict[str, Any]]:
     """The settings that are one value each, as wavecomb.options.Setting has them."""

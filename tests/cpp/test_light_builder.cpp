@@ -406,29 +406,6 @@ TEST(DomeDistribution, MeanAndBlack) {
   EXPECT_EQ(lights.set.records[0].radiance[0], 0);
 }
 
-TEST(LightBuilder, BadLightsAreRefusedByName) {
-  const auto message = [](const auto& change) -> std::string {
-    Light light = make_light(LightKind::kRect);
-    change(light);
-    try {
-      Lights lights({light});
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_EQ(message([](Light&) {}), "");
-  for (const std::string& m :
-       {message([](Light& l) { l.to_world.t.x = kNan; }),
-        message([](Light& l) { l.to_world.row[1].z = kInf; }),
-        message([](Light& l) { l.color.y = kInf; }), message([](Light& l) { l.width = kNan; }),
-        message([](Light& l) { l.texture = 3; }),
-        message([](Light& l) { l.kind = LightKind::kTriangle; })}) {
-    EXPECT_NE(m.find("/World/light"), std::string::npos) << m;
-    EXPECT_EQ(m.find('\n'), std::string::npos);
-  }
-}
-
 TEST(LightBuilder, DegenerateLightsHaveNoProbability) {
   std::vector<Light> lights;
   for (const LightKind kind : {LightKind::kRect, LightKind::kDisk, LightKind::kSphere}) {

@@ -12,7 +12,7 @@ from usd_recorder import QUAD, Recorder, write
 import wavecomb
 from wavecomb.picture.image import write_png
 from wavecomb.usd import load_stage, open_stage
-from wavecomb.usd.looks.parameters import light_radiance, material_parameters
+from wavecomb.usd.looks.parameters import as_stored, light_values, material_parameters
 from wavecomb.usd.looks.surface import DEFAULTS
 from wavecomb.usd.looks.surface_values import surface_values
 from wavecomb.usd.materialx.surfaces.inputs import definitions
@@ -279,12 +279,44 @@ def _authored(definition, value):
     return f"{kind} inputs:{definition.name} = {value if kind != 'bool' else str(value).lower()}"
 
 
-def test_light_radiance_is_what_the_loader_reads(path):
-    loaded = load_stage(path, editable=True)
+LAMPS = """
+def RectLight "Rect" {
+    float inputs:width = 3
+    bool inputs:normalize = 1
+    float inputs:diffuse = 2
+}
+def DiskLight "Disk" ( prepend apiSchemas = ["ShapingAPI"] ) {
+    float inputs:radius = 0.2
+    float inputs:shaping:focus = 3
+    color3f inputs:shaping:focusTint = (0.1, 0.2, 0.3)
+    float inputs:shaping:cone:angle = 40
+    float inputs:shaping:cone:softness = 0.5
+}
+def SphereLight "Point" { bool treatAsPoint = 1 }
+def CylinderLight "Tube" {
+    float inputs:radius = 0
+    float inputs:length = 2
+}
+def DistantLight "Sun" { float inputs:angle = 700 }
+def DomeLight "Sky" { color3f inputs:color = (0.1, 0.2, 0.3) }
+"""
+
+
+def test_light_values_are_what_the_loader_reads(path, tmp_path):
+    lamps = write(tmp_path, LAMPS, name="lamps.usda")
+    for name, count in ((path, 2), (lamps, 6)):
+        loaded, stage = load_stage(name, editable=True), open_stage(name)
+        assert len(loaded.light_paths) == count
+        for number, at in enumerate(loaded.light_paths):
+            values = light_values(stage.GetPrimAtPath(at), Usd.TimeCode.Default(), "Y")
+            have = loaded.scene.light(number)
+            assert {one: as_stored(value) for one, value in values.items()} == {
+                one: as_stored(have[one]) for one in values
+            }
     stage = open_stage(path)
-    key = light_radiance(stage.GetPrimAtPath("/W/Key"), Usd.TimeCode.Default(), "Y")
-    assert tuple(loaded.scene.light(0)["color"]) == key == (3, 3, 3)
-    assert light_radiance(stage.GetPrimAtPath("/W/Red"), Usd.TimeCode.Default(), "Y") is None
+    key = light_values(stage.GetPrimAtPath("/W/Key"), Usd.TimeCode.Default(), "Y")
+    assert key["color"] == (3, 3, 3) and key["width"] == 1
+    assert light_values(stage.GetPrimAtPath("/W/Red"), Usd.TimeCode.Default(), "Y") is None
 
 
 def test_the_report_lists_many_places(tmp_path):

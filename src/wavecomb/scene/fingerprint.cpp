@@ -5,6 +5,9 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <variant>
+
+#include "wavecomb/scene/light_table.h"
 
 namespace wavecomb {
 namespace {
@@ -134,22 +137,32 @@ uint64_t hash_textures(const Scene& scene) {
   return h.value();
 }
 
+void add_value(Hash& h, const LightParameter& p, const LightValue& value) {
+  if (p.kind == LightValueKind::kChoice) return h.add(MaterialSync{std::get<uint32_t>(value)});
+  if (p.kind == LightValueKind::kId && std::holds_alternative<std::monostate>(value))
+    return h.add(kNoLight);
+  std::visit(
+      [&](const auto& v) {
+        using T = std::decay_t<decltype(v)>;
+        if constexpr (std::is_same_v<T, std::vector<Affine>>)
+          for (const Affine& map : v) h.add(map);
+        else if constexpr (!std::is_same_v<T, std::monostate>)
+          h.add(v);
+      },
+      value);
+}
+
+/// The values of the table; what a light of its kind has not counts too, but for choices.
 void add_light(Hash& h, const Light& l) {
-  const Shaping& s = l.shaping;
-  h.add(l.kind, l.to_world, l.color, l.width, l.height, l.radius, l.length, l.angle, l.normalize,
-        l.texture, l.group, l.diffuse, l.specular, s.focus, s.focus_tint, s.cone_angle,
-        s.cone_softness, s.ies, s.ies_angle_scale, s.ies_normalize, l.light_link, l.shadow_link,
-        l.visible);
-  for (const Affine& portal : l.portals) h.add(portal);
+  h.add(l.kind, l.to_world);
+  for (const LightParameter& p : light_table())
+    if (p.kind != LightValueKind::kChoice || p.is_of(l.kind)) add_value(h, p, p.read(l));
 }
 
 uint64_t hash_lights(const Scene& scene) {
   Hash h;
   for (const Light& l : scene.lights()) add_light(h, l);
-  for (const Light& l : scene.geometry()->mesh_lights) {
-    add_light(h, l);
-    h.add(l.sync);
-  }
+  for (const Light& l : scene.geometry()->mesh_lights) add_light(h, l);
   for (const GeometrySet& set : scene.geometry()->sets)
     for (const GeometrySet::Entry& entry : set.entries) {
       h.add_bytes(entry.path.data(), entry.path.size());

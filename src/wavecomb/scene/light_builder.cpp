@@ -62,39 +62,6 @@ void put_radiance(LightRecord& record, const Double3& v) {
       {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
 }
 
-bool finite(const Vec3<float>& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-void check(const Light& light, size_t texture_count, size_t profile_count) {
-  const std::string where = "light '" + light.name + "': ";
-  const Affine& m = light.to_world;
-  if (!finite(m.row[0]) || !finite(m.row[1]) || !finite(m.row[2]) || !finite(m.t)) {
-    throw Error(where + "its transform is not finite");
-  }
-  if (!finite(light.color)) throw Error(where + "its colour times intensity is not finite");
-  for (const float size : {light.width, light.height, light.radius, light.length, light.angle}) {
-    if (!std::isfinite(size)) throw Error(where + "its size is not finite");
-  }
-  const Shaping& s = light.shaping;
-  for (const float value : {s.focus, s.focus_tint.x, s.focus_tint.y, s.focus_tint.z, s.cone_angle,
-                            s.cone_softness, s.ies_angle_scale, light.diffuse, light.specular}) {
-    if (!std::isfinite(value)) throw Error(where + "its shaping or multipliers are not finite");
-  }
-  if (s.ies != kNoIes && s.ies >= profile_count) {
-    throw Error(where + "there is no IES profile " + std::to_string(s.ies));
-  }
-  if (static_cast<uint32_t>(light.kind) >= static_cast<uint32_t>(LightKind::kTriangle)) {
-    throw Error(where + "is of no kind that has a place of its own");
-  }
-  for (const Affine& p : light.portals)
-    if (!finite(p.row[0]) || !finite(p.row[1]) || !finite(p.row[2]) || !finite(p.t))
-      throw Error(where + "a portal's transform is not finite");
-  if (light.texture != kNoTexture && light.texture >= texture_count) {
-    throw Error(where + "there is no texture " + std::to_string(light.texture));
-  }
-}
-
 bool is_infinite(LightKind kind) {
   return kind == LightKind::kDistant || kind == LightKind::kDome;
 }
@@ -563,7 +530,6 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   put_profiles(set, profiles);
   for (const bool infinite : {true, false}) {
     for (size_t i = 0; i < lights.size(); ++i) {
-      if (infinite) check(lights[i], textures.size(), profiles.size());
       if (is_infinite(lights[i].kind) != infinite) continue;
       set.of_input[i] = static_cast<uint32_t>(set.records.size());
       const Made made = make_light(set, lights[i], scene_radius, textures, before, profiles);

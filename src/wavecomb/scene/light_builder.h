@@ -102,9 +102,11 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 ///
 /// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
 /// the power that they send through it. `before`: lights with the same textures, whose densities of
-/// domes are taken over where they fit, or null. Throws Error naming the light for values that are
-/// not finite, unknown textures and more than kMaxLights lights. Of more than `most_picked` there
-/// is no table to choose by power.
+/// domes are taken over where they fit, or null. Throws Error for more than kMaxLights lights. Of
+/// more than `most_picked` there is no table to choose by power.
+///
+/// Contract: each light has passed check_light, each mesh light check_mesh_light
+/// (scene/light_table.h).
 LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const TexturePtr> textures, const LightSet* before = nullptr,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_checks.h"
 #include "wavecomb/texture/tile_store.h"
@@ -100,7 +101,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());
-    check_light(light, textures().size(), geometry_->profiles.size(), geometry_->sets.size());
+    check_light(light, {textures().size(), geometry_->profiles.size(), geometry_->sets.size()});
     if (light.group >= light_groups().size())
       throw_unknown("light group", light.group, light_groups().size());
   }

@@ -11,6 +11,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/check_curves.h"
 #include "wavecomb/scene/graph_parameters.h"
+#include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/mesh_attributes.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
@@ -306,14 +307,14 @@ uint32_t SceneBuilder::add_geometry_set(GeometrySet set) {
 }
 
 uint32_t SceneBuilder::add_light(Light light) {
-  check_light(light, textures_.size(), profiles_.size(), sets_.size());
+  check_light(light, {textures_.size(), profiles_.size(), sets_.size()});
   lights_.push_back(std::move(light));
   return static_cast<uint32_t>(lights_.size() - 1);
 }
 
 uint32_t SceneBuilder::add_mesh_light(Light light) {
   light.kind = LightKind::kTriangle;
-  check_light(light, textures_.size(), profiles_.size(), sets_.size());
+  check_mesh_light(light, {textures_.size(), profiles_.size(), sets_.size()});
   mesh_lights_.push_back(std::move(light));
   return static_cast<uint32_t>(mesh_lights_.size() - 1);
 }

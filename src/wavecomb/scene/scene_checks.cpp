@@ -65,33 +65,6 @@ void check_material(const Material& material, size_t texture_count, size_t graph
                 std::to_string(kMaxEvaluations) + " are possible");
 }
 
-void check_light(const Light& light, size_t texture_count, size_t profile_count, size_t set_count) {
-  const auto name = quoted("light", light.name);
-  if (!finite(light.to_world)) throw Error(name + " has a transform that is not finite; mend it");
-  if (!finite(light.color) || light.color.x < 0 || light.color.y < 0 || light.color.z < 0)
-    throw Error(name + " has a colour that is negative or not finite; give one of 0 or more");
-  for (float x : {light.width, light.height, light.radius, light.length, light.angle})
-    if (!std::isfinite(x) || x < 0)
-      throw Error(name + " has a size that is negative or not finite; give one of 0 or more");
-  for (const Affine& portal : light.portals)
-    if (!finite(portal)) throw Error(name + " has a portal whose transform is not finite; mend it");
-  if (light.texture != kNoTexture && light.texture >= texture_count)
-    throw Error(name + " reads a texture that was never added; add textures before lights");
-  const Shaping& s = light.shaping;
-  for (float x : {s.focus, s.focus_tint.x, s.focus_tint.y, s.focus_tint.z, s.cone_angle,
-                  s.cone_softness, s.ies_angle_scale})
-    if (!std::isfinite(x))
-      throw Error(name + " has shaping that is not finite; give finite numbers");
-  for (float x : {light.diffuse, light.specular})
-    if (!std::isfinite(x) || x < 0)
-      throw Error(name + " has a multiplier that is negative or not finite; give one of 0 or more");
-  if (s.ies != kNoIes && s.ies >= profile_count)
-    throw Error(name + " has an IES profile that was never added; add profiles before lights");
-  for (const uint32_t set : {light.light_link, light.shadow_link})
-    if (set != kNoSet && set >= set_count)
-      throw Error(name + " is linked to a set that was never added; add sets before lights");
-}
-
 void check_profile(const IesProfile& p) {
   const auto ascending = [](const std::vector<float>& x) {
     for (size_t i = 0; i + 1 < x.size(); ++i)

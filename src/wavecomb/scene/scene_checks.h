@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// What values of a scene may be: for SceneBuilder and for edits. All throw Error with one line
-/// that names the object.
+/// that names the object. Of lights: scene/light_table.h.
 #pragma once
 
 #include <cmath>
@@ -24,7 +24,6 @@ std::string quoted(const std::string& kind, const std::string& name);
 
 /// `texture_count`, `graph_count`: textures and graphs that there are.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);
-void check_light(const Light& light, size_t texture_count, size_t profile_count, size_t set_count);
 void check_profile(const IesProfile& profile);
 void check_camera(const Camera& camera);
 

@@ -13,7 +13,7 @@ from scene_stage import write_stage
 import wavecomb.gui
 from wavecomb.gui.headed_model import ColourRole, ToneRole
 from wavecomb.gui.scene import lights_model, materials_model
-from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER
+from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER, SWITCH
 from wavecomb.gui.scene.lights_model import LightForm, LightsModel
 from wavecomb.gui.scene.materials_model import MaterialForm, MaterialsModel
 from wavecomb.gui.scene.notes_model import NotesFilter, NotesModel, rows_of
@@ -100,7 +100,12 @@ def test_the_fields_of_a_light(edits):
         ("intensity", "intensity", NUMBER),
         ("exposure", "exposure", NUMBER),
         ("color", "colour", COLOUR),
+        ("radius", "radius", NUMBER),
+        ("normalize", "normalize", SWITCH),
+        ("diffuse", "diffuse", NUMBER),
+        ("specular", "specular", NUMBER),
     ]
+    assert [row.group for row in form.rows] == [""] * 5 + ["response"] * 2
     assert form.title == BULB and "on the stage" in form.rows[0].tip
     assert told.counts == [1, 0] and not form.is_edited("exposure")
     form.set_value("exposure", 1.5)

@@ -260,6 +260,25 @@ def test_lights(panel, same_as_saved, qtbot, stage_path, final):
     assert (final(panel.session).beauty == brighter).all()
 
 
+def test_fields_of_lights_are_what_their_kind_has(panel, same_as_saved, final):
+    lights = panel.lights
+    panel.tabs.setCurrentWidget(lights)
+    before = final(panel.session).beauty
+    lights.choose("/World/Lights/Sky")
+    assert not {"width", "radius", "normalize"} & lights.fields.keys()
+    lights.choose("/World/Lights/Bulb")
+    assert {"radius", "normalize", "diffuse", "specular"} <= lights.fields.keys()
+    assert "width" not in lights.fields
+    type_value(lights.fields["radius"].spin, "0.9")
+    wider = same_as_saved(panel)
+    assert (wider != before).any()
+    lights.fields["normalize"].box.click()
+    assert (same_as_saved(panel) != wider).any()
+    for name in ("radius", "normalize"):
+        QTest.mouseClick(lights.fields[name].back, LEFT)
+    assert (final(panel.session).beauty == before).all()
+
+
 def box(view):
     def where(rect):
         option = QStyleOptionViewItem()

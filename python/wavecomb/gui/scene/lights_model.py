@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, Qt
 
 from wavecomb.gui.headed_model import ColourRole, HeadedModel, ToneRole
-from wavecomb.gui.scene.form_model import COLOUR, NUMBER, FieldRow, FormModel
-from wavecomb.gui.scene.ranges import Range
-from wavecomb.gui.scene.render_sync import LIGHT_INPUTS
+from wavecomb.gui.scene.form_model import FieldRow, FormModel
+from wavecomb.gui.scene.light_inputs import LightInput
 from wavecomb.gui.scene.visibility import uneditable
 
 if TYPE_CHECKING:
@@ -19,18 +18,6 @@ if TYPE_CHECKING:
 NAME, KIND, ON, SOLO = range(4)
 HEADERS = ("Light", "Kind", "On", "Solo")
 SOFT_DOME = "soft dome"
-
-RANGES = {
-    "intensity": Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True),
-    "exposure": Range(-30.0, 30.0, -10.0, 10.0, 2),
-    "color": Range(0.0, 1e4, 0.0, 1.0),
-}
-TIPS = {
-    "intensity": "What the colour is multiplied by",
-    "exposure": "Stops: one more is twice as bright",
-    "color": "Linear Rec.709; the colour temperature of the stage comes on top",
-}
-LABELS = {"color": "colour"}
 
 
 class LightsModel(HeadedModel):
@@ -133,21 +120,23 @@ class LightForm(FormModel):
         self.path = path
         self.note = "No light" if path is None else ""
         self.title = "" if path is None else path or f"{SOFT_DOME}: the stage has no light"
-        self.rows = [self._row(path, name) for name in LIGHT_INPUTS] if path is not None else []
+        fields = self._edits.light_fields(path) if path is not None else []
+        self.rows = [self._row(path, one) for one in fields] if path is not None else []
         self.remade.emit()
 
-    def _row(self, path: str, name: str) -> FieldRow:
+    def _row(self, path: str, one: LightInput) -> FieldRow:
         reason = self._edits.light_reason(path)
         where = f"in the picture only, it cannot be saved: {reason}" if reason else "on the stage"
         return FieldRow(
-            name,
-            LABELS.get(name, name),
-            COLOUR if name == "color" else NUMBER,
-            self._edits.light_value(path, name),
-            name,
-            RANGES[name],
-            LIGHT_INPUTS[name],
-            tip=f"{TIPS[name]} ({where})",
+            one.name,
+            one.label,
+            one.kind,
+            self._edits.light_value(path, one.name),
+            one.label,
+            one.bounds,
+            one.default,
+            group=one.group,
+            tip=f"{one.tip} ({where})",
         )
 
     def value(self, name: str) -> Any:

@@ -10,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
+from wavecomb.gui.scene.light_inputs import BRIGHTNESS, LightInput, inputs_of, light_inputs
 from wavecomb.gui.scene.stage_edits import Key, StageEdits, Step
 from wavecomb.usd.looks.parameters import (
     IN_INSTANCE,
     Parameter,
     as_stored,
-    light_radiance,
+    light_values,
     material_parameters,
 )
 from wavecomb.usd.looks.surface_values import surface_values
@@ -25,9 +26,6 @@ from wavecomb.usd.looks.surface_values import surface_values
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
     from wavecomb.usd import LoadedStage
-
-LIGHT_INPUTS: dict[str, Any] = {"intensity": 1.0, "exposure": 0.0, "color": (1.0, 1.0, 1.0)}
-"""What of a light is edited, and its value where nothing is authored."""
 
 
 class RenderSync:
@@ -91,24 +89,24 @@ class RenderSync:
         return IN_INSTANCE if prim.IsInstanceProxy() else ""
 
     def light_value(self, path: str, name: str) -> Any:
-        """One of ``LIGHT_INPUTS`` as it is now.
+        """One of ``light_inputs()`` as it is now.
 
         Of a light whose edits cannot be saved: what its colour on the stage is multiplied by.
         """
-        default = LIGHT_INPUTS[name]
+        known = light_inputs()[name]
         if self.light_reason(path):
-            return self.edits.values.get((light_prim(path), f"!{name}"), default)
-        attribute = self.prim(path).GetAttribute(f"inputs:{name}")
-        value = attribute.Get(self.time) if attribute else None
-        if value is None:
-            return default
-        return tuple(value) if isinstance(value, Gf.Vec3f) else float(value)
+            return self.edits.values.get((light_prim(path), f"!{name}"), known.default)
+        return known.read(self.prim(path), self.time)
+
+    def light_fields(self, path: str) -> list[LightInput]:
+        """What of a light can be edited: where that cannot be saved, its brightness alone."""
+        return list(BRIGHTNESS) if self.light_reason(path) else inputs_of(self.prim(path))
 
     def light_key(self, path: str, name: str) -> Key:
         """Where an input of a light is edited."""
         if self.light_reason(path):
             return light_prim(path), f"!{name}"
-        return Sdf.Path(path), f".inputs:{name}"
+        return Sdf.Path(path), f".{light_inputs()[name].attribute}"
 
     def light_is_edited(self, path: str, name: str) -> bool:
         """Whether an input of a light was changed here."""
@@ -202,25 +200,29 @@ class RenderSync:
         scene, stage = self._session.scene, self.loaded
         if scene is None or stage is None:
             return
-        reason = self.light_reason(path)
-        radiance = None
-        if not reason:
+        on_stage = None
+        if not self.light_reason(path):
             up = str(UsdGeom.GetStageUpAxis(self.edits.stage))
-            radiance = light_radiance(self.prim(path), self.time, up)
+            on_stage = light_values(self.prim(path), self.time, up)
         for number, one in enumerate(stage.light_paths):
             if one != path or number >= scene.light_count:
                 continue
-            if radiance is None:
+            wanted = on_stage
+            if wanted is None:
                 tint = self.light_value(path, "color")
                 power = self.light_value(path, "intensity") * 2.0 ** self.light_value(
                     path, "exposure"
                 )
                 base = stage.scene.light(number)["color"]
-                colour = tuple(b * t * power for b, t in zip(base, tint, strict=True))
-            else:
-                colour = radiance
-            if as_stored(tuple(scene.light(number)["color"])) != as_stored(colour):
-                self._session.edit_light(number, color=colour)
+                wanted = {"color": tuple(b * t * power for b, t in zip(base, tint, strict=True))}
+            have = scene.light(number)
+            values = {
+                name: value
+                for name, value in wanted.items()
+                if as_stored(have[name]) != as_stored(value)
+            }
+            if values:
+                self._session.edit_light(number, **values)
         self._session.light_edits.clear()
 
 

@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from pxr import Gf, Sdf, Usd
+from pxr import Sdf, Usd
 from PySide6.QtCore import QObject, Signal
 
 from wavecomb.errors import WavecombError
 from wavecomb.gui.scene.edit_layer import save_edits
 from wavecomb.gui.scene.history import History
-from wavecomb.gui.scene.render_sync import LIGHT_INPUTS, RenderSync
+from wavecomb.gui.scene.light_inputs import LightInput, light_inputs
+from wavecomb.gui.scene.render_sync import RenderSync
 from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
 from wavecomb.usd.looks.parameters import Parameter, as_stored
@@ -21,9 +22,6 @@ from wavecomb.usd.looks.parameters import Parameter, as_stored
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
     from wavecomb.usd import LoadedStage
-
-_VALUE_TYPES = {True: Sdf.ValueTypeNames.Color3f, False: Sdf.ValueTypeNames.Float}
-"""Of an input of a light: whether it is a colour."""
 
 
 class SceneEdits(QObject):
@@ -204,8 +202,13 @@ class SceneEdits(QObject):
         return self._sync.light_reason(path) if self._sync is not None else ""
 
     def light_value(self, path: str, name: str) -> Any:
-        """One of ``LIGHT_INPUTS`` as it is now: ``RenderSync.light_value``."""
-        return self._sync.light_value(path, name) if self._sync else LIGHT_INPUTS[name]
+        """One of ``light_inputs()`` as it is now: ``RenderSync.light_value``."""
+        known = light_inputs()[name]
+        return self._sync.light_value(path, name) if self._sync else known.default
+
+    def light_fields(self, path: str) -> list[LightInput]:
+        """What of a light can be edited, in the order of a form."""
+        return self._sync.light_fields(path) if self._sync is not None else []
 
     def light_is_edited(self, path: str, name: str) -> bool:
         """Whether an input of a light was changed here."""
@@ -219,8 +222,8 @@ class SceneEdits(QObject):
         if value is not None and self.light_reason(path):
             opinion = Opinion(as_stored(value))
         elif value is not None:
-            stored = Gf.Vec3f(*value) if name == "color" else as_stored(value)
-            opinion = Opinion(stored, _VALUE_TYPES[name == "color"])
+            known = light_inputs()[name]
+            opinion = Opinion(known.stored(value), known.type_name)
         label = f"{name} of {path or 'soft dome'}"
         self._change(label, self._sync.light_key(path, name), opinion)
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from wavecomb.light_table import MESH, LightParameter, light_parameters, of_kind
 from wavecomb.run.boxed.wire import Array, Refused
 
 Kind = Callable[[Any, Sequence[Array]], Any]
@@ -158,12 +159,25 @@ _SHAPE: dict[str, Kind] = {
     "light_group": text,
     "asset_length": whole,
 }
-_LIGHT: dict[str, Kind] = {
-    "name": text, "color": COLOUR, "normalize": flag, "focus": number, "focus_tint": COLOUR,
-    "cone_angle": number, "cone_softness": number, "ies": maybe(whole), "ies_angle_scale": number,
-    "ies_normalize": flag, "diffuse": number, "specular": number, "visible": flag,
-    "light_link": maybe(whole), "shadow_link": maybe(whole),
+_LIGHT_VALUES: dict[str, Kind] = {
+    "number": number, "colour": COLOUR, "flag": flag, "choice": text, "id": maybe(whole),
+    "transforms": maybe(array("<f8", 3)),
 }  # fmt: skip
+
+
+def _light(row: LightParameter) -> Kind:
+    """What a parameter of a light takes."""
+    return text if row.refers == "group" else _LIGHT_VALUES[row.kind]
+
+
+_LIGHT: dict[str, Kind] = {
+    "name": text,
+    **{name: _light(row) for name, row in light_parameters().items() if row.kind != "choice"},
+}
+_MESH_LIGHT: dict[str, Kind] = {
+    "name": text,
+    **{row.name: _light(row) for row in of_kind(MESH) if row.kind != "choice"},
+}
 
 
 @dataclass(frozen=True)
@@ -259,16 +273,10 @@ CALLS: dict[str, Call] = {
             "motion": maybe(array("<f8", 4)),
         },
     ),
-    "add_light": Call(
-        {"kind": text, "transform": _MATRIX},
-        {
-            **_LIGHT, "width": number, "height": number, "radius": number, "length": number,
-            "angle": number, "texture": maybe(whole), "group": text,
-            "portals": maybe(array("<f8", 3)),
-        },
-        "lights",
+    "add_light": Call({"kind": text, "transform": _MATRIX}, _LIGHT, "lights"),
+    "add_mesh_light": Call(
+        {"transform": _MATRIX, "material_sync": text}, _MESH_LIGHT, "mesh lights"
     ),
-    "add_mesh_light": Call({"transform": _MATRIX, "material_sync": text}, _LIGHT, "mesh lights"),
     "add_geometry_set": Call({"rules": named(text)}, {}, "sets"),
     "add_ies": Call(
         {"vertical": many(number), "horizontal": many(number), "candela": array(_FLOATS, 2)},

@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd
+from pxr import Gf, Sdf, Usd
 
+from wavecomb.light_table import EDITABLE, MESH, LightParameter, light_parameters, of_kind
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.usd.lights.dome import DomeReader
-from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.colour_space import linear_colour, space_of
 from wavecomb.usd.looks.network import colour, number
@@ -33,7 +33,18 @@ KINDS = {
 }
 """Lights that are drawn, by prim type."""
 
-"""Whether rays meet the shapes of lights."""
+_READ_APART = frozenset({
+    "color", "normalize", "focus", "focus_tint", "cone_angle", "cone_softness", "ies_angle_scale",
+    "ies_normalize",
+})  # fmt: skip
+"""Parameters that depend on other inputs, or on the kind of light."""
+
+
+class Profiles(Protocol):
+    """Takes IES profiles by their files."""
+
+    def add(self, path: str, prim: Sdf.Path) -> int | None:
+        """Its number; None where it cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +88,7 @@ class LightReader:
         textures: TextureTable | None,
         groups: LightGroups,
         report: LoadReport,
-        profiles: IesTable | None = None,
+        profiles: Profiles | None = None,
         hidden: bool = False,
         links: LinkTable | None = None,
     ) -> None:
@@ -103,19 +114,16 @@ class LightReader:
         normalize = bool(self._get(prim, "normalize", False))
         local = np.eye(4)
         if kind == "rect":
-            options["width"] = abs(number(self._get(prim, "width", 1.0), 1.0))
-            options["height"] = abs(number(self._get(prim, "height", 1.0), 1.0))
             options["texture"] = self._texture(prim)
-        elif kind == "disk":
-            options["radius"] = abs(number(self._get(prim, "radius", 0.5), 0.5))
         elif kind == "sphere":
             self._sphere(prim, options, normalize, scale)
             normalize = normalize and options["radius"] > 0
         elif kind == "cylinder":
             normalize = self._cylinder(prim, options, normalize)
         elif kind == "distant":
-            options["angle"] = min(max(number(self._get(prim, "angle", 0.53), 0.53), 0.0), 360.0)
-        else:
+            angle = number(self._get(prim, "angle", 0.53), 0.53)
+            options["angle"] = min(max(angle, 0.0), 360.0)
+        elif kind == "dome":
             options["texture"] = self._texture(prim)
             local = self.domes.pole(prim)
             portals = self.domes.portals(prim, local)
@@ -123,7 +131,7 @@ class LightReader:
                 options["portals"] = portals
             normalize = False
         options["normalize"] = normalize
-        if self.hidden and kind not in ("distant", "dome"):
+        if self.hidden and kind in light_parameters()["visible"].kinds:
             options["visible"] = False
         return Light(kind, options, local)
 
@@ -148,11 +156,31 @@ class LightReader:
                 options[option] = linked
         if self.links and not self._get(prim, "shadow:enable", True):
             options["shadow_link"] = self.links.nothing()
-        for name in ("diffuse", "specular"):
-            factor = number(self._get(prim, name, 1.0), 1.0)
-            if factor != 1.0:
-                options[name] = max(factor, 0.0)
+        options.update(self._plain(prim, MESH if kind == "mesh" else kind))
         return options
+
+    def _plain(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
+        """What is read as it stands: of the shape always, others where they say something."""
+        options = {}
+        for row in of_kind(kind):
+            if not row.input or row.kind not in EDITABLE or row.name in _READ_APART:
+                continue
+            value = self._value(prim, row)
+            if row.group == "shape" or value != row.default:
+                options[row.name] = value
+        return options
+
+    def _value(self, prim: Usd.Prim, row: LightParameter) -> Any:
+        """A parameter within its range; sizes below 0 are as large as those above."""
+        found = self._get(prim, row.input, row.default)
+        if row.kind == "flag":
+            return bool(found)
+        low = -math.inf if row.least is None else row.least
+        high = math.inf if row.most is None else row.most
+        if row.kind == "colour":
+            return tuple(min(max(float(one), low), high) for one in colour(found, row.default))
+        value = number(found, row.default)
+        return min(max(abs(value) if row.group == "shape" else value, low), high)
 
     def _get(self, prim: Usd.Prim, name: str, default: Any) -> Any:
         attribute = prim.GetAttribute(f"inputs:{name}")
@@ -188,11 +216,10 @@ class LightReader:
     def _sphere(
         self, prim: Usd.Prim, options: dict[str, Any], normalize: bool, scale: float
     ) -> None:
-        """Radius; a point light gets the radiant intensity that the sphere would have."""
-        radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
+        """A point light gets the radiant intensity that the sphere would have."""
+        radius = options["radius"]
         point = prim.GetAttribute("treatAsPoint")
         if radius > 0 and not (point and point.Get(self.time)):
-            options["radius"] = radius
             return
         # Radiance L over the disk pi r^2 that is seen; normalized, L / (4 pi r^2).
         area = 0.25 if normalize or radius == 0 else math.pi * (scale * radius) ** 2
@@ -202,15 +229,13 @@ class LightReader:
             self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
 
     def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
-        """Length and radius; whether it is normalized. A thin one stands for a line."""
-        length = abs(number(self._get(prim, "length", 1.0), 1.0))
-        radius = abs(number(self._get(prim, "radius", 0.5), 0.5))
-        if radius == 0 and length > 0:
+        """Whether it is normalized. A thin one stands for a line."""
+        length: float = options["length"]
+        if options["radius"] == 0 and length > 0:
             self.report.note(
                 "cylinder light of radius 0: taken for a thin one, normalized", prim.GetPath()
             )
-            radius, normalize = 1e-3 * length, True
-        options["length"], options["radius"] = length, radius
+            options["radius"], normalize = 1e-3 * length, True
         return normalize
 
     def _shaping(self, prim: Usd.Prim, kind: str, options: dict[str, Any]) -> None:

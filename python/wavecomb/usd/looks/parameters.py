@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
+from wavecomb.light_table import EDITABLE, of_kind
 from wavecomb.usd import mtlx
 from wavecomb.usd.geometry.mesh import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
@@ -189,12 +190,19 @@ def _is_triple(type_name: Sdf.ValueTypeName) -> bool:
     return hasattr(value, "__len__") and not isinstance(value, str) and len(value) == 3
 
 
-def light_radiance(
-    prim: Usd.Prim, time: Usd.TimeCode, up_axis: str
-) -> tuple[float, float, float] | None:
-    """The colour that the loader gives ``SceneBuilder.add_light`` for a light outside of instances.
+class _AnyProfile:
+    """Takes every IES profile for one that can be read."""
 
-    None where the prim is no light that Wavecomb knows.
+    def add(self, path: str, prim: Sdf.Path) -> int:
+        """Its number."""
+        return 0
+
+
+def light_values(prim: Usd.Prim, time: Usd.TimeCode, up_axis: str) -> dict[str, Any] | None:
+    """What the loader gives ``SceneBuilder.add_light`` for a light outside of instances.
+
+    Numbers, colours and switches, by the names of ``wavecomb.light_table``, all that the kind of
+    light has but whether it is visible. None where the prim is no light that Wavecomb knows.
     """
     if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
         return None
@@ -211,10 +219,13 @@ def light_radiance(
             matrix = own * matrix
     scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
     report = LoadReport()
-    reader = LightReader(time, up_axis, None, LightGroups(report), report)
+    reader = LightReader(time, up_axis, None, LightGroups(report), report, _AnyProfile())
     light = reader.read(prim, scale)
-    r, g, b = light.options["color"]
-    return (r, g, b)
+    return {
+        row.name: light.options.get(row.name, row.default)
+        for row in of_kind(light.kind)
+        if row.kind in EDITABLE and row.name != "visible"
+    }
 
 
 def as_stored(value: Any) -> Any:

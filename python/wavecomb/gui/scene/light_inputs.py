@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Inputs of lights that the window edits: what the core's table of lights has, and brightness."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from pxr import Gf, Sdf, Usd
+
+from wavecomb.gui.scene.form_model import COLOUR, NUMBER, SWITCH
+from wavecomb.gui.scene.ranges import Range
+from wavecomb.light_table import EDITABLE, LightParameter, light_parameters, of_kind
+from wavecomb.usd.lights.light import KINDS
+from wavecomb.usd.looks.parameters import as_stored
+
+_TYPES = {
+    NUMBER: Sdf.ValueTypeNames.Float,
+    COLOUR: Sdf.ValueTypeNames.Color3f,
+    SWITCH: Sdf.ValueTypeNames.Bool,
+}
+_KINDS = {"number": NUMBER, "colour": COLOUR, "flag": SWITCH}
+
+
+@dataclass(frozen=True)
+class LightInput:
+    """An input of a light.
+
+    Attributes:
+        name: By which it is set.
+        input: UsdLux's, without "inputs:".
+        label: In the form.
+        kind: Of a field: ``form_model``.
+        default: Where nothing is authored.
+        bounds: Of a number, and of each part of a colour.
+        tip: What it does.
+        group: Heading that it stands under; "": none.
+    """
+
+    name: str
+    input: str
+    label: str
+    kind: str
+    default: Any
+    bounds: Range
+    tip: str
+    group: str = ""
+
+    @property
+    def attribute(self) -> str:
+        """Of the prim."""
+        return f"inputs:{self.input}"
+
+    @property
+    def type_name(self) -> Sdf.ValueTypeName:
+        """Of the attribute."""
+        return _TYPES[self.kind]
+
+    def read(self, prim: Usd.Prim, time: Usd.TimeCode) -> Any:
+        """What a prim has: a number, three of them or a bool."""
+        attribute = prim.GetAttribute(self.attribute)
+        value = attribute.Get(time) if attribute else None
+        if value is None:
+            return self.default
+        if self.kind == COLOUR:
+            return tuple(value)
+        return bool(value) if self.kind == SWITCH else float(value)
+
+    def stored(self, value: Any) -> Any:
+        """As the attribute holds it."""
+        return Gf.Vec3f(*value) if self.kind == COLOUR else as_stored(value)
+
+
+BRIGHTNESS = (
+    LightInput("intensity", "intensity", "intensity", NUMBER, 1.0,
+               Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True), "What the colour is multiplied by"),
+    LightInput("exposure", "exposure", "exposure", NUMBER, 0.0,
+               Range(-30.0, 30.0, -10.0, 10.0, 2), "Stops: one more is twice as bright"),
+    LightInput("color", "color", "colour", COLOUR, (1.0, 1.0, 1.0), Range(0.0, 1e4, 0.0, 1.0),
+               "Linear Rec.709; the colour temperature of the stage comes on top"),
+)  # fmt: skip
+"""What the core has as one colour."""
+
+
+def light_inputs() -> dict[str, LightInput]:
+    """All inputs by name."""
+    return {one.name: one for one in (*map(_of, _edited(light_parameters().values())), *BRIGHTNESS)}
+
+
+def inputs_of(prim: Usd.Prim) -> list[LightInput]:
+    """Those that a prim has, in the order of a form: brightness, its own, then under headings."""
+    kind = KINDS.get(str(prim.GetTypeName()), "")
+    brightness = {one.name for one in BRIGHTNESS}
+    own = [_of(row) for row in _edited(of_kind(kind)) if row.name not in brightness]
+    there = [one for one in own if prim.HasAttribute(one.attribute)]
+    return [*BRIGHTNESS, *sorted(there, key=lambda one: one.group)]
+
+
+def _edited(rows: Iterable[LightParameter]) -> list[LightParameter]:
+    return [row for row in rows if row.input and row.kind in EDITABLE]
+
+
+def _of(row: LightParameter) -> LightInput:
+    """A parameter of the core's as a field."""
+    low = -1e9 if row.least is None else row.least
+    high = 1e9 if row.most is None else row.most
+    usual = row.usual if row.most is None else row.most
+    bounds = Range(low, high, max(low, 0.0), usual)
+    group = row.group if row.group in ("shaping", "response") else ""
+    return LightInput(
+        row.name, row.input, row.label, _KINDS[row.kind], row.default, bounds, row.help[:-1], group
+    )

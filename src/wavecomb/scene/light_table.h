@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What a light can be told, as a table: a row for each member of Light and of its Shaping. Checks,
+/// the fingerprint, keywords in Python, calls of the sandbox and the window's fields follow from
+/// it. A new parameter is a member, a row here, and its use.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "wavecomb/scene/light_data.h"
+
+namespace wavecomb {
+
+/// A value of a light; of a choice its number, of an id that is none (kNoTexture, ...) monostate.
+using LightValue =
+    std::variant<std::monostate, bool, uint32_t, float, Vec3<float>, std::vector<Affine>>;
+
+enum class LightValueKind : uint8_t { kNumber, kColour, kFlag, kChoice, kId, kTransforms };
+/// What an id counts.
+enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup };
+/// What a parameter is about.
+enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
+
+/// Contract: lives as long as the program.
+struct LightParameter {
+  const char* name = "";   ///< keyword of add_light
+  const char* label = "";  ///< in a form
+  const char* help = "";   ///< a sentence, with the unit
+  const char* input = "";  ///< UsdLux's, without "inputs:"; "" where it has none of that meaning
+  LightGroup group = LightGroup::kEmission;
+  LightValueKind kind = LightValueKind::kNumber;
+  LightRefers refers = LightRefers::kNothing;
+  /// Of numbers and of each component of colours; all are finite.
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
+  double usual = 1;  ///< upper end of a slider, where there is no `most`
+  std::vector<const char*> choices;
+  uint32_t kinds = 0;  ///< bit k: lights of LightKind k have it
+
+  LightValue (*read)(const Light&) = nullptr;
+  void (*write)(Light&, const LightValue&) = nullptr;
+
+  bool is_of(LightKind light) const { return (kinds >> static_cast<uint32_t>(light) & 1) != 0; }
+  /// Whether a scene that is built can be told another value.
+  bool can_change() const {
+    return kind == LightValueKind::kNumber || kind == LightValueKind::kColour ||
+           kind == LightValueKind::kFlag;
+  }
+  LightValue standard() const { return read(Light{}); }
+};
+
+/// All parameters but kind, name and to_world, in the order that fingerprints take them in.
+std::span<const LightParameter> light_table();
+/// Null where there is none.
+const LightParameter* find_light_parameter(std::string_view name);
+
+const char* light_kind_name(LightKind kind);
+/// Of a light with a place of its own; throws Error for other names.
+LightKind light_kind(std::string_view name);
+
+/// How many things there are that lights refer to.
+struct LightReferences {
+  size_t textures = 0, profiles = 0, sets = 0;
+};
+
+/// Throws Error with one line that names the light where a value is not finite or out of range,
+/// where it refers to what was never added, or where `light` has no place of its own.
+void check_light(const Light& light, const LightReferences& there);
+/// Likewise of a light of meshes.
+void check_mesh_light(const Light& light, const LightReferences& there);
+
+}  // namespace wavecomb
