@@ -31,9 +31,12 @@ std::vector<float> Film::beauty() const {
   for (size_t i = 0; i < pixels_.size(); ++i) {
     const Pixel& p = pixels_[i];
     const double s = inverse(p.samples);
-    out[3 * i] = static_cast<float>(p.r * s);
-    out[3 * i + 1] = static_cast<float>(p.g * s);
-    out[3 * i + 2] = static_cast<float>(p.b * s);
+    std::array<double, 3> mean{p.r * s, p.g * s, p.b * s};
+    if (!splats_.empty()) {
+      const std::array<double, 3> splat = splats_.mean(i);
+      for (size_t c = 0; c < 3; ++c) mean[c] += splat[c];
+    }
+    for (size_t c = 0; c < 3; ++c) out[3 * i + c] = static_cast<float>(mean[c]);
   }
   return out;
 }
@@ -75,6 +78,7 @@ std::vector<Film::Block> Film::blocks() {
   add("pixels", pixels_);
   aovs_.for_each_block(add);
   add("errors", errors_);
+  splats_.for_each_block(add);
   return out;
 }
 
@@ -85,6 +89,7 @@ Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
   layers.variance = variance();
   release(errors_);
   release(pixels_);
+  splats_ = {};
   const auto count = [&](size_t i) { return layers.samples[i]; };
   layers.albedo = aovs_.albedo(count);
   layers.normal = aovs_.normal(count);

@@ -10,13 +10,14 @@
 
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/error_sums.h"
+#include "wavecomb/film/splats.h"
 
 namespace wavecomb {
 
 /// Sums of samples per pixel, in double precision, so that 65,536 samples stay exact to float.
 ///
 /// Contract: a pixel is written by one thread at a time, its samples in sample order; different
-/// pixels may be written at once. Row 0 is the top.
+/// pixels may be written at once. Splats are added by whom and when they come. Row 0 is the top.
 class Film {
  public:
   /// `with_error`: keeps what errors and variances are told from.
@@ -33,6 +34,9 @@ class Film {
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
+  /// Keeps splats from now on, in units of `unit`; the beauty is then the pixel's mean and theirs.
+  void keep_splats(FixedPoint unit) { splats_ = SplatLayer(pixels_.size(), unit); }
+  SplatLayer& splats() { return splats_; }
   /// Number of a pixel, row by row.
   size_t index(uint32_t x, uint32_t y) const { return size_t{y} * width_ + x; }
   const Pixel& pixel(size_t i) const { return pixels_[i]; }
@@ -42,10 +46,11 @@ class Film {
   const AovFilm& aovs() const { return aovs_; }
   /// Memory of the sums.
   size_t bytes() const {
-    return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums);
+    return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums) +
+           splats_.bytes();
   }
 
-  /// Means: rgb interleaved; black where a pixel has no samples.
+  /// Means: rgb interleaved; black where a pixel has neither samples nor splats.
   std::vector<float> beauty() const;
   /// Empty where not kept.
   std::vector<float> albedo() const;
@@ -82,6 +87,7 @@ class Film {
   std::vector<Pixel> pixels_;
   AovFilm aovs_;
   std::vector<ErrorSums> errors_;
+  SplatLayer splats_;  ///< empty where none are kept
 };
 
 }  // namespace wavecomb
