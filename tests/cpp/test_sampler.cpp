@@ -114,7 +114,8 @@ void expect_net(const std::vector<std::pair<float, float>>& points) {
 
 TEST(Sobol, EveryAlignedBlockIsANetInTheFirstTwoDimensions) {
   for (const uint32_t pixel : {0u, 1u, 12345u})
-    for (const uint32_t set : {kCameraSet, light_set(0), bsdf_set(0), light_set(7)})
+    for (const uint32_t set : {kCameraSet, vertex_set(VertexSet::kLight, 0),
+                               vertex_set(VertexSet::kBsdf, 0), vertex_set(VertexSet::kLight, 7)})
       for (uint32_t m = 0; m <= 10; ++m)
         for (uint32_t block = 0; block < 5; ++block) {
           std::vector<std::pair<float, float>> points;
@@ -281,11 +282,42 @@ TEST(Sobol, ConvergesFasterThanRandom) {
 }
 
 TEST(Sampler, SetsOfAPathAreDistinct) {
-  std::set<uint32_t> sets = {kCameraSet};
-  for (uint32_t depth = 0; depth < 100; ++depth) {
-    EXPECT_TRUE(sets.insert(light_set(depth)).second);
-    EXPECT_TRUE(sets.insert(bsdf_set(depth)).second);
+  std::set<uint32_t> sets = {kCameraSet, kTimeSet};
+  for (uint32_t depth = 0; depth < 4200; ++depth)
+    for (const VertexSet name :
+         {VertexSet::kLight, VertexSet::kBsdf, VertexSet::kFlight, VertexSet::kShadow})
+      EXPECT_TRUE(sets.insert(vertex_set(name, depth)).second);
+  EXPECT_LT(vertex_set(VertexSet::kBsdf, kSetDepths - 1), vertex_set(VertexSet::kFlight, 0));
+}
+
+/// Pictures of before there were others than these two are the same still.
+TEST(Sampler, SetsOfLightAndBsdfStandWhereTheyStood) {
+  for (const uint32_t depth : {0u, 1u, 2u, 7u, 4096u}) {
+    EXPECT_EQ(vertex_set(VertexSet::kLight, depth), 1 + 2 * depth);
+    EXPECT_EQ(vertex_set(VertexSet::kBsdf, depth), 2 + 2 * depth);
   }
+}
+
+/// Numbers of two sets of a vertex know nothing of one another: sums of products are as those of
+/// independent numbers, 0 within 4.5 standard errors of 1 / (12 sqrt n).
+TEST(Sampler, SetsOfAVertexAreIndependent) {
+  constexpr uint32_t n = 1u << 14;
+  const VertexSet names[] = {VertexSet::kLight, VertexSet::kBsdf, VertexSet::kFlight,
+                             VertexSet::kShadow};
+  for (const SamplerKind kind : {SamplerKind::kSobol, SamplerKind::kIndependent})
+    for (size_t i = 0; i < 4; ++i)
+      for (size_t j = 0; j < i; ++j) {
+        double sum[4] = {};
+        for (uint32_t sample = 0; sample < n; ++sample) {
+          const auto a = draw(kind, 5, sample, vertex_set(names[i], 3));
+          const auto b = draw(kind, 5, sample, vertex_set(names[j], 3));
+          const float pairs[4][2] = {{a.x, b.x}, {a.y, b.y}, {a.z, b.z}, {a.w, b.w}};
+          for (size_t d = 0; d < 4; ++d)
+            sum[d] += (double{pairs[d][0]} - 0.5) * (double{pairs[d][1]} - 0.5);
+        }
+        for (const double s : sum)
+          EXPECT_LT(std::abs(s / n), 4.5 / (12 * std::sqrt(double{n}))) << i << ", " << j;
+      }
 }
 
 TEST(Sampler, LanesAndOrderChangeNothing) {

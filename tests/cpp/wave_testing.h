@@ -23,8 +23,10 @@ struct WaveCase {
 /// A scene, its accelerator and a film, ready to run waves on this thread.
 class WaveRun {
  public:
+  /// `histories` gets the vertices of paths.
   WaveRun(std::shared_ptr<const Scene> scene, const WaveCase& wave_case,
-          std::shared_ptr<const EmbreeAccelerator> accel = nullptr)
+          std::shared_ptr<const EmbreeAccelerator> accel = nullptr,
+          HistoryReader* histories = nullptr)
       : case_(wave_case),
         scene_(std::move(scene)),
         accel_(accel ? std::move(accel) : std::make_shared<const EmbreeAccelerator>(scene_, 1u)),
@@ -57,6 +59,7 @@ class WaveRun {
     context_.aovs = &aovs_;
     context_.traversal_width = case_.traversal;
     context_.measures_costs = true;
+    context_.histories = histories;
     reference_ = std::make_unique<ReferenceIntegrator>(context_, 1);
     const Bounds& b = scene_->bounds();
     if (b.empty()) return;
@@ -71,28 +74,29 @@ class WaveRun {
 
   /// Runs all samples in waves of at most `wave_size` paths, in passes of at most `pass` samples.
   void all(uint32_t wave_size, uint32_t pass = 16) {
+    if (case_.lanes != kReferenceLanes) reserve(wave_size);
+    each_task(wave_size, pass, [&](const WaveTask& task) { run(task); });
+  }
+
+  /// Runs one(task) for the tasks of all samples.
+  template <typename One>
+  void each_task(uint32_t wave_size, uint32_t pass, const One& one) {
     const DenormalsOff denormals_off;
     const Settings& s = case_.settings;
-    if (case_.lanes != kReferenceLanes && (!wave_ || wave_size > capacity_)) {
-      wave_ = std::make_unique<Wave>(wave_size, context_);
-      capacity_ = wave_size;
-    }
     pass = std::min(pass, wave_size);
     const uint32_t step = std::max(1u, wave_size / pass);
     const auto count = static_cast<uint32_t>(pixels_.size());
     for (uint32_t first = 0; first < s.spp; first += pass)
       for (uint32_t p = 0; p < count; p += step)
-        run({pixels_.data() + p, std::min(step, count - p), first, std::min(pass, s.spp - first)});
+        one(WaveTask{pixels_.data() + p, std::min(step, count - p), first,
+                     std::min(pass, s.spp - first)});
   }
 
   /// Nanoseconds that shading synthetic hits of one material takes, by kernels of W lanes.
   template <size_t W>
   double time_material(const CalibrationHits& hits) {
     const DenormalsOff denormals_off;
-    if (!wave_ || hits.count > capacity_) {
-      wave_ = std::make_unique<Wave>(hits.count, context_);
-      capacity_ = hits.count;
-    }
+    reserve(hits.count);
     return wavecomb::time_material<W>(*wave_, context_, hits);
   }
 
@@ -110,6 +114,16 @@ class WaveRun {
     return picture;
   }
   const Wave& wave() const { return *wave_; }
+  /// Buffers with room for waves of `size` paths.
+  Wave& reserve(uint32_t size) {
+    if (!wave_ || size > capacity_) {
+      wave_ = std::make_unique<Wave>(size, context_);
+      capacity_ = size;
+    }
+    return *wave_;
+  }
+  const WaveContext& context() const { return context_; }
+  Film& film() { return film_; }
   const Counts& reference_counts() const { return *reference_->worker(0).counts; }
 
  private:

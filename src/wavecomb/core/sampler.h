@@ -32,16 +32,26 @@ struct Sample4 {
   F x, y, z, w;
 };
 
-/// Sets of four dimensions. A path's first set places it on the film and the lens; each vertex has
-/// two: one for its light (choice, u, v, roulette), one for its BSDF (lobe, u, v, light-texture
-/// spare). Its time in the shutter is of a set of its own, which no other number depends on.
+/// Sets of four dimensions that a path draws from once: its place on the film and the lens, and its
+/// time in the shutter.
 inline constexpr uint32_t kCameraSet = 0;
 inline constexpr uint32_t kTimeSet = 0xffffffffu;
-inline constexpr uint32_t light_set(uint32_t depth) {
-  return 1 + 2 * depth;
-}
-inline constexpr uint32_t bsdf_set(uint32_t depth) {
-  return 2 + 2 * depth;
+
+/// Sets that it draws from at each vertex. A step asks for its own by name, so that a step that
+/// comes or goes changes no other step's numbers.
+enum class VertexSet : uint32_t {
+  kLight,   ///< the light sample: choice, u, v; and roulette
+  kBsdf,    ///< the bounce: lobe, u, v
+  kFlight,  ///< the way to the vertex, where something lies on it (integrate/media.h)
+  kShadow,  ///< the way of its shadow ray
+};
+/// Depths below this have sets of their own.
+inline constexpr uint32_t kSetDepths = 1u << 23;
+
+/// The number of a set: of the first two, in turn from 1 on; of each other, in a block of its own.
+inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
+  const auto i = static_cast<uint32_t>(name);
+  return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;
 }
 
 namespace detail {

@@ -100,8 +100,9 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
           v.normal};
 }
 
-/// What all steps of a vertex are told of it. `depth` 0 is the camera's first hit. `material` and
-/// `geom` (geometry within the instance's group) belong to `hit`; `t` is the length of the ray.
+/// What all steps of a vertex are told of it. `depth` 0 is the first one; `t` is the length of the
+/// ray that led there. `hit` and `geom` (geometry within the instance's group) are of a surface;
+/// where the vertex is on none, `hit.inst` is kNoSurface.
 template <typename F>
 struct Vertex {
   const SceneView& scene;
@@ -118,6 +119,9 @@ struct Vertex {
 
   bool wants_lights() const { return aovs && aovs->wants_lights; }
 };
+
+/// A shadow ray ends at this share of the way to the light, and so before its surface.
+inline constexpr float kShadowReach = 0.9999f;
 
 /// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
 /// NaN-free: a contribution that is not finite is dropped.

@@ -1,203 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/integrate/reference.h"
 
-#include "wavecomb/integrate/path_aovs.h"
-#include "wavecomb/integrate/vertex.h"
-#include "wavecomb/surface/hit.h"
+#include "wavecomb/integrate/path_tracer.h"
 
 namespace wavecomb {
-
-struct ReferenceWorker {
-  explicit ReferenceWorker(const WaveContext& context)
-      : aovs(1, context.film->aovs().layout(), context.aovs) {}
-  PhaseClock clock;
-  Counts counts;
-  PathAovs aovs;  ///< of the path that is traced, in slot 0
-};
-
-namespace {
-
-using F = float;
-
-/// Traces paths one after the other, each depth first.
-class PathTracer {
- public:
-  PathTracer(const WaveContext& context, ReferenceWorker& worker)
-      : context_(context),
-        settings_(*context.settings),
-        clock_(worker.clock),
-        counts_(worker.counts),
-        aovs_(worker.aovs) {}
-
-  /// Radiance of a path, as the camera's exposure shows it; what else it found is in the AOVs' slot
-  /// 0.
-  Color<F> exposed_path(uint32_t pixel, uint32_t sample) {
-    aovs_.clear(1);
-    radiance_ = {};
-    const uint32_t last = trace_path(pixel, sample);
-    aovs_.end_path(last, radiance(), 1);
-    const F exposure = context_.camera->exposure;
-    if (exposure != 1) {
-      radiance_.sum *= exposure;
-      aovs_.expose(exposure, 1);
-    }
-    return radiance_.sum;
-  }
-  /// Traces a path of which nothing is wanted but choices of lights.
-  void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
-    probes_ = {out.probes.data() + path * out.most, out.most};
-    probe_count_ = 0;
-    aovs_.clear(1);
-    radiance_ = {};
-    trace_path(pixel, sample);
-    out.luminance[path] = luminance(radiance_.sum);
-    out.counts[path] = probe_count_;
-  }
-  const float* radiance() const { return reinterpret_cast<const float*>(&radiance_); }
-
- private:
-  /// Gives the first depth whose light is not yet a part of its own.
-  uint32_t trace_path(uint32_t pixel, uint32_t sample) {
-    const SceneView& scene = context_.scene;
-    const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
-    keys_ = {&key.pixel_hash, &key.sample, 1, 0};
-    const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
-    time_ = context_.moves() ? path_time<F>(settings_.sampler, key) : 0.f;
-    const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
-                                           static_cast<F>(pixel >> 16), r, true, time_);
-    aovs_.begin<F>(*context_.camera, r, kSlot, true);
-    F cone_at_origin = ray.width;
-    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u};
-    ++counts_.samples;
-
-    for (uint32_t depth = 0;; ++depth) {
-      clock_.enter(Phase::kTrace);
-      const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
-      const Hit hit = intersect(path.o, path.dir, tfar, depth);
-      clock_.enter(Phase::kShade);
-      path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
-      if (hit.inst == kNoHit) {
-        radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
-        if (aovs_.wants_groups())
-          aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
-        return depth;
-      }
-      const Vec3<F> p = fma(path.dir, hit.t, path.o);
-      if (hit.inst == kLightShape) {
-        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time_, hit.geom, true);
-        add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
-        return depth;
-      }
-      const uint32_t mesh = mesh_of(hit), material = material_of(hit, mesh);
-      if (depth == 0)
-        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time_, hit.inst, hit.geom, material, true);
-      if (settings_.cost_aware && depth >= settings_.roulette_depth) {
-        const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
-        if (!(cost_aware_number<F>(key, depth) < q)) return depth;
-        path.throughput *= 1.f / q;
-      }
-      VertexAovs<F> aovs = aovs_.wanted<F>(depth);
-      aovs.wants_lights |= !probes_.empty();
-      const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
-      add(aovs.emitter, v.emitted);
-      aovs_.vertex<F>(depth, kSlot, aovs, path, true);
-      aovs_.end_depth(depth, radiance(), 1);
-      bool is_free = false;
-      if (v.has_shadow) {
-        clock_.enter(Phase::kShadow);
-        shadow_set_ = v.shadow_set;
-        is_free = !occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth);
-        if (is_free) add(aovs.lit_by, v.direct);
-      }
-      if (!probes_.empty() && aovs.light_weight >= 0.f)
-        note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
-      if (!v.alive) return depth + 1;
-      path = v.next;
-      cone_at_origin = v.next.cone_width;
-    }
-  }
-
-  void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
-    if (probe_count_ == probes_.size()) return;
-    probes_[probe_count_++] = {aovs.lit_by,
-                               brought,
-                               aovs.light_weight,
-                               {aovs.lit_at.x, aovs.lit_at.y, aovs.lit_at.z},
-                               v.next.receiver};
-  }
-
-  struct Hit {
-    F t, u, v;
-    uint32_t prim, geom, inst;
-  };
-
-  Hit intersect(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
-    Hit h;
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kSlot, 1, times()};
-    keys_.salt = 2 * depth;
-    keys_.shadow_set = nullptr;
-    context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
-    counts_.add_rays(depth, 1);
-    return h;
-  }
-
-  bool occluded(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kSlot, 1, times()};
-    uint32_t blocked = 0;
-    keys_.salt = 2 * depth + 1;
-    keys_.shadow_set = context_.scene.lights.links.members ? &shadow_set_ : nullptr;
-    context_.accel->occluded(ray, &blocked, 1, false, keys_);
-    counts_.add_shadow_rays(depth, 1);
-    return blocked != 0;
-  }
-
-  /// Light `light`, or kNoLight, has brought `c`.
-  void add(uint32_t light, const Color<F>& c) {
-    radiance_.sum += c;
-    if (aovs_.wants_groups()) aovs_.add<F>(kSlot, aovs_.group_of<F>(light, true), c, true);
-  }
-
-  uint32_t mesh_of(const Hit& hit) const {
-    const SceneView& scene = context_.scene;
-    return scene.geometry_mesh[scene.instances[hit.inst].geometry + hit.geom];
-  }
-
-  uint32_t material_of(const Hit& hit, uint32_t mesh) const {
-    const SceneView& scene = context_.scene;
-    return hit_material<F>(scene, scene.instances[hit.inst].material, mesh, hit.prim, true);
-  }
-
-  VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const Hit& hit, uint32_t mesh,
-                        uint32_t material, const PathState<F>& path, VertexAovs<F>& aovs) {
-    const SceneView& scene = context_.scene;
-    counts_.add_records(depth, 1);
-    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, time_};
-    VertexResult<F> v{};
-    visit_program<F>(static_cast<ProgramId>(scene.material_program[material]),
-                     [&]<typename Bsdf>() {
-                       v = shade_vertex<Bsdf, F>({scene, settings_, key, depth, mesh_hit, hit.geom,
-                                                  hit.t, material, path, &aovs, true});
-                     });
-    return v;
-  }
-
-  const float* times() const { return context_.scene.has_motion ? &time_ : nullptr; }
-
-  static constexpr uint32_t kSlot = 0;  ///< the one that there is
-  const WaveContext& context_;
-  const ShadeSettings settings_;
-  PhaseClock& clock_;
-  Counts& counts_;
-  PresenceKeys keys_;
-  uint32_t shadow_set_ = 0;
-  F time_ = 0.f;  ///< of the path
-  PathAovs& aovs_;
-  RadianceRow<F> radiance_;
-  std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
-  uint32_t probe_count_ = 0;
-};
-
-}  // namespace
 
 ReferenceIntegrator::ReferenceIntegrator(const WaveContext& context, uint32_t threads)
     : context_(context) {
@@ -211,36 +17,14 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 }
 
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
-  ReferenceWorker& worker = *workers_[i];
-  PathTracer tracer(context_, worker);
-  Film& film = *context_.film;
-  worker.clock.start(Phase::kGenerate);
-  for (uint32_t p = 0; p < task.pixel_count; ++p) {
-    const uint32_t pixel = task.pixels[p], x = pixel & 0xffffu, y = pixel >> 16;
-    Film::Pixel sum = film.pixel(x, y);
-    for (uint32_t s = 0; s < task.samples; ++s) {
-      worker.clock.enter(Phase::kGenerate);
-      const auto start = worker.aovs.start_cost();
-      const Color<F> radiance = tracer.exposed_path(pixel, task.first_sample + s);
-      worker.aovs.spread_cost(1, start, [](size_t) { return 0; });
-      worker.clock.enter(Phase::kResolve);
-      if (film.has_error())
-        film.error(x, y).add(tracer.radiance(), sum.samples, {sum.r, sum.g, sum.b});
-      sum.r += radiance.x;
-      sum.g += radiance.y;
-      sum.b += radiance.z;
-      ++sum.samples;
-      worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
-    }
-    film.pixel(x, y) = sum;
-  }
-  worker.clock.stop();
+  trace_task(context_, *workers_[i], task, NoMedia());
 }
 
 void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,
                       size_t count, LightProbes& out) {
   ReferenceWorker worker(context);
-  PathTracer tracer(context, worker);
+  const NoMedia media;
+  PathTracer tracer(context, worker, media);
   worker.clock.start(Phase::kGenerate);
   for (size_t i = first; i < first + count; ++i)
     tracer.probe(pixels[i], static_cast<uint32_t>(i), i, out);

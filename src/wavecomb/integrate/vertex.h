@@ -28,19 +28,21 @@ inline VertexResult<F> shade_vertex(const Vertex<F>& v) {
     v.aovs->light_weight = F(-1.f);
   }
 
-  const Interaction<Bsdf, F> at = interact<Bsdf, F>(v);
+  const auto at = interact<Bsdf, F>(v);
   if constexpr (Bsdf::kEmits) out.emitted = emit<Bsdf, F>(v, at);
-  const Frame<F> frame = shading_frame<Bsdf, F>(v, at);
+  const Frame<F> frame = at.frame(v);
   const Vec3<F> wo = frame.to_local(-v.path.dir);
-  note_surface<Bsdf, F>(v, at, frame);
+  at.note(v, frame);
   if (v.depth >= v.settings.max_depth) return out;
   if (v.scene.lights.links.members) [[unlikely]]
-    out.next.link = link_class<F>(v);
+    out.next.link = at.link_class(v);
 
-  const Sample4<F> r_light = sample_4d<F>(v.settings.sampler, v.key, light_set(v.depth));
+  const Sample4<F> r_light =
+      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
   sample_light<Bsdf, F>(v, at, frame, wo, r_light, receiver, out);
-  const Sample4<F> r_bsdf = sample_4d<F>(v.settings.sampler, v.key, bsdf_set(v.depth));
+  const Sample4<F> r_bsdf =
+      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter<Bsdf, F>(v, at, frame, wo, r_bsdf, receiver, out);
   survive<F>(v, r_light.w, out);
   return out;

@@ -15,6 +15,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/integrator.h"
 #include "wavecomb/integrate/path_aovs.h"
+#include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/phase_clock.h"
 #include "wavecomb/integrate/ray_recorder.h"
@@ -45,15 +46,18 @@ struct WaveContext {
   OrderGrid grid;                      ///< for ray orders and hit positions
   Film* film;                          ///< each wave writes its own pixels only
   uint32_t traversal_width;
-  bool wants_position;              ///< some policy reads position keys
-  bool measures_costs;              ///< batches are timed
-  RayRecorder* recorder;            ///< gets the rays; null in any render that is not measured
-  const AovTables* aovs = nullptr;  ///< what indices mean to AOVs; null where none asks
+  bool wants_position;                 ///< some policy reads position keys
+  bool measures_costs;                 ///< batches are timed
+  RayRecorder* recorder;               ///< gets the rays; null in any render that is not measured
+  const AovTables* aovs = nullptr;     ///< what indices mean to AOVs; null where none asks
+  HistoryReader* histories = nullptr;  ///< gets vertices of paths; null where none are kept
 
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }
   /// Whether paths keep the class of the surface that they left, where lights are linked.
   bool links() const { return scene.lights.links.members != nullptr; }
+  /// Vertices that each path keeps.
+  uint32_t kept_vertices() const { return histories ? histories->most() : 0; }
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
   }
@@ -66,6 +70,7 @@ struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links()),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
+        history(capacity, context.kept_vertices()),
         rays(capacity),
         hits(capacity),
         shading(capacity, kRowWords<ShadingRecord>),
@@ -84,6 +89,7 @@ struct Wave {
 
   PathPool pool;
   PathAovs aovs;
+  PathHistory history;  ///< empty where nobody asks for vertices
   RayQueue rays;
   HitBuffer hits;
   ShadingQueue shading;
@@ -101,8 +107,8 @@ struct Wave {
   Counts counts;
 
   size_t bytes() const {
-    return pool.bytes() + aovs.bytes() + rays.bytes() + hits.bytes() + shading.bytes() +
-           shadows.bytes() + columns.bytes() + times.bytes();
+    return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
+           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes();
   }
 };
 

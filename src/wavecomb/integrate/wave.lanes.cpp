@@ -3,13 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "wavecomb/integrate/stages/collect.h"
-#include "wavecomb/integrate/stages/generate.h"
-#include "wavecomb/integrate/stages/order.h"
-#include "wavecomb/integrate/stages/order_rays.h"
-#include "wavecomb/integrate/stages/resolve.h"
-#include "wavecomb/integrate/stages/shade.h"
-#include "wavecomb/integrate/stages/trace.h"
+#include "wavecomb/integrate/run_wave.h"
 
 namespace wavecomb {
 
@@ -19,61 +13,7 @@ extern template void shade_batch<OpenPbrBsdf<Lanes<WAVECOMB_LANES>>, Lanes<WAVEC
 
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
-  using F = Lanes<W>;
-  using Clock = PhaseClock::Clock;
-  const Settings& s = *context.settings;
-  const ShadeSettings settings(s);
-  PhaseClock& clock = wave.clock;
-  clock.start(Phase::kGenerate);
-  const float* tfar = generate<F>(wave, context, task);
-  wave.counts.samples += task.path_count();
-  uint32_t depth = 0;
-  for (; wave.rays.size > 0; ++depth) {
-    // Camera rays of a pinhole are coherent as they come, and from one point packets give the same
-    // hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
-    const bool coherent = depth == 0 && context.camera->is_pinhole();
-    RayOrderChoice ray_order;
-    clock.enter(Phase::kTrace);
-    if (depth > 0) {
-      ray_order = order_rays<F>(wave, context, depth, s.ray_order, wave.ray_chooser,
-                                wave.pool.paths, wave.rays);
-      clock.enter(Phase::kTrace);
-      fetch_rays<F>(wave);
-    }
-    Clock::time_point start = Clock::now();
-    trace(wave, context, depth, depth == 0 ? tfar : nullptr, fetch_times<F>(wave, wave.rays),
-          coherent);
-    learn_order(wave.ray_chooser, depth, ray_order, start);
-
-    clock.enter(Phase::kShade);
-    collect<F>(wave, context, settings, depth);
-    const OrderChoice choice = order_records<F>(wave, context, depth);
-    clock.enter(Phase::kMetrics);
-    watch_coherence<F>(wave, context);
-    clock.enter(Phase::kShade);
-    start = Clock::now();
-    shade<F>(wave, context, settings, depth);
-    if (choice.work.records > 0)
-      wave.policy_chooser.learn(
-          depth, choice.arm, choice.work,
-          std::chrono::duration<double, std::nano>(Clock::now() - start).count(),
-          choice.prepare_ns);
-    compact<F>(wave);
-    wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
-
-    if (wave.shadows.size == 0) continue;
-    const RayOrderChoice shadow_order = order_rays<F>(
-        wave, context, depth, s.shadow_order, wave.shadow_chooser, wave.pool.shadows, wave.shadows);
-    clock.enter(Phase::kShadow);
-    fetch_shadows<F>(wave);
-    start = Clock::now();
-    shadow<F>(wave, context, depth);
-    learn_order(wave.shadow_chooser, depth, shadow_order, start);
-  }
-  clock.enter(Phase::kResolve);
-  wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
-  resolve(wave, context, task);
-  clock.stop();
+  run_wave_through<Lanes<W>>(wave, context, task, NoMedia());
 }
 
 /// Shades `records` synthetic hits of one material, to learn what it costs before the first pass.

@@ -15,6 +15,11 @@
 ///   BsdfEval<F> eval(wo, wi) const;
 ///   Color<F> diffuse_f_cos(wo, wi) const;  the part of eval's that counts as diffuse
 ///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    numbers in [0, 1)
+///
+/// A program that shades what is no surface (kOnSurface false: an event in a medium) is the same
+/// with a phase function in place of the BSDF, without a cosine, and has
+///
+///   static auto interact(const Vertex<F>&);    what it meets: integrate/steps/interact.h says how
 #pragma once
 
 #include "wavecomb/core/vec.h"
@@ -29,6 +34,7 @@ struct BsdfTraits {
   static constexpr bool kHasNonDelta = true;    ///< has lobes that light sampling makes sense for
   static constexpr bool kTransmits = false;     ///< those may lead to the other side
   static constexpr bool kHasTerminator = true;  ///< rays start beyond the terminator of its normals
+  static constexpr bool kOnSurface = true;      ///< shades hits; or else it has an `interact`
 };
 
 /// f(wo, wi) |cos theta_i| and the solid-angle density with which sample() would have chosen wi.

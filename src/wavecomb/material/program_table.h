@@ -30,18 +30,17 @@ using Programs = ProgramList<DiffuseBsdf<F>, MetalBsdf<F>, DielectricBsdf<F>, Pl
                              EmissiveBsdf<F>, PrincipledBsdf<F>, OpenPbrBsdf<F>>;
 static_assert(Programs<float>::kSize == kProgramCount && Programs<float>::kOrdered);
 
-namespace detail {
+/// Calls `visitor.operator()<Bsdf>()` with the class of a list that has the id `id`.
 template <typename... Bsdf, typename Visitor>
-inline void visit_list(ProgramList<Bsdf...>, ProgramId id, Visitor& visitor) {
+inline void visit_list(ProgramList<Bsdf...>, ProgramId id, Visitor&& visitor) {
   (void)((id == Bsdf::kProgram && (visitor.template operator()<Bsdf>(), true)) || ...);
 }
-}  // namespace detail
 
 /// Calls `visitor.operator()<Bsdf>()` with the class of program `id`:
 ///   visit_program<F>(id, [&]<typename Bsdf>() { shade<Bsdf>(batch); });
 template <typename F, typename Visitor>
 inline void visit_program(ProgramId id, Visitor&& visitor) {
-  detail::visit_list(Programs<F>{}, id, visitor);
+  visit_list(Programs<F>{}, id, visitor);
 }
 
 }  // namespace wavecomb

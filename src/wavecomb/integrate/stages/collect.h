@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 3a: hits become shading records; paths that left the scene or met a light's shape end
-/// here.
+/// Stage 3a: hits become shading records, and so does what stopped a path before its hit; paths
+/// that left the scene or met a light's shape end here.
 #pragma once
 
 #include "wavecomb/core/rows.h"
+#include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
@@ -13,9 +14,9 @@
 namespace wavecomb {
 
 /// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order.
-template <typename F>
-void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
-             uint32_t depth) {
+template <typename F, typename Media>
+void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
+             [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
   const RayQueue& rays = wave.rays;
   const HitBuffer& hits = wave.hits;
@@ -27,25 +28,36 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
   for (size_t i = 0; i < rays.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(rays.size - i);
     const U inst = load<U>(hits.inst + i);
-    const Mask<F> missed = active & Mask<F>(inst == U(kNoHit));
-    const Mask<F> shape = active & Mask<F>(inst == U(kLightShape));
+    Mask<F> missed = active & Mask<F>(inst == U(kNoHit));
+    Mask<F> shape = active & Mask<F>(inst == U(kLightShape));
     Mask<F> surface = active & not_(missed) & not_(shape);
-    const F t = load<F>(hits.t + i);
+    F t = load<F>(hits.t + i);
     const U slot = load<U>(rays.slot + i);
     const Vec3<F> o{load<F>(rays.ox + i), load<F>(rays.oy + i), load<F>(rays.oz + i)};
     const Vec3<F> d{load<F>(rays.dx + i), load<F>(rays.dy + i), load<F>(rays.dz + i)};
-    const Mask<F> ended = missed | shape;
-    const Mask<F> wanted = cost_aware ? active : ended;
+    const Mask<F> wanted = Media::kAny || cost_aware ? active : Mask<F>(missed | shape);
     PathRow<F> path;
     PathState<F> state;
+    [[maybe_unused]] Flight<F> flight;
     if (any(wanted)) {
       path = load_row<PathRow, F>(wave.pool.paths, slot, wanted);
+      if constexpr (Media::kAny) {
+        flight = media.template fly<F>({settings.sampler, path.key, depth, o, d, t}, active);
+        flight.stopped = active & flight.stopped;
+        t = select(flight.stopped, flight.t, t);
+        path.throughput = path.throughput * flight.weight;
+        store_row<PathRow, F>(wave.pool.paths, slot, path, active);
+        const Mask<F> through = not_(flight.stopped);
+        missed = missed & through;
+        shape = shape & through;
+        surface = surface & through;
+      }
       state = {path.d, path.throughput, path.pdf, path.eta_scale,
                F(0.f), F(0.f),          path.o,   path.receiver};
       if (context.links() && depth > 0)
         state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
     }
-    if (any(ended)) {
+    if (const Mask<F> ended = missed | shape; any(ended)) {
       Color<F> c(F(0.f));
       if (any(missed))
         c = select<F>(missed, environment_emission<F>(scene, settings, depth, state, missed), c);
@@ -69,7 +81,13 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (notes_hits && any(shape))
       wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
                              shape);
-    if (none(surface)) continue;
+    const auto recorded = [&] {
+      if constexpr (Media::kAny)
+        return Mask<F>(surface | flight.stopped);
+      else
+        return surface;
+    };
+    if (none(recorded())) continue;
 
     const U prim = load<U>(hits.prim + i);
     const U geom = load<U>(hits.geom + i);
@@ -77,8 +95,10 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const auto row = load_rows<2, F>(scene.instances, inst * 16u + 12u, surface);
     const U first = float_bits<F>(row[0]), inherited = float_bits<F>(row[1]);
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
-    const U material = hit_material<F>(scene, inherited, mesh, prim, surface);
-    const U program = gather<U>(scene.material_program, material, Mask<U>(surface));
+    U material = hit_material<F>(scene, inherited, mesh, prim, surface);
+    if constexpr (Media::kAny)
+      material = select(Mask<U>(flight.stopped), flight.material, material);
+    const U program = gather<U>(scene.material_program, material, Mask<U>(recorded()));
     if (notes_hits)
       wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,
                                surface);
@@ -86,21 +106,23 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, state, surface);
       surface = surface & (cost_aware_number<F>(path.key, depth) < q);
       path.throughput *= F(1.f) / q;
-      if (none(surface)) continue;
+      if (none(recorded())) continue;
       store_row<PathRow, F>(wave.pool.paths, slot, path, surface);
     }
 
     using Q = ShadingQueue;
-    const Mask<U> on(surface);
+    const Mask<U> on(recorded());
     const auto put = [&](uint32_t* column, const U& x) { compress_store<U>(column + n, x, on); };
     put(queue.slot, slot);
     put(queue.uints(Q::kMaterial), material);
     put(queue.uints(Q::kProgram), program);
     if (context.wants_position)
       put(queue.uints(Q::kPositionKey), position_key<F>(context.grid, fma(d, t, o)));
-    n += compress_row<ShadingRecord, F>(
-        queue.row(n), {t, load<F>(hits.u + i), load<F>(hits.v + i), prim, inst, mesh, geom, slot},
-        surface);
+    ShadingRecord<F> record{t,   load<F>(hits.u + i), load<F>(hits.v + i), prim, inst, mesh, geom,
+                            slot};
+    if constexpr (Media::kAny)
+      record = select_record<F>(flight.stopped, ShadingRecord<F>::event(t, slot), record);
+    n += compress_row<ShadingRecord, F>(queue.row(n), record, recorded());
   }
   queue.size = n;
   wave.counts.add_records(depth, n);

@@ -19,6 +19,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   const float inv_samples = 1.f / static_cast<float>(task.samples);
   float* tfar = wave.shadows.tfar;  // free until the first shading
   wave.aovs.clear(n);
+  wave.history.clear(n);
   for (uint32_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
     const U slot = lane_index<F>() + i;

@@ -53,7 +53,8 @@ void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
     if (wanted & kTextureColumn) {
       const MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
       const F width = fma(path.cone_spread, r.t, path.cone_width);
-      store(wave.columns.uints(2) + i, texture_key<F>(context.scene, hit, width, active));
+      const Mask<F> on_surface = active & Mask<F>(r.inst != U(kNoSurface));
+      store(wave.columns.uints(2) + i, texture_key<F>(context.scene, hit, width, on_surface));
     }
   }
 }

@@ -2,6 +2,7 @@
 /// Stage 3c: shading, batch by batch, in lanes.
 #pragma once
 
+#include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/vertex.h"
@@ -20,6 +21,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   const PathPool& pool = wave.pool;
   VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
   const bool wants_aovs = wave.aovs.wants_vertex(depth);
+  const bool is_watched = wants_aovs || wave.history;
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
@@ -57,7 +59,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                                 v.emitted, emits);
       lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
     }
-    if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
+    if (is_watched) {
+      if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
+      if (wave.history)
+        wave.history.template vertex<F>(depth, slot, state, t, material, v, pool.radiance, active);
+    }
     const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
                       select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
                       (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |
@@ -124,7 +130,7 @@ inline void spread_batch(Wave& wave, size_t begin, size_t end,
 }
 
 /// Shades the whole queue, batch by batch.
-template <typename F>
+template <typename F, typename Media>
 void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
   const ShadingQueue& queue = wave.shading;
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
@@ -135,7 +141,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
     if (timed || wave.aovs.wants_cost()) start = PhaseClock::Clock::now();
-    visit_program<F>(program, [&]<typename Bsdf>() {
+    visit_list(typename Media::template Programs<F>{}, program, [&]<typename Bsdf>() {
       shade_batch<Bsdf, F>(wave, context, settings, depth, begin, end);
     });
     if (timed) charge_batch(wave, begin, end, start);

@@ -2,6 +2,7 @@
 /// Stage 2: what the rays hit. Stage 4: what the shadow rays meet.
 #pragma once
 
+#include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
@@ -73,10 +74,11 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
-/// Adds what the unblocked shadow rays bring to their slots. A slot has at most one, so the order
-/// of the queue cannot matter.
-template <typename F>
-void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
+/// Adds what the unblocked shadow rays bring to their slots, as much of it as comes through what
+/// lies on the way. A slot has at most one, so the order of the queue cannot matter.
+template <typename F, typename Media>
+void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
+            [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
   ShadowQueue& q = wave.shadows;
   const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
@@ -86,15 +88,27 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
   context.accel->occluded(
       rays, q.occluded, context.traversal_width, false,
       presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
+  const bool is_watched = wave.aovs.wants_groups() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
-    const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
+    Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
+    if constexpr (Media::kAny) {
+      const auto path = load_row<PathRow, F>(wave.pool.paths, slot, active);
+      const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
+      const Vec3<F> d{load<F>(q.dx + i), load<F>(q.dy + i), load<F>(q.dz + i)};
+      const F t = load<F>(q.tfar + i) * (1.f / kShadowReach);
+      c = c * media.template transmittance<F>({context.settings->sampler, path.key, depth, o, d, t},
+                                              active);
+    }
     add_radiance<F>(wave.pool.radiance, slot, c, active);
-    if (wave.aovs.wants_groups())
-      wave.aovs.add<F>(slot,
-                       gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active),
-                       c, active);
+    if (is_watched) {
+      if (wave.aovs.wants_groups())
+        wave.aovs.add<F>(slot,
+                         gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active),
+                         c, active);
+      if (wave.history) wave.history.light<F>(depth, slot, c, active);
+    }
   }
   wave.aovs.spread_cost(q.size, start, [&](size_t i) { return q.slot[i]; });
   wave.counts.add_shadow_rays(depth, q.size);

@@ -60,7 +60,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
 
 /// What a path gets of the surface at a vertex that glows itself. Notes the emitter for AOVs.
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE Color<F> emit(const Vertex<F>& v, const Interaction<Bsdf, F>& at) {
+WAVECOMB_INLINE Color<F> emit(const Vertex<F>& v, const SurfaceInteraction<Bsdf, F>& at) {
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   Color<F> emission = at.params.emission;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The step `interact`: from a hit to a surface with its BSDF, and the frame that it is seen in.
+/// The step `interact`: from what a path has met to a place with a BSDF, and the frame that it is
+/// seen in.
 ///
 /// Where the way to x_k leads through what absorbs, with extinction sigma over the length t of the
 /// ray, T_k <- T_k exp(-sigma t) (Beer and Lambert).
@@ -18,9 +19,10 @@ template <typename Bsdf>
 inline constexpr uint32_t kVertexSlots =
     Bsdf::kSlots | (Bsdf::kEmits ? slot_bit(Slot::kEmission) : 0u);
 
-/// A surface as a path has met it.
+/// A surface as a path has met it. Steps after this one know of it `bsdf`, `throughput` and the
+/// functions, which whatever else a path meets has, too; `emit` alone is for surfaces.
 template <typename Bsdf, typename F>
-struct Interaction {
+struct SurfaceInteraction {
   UInt<F> slots;          ///< MaterialRecord::texture_slots
   Mask<F> reads_texture;  ///< lanes that need uv and a frame along it
   bool textured;          ///< whether any does
@@ -28,12 +30,24 @@ struct Interaction {
   ParamsOf<Bsdf, F> params;
   Bsdf bsdf;
   Color<F> throughput;  ///< of the path, up to the surface
+
+  /// What the BSDF's directions are local to: z is the shading normal.
+  Frame<F> frame(const Vertex<F>& v) const;
+  /// Notes for AOVs what is seen here, where they are wanted.
+  void note(const Vertex<F>& v, const Frame<F>& frame) const;
+  /// The class that linking knows it by.
+  UInt<F> link_class(const Vertex<F>& v) const;
+  /// Where a ray starts that leaves along `dir`.
+  Vec3<F> origin(const Vec3<F>& dir) const;
+  /// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light
+  /// leaks.
+  Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
 };
 
 /// The surface with the values of its material. Texture coordinates are worked out only where a
 /// texture or an AOV asks for them.
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE Interaction<Bsdf, F> interact(const Vertex<F>& v) {
+WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F>& v) {
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   const PathState<F>& path = v.path;
@@ -66,21 +80,30 @@ WAVECOMB_INLINE Interaction<Bsdf, F> interact(const Vertex<F>& v) {
           throughput};
 }
 
+/// What program `Bsdf` has met.
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE auto interact(const Vertex<F>& v) {
+  if constexpr (Bsdf::kOnSurface)
+    return interact_surface<Bsdf, F>(v);
+  else
+    return Bsdf::interact(v);
+}
+
 /// The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing
 /// but its own hit, whatever its neighbours are.
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE Frame<F> shading_frame(const Vertex<F>& v, const Interaction<Bsdf, F>& at) {
+WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F>& v) const {
   using U = UInt<F>;
-  if (!at.textured) return make_frame<F>(at.s.ns);
+  if (!textured) return make_frame<F>(s.ns);
   const Vec3<F>& dir = v.path.dir;
-  Vec3<F> n = at.s.ns;
-  const Vec3<F> tangent = select<F>(at.reads_texture, at.s.dpdu, Vec3<F>(F(0.f)));
+  Vec3<F> n = s.ns;
+  const Vec3<F> tangent = select<F>(reads_texture, s.dpdu, Vec3<F>(F(0.f)));
   const Mask<F> mapped =
-      v.active & Mask<F>((at.slots & (slot_bit(Slot::kNormal) | kGraphNormal)) != U(0u));
+      v.active & Mask<F>((slots & (slot_bit(Slot::kNormal) | kGraphNormal)) != U(0u));
   if (any(mapped)) {
     // A normal that looks away is bent until it is seen edge-on.
-    Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(at.params.normal));
-    const F towards = select(dot(dir, at.s.ng) < 0.f, F(1.f), F(-1.f));
+    Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
+    const F towards = select(dot(dir, s.ng) < 0.f, F(1.f), F(-1.f));
     const F seen = -dot(dir, bumped) * towards;
     bumped =
         select<F>(seen < 1e-3f, normalize(fma(dir, F(-towards * (1e-3f - seen)), bumped)), bumped);
@@ -89,22 +112,30 @@ WAVECOMB_INLINE Frame<F> shading_frame(const Vertex<F>& v, const Interaction<Bsd
   return make_frame<F>(n, tangent);
 }
 
-/// Notes for AOVs what is seen at a vertex.
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE void note_surface(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
-                                  const Frame<F>& frame) {
+WAVECOMB_INLINE void SurfaceInteraction<Bsdf, F>::note(const Vertex<F>& v,
+                                                       const Frame<F>& frame) const {
   if (!v.aovs) return;
-  v.aovs->albedo = at.bsdf.albedo();
-  v.aovs->normal = select<F>(dot(v.path.dir, at.s.ng) > 0.f, -frame.n, frame.n);
-  v.aovs->is_clear = not_(at.bsdf.has_non_delta());
-  if (v.aovs->wants_uv) v.aovs->uv = at.s.uv;
+  v.aovs->albedo = bsdf.albedo();
+  v.aovs->normal = select<F>(dot(v.path.dir, s.ng) > 0.f, -frame.n, frame.n);
+  v.aovs->is_clear = not_(bsdf.has_non_delta());
+  if (v.aovs->wants_uv) v.aovs->uv = s.uv;
 }
 
-/// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light leaks.
 template <typename Bsdf, typename F>
-inline Mask<F> is_consistent(const Interaction<Bsdf, F>& at, const Vec3<F>& world,
-                             const Vec3<F>& local) {
-  return F(dot(world, at.s.ng) * local.z) > 0.f;
+WAVECOMB_INLINE UInt<F> SurfaceInteraction<Bsdf, F>::link_class(const Vertex<F>& v) const {
+  return wavecomb::link_class<F>(v.scene, v.hit.inst, v.geom, v.active);
+}
+
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::origin(const Vec3<F>& dir) const {
+  return spawn_origin<F>(s, dir);
+}
+
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Mask<F> SurfaceInteraction<Bsdf, F>::is_consistent(const Vec3<F>& world,
+                                                                   const Vec3<F>& local) const {
+  return F(dot(world, s.ng) * local.z) > 0.f;
 }
 
 }  // namespace wavecomb

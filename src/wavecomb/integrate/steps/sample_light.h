@@ -13,12 +13,6 @@
 
 namespace wavecomb {
 
-/// The class that linking knows the surface at a vertex by.
-template <typename F>
-WAVECOMB_INLINE UInt<F> link_class(const Vertex<F>& v) {
-  return link_class<F>(v.scene, v.hit.inst, v.geom, v.active);
-}
-
 /// Who light is chosen for; its place is set where light is sampled.
 template <typename Bsdf, typename F>
 WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F>& v, const Frame<F>& frame,
@@ -36,16 +30,16 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F>& v, const Frame<
 
 /// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
 /// known.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE void sample_light(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
-                                  const Frame<F>& frame, const Vec3<F>& wo, const Sample4<F>& r,
+template <typename Bsdf, typename F, typename Interaction>
+WAVECOMB_INLINE void sample_light(const Vertex<F>& v, const Interaction& at, const Frame<F>& frame,
+                                  const Vec3<F>& wo, const Sample4<F>& r,
                                   LightReceiver<F>& receiver, VertexResult<F>& out) {
   using U = UInt<F>;
   const LightView& lights = v.scene.lights;
   const Mask<F> lit = v.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
   // Light is gathered where reflected rays will start, so that both techniques agree.
-  receiver.p = spawn_origin<F>(at.s, -v.path.dir);
+  receiver.p = at.origin(-v.path.dir);
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, lit);
   const Vec3<F> wi = frame.to_local(l.wi);
   const BsdfEval<F> e = at.bsdf.eval(wo, wi);
@@ -68,16 +62,16 @@ WAVECOMB_INLINE void sample_light(const Vertex<F>& v, const Interaction<Bsdf, F>
   }
   const Color<F> c =
       clean<F>(at.throughput * f_cos * l.weight * w, clamp_limit(v.settings, v.depth + 1));
-  out.has_shadow = lit & l.valid & is_consistent(at, l.wi, wi) & (max_component(c) > 0.f);
+  out.has_shadow = lit & l.valid & at.is_consistent(l.wi, wi) & (max_component(c) > 0.f);
   out.direct = c;
   if (v.wants_lights()) {
     v.aovs->lit_by = light;
     v.aovs->lit_at = receiver.p;
     v.aovs->light_weight = w;
   }
-  out.shadow_o = spawn_origin<F>(at.s, l.wi);
+  out.shadow_o = at.origin(l.wi);
   out.shadow_d = l.wi;
-  out.shadow_tfar = l.distance * 0.9999f;
+  out.shadow_tfar = l.distance * kShadowReach;
 }
 
 }  // namespace wavecomb

@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE void scatter(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
-                             const Frame<F>& frame, const Vec3<F>& wo, const Sample4<F>& r,
+template <typename Bsdf, typename F, typename Interaction>
+WAVECOMB_INLINE void scatter(const Vertex<F>& v, const Interaction& at, const Frame<F>& frame,
+                             const Vec3<F>& wo, const Sample4<F>& r,
                              const LightReceiver<F>& receiver, VertexResult<F>& out) {
   const PathState<F>& path = v.path;
   const BsdfSample<F> b = sample_bounce<Bsdf, F>(v.settings, at.bsdf, wo, r);
@@ -24,10 +24,10 @@ WAVECOMB_INLINE void scatter(const Vertex<F>& v, const Interaction<Bsdf, F>& at,
   out.next.cone_width = path.cone_width;
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
-  out.next.o = spawn_origin<F>(at.s, d);
+  out.next.o = at.origin(d);
   const F largest = max_component(out.next.throughput);
   out.alive =
-      v.active & (b.pdf > 0.f) & is_consistent(at, d, b.wi) & (largest > 0.f) & is_finite(largest);
+      v.active & (b.pdf > 0.f) & at.is_consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);
 }
 
 }  // namespace wavecomb

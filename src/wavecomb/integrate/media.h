@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What lies between surfaces. The stages that follow rays are templates on a class `Media`, so
+/// that scenes without any run kernels that know of none. It has
+///
+///   static constexpr bool kAny;            whether there is anything; if not, Programs is all else
+///   template <typename F> using Programs;  what may be met, surfaces included: ProgramList
+///   template <typename F> Flight<F> fly(const Passage<F>&, const Mask<F>& active) const;
+///   template <typename F> Color<F> transmittance(const Passage<F>&, const Mask<F>& active) const;
+///
+/// A program of its own shades what happens on the way (BsdfTraits::kOnSurface is false).
+///
+/// Contract: both functions give a lane what its own passage says, whatever the others are, and
+/// draw from VertexSet::kFlight and kShadow alone, so that no schedule shows.
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/material/program_table.h"
+
+namespace wavecomb {
+
+/// A straight way without surfaces: points o + x d, 0 < x < t. It leads to the vertex of `depth`,
+/// or, for a shadow ray, from it to a light.
+template <typename F>
+struct Passage {
+  SamplerKind sampler;
+  const SampleKey<F>& key;
+  uint32_t depth;
+  const Vec3<F>&o, &d;
+  const F& t;  ///< infinite where the scene ends
+};
+
+/// What becomes of a path on a passage.
+template <typename F>
+struct Flight {
+  Mask<F> stopped;   ///< it meets something on the way
+  F t;               ///< where, if so
+  UInt<F> material;  ///< and what: its program shades the vertex
+  Color<F> weight;   ///< of the throughput: transmittance over the probability of this outcome,
+                     ///< or over the density of t, times the extinction there
+};
+
+/// Nothing between surfaces.
+struct NoMedia {
+  static constexpr bool kAny = false;
+  template <typename F>
+  using Programs = wavecomb::Programs<F>;
+};
+
+}  // namespace wavecomb
