@@ -72,10 +72,11 @@ TEST(Allocation, IsCounted) {
 }
 
 /// Expects that a wave that has run once allocates nothing the second time.
-void expect_no_allocation(const ScenePtr& scene, WaveCase c, const std::string& what) {
+void expect_no_allocation(const ScenePtr& scene, WaveCase c, const std::string& what,
+                          HistoryReader* histories = nullptr) {
   c.settings.width = c.settings.height = 16;
   c.settings.spp = 4;
-  WaveRun run(scene, c);
+  WaveRun run(scene, c, nullptr, histories);
   run.all(1024);  // warm
   const uint64_t before = allocations;
   run.all(1024);
@@ -108,6 +109,23 @@ TEST(Allocation, NoneForAovs) {
       c.lanes = lanes;
       expect_no_allocation(scene, c, "all AOVs");
     }
+}
+
+TEST(Allocation, NoneForHistories) {
+  struct Counter final : HistoryReader {
+    uint64_t vertices = 0;
+    uint32_t most() const override { return 5; }
+    void ended(const PathHistory& history, const float* /*radiance*/, size_t paths) override {
+      for (uint32_t slot = 0; slot < paths; ++slot) vertices += history.count(slot);
+    }
+  };
+  for (const uint32_t lanes : lane_widths()) {
+    Counter counter;
+    WaveCase c;
+    c.lanes = lanes;
+    expect_no_allocation(mixed(), c, "histories", &counter);
+    EXPECT_GT(counter.vertices, 0u);
+  }
 }
 
 TEST(Allocation, NoneToOrderRays) {
