@@ -31,8 +31,8 @@ def test_this_tree_is_clean():
 
 def test_downward_includes_pass(tmp_path):
     files = {
-        "core/lanes.h": "#include <drjit/packet.h>\n",
-        "texture/tile.h": '#include "wavecomb/core/lanes.h"\n',
+        "core/lane_types.h": "#include <drjit/packet.h>\n",
+        "texture/tile.h": '#include "wavecomb/core/lane_types.h"\n',
         "scene/scene.h": '#include "wavecomb/texture/tile.h"\n#include <tbb/parallel_for.h>\n',
         "accel/embree.cpp": '#include <embree4/rtcore.h>\n#include "wavecomb/scene/scene.h"\n',
         "schedule/policies/none.h": '#include "wavecomb/schedule/policy.h"\n',

@@ -70,6 +70,22 @@ struct WordsOf<Vec3<F>> {
   static constexpr size_t value = 3;
 };
 
+/// A field's word as what lanes load and store, and back.
+template <typename F, typename T>
+WAVECOMB_INLINE F to_word(const T& field) {
+  if constexpr (std::is_same_v<T, F>)
+    return field;
+  else
+    return bits_float<F>(field);
+}
+template <typename F, typename T>
+WAVECOMB_INLINE void from_word(const F& word, T& field) {
+  if constexpr (std::is_same_v<T, F>)
+    field = word;
+  else
+    field = float_bits<F>(word);
+}
+
 /// Runs one(word, value) for each word of `value`, whose first is word `At`; `one` takes and gives
 /// values of type F.
 template <size_t At, typename F, typename T, typename One>
@@ -118,10 +134,7 @@ WAVECOMB_INLINE std::array<F, kRowWords<Row>> words_of_row(const Row<F>& row) {
   static_assert(sizeof(Row<float>) == 4 * kFieldWords<Row>, "WAVECOMB_FIELDS lists all fields");
   std::array<F, kRowWords<Row>> words;
   detail::for_each_word<0, F>(row, [&](auto at, const auto& value) WAVECOMB_INLINE_LAMBDA {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, F>)
-      words[at] = value;
-    else
-      words[at] = bits_float<F>(value);
+    words[at] = detail::to_word<F>(value);
   });
   for (size_t i = kFieldWords<Row>; i < kRowWords<Row>; ++i) words[i] = F(0.f);
   return words;
@@ -162,10 +175,7 @@ WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const 
       load_rows<kRowWords<Head>, F>(base, index * static_cast<uint32_t>(kRowWords<Row>), active);
   Head<F> head;
   detail::for_each_word<0, F>(head, [&](auto at, auto& value) WAVECOMB_INLINE_LAMBDA {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, F>)
-      value = words[at];
-    else
-      value = float_bits<F>(words[at]);
+    detail::from_word<F>(words[at], value);
   });
   return head;
 }
@@ -243,10 +253,7 @@ template <template <typename> class Head, typename F, size_t C>
 WAVECOMB_INLINE void store_columns(const Head<F>& head, float* const (&columns)[C], size_t at) {
   static_assert(C == kFieldWords<Head>);
   detail::for_each_word<0, F>(head, [&](auto word, const auto& value) WAVECOMB_INLINE_LAMBDA {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, F>)
-      store(columns[word] + at, value);
-    else
-      store(columns[word] + at, bits_float<F>(value));
+    store(columns[word] + at, detail::to_word<F>(value));
   });
 }
 

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Lanes to and from memory, and one lane of many; part of core/lanes.h.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "wavecomb/core/lane_arithmetic.h"
+
+namespace wavecomb {
+
+/// W consecutive values at `p` (any alignment).
+template <typename T>
+inline T load(const void* p) {
+  if constexpr (kIsScalar<T>) {
+    T value;
+    std::memcpy(&value, p, sizeof(T));
+    return value;
+  } else {
+    return drjit::load<T>(p);
+  }
+}
+template <LaneValue T>
+inline void store(void* p, const T& value) {
+  if constexpr (kIsScalar<T>)
+    std::memcpy(p, &value, sizeof(T));
+  else
+    drjit::store(p, value);
+}
+
+namespace detail {
+/// A packet's lanes in memory. Dr.Jit's entry() is not used: it reads integer registers through a
+/// pointer that may not alias them, which GCC 12 miscompiles.
+template <typename T>
+struct InMemory {
+  using Value = std::conditional_t<
+      std::is_same_v<T, FloatP<kWidth<T>>>, float,
+      std::conditional_t<std::is_same_v<T, Int<T>>, int32_t,
+                         std::conditional_t<std::is_same_v<T, UInt<T>>, uint32_t, uint64_t>>>;
+  alignas(64) Value value[kWidth<T>];
+
+  InMemory() : value{} {}
+  explicit InMemory(const T& lanes) { store(value, lanes); }
+};
+
+/// Words at base + 4 * index, where the index may have 64 bits.
+template <typename T, typename Index, typename M>
+inline T gather_words(const void* base, const Index& index, const M& active) {
+#if defined(__AVX2__)
+  if constexpr (requires { active.a1; })  // made of two halves
+    return T(gather_words<typename T::Array1>(base, drjit::low(index), active.a1),
+             gather_words<typename T::Array2>(base, drjit::high(index), active.a2));
+  else
+    return T::gather_(base, index, active, ReduceMode::Auto);
+#else
+  const InMemory<Index> at(index);
+  InMemory<T> result;
+  for (uint32_t bits = mask_bits(active); bits != 0; bits &= bits - 1) {
+    const auto i = static_cast<size_t>(std::countr_zero(bits));
+    const uint64_t address =
+        reinterpret_cast<uint64_t>(base) + 4 * static_cast<uint64_t>(at.value[i]);
+    std::memcpy(result.value + i, reinterpret_cast<const void*>(address), 4);
+  }
+  return load<T>(result.value);
+#endif
+}
+}  // namespace detail
+
+/// base[index] in each active lane, 0 elsewhere. `T` is a float or uint lane type; indices of
+/// active lanes are below 2^31.
+template <typename T>
+inline T gather(const void* base, const UInt<T>& index, const Mask<T>& active) {
+  if constexpr (kIsScalar<T>)
+    return active ? static_cast<const T*>(base)[index] : T(0);
+  else
+    return detail::gather_words<T>(base, index, active);
+}
+
+/// The 32-bit value at each lane's own address plus 4 * index bytes, in active lanes; 0 elsewhere.
+/// Contract: addresses are multiples of 4.
+template <typename T>
+inline T gather_at(const UInt64<T>& address, const UInt<T>& index, const Mask<T>& active) {
+  if constexpr (kIsScalar<T>)
+    return active ? reinterpret_cast<const T*>(address)[index] : T(0);
+  else
+    return detail::gather_words<T>(nullptr, UInt64<T>((address >> 2) + UInt64<T>(index)), active);
+}
+
+/// base[index] = value in each active lane; indices of active lanes are distinct and below 2^31.
+template <typename T>
+inline void scatter(void* base, const T& value, const UInt<T>& index, const Mask<T>& active) {
+  if constexpr (kIsScalar<T>) {
+    if (active) static_cast<T*>(base)[index] = value;
+  } else {
+#if defined(__AVX512VL__)
+    value.scatter_(base, index, active, ReduceMode::Auto);
+#else
+    const detail::InMemory<T> from(value);
+    const detail::InMemory<UInt<T>> at(index);
+    for (uint32_t bits = detail::mask_bits(active); bits != 0; bits &= bits - 1) {
+      const auto i = static_cast<size_t>(std::countr_zero(bits));
+      std::memcpy(static_cast<char*>(base) + 4 * size_t{at.value[i]}, from.value + i, 4);
+    }
+#endif
+  }
+}
+
+/// Writes the active lanes of `value` side by side at `p`, in lane order; returns how many.
+/// Contract: `p` has room for a whole packet, since the tail of the store is unspecified.
+template <typename T>
+inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
+  const uint32_t bits = lane_bits<T>(active);
+  if constexpr (kIsScalar<T>) {
+    if (bits) std::memcpy(p, &value, sizeof(T));
+#if defined(__AVX512F__)
+  } else if constexpr (kWidth<T> == 16) {
+    // Compress in the register, then store whole: a compressing store to memory is far slower on
+    // Zen 4.
+    const __m512i v = std::bit_cast<__m512i>(value.m);
+    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), v));
+#endif
+#if defined(__AVX512VL__)
+  } else if constexpr (kWidth<T> == 8) {
+    const __m256i v = std::bit_cast<__m256i>(value.m);
+    _mm256_storeu_si256(static_cast<__m256i*>(p),
+                        _mm256_maskz_compress_epi32(static_cast<__mmask8>(bits), v));
+#endif
+  } else {
+    const detail::InMemory<T> lanes(value);
+    auto* out = static_cast<char*>(p);
+    for (uint32_t rest = bits; rest != 0; rest &= rest - 1, out += 4)
+      std::memcpy(out, lanes.value + std::countr_zero(rest), 4);
+  }
+  return static_cast<uint32_t>(std::popcount(bits));
+}
+
+/// table[index] of 16 words in each lane; index < 16.
+template <typename U>
+inline U lookup16(const uint32_t* table, const U& index) {
+  if constexpr (kIsScalar<U>) {
+    return table[index];
+#if defined(__AVX512F__)
+  } else if constexpr (kWidth<U> == 16) {
+    return U(_mm512_permutexvar_epi32(index.m, _mm512_loadu_si512(table)));
+#endif
+#if defined(__AVX2__)
+  } else if constexpr (kWidth<U> == 8) {
+    const auto half = [&](const uint32_t* p) {
+      return _mm256_permutevar8x32_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)),
+                                         index.m);
+    };
+    return select(index > 7u, U(half(table + 8)), U(half(table)));
+#endif
+  } else {
+    detail::InMemory<U> at(index);
+    for (uint32_t& value : at.value) value = table[value];
+    return load<U>(at.value);
+  }
+}
+
+/// Bits in reverse order, lane by lane.
+template <typename U>
+inline U reverse_bits(U x) {
+#if defined(__AVX512BW__) && defined(__GFNI__)
+  if constexpr (kWidth<U> == 16) {
+    // A byte's bits by a matrix product over GF(2), then the bytes.
+    const __m512i matrix = _mm512_set1_epi64(static_cast<long long>(0x8040201008040201ull));
+    const __m512i order =
+        _mm512_broadcast_i32x4(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
+    return U(_mm512_shuffle_epi8(_mm512_gf2p8affine_epi64_epi8(x.m, matrix, 0), order));
+  } else
+#endif
+  {
+    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+    x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
+    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+    x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
+    return (x >> 16) | (x << 16);
+  }
+}
+
+/// Value of lane `i`.
+template <typename T>
+inline auto lane(const T& value, size_t i) {
+  if constexpr (kIsScalar<T>) {
+    (void)i;
+    return value;
+  } else {
+    return detail::InMemory<T>(value).value[i];
+  }
+}
+
+/// Value of the first active lane. Contract: at least one lane is active.
+template <typename T>
+inline auto first_active(const T& value, const Mask<T>& active) {
+  return lane(value, static_cast<size_t>(std::countr_zero(lane_bits<T>(active))));
+}
+
+/// True when every active lane holds the same value (true when none is active).
+template <typename F>
+inline bool is_uniform(const UInt<F>& value, const Mask<F>& active) {
+  if constexpr (kIsScalar<F>) {
+    return true;
+  } else {
+    const uint32_t bits = lane_bits<F>(active);
+    if (bits == 0) return true;
+    const UInt<F> first(lane(value, static_cast<size_t>(std::countr_zero(bits))));
+    return none(Mask<F>(value != first) & active);
+  }
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The types of lanes; part of core/lanes.h. This is the only file that includes Dr.Jit.
+#pragma once
+
+#include <drjit/packet.h>
+
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+/// For kernels that are called once or twice a packet: what they return then stays in registers,
+/// and what the caller does not use is not worked out. Compilers alone stop at the size of the
+/// caller.
+#define WAVECOMB_INLINE inline __attribute__((always_inline))
+
+namespace wavecomb {
+
+/// A packet of `W` floats.
+template <size_t W>
+using FloatP = drjit::Packet<float, W>;
+
+/// The lane type of width `W`: a plain float for one lane, a packet otherwise.
+template <size_t W>
+struct LaneType {
+  using type = FloatP<W>;
+};
+template <>
+struct LaneType<1> {
+  using type = float;
+};
+template <size_t W>
+using Lanes = typename LaneType<W>::type;
+
+/// Unsigned, signed, 64-bit and mask companions of a lane type, and its width.
+template <typename F>
+using UInt = drjit::uint32_array_t<F>;
+template <typename F>
+using Int = drjit::int32_array_t<F>;
+template <typename F>
+using Mask = drjit::mask_t<F>;
+
+namespace detail {
+template <typename T>
+struct Width {
+  static constexpr size_t value = 1;
+  using U64 = uint64_t;
+};
+template <typename T, size_t W>
+struct Width<drjit::Packet<T, W>> {
+  static constexpr size_t value = W;
+  using U64 = drjit::Packet<uint64_t, W>;
+};
+// The halves of a packet that is wider than a register.
+template <typename T, size_t W>
+struct Width<drjit::Array<T, W>> : Width<drjit::Packet<T, W>> {};
+}  // namespace detail
+
+template <typename T>
+inline constexpr size_t kWidth = detail::Width<T>::value;
+template <typename T>
+inline constexpr bool kIsScalar = kWidth<T> == 1;
+template <typename F>
+using UInt64 = typename detail::Width<F>::U64;
+
+/// What lanes are made of. Argument-dependent lookup finds Dr.Jit's functions of the same name
+/// beside ours; theirs are not constrained, so that this constraint makes ours the better match.
+template <typename T>
+concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
+
+using drjit::select;
+
+#if defined(__AVX512F__)
+// Dr.Jit 1.x compares unsigned lanes as signed ones at width 16 alone; these are a better match.
+namespace detail {
+using U16 = UInt<FloatP<16>>;
+using U16Mask = drjit::mask_t<U16>;
+}  // namespace detail
+#define WAVECOMB_COMPARE_U16(op, predicate)                                        \
+  inline detail::U16Mask operator op(const detail::U16& a, const detail::U16& b) { \
+    return detail::U16Mask::from_k(_mm512_cmp_epu32_mask(a.m, b.m, predicate));    \
+  }                                                                                \
+  template <typename T>                                                            \
+    requires std::is_integral_v<T>                                                 \
+  inline detail::U16Mask operator op(const detail::U16& a, const T& b) {           \
+    return a op detail::U16(static_cast<uint32_t>(b));                             \
+  }
+WAVECOMB_COMPARE_U16(<, _MM_CMPINT_LT)
+WAVECOMB_COMPARE_U16(<=, _MM_CMPINT_LE)
+WAVECOMB_COMPARE_U16(>, _MM_CMPINT_NLE)
+WAVECOMB_COMPARE_U16(>=, _MM_CMPINT_NLT)
+#undef WAVECOMB_COMPARE_U16
+#endif
+
+}  // namespace wavecomb
