@@ -11,8 +11,8 @@
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/graph_parameters.h"
-#include "wavecomb/texture/graph.h"
+#include "wavecomb/graph/parameters.h"
+#include "wavecomb/graph/run.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;

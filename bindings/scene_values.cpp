@@ -12,7 +12,7 @@
 
 #include "lights.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/graph_parameters.h"
+#include "wavecomb/graph/parameters.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;

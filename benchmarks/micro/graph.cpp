@@ -5,8 +5,8 @@
 #include <random>
 
 #include "scene_testing.h"
+#include "wavecomb/graph/parameters.h"
 #include "wavecomb/material/openpbr_params.h"
-#include "wavecomb/scene/graph_parameters.h"
 #include "widths.h"
 
 namespace wavecomb::micro {

@@ -136,7 +136,7 @@ class SceneBuilder:
         attributes: Sequence[str] = (),
     ) -> int:
         """A value graph, for ``add_material``: operations of 16 bytes as GraphOp in
-        texture/graph_data.h has them, images as (texture, stretch), outputs as (component of
+        graph/graph.h has them, images as (texture, stretch), outputs as (component of
         GRAPH_PARAMETERS, operand), names of attributes of meshes. Raises Error for one that reads
         what is not there."""
     def add_material(

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "scene_testing.h"
-#include "wavecomb/scene/curve.h"
+#include "wavecomb/curve/segment.h"
 
 namespace wavecomb::curve_testing {
 

@@ -3,9 +3,9 @@
 
 #include "curve_testing.h"
 #include "lane_testing.h"
-#include "wavecomb/accel/curve_shapes.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/denormals.h"
+#include "wavecomb/curve/intersect.h"
 #include "wavecomb/surface/surface.h"
 
 namespace wavecomb {

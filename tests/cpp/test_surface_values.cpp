@@ -2,7 +2,7 @@
 // The room `surface`: what rays and lights read of a hit is what shading reads there.
 #include "curve_testing.h"
 #include "lane_testing.h"
-#include "wavecomb/surface/graph_point.h"
+#include "wavecomb/graph/hit_point.h"
 #include "wavecomb/surface/hit.h"
 #include "wavecomb/surface/presence.h"
 #include "wavecomb/surface/surface.h"

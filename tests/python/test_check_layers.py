@@ -40,12 +40,18 @@ def test_downward_includes_pass(tmp_path):
         "integrate/wave.cpp": '#include "wavecomb/schedule/policy.h"\n',
         "surface/uv.h": '#include "wavecomb/scene/scene.h"\n',
         "light/triangle.h": '#include "wavecomb/surface/uv.h"\n',
+        "graph/run.h": '#include "wavecomb/texture/tile.h"\n',
+        "graph/value.h": '#include "wavecomb/scene/scene.h"\n#include "wavecomb/graph/run.h"\n',
+        "surface/values.h": '#include "wavecomb/graph/value.h"\n',
+        "curve/check.h": '#include "wavecomb/scene/scene.h"\n',
+        "scene/builder.cpp": '#include "wavecomb/curve/check.h"\n',
+        "curve/surface.h": '#include "wavecomb/surface/uv.h"\n',
         "render/renderer.cpp": '#include <oneapi/tbb.h>\n#include "wavecomb/integrate/wave.h"\n',
         "wavecomb.h": '#include "wavecomb/render/renderer.h"\n',
     }
     result = run(tree(tmp_path, files))
     assert result.returncode == 0, result.stderr
-    assert "11 files, 0 violations" in result.stdout
+    assert "17 files, 0 violations" in result.stdout
 
 
 @pytest.mark.parametrize(
@@ -57,6 +63,10 @@ def test_downward_includes_pass(tmp_path):
         ("core/rng.h", '#include "wavecomb/wavecomb.h"', "above it"),
         ("texture/tile.h", '#include "wavecomb/scene/scene.h"', "beside it"),
         ("surface/uv.h", '#include "wavecomb/light/triangle.h"', "above it"),
+        ("graph/run.h", '#include "wavecomb/graph/value.h"', "beside it"),
+        ("texture/tile.h", '#include "wavecomb/graph/value.h"', "beside it"),
+        ("scene/scene.h", '#include "wavecomb/curve/surface.h"', "above it"),
+        ("curve/surface.h", '#include "wavecomb/graph/drive.h"', "above it"),
         ("scene/scene.h", '#include "wavecomb/surface/uv.h"', "above it"),
         ("material/table.h", '#include "wavecomb/schedule/policy.h"', "beside it"),
         ("light/sampler.h", '#include  "wavecomb/accel/accelerator.h"', "beside it"),

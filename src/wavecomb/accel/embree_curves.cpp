@@ -4,9 +4,9 @@
 #include <limits>
 #include <tuple>
 
-#include "wavecomb/accel/curve_shapes.h"
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/presence.h"
+#include "wavecomb/curve/intersect.h"
 
 namespace wavecomb {
 namespace {

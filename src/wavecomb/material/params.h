@@ -3,8 +3,8 @@
 #pragma once
 
 #include "wavecomb/core/math.h"
+#include "wavecomb/graph/drive.h"
 #include "wavecomb/material/bsdf.h"
-#include "wavecomb/material/graph.h"
 #include "wavecomb/surface/slots.h"
 #include "wavecomb/surface/values.h"
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "wavecomb/core/affine.h"
+#include "wavecomb/graph/graph.h"
 #include "wavecomb/scene/openpbr_data.h"
-#include "wavecomb/texture/graph_data.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {

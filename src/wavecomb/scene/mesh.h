@@ -40,8 +40,8 @@ enum class Primitive : uint8_t {
   kSphere
 };
 
-/// An indexed triangle mesh, or curves, or points (scene/curve.h). Arrays belong to the caller and
-/// are not copied; `owner` keeps them alive for as long as a Scene uses them.
+/// An indexed triangle mesh, or curves, or points (curve/segment.h). Arrays belong to the caller
+/// and are not copied; `owner` keeps them alive for as long as a Scene uses them.
 struct Mesh {
   std::string name;
   Primitive primitive = Primitive::kTriangle;

@@ -141,7 +141,7 @@ class SceneBuilder {
                      const std::array<float, 4>& missing);
   /// A texture that was added; valid until the builder is gone or build() is called.
   const Texture& texture(uint32_t id) const;
-  /// A program for Material::graph and its parts; outputs are numbered as in graph_parameters.h.
+  /// A program for Material::graph and its parts; outputs are numbered as in graph/parameters.h.
   /// Texture ids in it must exist.
   uint32_t add_graph(const Graph& graph);
   /// Texture and graph ids in the material must exist.

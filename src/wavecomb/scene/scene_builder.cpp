@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/check_curves.h"
-#include "wavecomb/scene/graph_parameters.h"
+#include "wavecomb/curve/check.h"
+#include "wavecomb/graph/parameters.h"
 #include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/mesh_attributes.h"
 #include "wavecomb/scene/parallel.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wavecomb/scene/graph_parameters.h"
+#include "wavecomb/graph/parameters.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wavecomb/scene/graph_value.h"
+#include "wavecomb/graph/value.h"
 
 namespace wavecomb {
 namespace {

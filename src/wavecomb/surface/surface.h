@@ -2,7 +2,7 @@
 /// From a hit to what shading needs of the surface there.
 #pragma once
 
-#include "wavecomb/surface/curve_surface.h"
+#include "wavecomb/curve/surface.h"
 #include "wavecomb/surface/surface_reader.h"
 #include "wavecomb/surface/uv.h"
 

@@ -12,7 +12,7 @@
 namespace wavecomb {
 
 /// A hit on a mesh: instance (index into SceneView::instances), mesh, primitive, and barycentrics
-/// of vertices 1 and 2 of a triangle, or what scene/curve.h says.
+/// of vertices 1 and 2 of a triangle, or what curve/segment.h says.
 template <typename F>
 struct MeshHit {
   UInt<F> inst, mesh, prim;

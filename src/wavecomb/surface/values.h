@@ -6,7 +6,7 @@
 /// by component.
 #pragma once
 
-#include "wavecomb/scene/graph_value.h"
+#include "wavecomb/graph/value.h"
 #include "wavecomb/surface/slots.h"
 
 namespace wavecomb {

@@ -7,9 +7,9 @@
 #pragma once
 
 #include "wavecomb/core/frame.h"
+#include "wavecomb/graph/hit_point.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/material/params.h"
-#include "wavecomb/surface/graph_point.h"
 #include "wavecomb/surface/surface.h"
 
 namespace wavecomb {

@@ -5,8 +5,8 @@
 #include <array>
 
 #include "wavecomb/core/fields.h"
+#include "wavecomb/graph/value.h"
 #include "wavecomb/material/bsdf.h"
-#include "wavecomb/scene/graph_value.h"
 
 namespace wavecomb {
 

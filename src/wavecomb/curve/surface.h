@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// From a hit on a curve or point to the surface there; part of surface.h.
+/// From a hit on a curve or point to the surface there; part of surface/surface.h.
 #pragma once
 
-#include "wavecomb/scene/curve.h"
+#include "wavecomb/curve/segment.h"
+#include "wavecomb/curve/uv.h"
 #include "wavecomb/surface/surface_reader.h"
-#include "wavecomb/surface/uv.h"
 
 namespace wavecomb::detail {
 

@@ -13,7 +13,7 @@
 
 namespace wavecomb {
 
-/// Where a ray meets a curve or point, u and v as scene/curve.h has them.
+/// Where a ray meets a curve or point, u and v as curve/segment.h has them.
 struct CurveHit {
   float t, u, v;
 };

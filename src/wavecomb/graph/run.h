@@ -2,10 +2,10 @@
 /// Runs value graphs at hits.
 #pragma once
 
+#include "wavecomb/graph/graph.h"
+#include "wavecomb/graph/noise.h"
 #include "wavecomb/texture/attribute.h"
-#include "wavecomb/texture/graph_data.h"
 #include "wavecomb/texture/lookup.h"
-#include "wavecomb/texture/noise.h"
 
 namespace wavecomb {
 

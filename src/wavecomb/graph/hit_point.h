@@ -2,8 +2,8 @@
 /// What value graphs may ask of a hit.
 #pragma once
 
+#include "wavecomb/graph/run.h"
 #include "wavecomb/surface/surface.h"
-#include "wavecomb/texture/graph.h"
 
 namespace wavecomb {
 

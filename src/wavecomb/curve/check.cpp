@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/scene/check_curves.h"
+#include "wavecomb/curve/check.h"
 
 #include <cmath>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/curve.h"
+#include "wavecomb/curve/segment.h"
 
 namespace wavecomb {
 

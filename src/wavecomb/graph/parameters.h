@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "wavecomb/graph/graph.h"
 #include "wavecomb/scene/openpbr_data.h"
-#include "wavecomb/texture/graph_data.h"
 
 namespace wavecomb {
 

@@ -2,9 +2,9 @@
 /// One parameter that a value graph drives.
 #pragma once
 
-#include "wavecomb/scene/graph_parameters.h"
+#include "wavecomb/graph/parameters.h"
+#include "wavecomb/graph/run.h"
 #include "wavecomb/scene/material_data.h"
-#include "wavecomb/texture/graph.h"
 
 namespace wavecomb {
 

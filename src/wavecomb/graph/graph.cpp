@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/texture/graph_data.h"
+#include "wavecomb/graph/graph.h"
 
 #include <array>
 

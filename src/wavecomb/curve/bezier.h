@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Segments of curves in the space of a ray, in double precision.
+#pragma once
+
+#include <cmath>
+
+#include "wavecomb/core/vec3.h"
+
+namespace wavecomb::curve_math {
+
+using V = Vec3<double>;
+
+inline V vec(const float* p) {
+  return {p[0], p[1], p[2]};
+}
+inline double dot_d(const V& a, const V& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+inline V cross_d(const V& a, const V& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline V widen(const Vec3<float>& a) {
+  return {a.x, a.y, a.z};
+}
+inline Vec3<float> narrow(const V& a) {
+  return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
+}
+
+/// Right-handed axes with z along the ray, and its origin: there the ray is the z axis.
+struct RaySpace {
+  V o, x, y, z;
+  double length;  ///< of the direction: t is z / length
+
+  RaySpace(const float (&origin)[3], const float (&dir)[3]) : o(vec(origin)) {
+    const V d = vec(dir);
+    length = std::sqrt(dot_d(d, d));
+    z = d * (1 / length);
+    const double sign = std::copysign(1.0, z.z), a = -1 / (sign + z.z), b = z.x * z.y * a;
+    x = {1 + sign * z.x * z.x * a, sign * b, -sign * z.x};
+    y = {b, sign + z.y * z.y * a, -z.y};
+  }
+  V vector(const V& v) const { return {dot_d(v, x), dot_d(v, y), dot_d(v, z)}; }
+  V point(const V& p) const { return vector(p - o); }
+  V back(const V& v) const { return x * v.x + y * v.y + z * v.z; }
+};
+
+/// Control points of a segment, lines as cubics.
+struct Bezier {
+  V p[4];
+  double r[4];
+
+  V at(double u) const { return mix(p, u); }
+  double radius(double u) const { return mix(r, u); }
+  V along(double u) const { return slope(p, u); }
+  double widening(double u) const { return slope(r, u); }
+
+  template <typename T>
+  static T mix(const T* c, double u) {
+    const double w = 1 - u;
+    return c[0] * (w * w * w) + c[1] * (3 * w * w * u) + c[2] * (3 * w * u * u) +
+           c[3] * (u * u * u);
+  }
+  template <typename T>
+  static T slope(const T* c, double u) {
+    const double w = 1 - u;
+    return (c[1] - c[0]) * (3 * w * w) + (c[2] - c[1]) * (6 * w * u) + (c[3] - c[2]) * (3 * u * u);
+  }
+  template <typename T>
+  static void line(T* c) {
+    c[3] = c[1];
+    c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
+    c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
+  }
+  /// De Casteljau's halves.
+  template <typename T>
+  static void split(const T* c, T* a, T* b) {
+    const T m = (c[1] + c[2]) * 0.5;
+    a[0] = c[0];
+    b[3] = c[3];
+    a[1] = (c[0] + c[1]) * 0.5;
+    b[2] = (c[2] + c[3]) * 0.5;
+    a[2] = (a[1] + m) * 0.5;
+    b[1] = (m + b[2]) * 0.5;
+    a[3] = b[0] = (a[2] + b[1]) * 0.5;
+  }
+};
+
+}  // namespace wavecomb::curve_math
