@@ -150,7 +150,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
                       float metallic, float clearcoat, float clearcoat_roughness, float opacity,
                       float ior, float opacity_threshold, const Color3& conductor_eta,
                       const Color3& conductor_k, bool specular_workflow, bool presence,
-                      uint32_t evaluations, const nb::dict& openpbr, const nb::dict& textures,
+                      const nb::dict& openpbr, const nb::dict& textures,
                       std::optional<uint32_t> graph, std::optional<uint32_t> opacity_graph,
                       std::optional<uint32_t> emission_graph) {
   Material m;
@@ -170,7 +170,6 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   m.conductor_k = vec3(conductor_k);
   m.specular_workflow = specular_workflow;
   m.presence = presence;
-  m.evaluations = evaluations;
   m.openpbr = openpbr_of(name, openpbr);
   m.graph = graph.value_or(kNoGraph);
   m.opacity_graph = opacity_graph.value_or(kNoGraph);
@@ -528,9 +527,9 @@ void bind_scene(nb::module_& m) {
            "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,
            "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f, "ior"_a = 1.5f,
            "opacity_threshold"_a = 0.f, "conductor_eta"_a = black, "conductor_k"_a = black,
-           "specular_workflow"_a = false, "presence"_a = false, "evaluations"_a = 1,
-           "openpbr"_a = nb::dict(), "textures"_a = nb::dict(), "graph"_a = nb::none(),
-           "opacity_graph"_a = nb::none(), "emission_graph"_a = nb::none())
+           "specular_workflow"_a = false, "presence"_a = false, "openpbr"_a = nb::dict(),
+           "textures"_a = nb::dict(), "graph"_a = nb::none(), "opacity_graph"_a = nb::none(),
+           "emission_graph"_a = nb::none())
       .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "attributes"_a = nb::dict(), "name"_a = "",

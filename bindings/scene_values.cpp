@@ -39,7 +39,6 @@ const Members<Material, float> kMaterialNumbers{
     {"opacity_threshold", &Material::opacity_threshold}};
 const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material::specular_workflow},
                                                 {"presence", &Material::presence}};
-const Members<Material, uint32_t> kMaterialCounts{{"evaluations", &Material::evaluations}};
 // Of an input, where it is of the kind that a list is for.
 #define WAVECOMB_NUMBER_Number(name) {#name, &OpenPbr::name},
 #define WAVECOMB_NUMBER_Colour(name)
@@ -181,9 +180,6 @@ class Reader {
   void read(const char* name, const nb::object& value, bool& to) const {
     if (!nb::try_cast(value, to)) fail(name, "True or False");
   }
-  void read(const char* name, const nb::object& value, uint32_t& to) const {
-    if (!nb::try_cast(value, to)) fail(name, "a whole number of 0 or more");
-  }
 
   std::string what_;
   nb::dict values_;
@@ -288,7 +284,6 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
   put(d, m, kMaterialColors);
   put(d, m, kMaterialNumbers);
   put(d, m, kMaterialSwitches);
-  put(d, m, kMaterialCounts);
   for (uint32_t s = 0; s < kSlotCount; ++s)
     if (m.has_texture(static_cast<Slot>(s)))
       textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
@@ -355,7 +350,6 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     reader.take(changed, kMaterialColors);
     reader.take(changed, kMaterialNumbers);
     reader.take(changed, kMaterialSwitches);
-    reader.take(changed, kMaterialCounts);
     if (changed.program == ProgramId::kOpenPbr) take_openpbr(reader, changed.openpbr);
     reader.end();
     edit.materials[id] = std::move(changed);

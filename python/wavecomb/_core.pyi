@@ -158,7 +158,6 @@ class SceneBuilder:
         conductor_k: tuple[float, float, float] = (0, 0, 0),
         specular_workflow: bool = False,
         presence: bool = False,
-        evaluations: int = 1,
         openpbr: dict[str, Any] = {},
         textures: dict[str, dict[str, Any]] = {},
         graph: int | None = None,
@@ -173,8 +172,7 @@ class SceneBuilder:
         specular_color, emission, roughness, metallic, clearcoat, clearcoat_roughness, opacity,
         normal (tangent space, value already in [-1, 1] after scale and bias).
         For a metal: base_color is the reflectance at normal incidence, specular_color the tint at
-        82 degrees (black: none given, untinted). evaluations: how often a hit evaluates the
-        parameters; costs time and changes no picture.
+        82 degrees (black: none given, untinted).
         openpbr, for the program of that name: diffuse_roughness, specular_weight, anisotropy,
         rotation (turns), transmission_weight, transmission_color, transmission_depth,
         subsurface_weight, subsurface_color, subsurface_anisotropy, fuzz_weight, fuzz_color,

@@ -88,7 +88,6 @@ class GraphTest : public ::testing::Test {
     materials[2].graph = materials[2].opacity_graph = materials[2].emission_graph = 1;
     materials[2].presence = true;
     materials[3].graph = 0;
-    materials[3].evaluations = 3;
     materials_ = std::make_unique<SceneMaterials>(std::move(materials), graphs);
     view_.materials = materials_->records.data();
     view_.uses = materials_->uses.data();

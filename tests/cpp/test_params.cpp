@@ -238,24 +238,5 @@ TEST_F(ParamsTest, OpacityIsPresenceOrTransparency) {
   EXPECT_EQ(both(), std::pair(1.f, 1.f));
 }
 
-/// Counts of evaluations 1, 2 and 200: the same values, whether lanes share a material or not.
-TEST_F(ParamsTest, EvaluationsChangeNoValue) {
-  const auto values = [&] {
-    std::vector<float> out;
-    for (uint32_t m = 0; m < 3; ++m) {
-      float v[kValues];
-      record<float>(view_, m, {0.3f, 0.4f}, 0.01f, true, v);
-      out.insert(out.end(), v, v + kValues - 1);  // all but the flags
-    }
-    return out;
-  };
-  const std::vector<float> once = values();
-  records_[1].flags |= 1u << kEvaluationsShift;
-  records_[2].flags |= 199u << kEvaluationsShift;
-  EXPECT_EQ(values(), once);
-  expect_lanes_equal_scalar<4>(view_);
-  expect_lanes_equal_scalar<16>(view_);
-}
-
 }  // namespace
 }  // namespace wavecomb

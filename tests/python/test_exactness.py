@@ -191,7 +191,6 @@ def graph_scene() -> Any:
     ]  # fmt: skip
     shining = graph(emission=glow * 3)
     kinds.append({"graph": shining, "emission_graph": shining})
-    kinds[0]["evaluations"] = 2
     materials = [
         builder.add_material("openpbr" if i % 2 == 0 else "principled", name=f"G{i}", **kind)
         for i, kind in enumerate([*kinds, *kinds])

@@ -280,11 +280,15 @@ def test_spread_has_what_was_asked_for(tmp_path: Path) -> None:
     own = [size for name, size in scene.textures if "stone_" in name]
     assert len(own) == 200 and sum(own) == pytest.approx(6e6, rel=0.2)
     dear = {
-        prim.GetName(): prim.GetAttribute("wavecomb:evaluations").Get() or 1
+        prim.GetName(): sum(
+            shader.GetInput("octaves").Get()
+            for child in prim.GetChildren()
+            if (shader := UsdShade.Shader(child)).GetIdAttr().Get() == "ND_fractal3d_float"
+        )
         for prim in stage.GetPrimAtPath("/World/Looks").GetChildren()
         if prim.GetName().startswith("Stone_")
     }
-    assert dear["Stone_0000"] == 1 and dear["Stone_0199"] == 50
+    assert dear["Stone_0000"] == 0 and dear["Stone_0199"] == 50
     assert list(dear.values()) == sorted(dear.values())
     assert not loaded.report.warnings
 
@@ -305,15 +309,15 @@ def test_stones_are_closed_and_their_charts_lie_apart(tmp_path: Path) -> None:
     assert 0.25 < steps < 0.42  # of independent places on a unit square: 1 / 3
 
 
-def test_shader_cost_changes_time_and_no_picture(tmp_path: Path) -> None:
+def test_shader_cost_takes_time(tmp_path: Path) -> None:
     pictures = []
     for cost in (1.0, 200.0):
         (tmp_path / str(cost)).mkdir()
         _, loaded = spread_stage(
             tmp_path / str(cost), materials=1, texture_mb=0.5, triangles=5_000, shader_cost=cost
         )
+        assert not loaded.report.warnings
         pictures.append(wavecomb.render(loaded, size=(48, 48), spp=8, threads=1))
-    assert np.array_equal(pictures[0].beauty, pictures[1].beauty)
 
     def stone_ns(picture: wavecomb.Picture) -> float:
         return next(m["ns_per_record"] for m in picture.stats["materials"] if "Stone_" in m["name"])

@@ -312,15 +312,6 @@ def test_programs(tmp_path, program):
         assert got["base_color"] == (1, 1, 1)
 
 
-@pytest.mark.parametrize(("value", "evaluations"), [("7", 7), ("1", 1), ("0", 1), ("65537", 1)])
-def test_evaluations(tmp_path, value, evaluations):
-    material = f"custom int wavecomb:evaluations = {value}"
-    scene, loaded = load(tmp_path, surface("", material=material))
-    assert scene.material_of("M").get("evaluations", 1) == evaluations
-    bad = "is no whole number from 1 to 65536" in said(loaded)
-    assert bad == (value in ("0", "65537"))
-
-
 def test_unknown_program(tmp_path):
     scene, loaded = load(tmp_path, surface("", material='custom string wavecomb:program = "glas"'))
     assert scene.material_of("M")["program"] == "principled"

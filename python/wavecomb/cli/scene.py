@@ -48,7 +48,7 @@ from wavecomb.cli.options import Real, examples
     "--shader-cost",
     type=Real(1),
     metavar="X",
-    help="spread: evaluations of the dearest material per hit; costs time only.",
+    help="spread: octaves of noise on the dearest material; 1: none.",
 )
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
     """Write one of our own test stages, and its textures beside it."""

@@ -32,14 +32,12 @@ class MaterialInfo:
         inputs: Values of UsdPreviewSurface inputs by name.
         textures: Names in ``textures.TEXTURES`` by input.
         repeat: Texture repeats for each unit of uv.
-        evaluations: How often a hit evaluates it; costs time and changes no picture.
     """
 
     program: str
     inputs: dict[str, float | int | Colour] = field(default_factory=dict)
     textures: dict[str, str] = field(default_factory=dict)
     repeat: float = 1.0
-    evaluations: int = 1
 
 
 def diffuse(colour: Colour, texture: str | None = None, repeat: float = 1.0) -> MaterialInfo:

@@ -26,8 +26,8 @@ class SceneOptions:
         materials: How many ``spread`` and ``heavy`` have.
         programs: How many kinds of material ``spread`` uses, 1 to 5.
         texture_mb: Memory of all textures of ``spread`` and ``heavy``, 1e6 bytes; 0 is none.
-        shader_cost: How often the dearest material of ``spread`` evaluates its parameters for a
-            hit; the others from once up, geometrically.
+        shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
+            which is none, geometrically.
         lights: How many ``lights`` has.
     """
 

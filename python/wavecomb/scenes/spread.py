@@ -4,7 +4,8 @@
 For measuring how a renderer scales. Each stone is a mesh of its own, no instance, so that triangles
 are memory. Materials are dealt at random, so that neighbours differ. Each has a texture of its own,
 and the triangles of a stone lie all over it, as the charts of an atlas do: what neighbours read is
-not neighbouring memory, and the more triangles are seen, the more of the texture is read.
+not neighbouring memory, and the more triangles are seen, the more of the texture is read. Dear
+materials lay octaves of noise over it, in a network of MaterialX nodes.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from pxr import UsdShade
 
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.materials import Colour, MaterialInfo
+from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
@@ -23,6 +26,8 @@ from wavecomb.scenes.textures import Image, TextureInfo
 MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
 MAX_COST = 1000.0
+_OCTAVES_OF_NODE = 8
+"""Of one fractal; dearer materials add several."""
 _BYTES_PER_TEXEL = 4.0 * 4.0 / 3.0
 """Of 8 bit colour as the core holds it, mip levels included."""
 
@@ -47,8 +52,11 @@ def _edge(options: SceneOptions) -> int:
     return texture_edge(options, _BYTES_PER_TEXEL, TILE) if options.texture_mb > 0.0 else 0
 
 
-def evaluations(options: SceneOptions, index: int) -> int:
-    """Of material ``index``: the last has ``shader_cost``, the first 1, geometrically between."""
+def octaves(options: SceneOptions, index: int) -> int:
+    """Of the noise on material ``index``: ``shader_cost`` on the last, geometrically between.
+
+    The first has 1, which stands for its texture alone, without noise.
+    """
     share = index / (options.materials - 1) if options.materials > 1 else 1.0
     return round(options.shader_cost**share)
 
@@ -74,15 +82,44 @@ def _material(
     colour = tuple(float(v) for v in rng.permutation([low, 0.5 * (low + high), high]))
     name = f"Stone_{index:04d}"
     info = _PROGRAMS[index % options.programs]((colour[0], colour[1], colour[2]))
-    edge = _edge(options)
-    if edge:
-
-        def tinted(size: int, source: np.random.Generator) -> Image:
-            grey = grey_pattern(index, size, source)
-            return np.clip(0.2 + grey * np.array(colour), 0, 1).astype(np.float32)
-
-        texture = f"stone_{index:04d}"
-        writer.define_texture(texture, TextureInfo(tinted, edge, True))
-        info = replace(info, textures={"diffuseColor": texture})
-    writer.material(name, replace(info, evaluations=evaluations(options, index)))
+    texture = _texture(writer, index, edge, colour) if (edge := _edge(options)) else None
+    count = octaves(options, index)
+    if count == 1:
+        textures = {"diffuseColor": texture} if texture else {}
+        return writer.material(name, replace(info, textures=textures))
+    writer.material(name, info)
+    _lay_noise(writer, f"/World/Looks/{name}", texture, count)
     return name
+
+
+def _texture(writer: StageWriter, index: int, edge: int, colour: tuple[float, ...]) -> str:
+    """The name of a pattern in a colour."""
+
+    def tinted(size: int, source: np.random.Generator) -> Image:
+        grey = grey_pattern(index, size, source)
+        return np.clip(0.2 + grey * np.array(colour), 0, 1).astype(np.float32)
+
+    texture = f"stone_{index:04d}"
+    writer.define_texture(texture, TextureInfo(tinted, edge, True))
+    return texture
+
+
+def _lay_noise(writer: StageWriter, path: str, texture: str | None, count: int) -> None:
+    """Multiplies the colour of a UsdPreviewSurface by one over which noise lies."""
+    net = Network(writer.stage, path)
+    surface = UsdShade.Shader.Get(writer.stage, f"{path}/Surface")
+    colour = surface.GetInput("diffuseColor")
+    place = net.node("position", "vector3", space=("string", "world"))
+    shade: UsdShade.Output | None = None
+    for first in range(0, count, _OCTAVES_OF_NODE):
+        there = net.node("add", "vector3FA", in1=place, in2=("float", 1.7 * first))
+        few = min(_OCTAVES_OF_NODE, count - first)
+        cloud = net.node("fractal3d", "float", position=there, octaves=("integer", few))
+        shade = cloud if shade is None else net.node("add", "float", in1=shade, in2=cloud)
+    veins = net.node("smoothstep", "float", in_=shade, low=("float", -1.5), high=("float", 0.5))
+    plain = (
+        net.node("image", "color3", file=("filename", writer.texture_file(texture)))
+        if texture
+        else ("color3", tuple(colour.Get()))
+    )
+    colour.ConnectToSource(net.node("multiply", "color3FA", in1=plain, in2=veins))

@@ -164,10 +164,6 @@ class StageWriter:
         material.GetPrim().CreateAttribute(
             "wavecomb:program", Sdf.ValueTypeNames.String, custom=True
         ).Set(info.program)
-        if info.evaluations != 1:
-            material.GetPrim().CreateAttribute(
-                "wavecomb:evaluations", Sdf.ValueTypeNames.Int, custom=True
-            ).Set(info.evaluations)
         surface = UsdShade.Shader.Define(self.stage, f"/World/Looks/{name}/Surface")
         surface.CreateIdAttr("UsdPreviewSurface")
         for key, value in info.inputs.items():

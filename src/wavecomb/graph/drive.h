@@ -46,10 +46,11 @@ inline Vec3<F> sane_normal(const Vec3<F>& n) {
 }
 
 /// Runs the graphs of the active lanes, which all have one, and puts what they drive into `p`. A
-/// program beside "openpbr" has no place for what that one alone reads.
+/// program beside "openpbr" has no place for what that one alone reads. Never inlined, so that
+/// materials without graphs do not pay for its registers.
 template <typename F, typename Params>
-inline void drive_parameters(const MaterialView& view, const UInt<F>& material,
-                             const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
+[[gnu::noinline]] void drive_parameters(const MaterialView& view, const UInt<F>& material,
+                                        const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
   using U = UInt<F>;
   const U graph = gather_member<F>(view.materials, &MaterialRecord::graph, material, active);
   const auto places = parameter_places(p);

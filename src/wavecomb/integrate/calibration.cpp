@@ -73,7 +73,7 @@ CostSnapshot model_costs(const Scene& scene) {
   for (const Material& material : scene.materials()) {
     float ns = kProgramNs[static_cast<size_t>(material.program)];
     for (const TextureUse& use : material.textures)
-      if (use.texture != kNoTexture) ns += kTextureNs * static_cast<float>(material.evaluations);
+      if (use.texture != kNoTexture) ns += kTextureNs;
     costs.material_ns.push_back(ns);
     sum += ns;
   }

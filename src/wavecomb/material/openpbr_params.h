@@ -62,7 +62,7 @@ inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const 
   static_cast<OpenPbrInputs<F>&>(p) = r.template row<OpenPbrInputs>();
   p.thin_walled = r[&R::thin_walled];
   p.energy = view.energy;
-  complete_params<kSlots, F>(view, material, make_point, active, p);
+  complete_params<F>(view, material, make_point, active, p);
   return p;
 }
 

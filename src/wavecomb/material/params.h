@@ -49,45 +49,25 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
   return p;
 }
 
-/// Puts what graphs drive in the place of the parameters in `p`, and evaluates dear materials as
-/// often as they say: a packet as often as its dearest lane, with the values of one evaluation; the
-/// compiler is kept from seeing that.
-template <uint32_t kSlots, typename F, typename Params>
-[[gnu::noinline]] void evaluate_more(const MaterialView& view, const UInt<F>& material,
-                                     const GraphPoint<F>& point, const Mask<F>& active, Params& p) {
-  const UInt<F> more = p.flags >> kEvaluationsShift;
-  const Mask<F> driven = active & Mask<F>((p.flags & UInt<F>(uint32_t{kHasGraph})) != UInt<F>(0u));
-  const Mask<UInt<F>> on(active);
-  GraphPoint<F> at = point;
-  for (uint32_t done = 0; any(Mask<F>(on & (more > UInt<F>(done)))); ++done) {
-    asm volatile("" : : "r"(&at) : "memory");
-    Params again = p;
-    static_cast<ShadingParams<F>&>(again) =
-        evaluate_params<kSlots, F>(view, material, at.uv, at.uv_width, active);
-    if (any(driven)) drive_parameters<F>(view, material, at, driven, again);
-    asm volatile("" : : "r"(&again) : "memory");
-  }
-  if (any(driven)) drive_parameters<F>(view, material, at, driven, p);
-}
-
 }  // namespace detail
 
-/// Parameters `p` of material `material` with what graphs drive in its place: what
+/// Puts what graphs drive in the place of the parameters `p` of material `material`: what
 /// evaluate_params leaves to do. `make_point(active)` gives the GraphPoint and is called only where
 /// there is a graph.
-template <uint32_t kSlots, typename F, typename Params, typename MakePoint>
+template <typename F, typename Params, typename MakePoint>
 WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& material,
                                      const MakePoint& make_point, const Mask<F>& active,
                                      Params& p) {
-  const UInt<F> more = p.flags & UInt<F>(kMoreToEvaluate);
-  if (any(active & Mask<F>(more != UInt<F>(0u)))) [[unlikely]] {
+  const UInt<F> graph = p.flags & UInt<F>(uint32_t{kHasGraph});
+  const Mask<F> driven = active & Mask<F>(graph != UInt<F>(0u));
+  if (any(driven)) [[unlikely]] {
     // Copies, so that what all other materials use may stay in registers.
     const MaterialView v = view;
     const UInt<F> m = material;
-    const Mask<F> on = active;
+    const Mask<F> on = driven;
     const GraphPoint<F> at = make_point(on);
     Params copy = p;
-    detail::evaluate_more<kSlots, F>(v, m, at, on, copy);
+    detail::drive_parameters<F>(v, m, at, on, copy);
     p = copy;
   }
 }
@@ -101,7 +81,7 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
                                               const Vec2<F>& uv, const F& uv_width,
                                               const MakePoint& make_point, const Mask<F>& active) {
   auto p = detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
-  complete_params<kSlots, F>(view, material, make_point, active, p);
+  complete_params<F>(view, material, make_point, active, p);
   return p;
 }
 /// The same where graphs have nothing but uv.

@@ -80,9 +80,6 @@ struct Material {
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
   bool specular_workflow = false;  ///< principled: F0 from specular_color rather than metallic
   bool presence = false;  ///< principled: opacity is presence (cut-out) rather than transparency
-  /// How often a hit evaluates the parameters and their textures, 1 to kMaxEvaluations. Costs time
-  /// and changes nothing else: it stands for dearer shading networks where cost is measured.
-  uint32_t evaluations = 1;
   std::array<TextureUse, kSlotCount> textures;
   OpenPbr openpbr;  ///< read by the program of that name alone
   /// What computes parameters at hits, in place of constants and textures: ids of
@@ -113,7 +110,7 @@ struct alignas(64) MaterialRecord {
   float ior, opacity_threshold;
   float conductor_eta[3], conductor_k[3];
   uint32_t texture_slots;  ///< bit s: slot s reads a texture
-  uint32_t flags;          ///< MaterialFlags; upper half: evaluations - 1
+  uint32_t flags;          ///< MaterialFlags
   uint32_t program;
   uint32_t openpbr;  ///< its OpenPbrRecord
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
@@ -124,9 +121,6 @@ static_assert(sizeof(MaterialRecord) == 128);
 inline constexpr uint32_t kNeedsTangent = 1u << 31;
 /// Likewise: a graph drives parameters; one drives the normal.
 inline constexpr uint32_t kReadsGraph = 1u << 30, kGraphNormal = 1u << 29;
-/// The upper half of MaterialRecord::flags: evaluations beyond the first.
-inline constexpr uint32_t kEvaluationsShift = 16;
-inline constexpr uint32_t kMaxEvaluations = 1u << 16;
 enum MaterialFlags : uint32_t {
   kSpecularWorkflow = 1,
   kPresence = 2,
@@ -134,9 +128,6 @@ enum MaterialFlags : uint32_t {
   kEmits = 8,
   kHasGraph = 16,
 };
-/// Flags of materials whose parameters take more than their constants and textures.
-inline constexpr uint32_t kMoreToEvaluate = kHasGraph | ~((1u << kEvaluationsShift) - 1u);
-
 /// A TextureUse as lanes read it: 16 words.
 struct alignas(64) TextureUseRecord {
   uint32_t texture, channel;

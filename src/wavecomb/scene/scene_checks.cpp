@@ -60,9 +60,6 @@ void check_material(const Material& material, size_t texture_count, size_t graph
              static_cast<const OpenPbrInputs<float>&>(o).fields());
   if (!good) throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
-  if (material.evaluations < 1 || material.evaluations > kMaxEvaluations)
-    throw Error(name + " has " + std::to_string(material.evaluations) + " evaluations; from 1 to " +
-                std::to_string(kMaxEvaluations) + " are possible");
 }
 
 void check_profile(const IesProfile& p) {

@@ -43,7 +43,6 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   if (m.needs_presence()) r.flags |= kPresence;
   if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
   if (m.emits()) r.flags |= kEmits;
-  r.flags |= (m.evaluations - 1) << kEvaluationsShift;
   r.program = static_cast<uint32_t>(m.program);
   if (m.program == ProgramId::kOpenPbr && m.openpbr.anisotropy != 0)
     r.texture_slots |= kNeedsTangent;

@@ -233,7 +233,7 @@ CALLS: dict[str, Call] = {
             "roughness": number, "metallic": number, "clearcoat": number,
             "clearcoat_roughness": number, "opacity": number, "ior": number,
             "opacity_threshold": number, "conductor_eta": COLOUR, "conductor_k": COLOUR,
-            "specular_workflow": flag, "presence": flag, "evaluations": whole,
+            "specular_workflow": flag, "presence": flag,
             "openpbr": named(one_of(flag, number, COLOUR)), "textures": named(_USE),
             "graph": maybe(whole), "opacity_graph": maybe(whole), "emission_graph": maybe(whole),
         },

@@ -67,8 +67,6 @@ USES: dict[str, tuple[str, ...]] = {
 PROGRAMS = (*USES, "principled")
 """What ``wavecomb:program`` may say."""
 
-MAX_EVALUATIONS = 1 << 16
-
 _WRAP_INPUTS = ("wrapS", "wrapT")
 _ONES = (1.0, 1.0, 1.0, 1.0)
 _ZEROS = (0.0, 0.0, 0.0, 0.0)
@@ -86,21 +84,6 @@ def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> st
         report.warn(f"wavecomb:program {name!r} is none of {known}: principled", material.GetPath())
         return "principled"
     return str(name)
-
-
-def evaluations_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> int:
-    """How often ``wavecomb:evaluations`` of a material makes a hit evaluate it, else 1."""
-    attribute = material.GetAttribute("wavecomb:evaluations")
-    value = attribute.Get(time) if attribute else None
-    if value is None:
-        return 1
-    if not isinstance(value, int) or not 1 <= value <= MAX_EVALUATIONS:
-        report.warn(
-            f"wavecomb:evaluations {value!r} is no whole number from 1 to {MAX_EVALUATIONS}: 1",
-            material.GetPath(),
-        )
-        return 1
-    return value
 
 
 def constant(slot: str, value: Any, default: Any) -> Any:
@@ -155,9 +138,6 @@ class PreviewReader:
             attribute = self.material.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
                 parameters[slot] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
-        evaluations = evaluations_of(self.material, self.time, self.report)
-        if evaluations != 1:
-            parameters["evaluations"] = evaluations
         displacement = self._displacement(shader)
         return Surface(
             str(self.material.GetPath()),
