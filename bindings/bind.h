@@ -13,6 +13,7 @@ void bind_scene(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_graphs(nanobind::module_& m);
 void bind_lights(nanobind::module_& m);
+void bind_camera(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
 void bind_watching(nanobind::module_& m);
 void bind_settings(nanobind::module_& m);

@@ -17,6 +17,7 @@ NB_MODULE(_core, m) {
   bind_threads(m);
   bind_geometry(m);
   bind_lights(m);
+  bind_camera(m);
   bind_graphs(m);
   bind_recording(m);
   bind_watching(m);

@@ -14,6 +14,7 @@
 #include <cstring>
 
 #include "bind.h"
+#include "camera.h"
 #include "lights.h"
 #include "scene_values.h"
 #include "statistics.h"
@@ -410,32 +411,6 @@ uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector
   return builder.add_ies(std::move(profile));
 }
 
-void set_camera(SceneBuilder& builder,
-                const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transform,
-                const std::tuple<float, float, float, float>& window, float lens_radius,
-                float focus_distance, float near_clip, float far_clip,
-                const std::optional<Array<double>>& motion, const std::string& projection,
-                const std::string& conform, float pixel_aspect,
-                const std::vector<std::array<float, 4>>& clip_planes, float exposure) {
-  Camera camera;
-  camera.to_world = affine(transform);
-  std::tie(camera.window[0], camera.window[1], camera.window[2], camera.window[3]) = window;
-  camera.lens_radius = lens_radius;
-  camera.focus_distance = focus_distance;
-  camera.near_clip = near_clip;
-  camera.far_clip = far_clip;
-  camera.projection = projection_of(projection);
-  camera.conform = conform_of(conform);
-  camera.pixel_aspect = pixel_aspect;
-  camera.clip_planes = clip_planes;
-  camera.exposure = exposure;
-  if (motion && (motion->ndim() != 3 || motion->shape(1) != 4 || motion->shape(2) != 4))
-    throw Error("the motion of the camera must have the shape (steps, 4, 4)");
-  for (size_t s = 0; motion && s < motion->shape(0); ++s)
-    camera.steps.push_back(affine(motion->data() + 16 * s));
-  builder.set_camera(camera);
-}
-
 }  // namespace
 
 void bind_scene(nb::module_& m) {
@@ -554,10 +529,6 @@ void bind_scene(nb::module_& m) {
       .def("add_mesh_light", &add_mesh_light, "transform"_a, "material_sync"_a, "values"_a)
       .def("add_geometry_set", &add_geometry_set, "rules"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
-      .def("set_camera", &set_camera, "transform"_a, nb::kw_only(), "window"_a,
-           "lens_radius"_a = 0.f, "focus_distance"_a = 1.f, "near_clip"_a = 0.f,
-           "far_clip"_a = 1e30f, "motion"_a = nb::none(), "projection"_a = "perspective",
-           "conform"_a = "expandAperture", "pixel_aspect"_a = 1.f,
-           "clip_planes"_a = std::vector<std::array<float, 4>>{}, "exposure"_a = 1.f)
+      .def("set_camera", &set_camera, "transform"_a, "values"_a)
       .def("build", &SceneBuilder::build, nb::call_guard<nb::gil_scoped_release>());
 }

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "camera.h"
 #include "lights.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/graph/parameters.h"
@@ -53,38 +54,6 @@ const Members<OpenPbr, Vec3<float>> kOpenPbrColors{
 const Members<OpenPbr, float> kOpenPbrNumbers{{"transmission_depth", &OpenPbr::transmission_depth},
                                               WAVECOMB_OPENPBR_INPUTS(WAVECOMB_NUMBER)};
 const Members<OpenPbr, bool> kOpenPbrSwitches{{"thin_walled", &OpenPbr::thin_walled}};
-const Members<Camera, float> kCameraNumbers{
-    {"lens_radius", &Camera::lens_radius},   {"focus_distance", &Camera::focus_distance},
-    {"near_clip", &Camera::near_clip},       {"far_clip", &Camera::far_clip},
-    {"pixel_aspect", &Camera::pixel_aspect}, {"exposure", &Camera::exposure}};
-const std::vector<std::pair<const char*, Projection>> kProjections{
-    {"perspective", Projection::kPerspective},
-    {"orthographic", Projection::kOrthographic},
-    {"latlong", Projection::kLatlong}};
-const std::vector<std::pair<const char*, Conform>> kConforms{
-    {"expandAperture", Conform::kExpandAperture},
-    {"cropAperture", Conform::kCropAperture},
-    {"adjustApertureWidth", Conform::kAdjustApertureWidth},
-    {"adjustApertureHeight", Conform::kAdjustApertureHeight},
-    {"adjustPixelAspectRatio", Conform::kAdjustPixelAspectRatio}};
-
-template <typename Value>
-Value by_name(const char* what, const std::vector<std::pair<const char*, Value>>& names,
-              const std::string& wanted) {
-  std::string known;
-  for (const auto& [name, value] : names) {
-    if (wanted == name) return value;
-    known += std::string(known.empty() ? "" : ", ") + name;
-  }
-  throw Error(std::string("the camera has no ") + what + " '" + wanted + "'; there are " + known);
-}
-
-template <typename Value>
-const char* name_of(const std::vector<std::pair<const char*, Value>>& names, Value wanted) {
-  return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == wanted; })
-      ->first;
-}
-
 nb::object to_python(const Vec3<float>& v) {
   return nb::make_tuple(v.x, v.y, v.z);
 }
@@ -108,40 +77,6 @@ class Reader {
     for (const auto& [name, member] : members)
       if (const nb::object value = next(name); value.is_valid()) read(name, value, object.*member);
   }
-  template <size_t N>
-  void take(const char* name, float (&to)[N]) {
-    if (const nb::object value = next(name); value.is_valid()) read_numbers(name, value, to, N);
-  }
-  void take(const char* name, Affine& to) {
-    const nb::object value = next(name);
-    if (value.is_valid()) to = matrix_of(what_ + ": " + name, value);
-  }
-  void take(const char* name, std::string& to) {
-    const nb::object value = next(name);
-    if (value.is_valid() && !nb::try_cast(value, to)) fail(name, "a name");
-  }
-  /// Planes of four numbers.
-  void take(const char* name, std::vector<std::array<float, 4>>& to) {
-    const nb::object value = next(name);
-    if (value.is_valid() && !nb::try_cast(value, to)) fail(name, "4 numbers for each plane");
-  }
-  /// Some of (k, 4, 4), or none.
-  void take(const char* name, std::vector<Affine>& to) {
-    const nb::object value = next(name);
-    if (!value.is_valid()) return;
-    to.clear();
-    if (value.is_none()) return;
-    try {
-      const nb::object array =
-          nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float64");
-      const auto steps =
-          nb::cast<nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>>(
-              array);
-      for (size_t k = 0; k < steps.shape(0); ++k) to.push_back(affine(steps.data() + 16 * k));
-    } catch (const std::exception&) {
-      fail(name, "4 x 4 numbers for each step");
-    }
-  }
   /// Throws where there was more than has been taken.
   void end() const {
     if (nb::len(values_) == taken_) return;
@@ -163,15 +98,9 @@ class Reader {
   [[noreturn]] void fail(const char* name, const char* wanted) const {
     throw Error(what_ + ": " + name + " must be " + wanted);
   }
-  void read_numbers(const char* name, const nb::object& value, float* to, size_t n) const {
-    std::vector<float> numbers;
-    if (!nb::try_cast(value, numbers) || numbers.size() != n)
-      fail(name, n == 3 ? "3 numbers" : "4 numbers");
-    std::copy(numbers.begin(), numbers.end(), to);
-  }
   void read(const char* name, const nb::object& value, Vec3<float>& to) const {
-    float numbers[3];
-    read_numbers(name, value, numbers, 3);
+    std::vector<float> numbers;
+    if (!nb::try_cast(value, numbers) || numbers.size() != 3) fail(name, "3 numbers");
     to = {numbers[0], numbers[1], numbers[2]};
   }
   void read(const char* name, const nb::object& value, float& to) const {
@@ -299,50 +228,10 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
   return d;
 }
 
-nb::dict camera_dict(const Scene& scene) {
-  const Camera& c = scene.camera();
-  nb::dict d;
-  d["to_world"] = matrix(c.to_world);
-  d["window"] = nb::make_tuple(c.window[0], c.window[1], c.window[2], c.window[3]);
-  put(d, c, kCameraNumbers);
-  d["projection"] = name_of(kProjections, c.projection);
-  d["conform"] = name_of(kConforms, c.conform);
-  d["clip_planes"] = c.clip_planes;
-  return d;
-}
-
-Projection projection_of(const std::string& name) {
-  return by_name("projection", kProjections, name);
-}
-
-Conform conform_of(const std::string& name) {
-  return by_name("conform", kConforms, name);
-}
-
 SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dict& materials,
                      const nb::dict& lights) {
   SceneEdit edit;
-  if (!camera.is_none()) {
-    Camera changed = scene.camera();
-    Reader reader("the camera", nb::cast<nb::dict>(camera));
-    reader.take("transform", changed.to_world);
-    reader.take("to_world", changed.to_world);
-    // One that is put somewhere stands still there.
-    const nb::dict values = nb::cast<nb::dict>(camera);
-    if (values.contains("transform") || values.contains("to_world")) changed.steps.clear();
-    reader.take("motion", changed.steps);
-    reader.take("window", changed.window);
-    reader.take(changed, kCameraNumbers);
-    std::string projection = name_of(kProjections, changed.projection);
-    std::string conform = name_of(kConforms, changed.conform);
-    reader.take("projection", projection);
-    reader.take("conform", conform);
-    changed.projection = projection_of(projection);
-    changed.conform = conform_of(conform);
-    reader.take("clip_planes", changed.clip_planes);
-    reader.end();
-    edit.camera = changed;
-  }
+  if (!camera.is_none()) edit.camera = edited_camera(scene, nb::cast<nb::dict>(camera));
   for_each_change("material", materials, [&](uint32_t id, const nb::dict& values) {
     check_index("material", id, scene.materials().size());
     Material changed = scene.materials()[id];

@@ -21,9 +21,6 @@ wavecomb::Affine affine(const T* m) {
 wavecomb::Affine affine(
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& m);
 
-/// By their names in Python and USD; throw Error for others.
-wavecomb::Projection projection_of(const std::string& name);
-wavecomb::Conform conform_of(const std::string& name);
 /// The parameters of program "openpbr" by name; throws Error for others.
 wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
 
@@ -35,9 +32,8 @@ void check_index(const char* kind, uint32_t i, size_t count);
 nanobind::list matrix(const wavecomb::Affine& m);
 wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 
-/// As add_material and set_camera take them. Throw Error for ids that are not there.
+/// As add_material takes it. Throws Error for ids that are not there.
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
-nanobind::dict camera_dict(const wavecomb::Scene& scene);
 
 /// What Renderer.edit() is told. Values that are not given stay as they are. Throws Error that
 /// names the object and the value.

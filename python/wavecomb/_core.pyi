@@ -368,30 +368,50 @@ class SceneBuilder:
         self,
         transform: NDArray[Any],
         *,
-        window: tuple[float, float, float, float],
-        lens_radius: float = 0,
-        focus_distance: float = 1,
-        near_clip: float = 0,
-        far_clip: float = 1e30,
         motion: NDArray[np.float64] | None = None,
-        projection: str = "perspective",
-        conform: str = "expandAperture",
+        # ---- camera_table(): tools/update_stub ----
+        # x0, x1, y0, y1 of what the picture shows: on the plane z = -1, across the axis of an
+        # orthographic camera, longitude and latitude in radians of a latlong one.
+        window: tuple[float, float, float, float],
+        # Of the lens, scene units; 0: all is sharp.
+        lens_radius: float = 0,
+        # Along -z, scene units; above 0 with a lens.
+        focus_distance: float = 1,
+        # Along -z, scene units; of a latlong camera a distance.
+        near_clip: float = 0,
+        # Along -z, scene units; of a latlong camera a distance.
+        far_clip: float = 1e30,
+        # latlong: all directions, longitude to the right, latitude up.
+        projection: Literal["perspective", "orthographic", "latlong"] = "perspective",
+        # What gives way where the shapes of window and picture differ: UsdRender's
+        # aspectRatioConformPolicy.
+        conform: Literal[
+            "expandAperture",
+            "cropAperture",
+            "adjustApertureWidth",
+            "adjustApertureHeight",
+            "adjustPixelAspectRatio",
+        ] = "expandAperture",
+        # Width of a pixel / its height.
         pixel_aspect: float = 1,
-        clip_planes: Sequence[Sequence[float]] = (),
+        # Planes (a, b, c, d) in the camera's space; of what it sees itself, points with a x + b y +
+        # c z + d < 0 are cut off.
+        clip_planes: Sequence[Sequence[float]] = [],
+        # What light is multiplied by in the picture.
         exposure: float = 1,
+        # ---- to here ----
     ) -> None:
-        """Looks along -z. window: x0, x1, y0, y1 on the plane z = -1 (aperture / focal length); of
-        an "orthographic" camera in scene units across its axis; of a "latlong" one longitude and
-        latitude in radians. The renderer fits it to the picture, whose pixels are pixel_aspect
-        times as wide as high, by conform: UsdRender's aspectRatioConformPolicy. motion: (s, 4, 4),
-        transforms at s equal steps over the shutter. clip_planes: (a, b, c, d) in the camera's
-        space; what it sees itself is cut off where a x + b y + c z + d < 0. exposure multiplies
-        light in the picture. Raises Error for names that are not known."""
+        """Looks along -z. The renderer fits the window to the picture, as conform says. motion:
+        (s, 4, 4), transforms at s equal steps over the shutter. Raises Error for names that are not
+        known."""
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
 
 def light_table() -> list[dict[str, Any]]:
     """The parameters of lights, as wavecomb.light_table.LightParameter has them."""
+
+def camera_table() -> list[dict[str, Any]]:
+    """The parameters of cameras, as wavecomb.camera_table.CameraParameter has them."""
 
 def setting_table() -> list[dict[str, Any]]:
     """The settings that are one value each, as wavecomb.options.Setting has them."""

@@ -210,7 +210,7 @@ def test_core_refuses_what_is_no_camera():
     for options, words in (
         ({"pixel_aspect": 0}, "pixel_aspect"),
         ({"exposure": -1}, "exposure"),
-        ({"clip_planes": [(0, 0, math.nan, 1)]}, "clipping plane"),
+        ({"clip_planes": [(0, 0, math.nan, 1)]}, "clip_planes are not finite"),
         ({"projection": "latlong", "window": (-1, 1, -2, 2)}, "between the poles"),
     ):
         builder = _core.SceneBuilder()

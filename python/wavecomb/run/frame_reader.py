@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import UsdGeom
 
+from wavecomb.camera_table import camera_defaults
 from wavecomb.load_options import LoadOptions
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
@@ -27,19 +28,6 @@ if TYPE_CHECKING:
     from pxr import Usd
 
     from wavecomb.usd.stage.loaded import LoadedStage
-
-_CAMERA: dict[str, Any] = {
-    "lens_radius": 0.0,
-    "focus_distance": 1.0,
-    "near_clip": 0.0,
-    "far_clip": 1e30,
-    "projection": "perspective",
-    "conform": "expandAperture",
-    "pixel_aspect": 1.0,
-    "clip_planes": [],
-    "exposure": 1.0,
-}
-"""What ``SceneBuilder.set_camera`` takes where a camera says nothing."""
 
 
 @dataclass(frozen=True)
@@ -136,5 +124,5 @@ class FrameReader:
         if not self._stock.has_same_levels(view, options.size):
             return None
         moves = camera_motion(seen.camera, motion)
-        camera = {"transform": view.transform, **_CAMERA, **view.options, "motion": moves}
+        camera = {"transform": view.transform, **camera_defaults(), **view.options, "motion": moves}
         return Seen(camera, str(seen.camera.GetPath()), shutter, seen.choice, number)

@@ -5,17 +5,11 @@ namespace wavecomb {
 
 CameraSetup::CameraSetup(const Camera& camera, uint32_t width, uint32_t height,
                          const FilterTable& table)
-    : projection(camera.projection),
-      to_world(camera.to_world),
-      steps(camera.steps.begin(), camera.steps.end()),
-      lens_radius(camera.projection == Projection::kLatlong ? 0.f : camera.lens_radius),
-      focus_distance(camera.focus_distance),
-      near_clip(camera.near_clip),
-      far_clip(camera.far_clip),
-      clip_planes(camera.clip_planes),
-      exposure(camera.exposure),
+    : Camera(camera),
+      places(camera.steps.begin(), camera.steps.end()),
       filter(table.offsets()),
       has_far(camera.far_clip < 1e29f || !camera.clip_planes.empty()) {
+  if (projection == Projection::kLatlong) lens_radius = 0;
   const Vec3<float> z = to_world.axis(2);
   backward = z * (1.f / length(z));
   const FittedWindow window = fitted_window(camera, width, height);

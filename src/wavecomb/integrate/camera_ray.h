@@ -18,22 +18,18 @@ namespace wavecomb {
 /// not blur as much as the pixel does; Igehy's full pixel shows, beside renderers without cones.
 inline constexpr float kConeShare = 0.25f;
 
-/// A camera with its window fitted to a picture of width x height pixels.
-struct CameraSetup {
-  Projection projection;
-  Affine to_world;
-  std::vector<MatrixStep> steps;  ///< over the shutter, where it moves
-  Vec3<float> backward;           ///< unit vector along the camera's z axis
-  float x0, y1;                   ///< the window's upper left corner
-  float step_x, step_y;           ///< window size of a pixel
-  float lens_radius, focus_distance, near_clip, far_clip;
-  std::vector<std::array<float, 4>> clip_planes;
-  float exposure;
-  const float* filter;  ///< FilterTable::offsets()
-  bool has_far;         ///< something is cut off far away
+/// A camera with its window fitted to a picture of width x height pixels. The lens of a latlong
+/// camera has no radius.
+struct CameraSetup : Camera {
+  std::vector<MatrixStep> places;  ///< over the shutter, where it moves
+  Vec3<float> backward;            ///< unit vector along the camera's z axis
+  float x0, y1;                    ///< the window's upper left corner
+  float step_x, step_y;            ///< window size of a pixel
+  const float* filter;             ///< FilterTable::offsets()
+  bool has_far;                    ///< something is cut off far away
 
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table);
-  bool moves() const { return !steps.empty(); }
+  bool moves() const { return !places.empty(); }
   /// Whether all rays are narrow about one direction and meet in one point.
   bool is_pinhole() const {
     return projection == Projection::kPerspective && lens_radius == 0 && clip_planes.empty() &&
@@ -48,8 +44,8 @@ inline MatrixLanes<F> camera_place(const CameraSetup& camera, const F& time,
   const Affine& m = camera.to_world;
   if (!camera.moves())
     return {{Vec3<F>(m.row[0]), Vec3<F>(m.row[1]), Vec3<F>(m.row[2])}, Vec3<F>(m.t)};
-  const auto segments = static_cast<uint32_t>(camera.steps.size() - 1);
-  return detail::MatrixPair<F>(camera.steps.data(), UInt<F>(0u), UInt<F>(segments), time, active)
+  const auto segments = static_cast<uint32_t>(camera.places.size() - 1);
+  return detail::MatrixPair<F>(camera.places.data(), UInt<F>(0u), UInt<F>(segments), time, active)
       .matrix();
 }
 

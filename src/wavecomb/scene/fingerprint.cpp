@@ -6,7 +6,9 @@
 #include <string_view>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
+#include "wavecomb/scene/camera_table.h"
 #include "wavecomb/scene/light_table.h"
 
 namespace wavecomb {
@@ -61,6 +63,11 @@ class Hash {
   }
 
   uint64_t state_ = 0xcbf29ce484222325ull;
+};
+
+template <typename... F>
+struct Overloaded : F... {
+  using F::operator()...;
 };
 
 uint64_t hash_geometry(const Scene& scene) {
@@ -202,18 +209,28 @@ uint64_t hash_names(const Scene& scene) {
   return h.value();
 }
 
+/// Parameters beyond the first ones count where they are not the default, so that cameras keep
+/// their fingerprint where another comes.
 uint64_t hash_camera(const Scene& scene) {
   Hash h;
   const Camera& c = scene.camera();
-  h.add(c.to_world, c.lens_radius, c.focus_distance, c.near_clip, c.far_clip);
+  h.add(c.to_world);
   for (const Affine& step : c.steps) h.add(step);
-  h.add_array(std::span<const float>(c.window));
-  // Of what is as it was before there was anything else, nothing: old checkpoints go on.
-  if (c.projection != Projection::kPerspective || c.conform != Conform::kExpandAperture)
-    h.add(c.projection, c.conform);
-  if (c.pixel_aspect != 1) h.add(c.pixel_aspect);
-  if (c.exposure != 1) h.add(uint32_t{1}, c.exposure);
-  for (const auto& plane : c.clip_planes) h.add_array(std::span<const float>(plane));
+  for (const CameraParameter& p : camera_table()) {
+    const CameraValue value = p.read(c);
+    if (!p.counts_always) {
+      if (value == p.standard()) continue;
+      h.add_bytes(p.name, std::strlen(p.name));
+    }
+    std::visit(
+        Overloaded{[&](const auto& one) { h.add(one); },
+                   [&](const FourNumbers& four) { h.add_array(std::span<const float>(four)); },
+                   [&](const std::vector<FourNumbers>& planes) {
+                     for (const FourNumbers& plane : planes)
+                       h.add_array(std::span<const float>(plane));
+                   }},
+        value);
+  }
   return h.value();
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/camera_table.h"
 #include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_checks.h"

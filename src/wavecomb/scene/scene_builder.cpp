@@ -11,6 +11,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/curve/check.h"
 #include "wavecomb/graph/parameters.h"
+#include "wavecomb/scene/camera_table.h"
 #include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/mesh_attributes.h"
 #include "wavecomb/scene/parallel.h"

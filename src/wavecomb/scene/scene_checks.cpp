@@ -8,9 +8,7 @@
 
 namespace wavecomb {
 
-namespace {
-constexpr float kHalfTurn = 1.5708f;  // a little above pi / 2
-}
+namespace {}
 
 std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
@@ -81,35 +79,6 @@ void check_profile(const IesProfile& p) {
   for (const float x : p.candela)
     if (!std::isfinite(x) || x < 0)
       throw Error("an IES profile has a value that is negative or not finite");
-}
-
-void check_camera(const Camera& camera) {
-  const float* w = camera.window;
-  if (!finite(camera.to_world) || std::abs(camera.to_world.determinant()) < 1e-30f)
-    throw Error("the camera's transform is singular or not finite; mend it");
-  if (camera.steps.size() == 1 || camera.steps.size() > kMostSteps)
-    throw Error("the camera's motion needs 2 to " + std::to_string(kMostSteps) + " steps");
-  for (const Affine& step : camera.steps)
-    if (!finite(step) || std::abs(step.determinant()) < 1e-30f)
-      throw Error("the camera's motion is singular or not finite; mend it");
-  for (int i = 0; i < 4; ++i)
-    if (!std::isfinite(w[i])) throw Error("the camera's window is not finite; check its aperture");
-  if (!(w[0] < w[1]) || !(w[2] < w[3]))
-    throw Error("the camera's window is empty; check its aperture and focal length");
-  if (!(camera.lens_radius >= 0) || !std::isfinite(camera.lens_radius) ||
-      (camera.lens_radius > 0 && !(camera.focus_distance > 0)))
-    throw Error("the camera's lens needs a radius of 0 or more and a focus distance above 0");
-  if (camera.projection == Projection::kLatlong && (w[3] > kHalfTurn || w[2] < -kHalfTurn))
-    throw Error("the latlong camera's window must lie between the poles");
-  if (!(camera.pixel_aspect > 0) || !std::isfinite(camera.pixel_aspect))
-    throw Error("the camera's pixel_aspect must be a number above 0");
-  if (!(camera.exposure >= 0) || !std::isfinite(camera.exposure))
-    throw Error("the camera's exposure must be a number of 0 or more");
-  for (const auto& plane : camera.clip_planes)
-    for (const float x : plane)
-      if (!std::isfinite(x)) throw Error("a clipping plane of the camera is not finite; mend it");
-  if (!(camera.near_clip >= 0) || !(camera.far_clip > camera.near_clip))
-    throw Error("the camera's clipping range must start at 0 or more and end beyond its start");
 }
 
 }  // namespace wavecomb

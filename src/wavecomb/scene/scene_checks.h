@@ -6,7 +6,6 @@
 #include <cmath>
 #include <string>
 
-#include "wavecomb/scene/camera.h"
 #include "wavecomb/scene/light_data.h"
 #include "wavecomb/scene/material_data.h"
 
@@ -25,6 +24,5 @@ std::string quoted(const std::string& kind, const std::string& name);
 /// `texture_count`, `graph_count`: textures and graphs that there are.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);
 void check_profile(const IesProfile& profile);
-void check_camera(const Camera& camera);
 
 }  // namespace wavecomb

@@ -117,8 +117,9 @@ def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     # A window that is off the axis looks past the centre.
     shift = -0.5 * (x0 + x1) * depth * axes[0] - 0.5 * (y0 + y1) * depth * axes[1]
     framed = _placed(pose, axes, place + shift)
-    near = min(framed.near_clip, 1e-3 * distance)
-    return replace(framed, near_clip=near, far_clip=max(framed.far_clip, distance + 2.0 * size))
+    near = min(framed.value("near_clip"), 1e-3 * distance)
+    far = max(framed.value("far_clip"), distance + 2.0 * size)
+    return framed.changed(near_clip=near, far_clip=far)
 
 
 def _scaled(pose: Pose, factor: float) -> Pose:

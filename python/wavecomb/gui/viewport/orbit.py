@@ -6,12 +6,14 @@ Transforms are in USD's row-vector convention: rows are right, up, back and posi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb.camera_table import camera_defaults
 from wavecomb.picture.output import camera_window
 
 Matrix = NDArray[np.float64]
@@ -28,46 +30,32 @@ class Pose:
         to_world: (4, 4), row vectors; looks along -z.
         window: x0, x1, y0, y1 on the plane z = -1; of an orthographic camera across its axis, of a
             latlong one in radians.
-        lens_radius: 0: all is sharp.
-        focus_distance: Along the axis.
-        near_clip: Along the axis.
-        far_clip: Along the axis.
-        projection: perspective, orthographic or latlong.
-        conform: What gives way where the shapes of window and picture differ.
-        pixel_aspect: Width of a pixel / its height.
-        clip_planes: Further ones, (a, b, c, d) in the camera's space.
-        exposure: What light is multiplied by.
+        others: The other ones of ``camera_parameters()``, where they are not the default.
         path: Camera prim that this is; None: a free camera.
     """
 
     to_world: Matrix
     window: tuple[float, float, float, float]
-    lens_radius: float = 0.0
-    focus_distance: float = 1.0
-    near_clip: float = 0.0
-    far_clip: float = 1e30
-    projection: str = "perspective"
-    conform: str = "expandAperture"
-    pixel_aspect: float = 1.0
-    clip_planes: tuple[tuple[float, ...], ...] = ()
-    exposure: float = 1.0
+    others: Mapping[str, Any] = field(default_factory=dict)
     path: str | None = None
 
     def options(self) -> dict[str, Any]:
         """For ``Renderer.edit``."""
-        return {
-            "transform": self.to_world,
-            "window": self.window,
-            "lens_radius": self.lens_radius,
-            "focus_distance": self.focus_distance,
-            "near_clip": self.near_clip,
-            "far_clip": self.far_clip,
-            "projection": self.projection,
-            "conform": self.conform,
-            "pixel_aspect": self.pixel_aspect,
-            "clip_planes": [list(plane) for plane in self.clip_planes],
-            "exposure": self.exposure,
-        }
+        here = {"transform": self.to_world, "window": self.window}
+        return {**here, **camera_defaults(), **self.others}
+
+    def value(self, name: str) -> Any:
+        """Of ``others``, or its default."""
+        return {**camera_defaults(), **self.others}[name]
+
+    def changed(self, **others: Any) -> Pose:
+        """With other values of ``others``."""
+        return replace(self, others={**self.others, **others})
+
+    @property
+    def projection(self) -> str:
+        """Perspective, orthographic or latlong."""
+        return str(self.value("projection"))
 
     def fitted(self, width: int, height: int) -> tuple[float, float, float, float]:
         """The window as a picture of this size shows it."""
@@ -98,19 +86,12 @@ class Pose:
         return float((self.position - point) @ self.back)
 
 
+def pose_of(to_world: Matrix, values: Mapping[str, Any], path: str | None) -> Pose:
+    """The pose of a camera with these values of ``camera_parameters()``, and maybe others."""
+    others = {name: values[name] for name in camera_defaults() if name in values}
+    return Pose(to_world, tuple(values["window"]), others, path)
+
+
 def pose_of_scene(camera: dict[str, Any], path: str | None) -> Pose:
     """The pose of ``Scene.camera``."""
-    return Pose(
-        np.array(camera["to_world"], np.float64),
-        tuple(camera["window"]),
-        camera.get("lens_radius", 0.0),
-        camera.get("focus_distance", 1.0),
-        camera["near_clip"],
-        camera["far_clip"],
-        camera.get("projection", "perspective"),
-        camera.get("conform", "expandAperture"),
-        camera.get("pixel_aspect", 1.0),
-        tuple(map(tuple, camera.get("clip_planes", ()))),
-        camera.get("exposure", 1.0),
-        path,
-    )
+    return pose_of(np.array(camera["to_world"], np.float64), camera, path)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.gui.viewport.engine import Edit
-from wavecomb.gui.viewport.orbit import Pose
+from wavecomb.gui.viewport.orbit import Pose, pose_of
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -40,7 +40,7 @@ def camera_pose(usd: Usd.Stage, path: str, time: float | None) -> Pose | None:
     code: Usd.TimeCode = time_code(usd, time)
     to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
     view = read_camera(prim, to_world, code, LoadReport())
-    return None if view is None else Pose(view.transform, path=path, **view.options)
+    return None if view is None else pose_of(view.transform, view.options, path)
 
 
 def edits_again(

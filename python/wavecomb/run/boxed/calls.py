@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from wavecomb.camera_table import camera_parameters
 from wavecomb.light_table import MESH, LightParameter, light_parameters, of_kind
 from wavecomb.run.boxed.wire import Array, Refused
 
@@ -164,6 +165,10 @@ _LIGHT_VALUES: dict[str, Kind] = {
     "transforms": maybe(array("<f8", 3)),
 }  # fmt: skip
 
+_CAMERA_VALUES: dict[str, Kind] = {
+    "number": number, "choice": text, "four": _FOUR, "planes": many(_FOUR),
+}  # fmt: skip
+
 
 def _light(row: LightParameter) -> Kind:
     """What a parameter of a light takes."""
@@ -286,10 +291,8 @@ CALLS: dict[str, Call] = {
     "set_camera": Call(
         {"transform": _MATRIX},
         {
-            "window": _FOUR, "lens_radius": number, "focus_distance": number, "near_clip": number,
-            "far_clip": number, "motion": maybe(array("<f8", 3)), "projection": text,
-            "conform": text, "pixel_aspect": number, "clip_planes": many(_FOUR),
-            "exposure": number,
+            **{name: _CAMERA_VALUES[row.kind] for name, row in camera_parameters().items()},
+            "motion": maybe(array("<f8", 3)),
         },
     ),
 }  # fmt: skip

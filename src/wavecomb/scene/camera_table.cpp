@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/camera_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/scene/motion.h"
+#include "wavecomb/scene/scene_checks.h"
+
+namespace wavecomb {
+namespace {
+
+template <auto kMember>
+CameraValue read(const Camera& camera) {
+  using T = std::remove_cvref_t<decltype(camera.*kMember)>;
+  if constexpr (std::is_enum_v<T>)
+    return static_cast<uint32_t>(camera.*kMember);
+  else if constexpr (std::is_array_v<T>)
+    return std::to_array(camera.*kMember);
+  else
+    return camera.*kMember;
+}
+
+template <auto kMember>
+void write(Camera& camera, const CameraValue& value) {
+  using T = std::remove_cvref_t<decltype(camera.*kMember)>;
+  if constexpr (std::is_enum_v<T>)
+    camera.*kMember = static_cast<T>(std::get<uint32_t>(value));
+  else if constexpr (std::is_array_v<T>)
+    std::copy_n(std::get<FourNumbers>(value).begin(), 4, camera.*kMember);
+  else
+    camera.*kMember = std::get<T>(value);
+}
+
+template <auto kMember>
+CameraParameter row(const char* name, const char* help) {
+  CameraParameter p;
+  p.name = name;
+  p.help = help;
+  p.read = &read<kMember>;
+  p.write = &write<kMember>;
+  p.kind = static_cast<CameraValueKind>(p.read(Camera{}).index());
+  return p;
+}
+/// A number of `least` or more.
+template <auto kMember>
+CameraParameter number_from(const char* name, double least, const char* help) {
+  CameraParameter p = row<kMember>(name, help);
+  p.least = least;
+  return p;
+}
+/// A number above `least`.
+template <auto kMember>
+CameraParameter number_above(const char* name, double least, const char* help) {
+  CameraParameter p = number_from<kMember>(name, least, help);
+  p.is_above = true;
+  return p;
+}
+/// A number that may be infinite.
+template <auto kMember>
+CameraParameter distance(const char* name, const char* help) {
+  CameraParameter p = row<kMember>(name, help);
+  p.may_be_infinite = true;
+  return p;
+}
+template <auto kMember>
+CameraParameter choice(const char* name, std::vector<const char*> choices, const char* help) {
+  CameraParameter p = row<kMember>(name, help);
+  p.choices = std::move(choices);
+  return p;
+}
+CameraParameter needed(CameraParameter p) {
+  p.is_needed = true;
+  return p;
+}
+CameraParameter counted(CameraParameter p) {
+  p.counts_always = true;
+  return p;
+}
+
+std::vector<CameraParameter> make_table() {
+  using C = Camera;
+  return {
+      counted(number_from<&C::lens_radius>("lens_radius", 0,
+                                           "Of the lens, scene units; 0: all is sharp.")),
+      counted(distance<&C::focus_distance>("focus_distance",
+                                           "Along -z, scene units; above 0 with a lens.")),
+      counted(number_from<&C::near_clip>("near_clip", 0,
+                                         "Along -z, scene units; of a latlong camera a distance.")),
+      counted(distance<&C::far_clip>("far_clip",
+                                     "Along -z, scene units; of a latlong camera a distance.")),
+      counted(needed(row<&C::window>(
+          "window",
+          "x0, x1, y0, y1 of what the picture shows: on the plane z = -1, across the axis of an "
+          "orthographic camera, longitude and latitude in radians of a latlong one."))),
+      choice<&C::projection>("projection", {"perspective", "orthographic", "latlong"},
+                             "latlong: all directions, longitude to the right, latitude up."),
+      choice<&C::conform>("conform",
+                          {"expandAperture", "cropAperture", "adjustApertureWidth",
+                           "adjustApertureHeight", "adjustPixelAspectRatio"},
+                          "What gives way where the shapes of window and picture differ: "
+                          "UsdRender's aspectRatioConformPolicy."),
+      number_above<&C::pixel_aspect>("pixel_aspect", 0, "Width of a pixel / its height."),
+      row<&C::clip_planes>("clip_planes",
+                           "Planes (a, b, c, d) in the camera's space; of what it sees itself, "
+                           "points with a x + b y + c z + d < 0 are cut off."),
+      number_from<&C::exposure>("exposure", 0, "What light is multiplied by in the picture."),
+  };
+}
+
+std::string text(double v) {
+  char digits[32];
+  std::snprintf(digits, sizeof(digits), "%g", v);
+  return digits;
+}
+
+bool finite(const FourNumbers& four) {
+  for (const float x : four)
+    if (!std::isfinite(x)) return false;
+  return true;
+}
+
+bool is_place(const Affine& m) {
+  return finite(m) && std::abs(m.determinant()) >= 1e-30f;
+}
+
+constexpr float kHalfTurn = 1.5708f;  ///< pi / 2, with room for rounding
+
+}  // namespace
+
+void CameraParameter::check(const Camera& camera) const {
+  const auto wrong = [&](const std::string& what) {
+    throw Error("the camera's " + std::string(name) + " " + what);
+  };
+  const CameraValue value = read(camera);
+  if (const auto* number = std::get_if<float>(&value)) {
+    const double v = *number;
+    if (std::isnan(v) || (std::isinf(v) && !may_be_infinite)) wrong("is not finite; mend it");
+    if (v < least || (is_above && v <= least))
+      wrong("is " + text(v) + "; it must be " +
+            (is_above ? "above " + text(least) : text(least) + " or more"));
+  } else if (const auto* four = std::get_if<FourNumbers>(&value)) {
+    if (!finite(*four)) wrong("is not finite; mend it");
+  } else if (const auto* planes = std::get_if<std::vector<FourNumbers>>(&value)) {
+    for (const FourNumbers& plane : *planes)
+      if (!finite(plane)) wrong("are not finite; mend them");
+  }
+}
+
+std::span<const CameraParameter> camera_table() {
+  static const std::vector<CameraParameter> table = make_table();
+  return table;
+}
+
+void check_camera(const Camera& camera) {
+  if (!is_place(camera.to_world))
+    throw Error("the camera's transform is singular or not finite; mend it");
+  if (camera.steps.size() == 1 || camera.steps.size() > kMostSteps)
+    throw Error("the camera's motion needs 2 to " + std::to_string(kMostSteps) + " steps");
+  for (const Affine& step : camera.steps)
+    if (!is_place(step)) throw Error("the camera's motion is singular or not finite; mend it");
+  for (const CameraParameter& p : camera_table()) p.check(camera);
+  // What spans several of them.
+  const float* w = camera.window;
+  if (!(w[0] < w[1]) || !(w[2] < w[3]))
+    throw Error("the camera's window is empty; check its aperture and focal length");
+  if (camera.projection == Projection::kLatlong && (w[3] > kHalfTurn || w[2] < -kHalfTurn))
+    throw Error("the latlong camera's window must lie between the poles");
+  if (camera.lens_radius > 0 && !(camera.focus_distance > 0))
+    throw Error("the camera's lens needs a focus distance above 0");
+  if (!(camera.far_clip > camera.near_clip))
+    throw Error("the camera's clipping range must end beyond its start");
+}
+
+}  // namespace wavecomb
