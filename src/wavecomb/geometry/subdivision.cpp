@@ -88,49 +88,6 @@ Sdc::Options options_of(const Cage& cage) {
   return options;
 }
 
-void check_points(std::span<const int32_t> points, uint32_t count, const char* what) {
-  for (const int32_t p : points)
-    if (p < 0 || static_cast<uint32_t>(p) >= count)
-      throw Error(std::string(what) + " names a point that is not there");
-}
-
-/// What OpenSubdiv takes for granted.
-void check(const Cage& cage) {
-  size_t at = 0;
-  for (const int32_t size : cage.face_sizes) {
-    if (size < 3) throw Error("a face has fewer than three corners");
-    if (cage.scheme == Scheme::kLoop && size != 3)
-      throw Error("Loop subdivision needs triangles, and a face is none");
-    if (static_cast<size_t>(size) > cage.corners.size() - at)
-      throw Error("the face counts do not add up to the number of face indices");
-    at += static_cast<size_t>(size);
-  }
-  if (at != cage.corners.size())
-    throw Error("the face counts do not add up to the number of face indices");
-  if (at == 0) throw Error("no faces");
-  check_points(cage.corners, cage.vertex_count, "a face");
-  at = 0;
-  std::vector<int32_t> sorted;
-  for (const int32_t size : cage.face_sizes) {
-    const auto face = cage.corners.subspan(at, static_cast<size_t>(size));
-    sorted.assign(face.begin(), face.end());
-    std::sort(sorted.begin(), sorted.end());
-    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
-      throw Error("a face has one point twice");
-    at += static_cast<size_t>(size);
-  }
-  check_points(cage.crease_edges, cage.vertex_count, "a crease");
-  check_points(cage.corner_vertices, cage.vertex_count, "a sharp corner");
-  if (cage.crease_edges.size() != 2 * cage.crease_sharpness.size() ||
-      cage.corner_vertices.size() != cage.corner_sharpness.size())
-    throw Error("creases or corners do not have a sharpness each");
-  for (const FaceVaryingIndices& channel : cage.channels) {
-    if (channel.indices.size() != cage.corners.size())
-      throw Error("a face-varying primvar does not have an index for each corner");
-    check_points(channel.indices, channel.value_count, "a face-varying primvar");
-  }
-}
-
 }  // namespace
 
 struct Subdivision::Refiner {
@@ -197,7 +154,7 @@ std::vector<float> flat(const std::vector<V>& values) {
 
 Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   if (level < 1 || level > kMaxLevel) throw Error("the level of subdivision must be 1 to 10");
-  check(cage);
+  check_cage(cage);
   // OpenSubdiv counts with 32 bits; each level has four times the corners.
   if ((cage.corners.size() >> (31 - 2 * level)) > 0)
     throw Error("too many faces for level " + std::to_string(level));
@@ -385,32 +342,6 @@ std::vector<float> Subdivision::face_varying(uint32_t channel, std::span<const f
     refine.LimitFaceVarying(from, to, c);
     return flat(limit);
   });
-}
-
-Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
-                    std::span<const float> values, uint32_t width) {
-  check_points(corners, vertex_count, "a face");
-  if (values.size() != corners.size() * width)
-    throw Error("a face-varying primvar has the wrong number of values");
-  Welded out;
-  out.indices.resize(corners.size());
-  // The distinct values of each point so far, as a list of corners.
-  constexpr uint32_t kEnd = ~0u;
-  std::vector<uint32_t> first(vertex_count, kEnd), next(corners.size(), kEnd);
-  for (size_t c = 0; c < corners.size(); ++c) {
-    const float* own = values.data() + c * width;
-    uint32_t* link = &first[static_cast<size_t>(corners[c])];
-    while (*link != kEnd && !std::equal(own, own + width, values.data() + size_t{*link} * width))
-      link = &next[*link];
-    if (*link != kEnd) {
-      out.indices[c] = out.indices[*link];
-      continue;
-    }
-    *link = static_cast<uint32_t>(c);
-    out.indices[c] = static_cast<int32_t>(out.values.size() / width);
-    out.values.insert(out.values.end(), own, own + width);
-  }
-  return out;
 }
 
 }  // namespace wavecomb

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+/// SceneBuilder: groups in groups become a list of instances, and the whole becomes a scene.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/scene/parallel.h"
+#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_checks.h"
+#include "wavecomb/scene/scene_limits.h"
+
+namespace wavecomb {
+namespace {
+
+constexpr uint64_t kUncounted = ~uint64_t{0};
+/// What an instance takes at least, Embree's geometry for it before all.
+constexpr uint64_t kInstanceBytes = 400;
+
+/// Instances that can be numbered and that the memory of this machine holds.
+uint64_t max_instances() {
+  const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGE_SIZE);
+  if (pages <= 0 || page_bytes <= 0) return kMaxInstances;
+  return std::min(kMaxInstances, static_cast<uint64_t>(pages) * static_cast<uint64_t>(page_bytes) /
+                                     kInstanceBytes);
+}
+constexpr uint32_t kMaxNesting = 4096;
+
+}  // namespace
+
+uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
+                                        std::vector<uint64_t>& of_group) const {
+  constexpr uint64_t kUnderWay = ~uint64_t{0} - 1;
+  uint64_t& known = of_group[group];
+  if (known == kUnderWay)
+    throw Error(quoted("group", groups_[group].name) +
+                " holds itself; break the cycle of instances");
+  if (known != kUncounted) return known;
+  if (depth > kMaxNesting)
+    throw Error("groups are nested more than " + std::to_string(kMaxNesting) +
+                " deep; flatten some");
+  known = kUnderWay;
+  uint64_t count = group != 0 && !groups_[group].meshes.empty() ? 1 : 0;
+  for (const Node& node : children_[group]) {
+    count += count_placements(node.child, depth + 1, of_group);
+    if (count > max_instances())
+      throw Error("more than " + std::to_string(max_instances() / 1000000) +
+                  " million instances, the most that can be numbered or that this machine's "
+                  "memory holds; use fewer");
+  }
+  return known = count;
+}
+
+uint32_t common_segments(uint32_t a, uint32_t b) {
+  const uint32_t both = std::lcm(a, b);
+  return both < kMostSteps / 2 ? both : std::max(a, b);
+}
+
+std::vector<Affine> SceneBuilder::composed(std::span<const Affine> outer, const Affine& still,
+                                           const Node& node) const {
+  if (outer.empty() && !node.motion.moves()) return {};
+  const Affine* const first =
+      node.motion.moves() ? &node_steps_[node.motion.first] : &node.transform;
+  const std::span<const Affine> inner(first, node.motion.segments + 1);
+  if (outer.empty()) outer = {&still, 1};
+  const uint32_t n = common_segments(std::max<uint32_t>(1, static_cast<uint32_t>(outer.size() - 1)),
+                                     std::max(1u, node.motion.segments));
+  std::vector<Affine> steps;
+  for (uint32_t k = 0; k <= n; ++k) steps.push_back(at_step(outer, k, n) * at_step(inner, k, n));
+  return steps;
+}
+
+void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
+                           const std::vector<uint64_t>& counts, std::vector<Instance>& out,
+                           SceneGeometry& geometry) const {
+  if (group != 0 && !groups_[group].meshes.empty()) {
+    out.push_back(here);
+    if (!steps.empty()) {
+      out.back().motion = {static_cast<uint32_t>(geometry.steps.size()),
+                           static_cast<uint32_t>(steps.size() - 1)};
+      // What knows one place only takes the middle of the shutter.
+      out.back().to_world = at_step(steps, 1, 2);
+      for (const Affine& m : steps) geometry.steps.emplace_back(m);
+    }
+  }
+  for (const Node& node : children_[group]) {
+    if (counts[node.child] == 0) continue;
+    const auto placement = static_cast<uint32_t>(geometry.placements.size());
+    geometry.placements.push_back({here.placement, node.child, node.name, node.number});
+    const std::vector<Affine> moved = composed(steps, here.to_world, node);
+    flatten(node.child,
+            {node.child,
+             here.to_world * node.transform,
+             node.material == kInheritMaterial ? here.material : node.material,
+             placement,
+             {}},
+            moved, counts, out, geometry);
+  }
+}
+
+std::shared_ptr<const Scene> SceneBuilder::build() {
+  auto geometry = std::make_shared<SceneGeometry>();
+  // Counted first: shared groups can be placed in 2^n ways, and most of them may hold nothing.
+  std::vector<uint64_t> placements(groups_.size(), kUncounted);
+  std::vector<Instance> flat;
+  flat.reserve(count_placements(0, 0, placements));
+  flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, *geometry);
+  const auto sound = [](const Affine& m) {
+    const float det = m.determinant();
+    return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
+  };
+  size_t singular = 0;
+  for (Instance& i : flat) {
+    bool good = i.motion.moves() || sound(i.to_world);
+    for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
+      good = good && sound(geometry->steps[i.motion.first + k].affine());
+    if (good)
+      geometry->instances.push_back(std::move(i));
+    else
+      ++singular;
+  }
+  if (singular > 0)
+    warnings_.push_back(std::to_string(singular) +
+                        " instances have a singular transform and were left out");
+
+  SceneCounts counts{.meshes = meshes_.size(),
+                     .materials = materials_.size() + 1,
+                     .instances = geometry->instances.size(),
+                     .placed = groups_[0].meshes.size(),
+                     .placements = geometry->placements.size(),
+                     .steps = geometry->steps.size()};
+  for (const Group& group : groups_) counts.grouped += group.meshes.size();
+  for (const Instance& i : geometry->instances) counts.placed += groups_[i.group].meshes.size();
+  check_counts(counts);
+
+  // A grey for meshes that nothing was bound to.
+  const auto material_count = static_cast<uint32_t>(materials_.size());
+  const uint32_t grey = material_count;
+  Material fallback;
+  fallback.name = "default";
+  fallback.program = ProgramId::kDiffuse;
+  fallback.base_color = {0.5f, 0.5f, 0.5f};
+  materials_.push_back(fallback);
+  for (const Mesh& mesh : meshes_) {
+    const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
+    if (bad(mesh.material) ||
+        std::any_of(mesh.face_materials.begin(), mesh.face_materials.end(), bad))
+      throw Error(quoted("mesh", mesh.name) + " uses a material that was never added");
+  }
+  for (Instance& i : geometry->instances) {
+    if (i.material == kInheritMaterial) i.material = grey;
+    if (i.material > grey) throw Error("an instance uses a material that was never added");
+  }
+
+  geometry->meshes = std::move(meshes_);
+  geometry->groups = std::move(groups_);
+  geometry->textures = std::move(textures_);
+  geometry->profiles = std::move(profiles_);
+  geometry->sets = std::move(sets_);
+  geometry->mesh_lights = std::move(mesh_lights_);
+  geometry->light_groups = std::move(light_groups_);
+  geometry->attribute_names = std::move(attribute_names_);
+  geometry->names = std::move(names_);
+  geometry->warnings = std::move(warnings_);
+  std::shared_ptr<const SceneMaterials> materials;
+  std::shared_ptr<const SceneLights> lights;
+  with_threads(threads_, [&] {
+    make_records(*geometry, grey);
+    materials = std::make_shared<const SceneMaterials>(
+        std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})));
+    lights =
+        std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
+  });
+  std::shared_ptr<Scene> scene(
+      new Scene(std::move(geometry), std::move(materials), std::move(lights), nullptr, camera_));
+  scene->link();
+  *this = SceneBuilder(threads_, store_);
+  return scene;
+}
+
+}  // namespace wavecomb
