@@ -20,6 +20,11 @@ void bind_settings(nanobind::module_& m);
 void bind_render(nanobind::module_& m);
 void bind_renderer(nanobind::module_& m);
 
+/// The parts of class SceneBuilder that add textures and materials; meshes, curves, points and
+/// instances.
+void def_materials(nanobind::class_<wavecomb::SceneBuilder>& builder);
+void def_meshes(nanobind::class_<wavecomb::SceneBuilder>& builder);
+
 /// A texture use as SceneBuilder.add_material takes it.
 wavecomb::TextureUse texture_use(const nanobind::dict& d);
 

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Meshes, curves, points and instances of SceneBuilder.
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <array>
+
+#include "arguments.h"
+#include "bind.h"
+#include "scene_values.h"
+#include "wavecomb/scene/scene.h"
+
+namespace nb = nanobind;
+using namespace wavecomb;
+
+namespace {
+
+/// Keeps arrays alive from C++; they are let go of with the GIL held.
+std::shared_ptr<const void> hold(nb::list arrays) {
+  return {new nb::list(std::move(arrays)), [](const void* p) {
+            const nb::gil_scoped_acquire gil;
+            delete static_cast<const nb::list*>(p);
+          }};
+}
+
+/// Per vertex when (n, k), per corner when (m, 3, k); with steps before that where it `deforms`.
+Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, const std::string& name,
+                       bool deforms = false) {
+  if (!values) return Attribute::kNone;
+  const size_t first = deforms ? 1 : 0, n = values->ndim();
+  if (n == first + 2 && values->shape(first + 1) == k) return Attribute::kVertex;
+  if (n == first + 3 && values->shape(first + 1) == 3 && values->shape(first + 2) == k)
+    return Attribute::kCorner;
+  throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
+}
+
+/// Attributes by name, each a rate and an array (values, components). `owners` collects the arrays.
+std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& attributes,
+                                         nb::list& owners) {
+  std::vector<MeshAttribute> out;
+  for (const auto& [key, value] : attributes) {
+    const auto name = nb::cast<std::string>(key);
+    const auto [rate, values] = nb::cast<std::pair<std::string, Array<float>>>(value);
+    if (values.ndim() != 2)
+      throw Error("attribute '" + name + "' must have the shape (values, components)");
+    out.push_back({builder.attribute(name),
+                   choose<AttributeRate>("rate of attribute '" + name + "'", rate,
+                                         {{"constant", AttributeRate::kConstant},
+                                          {"primitive", AttributeRate::kPrimitive},
+                                          {"vertex", AttributeRate::kVertex},
+                                          {"corner", AttributeRate::kCorner},
+                                          {"end", AttributeRate::kEnd}}),
+                   static_cast<uint32_t>(std::min<size_t>(values.shape(1), 5)),
+                   {values.data(), values.size()}});
+    owners.append(nb::cast(values));
+  }
+  return out;
+}
+
+/// Arrays as a mesh; they are kept alive, not copied.
+Mesh make_mesh(SceneBuilder& builder, const Array<float>& positions,
+               const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+               const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
+               const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+               const nb::dict& attributes, const std::string& name) {
+  Mesh mesh;
+  mesh.name = name;
+  const bool deforms = positions.ndim() == 3;
+  if ((positions.ndim() != 2 && !deforms) || positions.shape(positions.ndim() - 1) != 3 ||
+      indices.ndim() != 2 || indices.shape(1) != 3)
+    throw Error("mesh '" + name +
+                "' needs positions of shape (n, 3), or (steps, n, 3), and indices of shape (m, 3)");
+  if (deforms) mesh.steps = static_cast<uint32_t>(std::min<size_t>(positions.shape(0), 1u << 30));
+  if (indices.dtype() != nb::dtype<uint32_t>() && indices.dtype() != nb::dtype<int32_t>())
+    throw Error("mesh '" + name + "' needs indices of int32 or uint32");
+  mesh.positions = {positions.data(), positions.size()};
+  mesh.indices = {static_cast<const uint32_t*>(indices.data()), indices.size()};
+  nb::list owners;
+  owners.append(nb::cast(positions));
+  owners.append(nb::cast(indices));
+  mesh.normals_at = attribute_of(normals, 3, name, deforms);
+  if (normals) {
+    mesh.normals = {normals->data(), normals->size()};
+    owners.append(nb::cast(*normals));
+  }
+  mesh.uvs_at = attribute_of(uvs, 2, name);
+  if (uvs) {
+    mesh.uvs = {uvs->data(), uvs->size()};
+    owners.append(nb::cast(*uvs));
+  }
+  if (face_materials) {
+    mesh.face_materials = {face_materials->data(), face_materials->size()};
+    owners.append(nb::cast(*face_materials));
+  }
+  mesh.attributes = attributes_of(builder, attributes, owners);
+  mesh.material = material;
+  mesh.owner = hold(std::move(owners));
+  return mesh;
+}
+
+uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
+                  const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+                  const std::optional<Array<float>>& normals,
+                  const std::optional<Array<float>>& uvs,
+                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                  const nb::dict& attributes, const std::string& name,
+                  const std::string& light_group, uint32_t asset_length,
+                  std::optional<uint32_t> mesh_light) {
+  Mesh mesh = make_mesh(builder, positions, indices, normals, uvs, face_materials, material,
+                        attributes, name);
+  mesh.light_group = builder.light_group(light_group);
+  mesh.asset_length = asset_length;
+  mesh.mesh_light = mesh_light.value_or(kNoLight);
+  return builder.add_mesh(std::move(mesh));
+}
+
+void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positions,
+                  const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
+                  const std::optional<Array<float>>& normals,
+                  const std::optional<Array<float>>& uvs,
+                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                  const nb::dict& attributes) {
+  builder.replace_mesh(id, make_mesh(builder, positions, indices, normals, uvs, face_materials,
+                                     material, attributes, ""));
+}
+
+/// What curves and points have in common, ready but for primitive, segments and normals. `owners`
+/// collects their arrays.
+Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
+                 const std::optional<Array<float>>& uvs,
+                 const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                 const nb::dict& attributes, const std::string& name,
+                 const std::string& light_group, uint32_t asset_length, nb::list& owners) {
+  Mesh mesh;
+  mesh.name = name;
+  mesh.light_group = builder.light_group(light_group);
+  mesh.asset_length = asset_length;
+  mesh.material = material;
+  const bool deforms = positions.ndim() == 3;
+  if ((positions.ndim() != 2 && !deforms) || positions.shape(positions.ndim() - 1) != 3)
+    throw Error("mesh '" + name + "' needs positions of shape (n, 3) or (steps, n, 3)");
+  if (deforms) mesh.steps = static_cast<uint32_t>(std::min<size_t>(positions.shape(0), 1u << 30));
+  mesh.positions = {positions.data(), positions.size()};
+  mesh.radii = {radii.data(), radii.size()};
+  owners.append(nb::cast(positions));
+  owners.append(nb::cast(radii));
+  if (uvs) {
+    mesh.uvs = {uvs->data(), uvs->size()};
+    mesh.uvs_at = Attribute::kCorner;
+    owners.append(nb::cast(*uvs));
+  }
+  if (face_materials) {
+    mesh.face_materials = {face_materials->data(), face_materials->size()};
+    owners.append(nb::cast(*face_materials));
+  }
+  mesh.attributes = attributes_of(builder, attributes, owners);
+  return mesh;
+}
+
+uint32_t add_curves(SceneBuilder& builder, const std::string& kind, const Array<float>& positions,
+                    const Array<uint32_t>& segments, const Array<float>& radii,
+                    const std::optional<Array<float>>& normals,
+                    const std::optional<Array<float>>& uvs,
+                    const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                    const nb::dict& attributes, const std::string& name,
+                    const std::string& light_group, uint32_t asset_length) {
+  nb::list owners;
+  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, attributes,
+                          name, light_group, asset_length, owners);
+  mesh.primitive = choose<Primitive>("kind of curves", kind,
+                                     {{"linear-tube", Primitive::kLinearTube},
+                                      {"cubic-tube", Primitive::kCubicTube},
+                                      {"linear-ribbon", Primitive::kLinearRibbon},
+                                      {"cubic-ribbon", Primitive::kCubicRibbon}});
+  mesh.indices = {segments.data(), segments.size()};
+  owners.append(nb::cast(segments));
+  if (normals) {
+    mesh.normals = {normals->data(), normals->size()};
+    owners.append(nb::cast(*normals));
+  }
+  mesh.owner = hold(std::move(owners));
+  return builder.add_mesh(std::move(mesh));
+}
+
+uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
+                    const std::optional<Array<float>>& uvs,
+                    const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
+                    const nb::dict& attributes, const std::string& name,
+                    const std::string& light_group, uint32_t asset_length) {
+  nb::list owners;
+  Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, attributes,
+                          name, light_group, asset_length, owners);
+  mesh.primitive = Primitive::kSphere;
+  mesh.owner = hold(std::move(owners));
+  return builder.add_mesh(std::move(mesh));
+}
+
+void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
+                   const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transforms,
+                   const std::optional<Array<uint32_t>>& materials,
+                   const std::optional<std::vector<std::string>>& names,
+                   const std::optional<Array<uint32_t>>& numbers,
+                   const std::optional<std::vector<uint32_t>>& asset_lengths,
+                   const std::optional<Array<double>>& motion) {
+  if (transforms.ndim() != 3 || transforms.shape(1) != 4 || transforms.shape(2) != 4)
+    throw Error("transforms of instances must have the shape (k, 4, 4)");
+  const bool is_double = transforms.dtype() == nb::dtype<double>();
+  if (!is_double && transforms.dtype() != nb::dtype<float>())
+    throw Error("transforms of instances must be of float32 or float64");
+  const size_t k = transforms.shape(0);
+  if (materials && (materials->ndim() != 1 || materials->shape(0) != k))
+    throw Error("materials of instances must be one for each transform");
+  if (names && names->size() != 1 && names->size() != k)
+    throw Error("names of instances must be one, or one for each transform");
+  if (numbers && (numbers->ndim() != 1 || numbers->shape(0) != k))
+    throw Error("numbers of instances must be one for each transform");
+  if (asset_lengths && (!names || asset_lengths->size() != names->size()))
+    throw Error("asset lengths of instances must be one for each name");
+  if (motion && (motion->ndim() != 4 || motion->shape(0) != k || motion->shape(2) != 4 ||
+                 motion->shape(3) != 4))
+    throw Error("the motion of instances must have the shape (k, steps, 4, 4)");
+  const size_t steps = motion ? motion->shape(1) : 0;
+  std::vector<Affine> moved(steps);
+  std::vector<uint32_t> texts;
+  for (size_t i = 0; names && i < names->size(); ++i)
+    texts.push_back(
+        builder.add_placement_name((*names)[i], asset_lengths ? (*asset_lengths)[i] : 0));
+  for (size_t i = 0; i < k; ++i) {
+    for (size_t s = 0; s < steps; ++s) moved[s] = affine(motion->data() + 16 * (i * steps + s));
+    builder.add_instance(parent, child,
+                         is_double ? affine(static_cast<const double*>(transforms.data()) + 16 * i)
+                                   : affine(static_cast<const float*>(transforms.data()) + 16 * i),
+                         materials ? materials->data()[i] : kInheritMaterial,
+                         texts.empty() ? kNoName : texts[texts.size() == 1 ? 0 : i],
+                         numbers ? numbers->data()[i] : kNoName, moved);
+  }
+}
+
+}  // namespace
+
+void def_meshes(nb::class_<SceneBuilder>& builder) {
+  using namespace nb::literals;
+  builder
+      .def("add_mesh", &add_mesh, "positions"_a, "indices"_a, nb::kw_only(),
+           "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
+           "material"_a = kInheritMaterial, "attributes"_a = nb::dict(), "name"_a = "",
+           "light_group"_a = "", "asset_length"_a = 0, "mesh_light"_a = nb::none())
+      .def("replace_mesh", &replace_mesh, "mesh"_a, "positions"_a, "indices"_a, nb::kw_only(),
+           "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
+           "material"_a = kInheritMaterial, "attributes"_a = nb::dict())
+      .def("add_curves", &add_curves, "kind"_a, "positions"_a, "segments"_a, "radii"_a,
+           nb::kw_only(), "normals"_a = nb::none(), "uvs"_a = nb::none(),
+           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
+           "attributes"_a = nb::dict(), "name"_a = "", "light_group"_a = "", "asset_length"_a = 0)
+      .def("add_points", &add_points, "positions"_a, "radii"_a, nb::kw_only(), "uvs"_a = nb::none(),
+           "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
+           "attributes"_a = nb::dict(), "name"_a = "", "light_group"_a = "", "asset_length"_a = 0)
+      .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
+           "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
+           "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none());
+}
