@@ -11,6 +11,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
+from numbers import Integral, Real
 from typing import Any, cast
 
 from wavecomb.errors import WavecombError
@@ -36,6 +37,8 @@ class Row:
         many: May be given again.
         least: Smallest number.
         most: Largest number.
+        above: Whether ``least`` itself is too little.
+        unit: Of numbers.
     """
 
     help: str
@@ -47,6 +50,47 @@ class Row:
     many: bool = False
     least: float = -math.inf
     most: float = math.inf
+    above: bool = False
+    unit: str = ""
+
+    def check(self, name: str, value: Any) -> None:
+        """Raises WavecombError, which says ``name``, for a value that is none; None is no value."""
+        if value is None:
+            return
+        for one in value if self.many and self.choices else (value,):
+            if self.choices and one not in self.choices:
+                raise WavecombError(f"no {name} {one!r}; there are {', '.join(self.choices)}")
+        numbers = value if self.kind == "pair" else (value,)
+        counts = {"number": 1, "integer": 1, "pair": 2}
+        if self.kind not in counts:
+            return
+        is_whole = self.kind == "integer"
+        good = len(numbers) == counts[self.kind] and all(
+            isinstance(one, Integral if is_whole else Real) and self._is_in_range(one)
+            for one in numbers
+        )
+        if not good:
+            what = (
+                "two numbers"
+                if self.kind == "pair"
+                else "a whole number"
+                if is_whole
+                else "a number"
+            )
+            unit = f" {self.unit}" if self.unit else ""
+            raise WavecombError(f"{name} {value}{unit}: must be {what}{self._range_text()}")
+
+    def _is_in_range(self, number: Any) -> bool:
+        return bool(math.isfinite(number) and self.least <= number <= self.most) and not (
+            self.above and number == self.least
+        )
+
+    def _range_text(self) -> str:
+        if math.isfinite(self.most):
+            return f" from {self.least:g} to {self.most:g}"
+        if math.isfinite(self.least):
+            return f" above {self.least:g}" if self.above else f" of at least {self.least:g}"
+        return ""
 
     @property
     def key(self) -> str:
@@ -155,7 +199,7 @@ class LoadOptions:
     )  # fmt: skip
     texture_limit: float | None = _row(
         None, "Memory of all textures; what does not fit waits in a temporary file.", "number",
-        "--texture-limit", metavar="MB", least=0, unset="any",
+        "--texture-limit", metavar="MB", least=0, above=True, unit="MB", unset="any",
     )  # fmt: skip
     working_space: str = _row(
         "rec709", "Linear colours that the picture is computed in.", "choice", "--working-space",
@@ -167,8 +211,8 @@ class LoadOptions:
         "picture.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
-    size: tuple[int, int] = _row((600, 600), "Of the picture.", "pair")
-    threads: int = _row(0, "That read.", "integer")
+    size: tuple[int, int] = _row((600, 600), "Of the picture.", "pair", least=1)
+    threads: int = _row(0, "That read.", "integer", least=0)
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
@@ -197,26 +241,9 @@ class LoadOptions:
 
     def check(self) -> None:
         """Raises WavecombError for what no stage can have."""
-        if self.texture_limit is not None and not self.texture_limit > 0:
-            raise WavecombError(f"texture limit {self.texture_limit} MB: must be more than 0")
-        if self.working_space not in WORKING_SPACES:
-            known = ", ".join(WORKING_SPACES)
-            raise WavecombError(f"working space {self.working_space!r} is none of {known}")
-        if self.frame is not None and not math.isfinite(self.frame):
-            raise WavecombError(f"frame must be a number, not {self.frame}")
-        if self.lights not in LIGHT_SHAPES:
-            raise WavecombError(f"lights {self.lights!r}: there are {', '.join(LIGHT_SHAPES)}")
-        if not (len(self.size) == 2 and min(self.size) >= 1):
-            raise WavecombError(
-                f"size {self.size}: must be a width and a height of at least 1 pixel"
-            )
-        unknown = [name for name in self.purposes or () if name not in PURPOSES]
-        if unknown:
-            raise WavecombError(f"no purpose {unknown[0]!r}; there are {', '.join(PURPOSES)}")
-        if self.projection is not None and self.projection not in PROJECTIONS:
-            raise WavecombError(
-                f"no camera projection {self.projection!r}; there are {', '.join(PROJECTIONS)}"
-            )
+        for one in fields(self):
+            row = row_of(one)
+            row.check(row.option[2:].replace("-", " ") or one.name, getattr(self, one.name))
 
 
 def row_of(option: Field[Any]) -> Row:

@@ -154,7 +154,7 @@ def test_halves_are_boxes_in_linear_light():
 
 
 def test_limits_that_cannot_be(tmp_path, stage):
-    with pytest.raises(WavecombError, match="texture limit -1 MB: must be more than 0"):
+    with pytest.raises(WavecombError, match="texture limit -1 MB: must be a number above 0"):
         load_stage(write(tmp_path, stage), texture_limit=-1, builder_factory=Recorder)
     _, loaded = load(tmp_path, stage, texture_limit=1e-6)
     assert "even without detail" in said(loaded)

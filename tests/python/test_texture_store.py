@@ -283,5 +283,5 @@ def test_the_file_goes_where_it_is_told_to(monkeypatch, tmp_path):
 
 
 def test_a_limit_is_a_number_above_0(stage):
-    with pytest.raises(WavecombError, match="texture limit 0 MB: must be more than 0"):
+    with pytest.raises(WavecombError, match="texture limit 0 MB: must be a number above 0"):
         load_stage(stage, texture_limit=0)

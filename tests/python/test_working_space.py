@@ -147,5 +147,5 @@ def test_textures_are_converted_by_what_they_are(tmp_path):
 
 
 def test_unknown_working_space(tmp_path):
-    with pytest.raises(WavecombError, match="'aces' is none of rec709, acescg"):
+    with pytest.raises(WavecombError, match="no working space 'aces'; there are rec709, acescg"):
         load_stage(write(tmp_path, STAGE), working_space="aces", builder_factory=Recorder)

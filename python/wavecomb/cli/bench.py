@@ -13,7 +13,8 @@ from pathlib import Path
 
 import click
 
-from wavecomb.cli.options import Real, examples
+from wavecomb.cli.options import examples
+from wavecomb.cli.row_options import Real
 
 _METRICS = (
     *("render_s", "shade_and_order_s", "shade_s", "load_s", "build_s"),

@@ -9,7 +9,8 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import Real, examples, isolate_option
+from wavecomb.cli.options import examples, isolate_option
+from wavecomb.cli.row_options import Real
 from wavecomb.cli.sandbox import enter_to_read
 
 _METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")

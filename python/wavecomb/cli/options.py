@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options that more than one command has, and types of option values."""
+"""Options that more than one command has."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from wavecomb.cli.row_options import Real, row_option
 from wavecomb.load_options import Row, given, rows
 
 if TYPE_CHECKING:
@@ -17,31 +17,6 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.choice import RenderChoice
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-
-class Real(click.ParamType):
-    """A finite number, perhaps with a lower bound."""
-
-    name = "number"
-
-    def __init__(self, minimum: float = -math.inf, *, above: bool = False) -> None:
-        self._minimum = minimum
-        self._above = above
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Text to a float; fails with what it must be."""
-        try:
-            number = float(value)
-        except ValueError:
-            self.fail(f"{value!r} is not a number", param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number", param, ctx)
-        if number < self._minimum or (self._above and number == self._minimum):
-            bound = "above" if self._above else "at least"
-            self.fail(f"{value} must be {bound} {self._minimum:g}", param, ctx)
-        return number
 
 
 def examples(*lines: str) -> str:
@@ -126,33 +101,23 @@ def isolation_options(command: F) -> F:
 
 def stage_options(command: F) -> F:
     """STAGE, and an option for each row of ``LoadOptions``."""
-    for row in reversed(rows().values()):
-        command = _load_option(row)(command)
+    parameters = command.__dict__.setdefault("__click_params__", [])
+    parameters += [_load_option(row) for row in reversed(rows().values())]
     return click.argument("stage", type=click.Path())(command)
 
 
-def _load_option(row: Row) -> Callable[[F], F]:
-    text = row.help + (f"  [default: {row.unset}]" if row.unset else "")
-    if row.kind == "not":
-        return click.option(row.option, row.key, is_flag=True, help=text)
-    kinds: dict[str, Any] = {
-        "text": str,
-        "file": click.Path(),
-        "number": Real(row.least),
-        "pair": Real(),
-        "choice": click.Choice(row.choices),
-        "switch": click.Choice(["on", "off"]),
-    }
-    if row.kind == "integer":
-        kinds["integer"] = click.IntRange(int(row.least), int(row.most))
-    return click.option(
-        row.option,
-        row.key,
-        type=kinds[row.kind],
+def _load_option(row: Row) -> click.Option:
+    return row_option(
+        [row.option, row.key],
+        "flag" if row.kind == "not" else row.kind,
+        row.help,
+        default=row.unset,
+        choices=row.choices,
+        least=row.least,
+        most=row.most,
+        above=row.above,
         metavar=row.metavar,
-        multiple=row.many,
-        nargs=2 if row.kind == "pair" else 1,
-        help=text,
+        many=row.many,
     )
 
 

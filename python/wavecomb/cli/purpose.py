@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from wavecomb.cli.options import Real
+from wavecomb.cli.row_options import Real
 from wavecomb.errors import WavecombError
 
 if TYPE_CHECKING:

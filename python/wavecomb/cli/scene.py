@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.options import Real, examples
+from wavecomb.cli.options import examples
+from wavecomb.cli.row_options import Real
 
 
 @click.command(

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from wavecomb.cli.options import Real
+from wavecomb.cli.row_options import row_option
 from wavecomb.options import Setting, default_text, settings
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -18,6 +18,8 @@ ASKED_FOR_ELSEWHERE = (
     *("progressive", "costs"),
 )
 """Settings whose options say more than the setting: --size, --adaptive, --costs FILE ..."""
+
+_METAVARS = {"integer": "N", "number": "X", "text": "TEXT"}
 
 
 class SettingCommand(click.Command):
@@ -65,29 +67,16 @@ def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
 
 def _option(row: Setting) -> click.Option:
     """Of a setting."""
-    if row.kind == "flag":
-        return click.Option([row.option, row.name], is_flag=True, default=None, help=row.help)
-    kind: Any
-    metavar = None
-    text = row.help
-    if row.kind == "choice":
-        kind = click.Choice(list(row.choices))
-    elif row.steps:
-        kind = _Steps(row)
-    elif row.kind == "integer":
-        kind, metavar = click.IntRange(min=0), "N"
-    elif row.kind == "number":
-        least = row.least or 0.0
-        kind, metavar = Real(0, above=least > 0 and not row.zero), "X"
-    else:
-        kind, metavar = str, "TEXT"
-    if row.zero and not row.steps:
-        text += f" 0: {row.zero}."
-    return click.Option(
+    # The core says what is out of range; only signs are told here.
+    return row_option(
         [row.option, row.name],
-        type=kind,
-        metavar=metavar,
-        help=f"{text}  [default: {default_text(row)}]",
+        _Steps(row) if row.steps else row.kind,
+        row.help + (f" 0: {row.zero}." if row.zero and not row.steps else ""),
+        default="" if row.kind == "flag" else default_text(row),
+        choices=tuple(row.choices),
+        least=0,
+        above=(row.least or 0.0) > 0 and not row.zero,
+        metavar=None if row.steps else _METAVARS.get(row.kind),
     )
 
 
