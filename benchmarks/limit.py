@@ -50,7 +50,7 @@ from sitting import (
 )
 
 from wavecomb import _core
-from wavecomb.api import make_settings
+from wavecomb.run.settings import make_settings
 
 KINDS = ("camera", "bounce", "shadow")
 WIDTHS = (1, 4, 8, 16)

@@ -42,10 +42,11 @@ def resident(key):
         return next(int(line.split()[1]) * 1024 for line in file if line.startswith(key))
 import wavecomb.usd.stage.load
 from wavecomb import _core, api
+from wavecomb.run.settings import make_settings
 from wavecomb.run.stats import make_stats
 imports, imports_bytes = time.monotonic(), resident("VmRSS")
 stage, output, size, threads = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
-settings = api.make_settings((size, size), 1, threads=threads)
+settings = make_settings((size, size), 1, threads=threads)
 loaded = api.load(stage, threads=threads, isolate=False)  # as commands do
 load = time.monotonic()
 result = _core.render(loaded.scene, settings, None, None, None)

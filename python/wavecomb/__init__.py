@@ -18,10 +18,11 @@ isa.install()
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene, SceneBuilder, Settings
-    from wavecomb.api import Picture, load, render
+    from wavecomb.api import load, render
     from wavecomb.errors import WavecombError
     from wavecomb.picture import cryptomatte
     from wavecomb.picture.compare import Comparison, compare
+    from wavecomb.picture.rendered import Picture
     from wavecomb.run.sequence import render_frames
     from wavecomb.scheduling import SchedulingPolicy
 
@@ -45,7 +46,7 @@ __all__ = [
 
 _HOMES = {
     "Comparison": "wavecomb.picture.compare",
-    "Picture": "wavecomb.api",
+    "Picture": "wavecomb.picture.rendered",
     "Scene": "wavecomb._core",
     "SceneBuilder": "wavecomb._core",
     "SchedulingPolicy": "wavecomb.scheduling",

@@ -139,9 +139,9 @@ def test_memory_is_as_stated(loaded: Any, names: tuple[str, ...]) -> None:
 
 
 def test_many_light_groups_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    from wavecomb.api import check_memory
+    from wavecomb.run.settings import check_memory
 
-    monkeypatch.setattr("wavecomb.api.machine_limit", lambda: 2**30)
+    monkeypatch.setattr("wavecomb.run.settings.machine_limit", lambda: 2**30)
     settings = _core.Settings(width=1500, height=1500, spp=1)
     check_memory(settings, aovs.expand(["light_groups"]), 4)
     with pytest.raises(WavecombError, match=r"needs about 5 GiB .*smaller size or fewer AOVs"):

@@ -132,6 +132,7 @@ MEASURE = """
 import json, os, sys
 import wavecomb.usd.stage.load
 from wavecomb import _core, api
+from wavecomb.run.settings import make_settings
 
 def memory(key):
     lines = open("/proc/self/status").read().splitlines()
@@ -150,7 +151,7 @@ after = memory("VmRSS")
 shares = {}
 for threads in (1, 2):
     before = cpu()
-    settings = api.make_settings((64, 64), 1, threads=threads)
+    settings = make_settings((64, 64), 1, threads=threads)
     result = _core.render(loaded.scene, settings)
     spent = [ns - before.get(task, 0) for task, ns in cpu().items()]
     shares[threads] = max(spent) / sum(spent)
@@ -194,12 +195,13 @@ def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
     code = """
 import json, sys
 from wavecomb import _core, api
+from wavecomb.run.settings import make_settings
 from wavecomb.cli.reporting import make_reporter
 from wavecomb.run.progress import Interrupt
 from wavecomb.run.watcher import Watcher
 loaded = api.load(sys.argv[1])
 with Interrupt(), make_reporter(None, quiet=False).rendering() as bar:
-    _core.render(loaded.scene, api.make_settings((8, 8), 1), watcher=Watcher(reporter=bar))
+    _core.render(loaded.scene, make_settings((8, 8), 1), watcher=Watcher(reporter=bar))
 print(json.dumps([name for name in ("OpenImageIO", "rich") if name in sys.modules]))
 """
     unforced = {k: v for k, v in os.environ.items() if k not in ("FORCE_COLOR", "TTY_COMPATIBLE")}

@@ -17,7 +17,7 @@ from wavecomb.run.faults import describe
 from wavecomb.run.frame_names import frame_text, has_place, parse_frames
 
 if TYPE_CHECKING:
-    from wavecomb.api import Picture
+    from wavecomb.picture.rendered import Picture
     from wavecomb.run.sequence import Frames
     from wavecomb.usd import LoadReport
 

@@ -14,8 +14,8 @@ from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.run.frame_names import fill
 
 if TYPE_CHECKING:
-    from wavecomb.api import Picture
     from wavecomb.cli.reporting import Reporter
+    from wavecomb.picture.rendered import Picture
     from wavecomb.run.checkpoint import Checkpoint
     from wavecomb.run.sequence import Frames
     from wavecomb.usd import LoadedStage, LoadReport
@@ -129,8 +129,9 @@ class Job:
         resumed: Checkpoint | None = None,
     ) -> tuple[Picture, int | None, LoadReport]:
         """The picture, the number of the signal that stopped it, and what to say of the stage."""
-        from wavecomb.api import check_memory, picture_of
+        from wavecomb.picture.rendered import picture_of
         from wavecomb.run.progress import Interrupt
+        from wavecomb.run.settings import check_memory
         from wavecomb.run.watcher import Watcher
 
         with self.reporter.loading(self.stage) as progress:

@@ -70,7 +70,7 @@ class Plan:
             aovs: Layers that are kept.
             resumed: Whether a render goes on: it has a size and a region.
         """
-        from wavecomb.api import DEFAULT_SIZE, make_settings
+        from wavecomb.run.settings import DEFAULT_SIZE, make_settings
 
         chosen = dict(chosen)
         width, height = self.choice.resolution or DEFAULT_SIZE

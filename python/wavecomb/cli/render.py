@@ -11,10 +11,11 @@ import click
 from wavecomb.cli.aovs import AovOptions, aov_options
 from wavecomb.cli.frames import check_frames, frame_options, open_frames, render_sequence
 from wavecomb.cli.job import Job, Names, Shot, Still, how_far, purpose_at
-from wavecomb.cli.options import Real, StageOptions, examples, isolation_options, stage_options
+from wavecomb.cli.options import StageOptions, examples, isolation_options, stage_options
 from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions, purpose_options
 from wavecomb.cli.reporting import make_reporter
+from wavecomb.cli.row_options import Real
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.cli.setting_options import SettingCommand, setting_options
 from wavecomb.options import settings as known_settings
@@ -122,7 +123,7 @@ def render_command(
     SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
     all. docs/render.md and docs/aovs.md say more.
     """
-    from wavecomb.api import keeps_error
+    from wavecomb.run.settings import keeps_error
 
     source = StageOptions.take(options)
     purpose = PurposeOptions.take(options)

@@ -89,7 +89,7 @@ class Setup(_Rows):
         Raises:
             WavecombError, wavecomb._core.Error: A value is no good; one line.
         """
-        from wavecomb.api import make_settings
+        from wavecomb.run.settings import make_settings
 
         own = {"width", "height", "spp", "aovs", "denoise", "region", "own_policy", "profile"}
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in own}

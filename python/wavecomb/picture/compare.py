@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from wavecomb.api import Picture
+    from wavecomb.picture.rendered import Picture
 
     Source: TypeAlias = str | os.PathLike[str] | Picture | NDArray[Any]
 

@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb import _core
-from wavecomb.api import check_memory, picture_of, prepare
 from wavecomb.load_options import LoadOptions, split
+from wavecomb.picture.rendered import picture_of
 from wavecomb.run.boxed.reader import Reader, is_wanted
 from wavecomb.run.frame_names import parse_frames
+from wavecomb.run.settings import check_memory, prepare
 from wavecomb.run.stats import make_stats
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.api import Picture
+    from wavecomb.picture.rendered import Picture
     from wavecomb.run.frame_reader import FrameReader
     from wavecomb.usd import LoadedStage
 

@@ -258,7 +258,7 @@ class Engine:
         result: Result,
         statistics: dict[str, Any],
     ) -> Frame:
-        from wavecomb.api import picture_of
+        from wavecomb.picture.rendered import picture_of
 
         aovs = task.setup.aovs
         picture = picture_of(result, statistics, scene=renderer.scene, aovs=aovs)

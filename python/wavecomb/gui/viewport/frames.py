@@ -14,7 +14,7 @@ from wavecomb.gui.setup import Setup
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Snapshot
-    from wavecomb.api import Picture
+    from wavecomb.picture.rendered import Picture
 
 Array = NDArray[Any]
 _FIELDS = ("albedo", "normal", "depth", "samples", "error", "variance")

@@ -17,13 +17,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from wavecomb.api import MAX_EDGE
 from wavecomb.gui import theme
 from wavecomb.gui.scheduling.choices import number
 from wavecomb.gui.scheduling.setting_controls import control_of, show_control
 from wavecomb.gui.viewport.cameras_model import CamerasModel
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.widgets import caption, named
+from wavecomb.run.settings import MAX_EDGE
 
 _MOST: dict[str, dict[str, Any]] = {"width": {"most": MAX_EDGE}, "height": {"most": MAX_EDGE}}
 _NAMES = {"max_depth": "depth"}

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from wavecomb.api import Picture
 from wavecomb.errors import WavecombError
 from wavecomb.gui.viewport.denoiser import denoised_frame
 from wavecomb.gui.viewport.develop import develop_frame
@@ -14,6 +13,7 @@ from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.picture.image import Transfer, write_png_codes
 from wavecomb.picture.output import scene_metadata
+from wavecomb.picture.rendered import Picture
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene

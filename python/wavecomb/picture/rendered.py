@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rendered picture: its layers, and how it is saved."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.run import aovs as aov_names
+
+if TYPE_CHECKING:
+    from wavecomb._core import Result, Scene
+    from wavecomb.picture.exr import Compression
+    from wavecomb.picture.image import Transfer
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered picture. Row 0 is the top.
+
+    Attributes:
+        beauty: (height, width, 3), linear Rec.709, or in the working space of the stage.
+        albedo: (height, width, 3). Like normal and depth, None where it was not asked for.
+        normal: (height, width, 3), world space.
+        depth: (height, width), along the camera's axis; infinite where nothing was hit.
+        samples: (height, width), samples that each pixel got.
+        error: (height, width), what adaptive sampling goes by (docs/render.md); infinite where
+            there are too few samples. None unless the render was adaptive or had error=True.
+        variance: (height, width, 3), of each pixel's mean, as if its samples were independent;
+            None likewise.
+        denoised: (height, width, 3), the beauty without its noise; None unless asked for.
+        stats: What was done and how long it took; docs/statistics.md has the schema.
+        cancelled: Progress asked to stop; the picture holds what was done.
+        costs: What shading took, by name of material and texture: a profile that another render
+            can start from.
+        aovs: Further AOVs by name, (height, width) or (height, width, channels): docs/aovs.md.
+            Cryptomatte levels are pairs of id and coverage, as `wavecomb.cryptomatte` reads them.
+        manifests: Cryptomatte level -> name -> id, of what the picture holds.
+        metadata: For the header of a file, beside what the statistics say.
+        chosen: Names of the layers that are saved; all that there are where it is empty.
+    """
+
+    beauty: NDArray[np.float32]
+    albedo: NDArray[np.float32] | None
+    normal: NDArray[np.float32] | None
+    depth: NDArray[np.float32] | None
+    samples: NDArray[np.uint32]
+    error: NDArray[np.float32] | None = None
+    variance: NDArray[np.float32] | None = None
+    denoised: NDArray[np.float32] | None = None
+    stats: dict[str, Any] = field(default_factory=dict, repr=False)
+    cancelled: bool = False
+    costs: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
+    aovs: dict[str, NDArray[np.float32]] = field(default_factory=dict, repr=False)
+    manifests: dict[str, dict[str, int]] = field(default_factory=dict, repr=False)
+    metadata: dict[str, Any] = field(default_factory=dict, repr=False)
+    chosen: tuple[str, ...] = ()
+
+    def layers(self) -> dict[str, NDArray[Any]]:
+        """The layers of an EXR file by name and in order; a Cryptomatte is several there."""
+        from wavecomb.picture import cryptomatte
+
+        arrays = {
+            "beauty": self.beauty,
+            "denoised": self.denoised,
+            "albedo": self.albedo,
+            "normal": self.normal,
+            "depth": self.depth,
+            "samples": self.samples,
+            "error": self.error,
+            "variance": self.variance,
+        }
+        out: dict[str, NDArray[Any]] = {}
+        wanted = set(self.chosen or {**arrays, **self.aovs}) | {"denoised"}
+        if self.chosen == aov_names.DEFAULT:
+            wanted |= {"error", "variance"}
+        for name, array in {**arrays, **self.aovs}.items():
+            may_be_kept_only = name in arrays or name in aov_names.GUIDES
+            if array is None or (may_be_kept_only and name not in wanted):
+                continue
+            out.update(
+                cryptomatte.layers(name, array) if name in cryptomatte.LEVELS else {name: array}
+            )
+        return out
+
+    def with_denoised(self, *, threads: int = 0) -> Picture:
+        """The picture with its layer ``denoised``, by Open Image Denoise; the beauty stays.
+
+        Guided by the AOVs guide_albedo and guide_normal, which see through mirrors and clear glass,
+        or else by albedo and normal.
+
+        Raises:
+            WavecombError: The extra ``denoise`` is missing; says how to install it.
+        """
+        from wavecomb.errors import WavecombError
+        from wavecomb.picture.denoise import denoise
+
+        albedo = self.aovs.get("guide_albedo", self.albedo)
+        normal = self.aovs.get("guide_normal", self.normal)
+        if albedo is None or normal is None:
+            raise WavecombError(
+                "denoising needs the AOVs guide_albedo and guide_normal: render with them, too"
+            )
+        start = time.perf_counter()
+        denoised = denoise(self.beauty, albedo, normal, threads=threads)
+        seconds = {**self.stats.get("seconds", {}), "denoise": time.perf_counter() - start}
+        return replace(self, denoised=denoised, stats={**self.stats, "seconds": seconds})
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        half: bool = False,
+        compression: Compression = "zip",
+        tile: int = 0,
+        split: bool = False,
+        exposure: float = 0.0,
+        tone_map: Transfer = "clamp",
+    ) -> list[Path]:
+        """Writes all layers (.exr) or the picture for display (.png), whole or not at all.
+
+        A .png is of the denoised picture where there is one.
+
+        Args:
+            path: By its ending .exr or .png.
+            half: EXR: 16 bit colours and normals.
+            compression: EXR: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa or dwab.
+            tile: EXR: edge of tiles in pixels, a multiple of 16; 0: scanlines.
+            split: EXR: a file for each AOV, path.NAME.exr, the beauty in ``path`` itself.
+            exposure: PNG: in stops.
+            tone_map: PNG: "clamp" or "neutral".
+
+        Returns:
+            The files that were written.
+
+        >>> picture = wavecomb.render("mixed.usdc")  # doctest: +SKIP
+        >>> picture.save("mixed.exr", half=True)  # doctest: +SKIP
+        >>> picture.save("mixed.png", exposure=0.5)  # doctest: +SKIP
+        """
+        from wavecomb.picture.image import write_png
+        from wavecomb.picture.output import save_layers
+        from wavecomb.picture.working_space import to_rec709
+
+        kind = Path(path).suffix.lower()
+        if kind == ".exr":
+            return save_layers(
+                path,
+                self.layers(),
+                self.file_metadata(),
+                self.manifests,
+                half=half,
+                compression=compression,
+                tile=tile,
+                split=split,
+            )
+        if kind == ".png":
+            shown = self.beauty if self.denoised is None else self.denoised
+            shown = to_rec709(shown, self.stats.get("working_space", "rec709"))
+            write_png(path, shown, exposure=exposure, tone_map=tone_map)
+            return [Path(path)]
+        raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
+
+    def file_metadata(self) -> dict[str, Any]:
+        """Attributes of an EXR file: version, stage, camera, settings, times, matrices."""
+        from wavecomb.run.stats import picture_metadata
+
+        return {**picture_metadata(self.stats), **self.metadata}
+
+
+def picture_of(
+    result: Result,
+    stats: dict[str, Any],
+    *,
+    scene: Scene | None = None,
+    aovs: Sequence[str] = aov_names.DEFAULT,
+) -> Picture:
+    """A result of the core as a picture.
+
+    Args:
+        result: Of ``_core.render``.
+        stats: Of ``make_stats``.
+        scene: What was rendered, for the camera's matrices.
+        aovs: Names as ``aovs.expand`` gives them.
+    """
+    from wavecomb.picture.output import scene_metadata
+
+    height, width = result.beauty.shape[:2]
+    return Picture(
+        beauty=result.beauty,
+        albedo=result.albedo,
+        normal=result.normal,
+        depth=result.depth,
+        samples=result.samples,
+        error=result.error,
+        variance=result.variance,
+        stats=stats,
+        cancelled=result.cancelled,
+        costs=result.costs,
+        aovs=result.aovs,
+        manifests=result.manifests,
+        metadata={} if scene is None else scene_metadata(scene, width, height),
+        chosen=tuple(aovs),
+    )

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a render is asked for, checked: settings, policy, costs, AOVs, memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.run import aovs as aov_names
+from wavecomb.run.isolate.memory import machine_limit
+
+if TYPE_CHECKING:
+    from wavecomb._core import Settings
+    from wavecomb.scheduling import SchedulingPolicy
+
+DEFAULT_SIZE = (600, 600)
+MAX_EDGE = 65536
+MAX_SPP = 1 << 24
+# Of an adaptive render: sums and layers of errors, and what measuring them takes.
+_ERROR_BYTES_PER_PIXEL = 100
+
+
+def prepare(
+    size: tuple[int, int],
+    spp: int,
+    policy: str | SchedulingPolicy | None,
+    costs: str | Mapping[str, Mapping[str, float]] | None,
+    aovs: Iterable[str] | None,
+    settings: dict[str, Any],
+) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
+    """Checked arguments of ``render``: a policy of the caller's, a profile, AOVs, settings."""
+    own: Any = None
+    if isinstance(policy, str):
+        settings["policy"] = policy
+    elif policy is not None:
+        from wavecomb.scheduling import check_policy
+
+        check_policy(policy)
+        own = policy
+    profile: dict[str, dict[str, float]] | None = None
+    if isinstance(costs, str):
+        settings["costs"] = costs
+    elif costs is not None:
+        from wavecomb.run.costs import check_costs
+
+        profile = check_costs(costs)
+    names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
+    chosen = make_settings(size, spp, aovs=names, **settings)
+    return own, profile, tuple(names), chosen
+
+
+def make_settings(
+    size: tuple[int, int],
+    spp: int,
+    *,
+    aovs: Sequence[str] = aov_names.DEFAULT,
+    **settings: Any,
+) -> Settings:
+    """Checked settings; raises WavecombError or _core.Error in one line. aovs: as expanded.
+
+    Checks what the core cannot know: whether the picture fits in the memory of this machine.
+    """
+    from wavecomb import _core
+    from wavecomb.errors import WavecombError
+
+    width, height = (int(edge) for edge in size)
+    if not (1 <= width <= MAX_EDGE and 1 <= height <= MAX_EDGE):
+        raise WavecombError(
+            f"size {width} x {height}: each edge must be from 1 to {MAX_EDGE} pixels"
+        )
+    if not 1 <= int(spp) <= MAX_SPP:
+        raise WavecombError(f"{spp} samples per pixel: must be from 1 to {MAX_SPP}")
+    if tuple(aovs) != aov_names.DEFAULT:
+        settings["aovs"] = aov_names.for_core(aovs)
+        settings["error"] = settings.get("error", False) or bool({"error", "variance"} & {*aovs})
+    chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
+    check_memory(chosen, aovs)
+    chosen.check()
+    return chosen
+
+
+def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> None:
+    """Raises WavecombError unless the film and the picture fit in the memory of this machine.
+
+    Args:
+        settings: Of the render.
+        aovs: As expanded.
+        light_groups: Of the scene; to be checked again once that is known.
+    """
+    from wavecomb.errors import WavecombError
+
+    others = [name for name in aovs if name not in aov_names.ERRORS]
+    each = aov_names.bytes_per_pixel(others, light_groups)
+    each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
+    needed, there = settings.width * settings.height * each, machine_limit()
+    if there is not None and needed > 0.8 * there:
+        raise WavecombError(
+            f"size {settings.width} x {settings.height}: needs about {needed / 2**30:.0f} GiB of "
+            f"memory, this machine has {there / 2**30:.0f}; choose a smaller size or fewer AOVs"
+        )
+
+
+def keeps_error(settings: Settings) -> bool:
+    """Whether a render with these settings has the layers error and variance."""
+    return bool(settings.adaptive or settings.noise or settings.error)
