@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.usd.looks.graph_code import INPUTS, nodes_of
+from wavecomb.usd.graphs.node import INPUTS, nodes_of
 
 COLUMNS = {"uv": 0, "position": 3, "local_position": 6, "normal": 9, "local_normal": 12,
            "tangent": 15, "view": 18}  # fmt: skip
@@ -186,7 +186,7 @@ FORMULAS = {
 
 
 def evaluate(value, points):
-    """A value (of ``graph_code``) at points (n, 21), textures white."""
+    """A value (of ``usd.graphs``) at points (n, 21), textures white."""
     points = np.asarray(points, np.float64)
     results = {}
 

@@ -156,7 +156,9 @@ def openpbr_scene() -> Any:
 
 def graph_scene() -> Any:
     """Tiles whose parameters graphs drive, the same one or others side by side; one shines."""
-    from wavecomb.usd.looks.graph_code import PARAMETERS, Expressions, assemble, numbers
+    from wavecomb.usd.graphs.expressions import Expressions
+    from wavecomb.usd.graphs.node import PARAMETERS, numbers
+    from wavecomb.usd.graphs.program import assemble
 
     builder = wavecomb.SceneBuilder()
     texels = np.random.default_rng(2).integers(0, 256, (64, 64, 3), np.uint8)

@@ -10,17 +10,11 @@ import pytest
 from graph_reference import FORMULAS, evaluate
 
 from wavecomb import _core
-from wavecomb.usd.looks import graph_code
-from wavecomb.usd.looks.graph_code import (
-    INPUTS,
-    POINT_SIZE,
-    Expressions,
-    GraphTooLarge,
-    assemble,
-    is_constant,
-    linear,
-    numbers,
-)
+from wavecomb.usd.graphs import program
+from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.linear import linear
+from wavecomb.usd.graphs.node import INPUTS, POINT_SIZE, GraphTooLarge, is_constant, numbers
+from wavecomb.usd.graphs.program import assemble
 
 CONTINUOUS = [c for c in FORMULAS if c not in ("modulo", "less", "equal", "floor", "sign")]
 JUMPS = ["modulo", "less", "floor", "sign"]
@@ -217,7 +211,7 @@ def test_registers_are_used_again():
         value = make.op("sin", make.op("add", value, numbers(0.1 * i)))
     graph = assemble(dict(enumerate(value)))
     assert graph.count == 800  # the first sum is of 0
-    top = np.frombuffer(graph.ops, graph_code._OP)["to"].max()
+    top = np.frombuffer(graph.ops, program._OP)["to"].max()
     assert top < 12
 
 
@@ -234,7 +228,7 @@ def test_programs_that_read_what_is_not_there_are_refused():
     make = Expressions()
     graph = assemble(dict(enumerate(make.op("sin", make.input("position")))))
     builder.add_graph(graph.ops, graph.constants, graph.images, graph.outputs)
-    ops = np.frombuffer(graph.ops, graph_code._OP)
+    ops = np.frombuffer(graph.ops, program._OP)
 
     def changed(**fields):
         other = ops.copy()

@@ -11,7 +11,7 @@ from graph_reference import perlin
 from materialx_nodes import Node, points, run
 from pxr import Gf, Sdf, UsdShade
 
-from wavecomb.usd.looks.graph_surface import plain_use
+from wavecomb.usd.graphs.surface import plain_use
 from wavecomb.usd.materialx.nodes import images
 
 AT = points()

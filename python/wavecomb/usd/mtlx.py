@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.graph_code import Expressions, Value
+from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.node import Value
 from wavecomb.usd.stage.unread import unread_mtlx
 
 if TYPE_CHECKING:
-    from wavecomb.usd.looks.graph_surface import Networks
+    from wavecomb.usd.graphs.surface import Networks
     from wavecomb.usd.looks.surface import Surface
     from wavecomb.usd.looks.surface_inputs import InputDefinition
     from wavecomb.usd.looks.texture import TextureTable

@@ -2,7 +2,7 @@
 /// Value graphs as data: flat programs over a small file of registers.
 ///
 /// A register holds one float for each lane; a vector of 2 to 4 components is as many neighbours.
-/// Python compiles the node networks of a stage to programs (wavecomb/usd/looks/graph_code.py);
+/// Python compiles the node networks of a stage to programs (wavecomb/usd/graphs/expressions.py);
 /// here they are only run.
 #pragma once
 

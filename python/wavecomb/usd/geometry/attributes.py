@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.geometry.curves import CurveArrays
-from wavecomb.usd.geometry.mesh import MeshArrays
+from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, fitting, spread
 
 MAX_WIDTH = 4

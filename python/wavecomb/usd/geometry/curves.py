@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from pxr import Gf, Usd
 
 from wavecomb.usd.geometry.deforming import points_at, points_now, step_times
-from wavecomb.usd.geometry.mesh import (
+from wavecomb.usd.geometry.mesh import find_primvar
+from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
     bake,
     bake_normals,
     check_matrix,
     extent,
-    find_primvar,
 )
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, as_array, read_primvar
 from wavecomb.usd.geometry.shutter import Motion

@@ -10,7 +10,8 @@ from pxr import Usd
 
 from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
 from wavecomb.usd.geometry.deforming import deforms
-from wavecomb.usd.geometry.mesh import UV_NAMES, MeshArrays, MeshReader
+from wavecomb.usd.geometry.mesh import MeshReader
+from wavecomb.usd.geometry.mesh_arrays import UV_NAMES, MeshArrays
 from wavecomb.usd.geometry.points import PointReader
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.skeleton import Skeletons

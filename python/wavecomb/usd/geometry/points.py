@@ -17,7 +17,7 @@ from wavecomb.usd.geometry.curves import (
     thick_extent,
     uniform_scale,
 )
-from wavecomb.usd.geometry.mesh import IDENTITY, bake, check_matrix
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
 from wavecomb.usd.geometry.strands import lay_out_points
 from wavecomb.usd.stage.report import LoadReport
 

@@ -17,7 +17,7 @@ from wavecomb.run.isolate.memory import machine_limit
 from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.attributes import RefinedAttributes
 from wavecomb.usd.geometry.cage import Cage
-from wavecomb.usd.geometry.mesh import MeshArrays
+from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import as_integers, spread
 from wavecomb.usd.geometry.view_size import ViewSize, placements
 from wavecomb.usd.looks.assign import Draw, Worn

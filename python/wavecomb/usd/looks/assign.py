@@ -13,12 +13,13 @@ from pxr import Gf, Sdf, Usd, UsdShade
 
 from wavecomb.usd.geometry.attributes import MAX_WIDTH, Wanted, check_fit
 from wavecomb.usd.geometry.curves import CurveArrays
-from wavecomb.usd.geometry.mesh import MeshArrays, find_primvar
+from wavecomb.usd.geometry.mesh import find_primvar
+from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import PrimvarError, as_integers
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
-from wavecomb.usd.looks.graph_bind import asks_for, bound
-from wavecomb.usd.looks.graph_code import PARAMETERS, GraphTooLarge
+from wavecomb.usd.graphs.bind import asks_for, bound
+from wavecomb.usd.graphs.node import PARAMETERS, GraphTooLarge
 from wavecomb.usd.looks.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.looks.network import colour, number
 from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface

@@ -13,8 +13,8 @@ from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.usd import mtlx
-from wavecomb.usd.looks.graph_attributes import with_attributes
-from wavecomb.usd.looks.graph_code import GraphTooLarge
+from wavecomb.usd.graphs.attributes import with_attributes
+from wavecomb.usd.graphs.node import GraphTooLarge
 from wavecomb.usd.looks.network import shader_id
 from wavecomb.usd.looks.preview import PreviewReader
 from wavecomb.usd.looks.surface import (
@@ -28,7 +28,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.looks.graph_code import Graph
+    from wavecomb.usd.graphs.program import Graph
 
 INHERIT_MATERIAL = 0xFFFFFFFF
 """Same as ``_core.INHERIT_MATERIAL``: what the instance says."""

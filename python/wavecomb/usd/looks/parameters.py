@@ -17,7 +17,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from wavecomb.light_table import EDITABLE, of_kind
 from wavecomb.usd import mtlx
-from wavecomb.usd.geometry.mesh import IDENTITY
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical, linear_colour, space_of

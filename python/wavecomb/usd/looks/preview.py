@@ -10,9 +10,9 @@ import numpy as np
 from pxr import Usd, UsdShade
 
 from wavecomb.usd import mtlx
+from wavecomb.usd.graphs.node import PARAMETERS
+from wavecomb.usd.graphs.surface import Drivers
 from wavecomb.usd.looks.colour_space import SRGB, canonical, linear_colour, space_of
-from wavecomb.usd.looks.graph_code import PARAMETERS
-from wavecomb.usd.looks.graph_surface import Drivers
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
     Source,

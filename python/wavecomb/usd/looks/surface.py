@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from wavecomb.usd.looks.graph_code import Graph, Value
+    from wavecomb.usd.graphs.node import Value
+    from wavecomb.usd.graphs.program import Graph
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom
 
-from wavecomb.usd.geometry.mesh import UV_NAMES
+from wavecomb.usd.geometry.mesh_arrays import UV_NAMES
 from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.looks.material import MaterialTable, bound_materials
 from wavecomb.usd.looks.pixels import TextureError, read_header

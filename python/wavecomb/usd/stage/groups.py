@@ -16,24 +16,22 @@ from wavecomb.usd.cameras import framing
 from wavecomb.usd.geometry.attributes import on_shape
 from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
 from wavecomb.usd.geometry.gprims import GprimReader, add_shape
-from wavecomb.usd.geometry.mesh import IDENTITY, UV_NAMES, MeshArrays
-from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.looks.assign import Assigner, Draw, Worn
-from wavecomb.usd.looks.colour import quantise
 from wavecomb.usd.looks.material import (
-    DEFAULT_COLOUR,
     INHERIT_MATERIAL,
     BindingScan,
     MaterialTable,
     bound_materials,
 )
-from wavecomb.usd.looks.network import colour
-from wavecomb.usd.stage.group import Group, Matrices, Scope, middle_of
-from wavecomb.usd.stage.identity import Assets, LightGroups
-from wavecomb.usd.stage.instancing import moved_instances, read_instances, sound
+from wavecomb.usd.stage.group import Group, Matrices, Scope
+from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.instance_materials import InstanceMaterials
+from wavecomb.usd.stage.instancing import moved_instances, read_instances
+from wavecomb.usd.stage.placing import GroupPlacer
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.shared import MeshStock
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
@@ -100,7 +98,8 @@ class GroupBuilder:
         self.assigner = Assigner(materials, self.time, report)
         self.mesh_lights = MeshLights(builder, traversal.lights, materials, report)
         self.bindings = BindingScan()
-        self.assets = Assets()
+        self.placer = GroupPlacer(builder, self.mesh_lights, report, framed)
+        self.worn = InstanceMaterials(traversal, materials, report)
         self._groups: dict[Hashable, Group] = {}
         self._building: set[Hashable] = set()
 
@@ -217,7 +216,7 @@ class GroupBuilder:
             "attributes": on_shape(worn.reads, shape, draw.matrix.GetDeterminant3() < 0),
             "name": name,
             "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
-            "asset_length": self._asset_length(draw.prim, name),
+            "asset_length": self.placer.asset_length(draw.prim, name),
         }
         if lamp is not None:
             options["mesh_light"] = lamp.number
@@ -230,7 +229,7 @@ class GroupBuilder:
         except ValueError as error:
             self.report.warn(f"{_WORDS[kind]} left out: {error}")
             return
-        self.builder.add_to_group(self._number(group), number)
+        self.builder.add_to_group(self.placer.number(group), number)
         group.grow(shape.bounds)
         if self.framed is not None:
             more = self.framed if group.number == 0 else None
@@ -274,25 +273,13 @@ class GroupBuilder:
             return
         inherit = np.array([INHERIT_MATERIAL], np.uint32)
         motion = None if steps is None else steps[None]
-        self._add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
+        self.placer.add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
 
     def _materials(self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope) -> Worn:
         inherits = draw.material is None and scope.bound and not any(draw.subset_materials)
         if scope.override or inherits:
             return Worn(INHERIT_MATERIAL)
         return self.assigner.assign(draw, mesh, INHERIT_MATERIAL if scope.inside else None)
-
-    def _asset_length(self, prim: Usd.Prim, name: str) -> int:
-        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
-        length = self.assets.length(prim)
-        return length and length + len(name) - len(str(prim.GetPath()))
-
-    def _number(self, group: Group) -> int:
-        """A group's number in the scene; made when something comes into it."""
-        if group.number is None:
-            group.number = self.builder.add_group(group.name, root=group.root)
-            self.report.tally("groups")
-        return group.number
 
     def _group(
         self,
@@ -333,7 +320,7 @@ class GroupBuilder:
             child = self._instance_group(placed, scope)
             if child is None:
                 continue
-            material = self._instance_material(placed, scope)
+            material = self.worn.of_instance(placed, scope)
             steps = None if placed.track is None else placed.track.steps()
             count = 0 if steps is None else len(steps)
             batch = batches.setdefault((id(child), count), (child, [], [], [], []))
@@ -345,7 +332,7 @@ class GroupBuilder:
             transforms = np.stack(matrices)
             motion = np.stack(moves) if count else None
             ids = np.array(materials, np.uint32)
-            self._add(parent, child, transforms, ids, prims, motion=motion)
+            self.placer.add(parent, child, transforms, ids, prims, motion=motion)
         self.report.tally("instances", len(instances))
 
     def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
@@ -358,35 +345,12 @@ class GroupBuilder:
         alias, exact = None, None
         if not override and (collections or scope.alias is not None):
             alias = (path, proxy.GetPath())
-            exact = self._proxy_bindings(proxy)
+            exact = self.worn.of_proxies(proxy)
         bound = placed.material is not None or (scope.bound and not override)
         inner = Scope(True, bound and alias is None, override, alias, path)
         key = ("native", path, inner.bound, override, placed.purpose, exact)
         roots = list(prototype.GetChildren())
         return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
-
-    def _proxy_bindings(self, instance: Usd.Prim) -> tuple[str, ...]:
-        """Material paths of all below an instance: tells which instances may share a group."""
-        prims = [
-            prim
-            for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
-            if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.Subset)
-        ]
-        bound = bound_materials(prims, self.traversal.binding_purposes)
-        return tuple(str(m.GetPath()) if m else "" for m in bound)
-
-    def _instance_material(self, placed: Placed, scope: Scope) -> int:
-        """The id for the meshes of an instance that have none of their own."""
-        if placed.material is not None:
-            return self.materials.add(self.materials.surface(placed.material))
-        if scope.override or scope.bound:
-            return INHERIT_MATERIAL
-        for primvar in placed.inherited:
-            if primvar.GetPrimvarName() == "displayColor":
-                value = from_attribute(primvar.GetAttr(), "displayColor", self.time)
-                if value is not None and len(value.values):
-                    return self.materials.plain(colour(value.values[0], DEFAULT_COLOUR))
-        return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
     def _place_instancer(self, parent: Group, placed: Placed, scope: Scope) -> None:
         """Adds a point instancer, all instances of one prototype at a time."""
@@ -397,7 +361,7 @@ class GroupBuilder:
         instances = read_instances(prim, self.time, len(targets), self.report)
         if instances is None or len(instances.kept) == 0:
             return
-        materials = self._instancer_materials(placed, instances.authored, scope)[instances.kept]
+        materials = self.worn.of_instancer(placed, instances.authored, scope)[instances.kept]
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
         outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
@@ -421,7 +385,7 @@ class GroupBuilder:
                 transforms = transforms @ outer
             numbers = instances.kept[chosen].astype(np.uint32)
             motion = None if moved is None else np.ascontiguousarray(moved[chosen])
-            self._add(parent, child, transforms, materials[chosen], [prim], numbers, motion)
+            self.placer.add(parent, child, transforms, materials[chosen], [prim], numbers, motion)
         self.report.tally("point instances", len(instances.kept))
 
     def _prototype_group(self, root: Usd.Prim, placed: Placed, scope: Scope) -> Group | None:
@@ -437,99 +401,3 @@ class GroupBuilder:
         )
         key = ("point", path, inner.bound, inner.override, placed.purpose, inner.alias)
         return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)
-
-    def _instancer_materials(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
-        """(count,) ids for the instances of a point instancer: by its displayColor."""
-        if scope.bound or scope.override:
-            return np.full(count, INHERIT_MATERIAL, np.uint32)
-        inherited = self.traversal.inherit(placed.prim, placed.inherited)
-        attribute = placed.prim.GetAttribute("primvars:displayColor")
-        if attribute.HasAuthoredValue():
-            attributes = [attribute]
-        else:
-            attributes = [p.GetAttr() for p in inherited if p.GetPrimvarName() == "displayColor"]
-        for candidate in attributes:
-            try:
-                primvar = from_attribute(candidate, "displayColor", self.time)
-            except PrimvarError as error:
-                self.report.warn(f"{error}: ignored", placed.prim.GetPath())
-                continue
-            if primvar is None or primvar.values.shape[1] < 3:
-                continue
-            if len(primvar.values) == 1:
-                return np.full(count, self.materials.plain(primvar.values[0]), np.uint32)
-            if len(primvar.values) == count:
-                palette, index = quantise(primvar.values[:, :3])
-                ids = np.array([self.materials.plain(c) for c in palette], np.uint32)
-                return ids[index]
-            what = "point instancer displayColor does not match protoIndices: ignored"
-            self.report.warn(what, placed.prim.GetPath())
-        default = INHERIT_MATERIAL if scope.inside else self.materials.plain()
-        return np.full(count, default, np.uint32)
-
-    def _add(
-        self,
-        parent: Group,
-        child: Group,
-        transforms: Matrices,
-        materials: NDArray[np.uint32],
-        prims: Sequence[Usd.Prim],
-        numbers: NDArray[np.uint32] | None = None,
-        motion: Matrices | None = None,
-    ) -> None:
-        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
-
-        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
-        """
-        usable = sound(transforms)
-        if motion is not None:
-            usable &= sound(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
-        if not usable.all():
-            what = "instances left out: transform without an inverse"
-            self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
-            transforms, materials = transforms[usable], materials[usable]
-            motion = None if motion is None else motion[usable]
-            if numbers is None:
-                prims = [prim for prim, good in zip(prims, usable, strict=True) if good]
-            else:
-                numbers = numbers[usable]
-        if len(transforms) == 0:
-            return
-        if child.sampled_lamp is not None:
-            parent.sampled_lamp = child.sampled_lamp
-            if motion is not None:
-                self.mesh_lights.say_moving(child.sampled_lamp)
-        if child.lit:
-            middle = transforms if motion is None else middle_of(motion)
-            parent.children.append((child, middle))
-            parent.lit = True
-        if child.has_surfaces:
-            parent.surfaced.append((child, transforms))
-            parent.has_surfaces = True
-        if child.number is None:
-            return
-        names = [self.report.place(prim.GetPath()) for prim in prims]
-        lengths = [self._asset_length(*pair) for pair in zip(prims, names, strict=True)]
-        self.builder.add_instances(
-            self._number(parent),
-            child.number,
-            transforms,
-            materials,
-            names=names,
-            numbers=numbers,
-            asset_lengths=lengths,
-            **({} if motion is None else {"motion": motion}),
-        )
-        if child.bounds is not None:
-            if motion is not None:
-                transforms = motion.reshape(-1, 4, 4)
-            if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
-                child.outlines = [inner]
-                more = self.framed if parent.number == 0 else None
-                parent.reach(framing.placed(inner, transforms, more), more)
-            lo, hi = child.bounds
-            centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
-            linear = transforms[:, :3, :3]
-            middle = centre @ linear + transforms[:, 3, :3]
-            reach = half @ np.abs(linear)
-            parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.cameras.camera import View
     from wavecomb.usd.geometry.cage import Cage
     from wavecomb.usd.geometry.curves import CurveArrays
-    from wavecomb.usd.geometry.mesh import MeshArrays
+    from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 
 
 class MeshStock:

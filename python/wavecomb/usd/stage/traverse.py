@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
-from wavecomb.usd.geometry.mesh import IDENTITY
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import SHAPES
 from wavecomb.usd.geometry.shutter import Motion, Track

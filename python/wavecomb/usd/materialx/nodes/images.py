@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import math
 
+from wavecomb.usd.graphs.node import Value, fit, numbers
+from wavecomb.usd.graphs.surface import COLOURS, NORMAL, uv_matrix
 from wavecomb.usd.looks.colour_space import space_of
-from wavecomb.usd.looks.graph_code import Value, fit, numbers
-from wavecomb.usd.looks.graph_surface import COLOURS, NORMAL, uv_matrix
 from wavecomb.usd.looks.texture import asset_file
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 

@@ -9,8 +9,9 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
 from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.looks.graph_code import Expressions, Value, fit, numbers
-from wavecomb.usd.looks.graph_surface import COLOURS
+from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.node import Value, fit, numbers
+from wavecomb.usd.graphs.surface import COLOURS
 from wavecomb.usd.looks.network import Source, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes.body import Body

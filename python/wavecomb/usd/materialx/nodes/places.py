@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.looks.graph_code import Value, fit, numbers
-from wavecomb.usd.looks.graph_colour import in_working_space
-from wavecomb.usd.looks.graph_surface import COLOURS, NORMAL
+from wavecomb.usd.graphs.colour import in_working_space
+from wavecomb.usd.graphs.node import Value, fit, numbers
+from wavecomb.usd.graphs.surface import COLOURS, NORMAL
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.stage.times import frame_number
 

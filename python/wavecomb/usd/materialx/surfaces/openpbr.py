@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from wavecomb.usd.looks.graph_code import Value, fit, numbers
+from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.materialx.surfaces.models import BLACK, MODELS, WHITE, Colour, Row
 
 if TYPE_CHECKING:
-    from wavecomb.usd.looks.graph_surface import Drivers
+    from wavecomb.usd.graphs.surface import Drivers
 
 
 class Inputs(Protocol):

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.graph_code import Value, is_constant, numbers
-from wavecomb.usd.looks.graph_surface import Drivers, sampled
+from wavecomb.usd.graphs.node import Value, is_constant, numbers
+from wavecomb.usd.graphs.surface import Drivers, sampled
 from wavecomb.usd.looks.network import colour, number, source_of
 from wavecomb.usd.looks.surface import Surface
 from wavecomb.usd.materialx.nodes.network import Networks

@@ -11,16 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.looks.graph_code import (
-    PRIMVAR,
-    Expressions,
-    Node,
-    Value,
-    is_constant,
-    numbers,
-    substituted,
-)
-from wavecomb.usd.looks.graph_surface import graphs_of, plain_use
+from wavecomb.usd.graphs.expressions import Expressions, substituted
+from wavecomb.usd.graphs.node import PRIMVAR, Node, Value, is_constant, numbers
+from wavecomb.usd.graphs.surface import graphs_of, plain_use
 from wavecomb.usd.looks.surface import SLOTS, SurfaceGraph
 
 if TYPE_CHECKING:

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from wavecomb.usd.looks.graph_code import PARAMETERS, Expressions, fit, numbers
-from wavecomb.usd.looks.graph_colour import in_working_space
-from wavecomb.usd.looks.graph_surface import graphs_of
+from wavecomb.usd.graphs.colour import in_working_space
+from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.node import PARAMETERS, fit, numbers
+from wavecomb.usd.graphs.surface import graphs_of
 from wavecomb.usd.looks.surface import COLOUR_SLOTS, DEFAULTS, Surface
 
 

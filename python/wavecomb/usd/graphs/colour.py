@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.looks.graph_code import Expressions, Value, numbers
+from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.node import Value, numbers
 
 
 def in_working_space(make: Expressions, value: Value, working: str) -> Value:

@@ -9,24 +9,21 @@ from typing import Any, Protocol
 import numpy as np
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.graph_code import (
+from wavecomb.usd.graphs.expressions import Expressions, substituted
+from wavecomb.usd.graphs.linear import Linear, linear
+from wavecomb.usd.graphs.node import (
     PARAMETERS,
     POINT_SIZE,
     PRIMVAR,
-    Expressions,
-    Graph,
     GraphTooLarge,
-    Linear,
     Node,
     Part,
     Value,
-    assemble,
     fit,
     is_constant,
-    linear,
     nodes_of,
-    substituted,
 )
+from wavecomb.usd.graphs.program import Graph, assemble
 from wavecomb.usd.looks.surface import COLOUR_SLOTS, SLOTS, SurfaceGraph
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays of a mesh in its group's space: what they are, and how a transform goes into them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf
+
+from wavecomb.usd.geometry.cage import Cage
+from wavecomb.usd.geometry.triangulate import MeshError, Topology
+
+Array = NDArray[np.float32]
+
+IDENTITY = Gf.Matrix4d(1.0)
+
+LIMIT = 1e18
+"""Coordinates beyond this are taken for a mistake (Embree's own limit is 1.8e18)."""
+
+UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
+"""Texture coordinates that are looked for where no material says which."""
+
+_CHUNK = 1 << 18
+
+
+@dataclass
+class MeshArrays:
+    """A mesh in its group's space.
+
+    Attributes:
+        positions: (n, 3), or (s, n, 3) at s steps over the shutter.
+        triangles: (m, 3), counter-clockwise from outside.
+        normals: (n, 3), (m, 3, 3) or None; at each step where there are some.
+        uvs: (n, 2), (m, 3, 2) or None.
+        bounds: (2, 3) lowest and highest coordinates.
+        topology: Where the triangles come from; None for implicit shapes.
+        cage: What can be subdivided or displaced once the view is known; None: this is all.
+    """
+
+    positions: Array
+    triangles: NDArray[np.uint32]
+    normals: Array | None
+    uvs: Array | None
+    bounds: Array
+    topology: Topology | None = None
+    cage: Cage | None = None
+
+
+def check_matrix(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform mirrors.
+
+    Raises:
+        MeshError: It has no inverse or is not finite.
+    """
+    det = matrix.GetDeterminant3()
+    if not abs(det) > 1e-6:
+        volume = 1.0
+        for row in range(3):
+            volume *= matrix.GetRow3(row).GetLength()
+        if not abs(det) > 1e-9 * volume:
+            raise MeshError("its transform has no inverse")
+    return bool(det < 0)
+
+
+def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
+    """Points (n, 3) under a transform, in double precision: a float32 copy."""
+    m = np.array(matrix)
+    linear, offset = m[:3, :3], m[3, :3]
+    if len(points) <= _CHUNK:
+        return (points @ linear + offset).astype(np.float32)
+    out = np.empty((len(points), 3), np.float32)
+    for first in range(0, len(points), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        out[part] = points[part] @ linear + offset
+    return out
+
+
+def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
+    """Normals (..., 3) under the inverse transpose of a transform, unit length."""
+    linear = np.array(matrix.GetInverse())[:3, :3].T
+    flat = normals.reshape(-1, 3)
+    out = np.empty(flat.shape, np.float32)
+    for first in range(0, len(flat), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        turned = flat[part] @ linear
+        length = np.sqrt(np.einsum("ij,ij->i", turned, turned))
+        out[part] = turned / np.where(length > 0, length, 1)[:, None]
+    return out.reshape(normals.shape)
+
+
+def extent(positions: Array) -> Array:
+    """Bounds (2, 3) of points.
+
+    Raises:
+        MeshError: A point is not finite or absurdly far away.
+    """
+    bounds = np.empty((2, 3), np.float32)
+    np.minimum.reduce(positions, axis=0, out=bounds[0])
+    np.maximum.reduce(positions, axis=0, out=bounds[1])
+    # Written so that NaN fails too.
+    if not (bounds[0].min() > -LIMIT and bounds[1].max() < LIMIT):
+        raise MeshError("a point is not finite or absurdly far away")
+    return bounds

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts groups into groups: as instances of the scene, with names, materials and motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd
+
+from wavecomb.usd.cameras import framing
+from wavecomb.usd.lights.mesh_light import MeshLights
+from wavecomb.usd.stage.group import Group, Matrices, middle_of
+from wavecomb.usd.stage.identity import Assets
+from wavecomb.usd.stage.instancing import sound
+from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+
+class GroupPlacer:
+    """Gives groups numbers in the scene, and places them in one another."""
+
+    def __init__(
+        self,
+        builder: _core.SceneBuilder,
+        mesh_lights: MeshLights,
+        report: LoadReport,
+        framed: NDArray[np.float64] | None,
+    ) -> None:
+        """``framed``: as of ``GroupBuilder``."""
+        self.builder = builder
+        self.mesh_lights = mesh_lights
+        self.report = report
+        self.framed = framed
+        self.assets = Assets()
+
+    def asset_length(self, prim: Usd.Prim, name: str) -> int:
+        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
+        length = self.assets.length(prim)
+        return length and length + len(name) - len(str(prim.GetPath()))
+
+    def number(self, group: Group) -> int:
+        """A group's number in the scene; made when something comes into it."""
+        if group.number is None:
+            group.number = self.builder.add_group(group.name, root=group.root)
+            self.report.tally("groups")
+        return group.number
+
+    def add(
+        self,
+        parent: Group,
+        child: Group,
+        transforms: Matrices,
+        materials: NDArray[np.uint32],
+        prims: Sequence[Usd.Prim],
+        numbers: NDArray[np.uint32] | None = None,
+        motion: Matrices | None = None,
+    ) -> None:
+        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
+
+        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
+        """
+        usable = sound(transforms)
+        if motion is not None:
+            usable &= sound(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
+        if not usable.all():
+            what = "instances left out: transform without an inverse"
+            self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
+            transforms, materials = transforms[usable], materials[usable]
+            motion = None if motion is None else motion[usable]
+            if numbers is None:
+                prims = [prim for prim, good in zip(prims, usable, strict=True) if good]
+            else:
+                numbers = numbers[usable]
+        if len(transforms) == 0:
+            return
+        if child.sampled_lamp is not None:
+            parent.sampled_lamp = child.sampled_lamp
+            if motion is not None:
+                self.mesh_lights.say_moving(child.sampled_lamp)
+        if child.lit:
+            middle = transforms if motion is None else middle_of(motion)
+            parent.children.append((child, middle))
+            parent.lit = True
+        if child.has_surfaces:
+            parent.surfaced.append((child, transforms))
+            parent.has_surfaces = True
+        if child.number is None:
+            return
+        names = [self.report.place(prim.GetPath()) for prim in prims]
+        lengths = [self.asset_length(*pair) for pair in zip(prims, names, strict=True)]
+        self.builder.add_instances(
+            self.number(parent),
+            child.number,
+            transforms,
+            materials,
+            names=names,
+            numbers=numbers,
+            asset_lengths=lengths,
+            **({} if motion is None else {"motion": motion}),
+        )
+        if child.bounds is not None:
+            if motion is not None:
+                transforms = motion.reshape(-1, 4, 4)
+            if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
+                child.outlines = [inner]
+                more = self.framed if parent.number == 0 else None
+                parent.reach(framing.placed(inner, transforms, more), more)
+            lo, hi = child.bounds
+            centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
+            linear = transforms[:, :3, :3]
+            middle = centre @ linear + transforms[:, 3, :3]
+            reach = half @ np.abs(linear)
+            parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
