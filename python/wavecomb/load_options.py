@@ -211,8 +211,8 @@ class LoadOptions:
         "picture.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
-    size: tuple[int, int] = _row((600, 600), "Of the picture.", "pair", least=1)
-    threads: int = _row(0, "That read.", "integer", least=0)
+    size: tuple[int, int] = _row((600, 600), "Width and height of the picture.", "pair", least=1)
+    threads: int = _row(0, "Threads that read; 0: all.", "integer", least=0)
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:

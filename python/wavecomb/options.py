@@ -49,7 +49,7 @@ class Setting:
 
     @property
     def option(self) -> str:
-        """Of a command.
+        """The option of a command.
 
         >>> settings()["wave_size"].option
         '--wave-size'

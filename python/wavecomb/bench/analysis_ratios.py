@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 TIMES = ("shade_s", "order_s", "shade_and_order_s", "render_s")
 GAINS = ("efficiency", "samples_per_s", "rays_per_s")
-"""Of these more is better."""
+"""Figures of which more is better."""
 
 
 def ratios(

@@ -17,9 +17,9 @@ from wavecomb.bench.suite_model import WAVECOMB
 _SIZE = 160
 _SPP = 8
 _BYTES_PER_SECOND = 25e6
-"""Of textures, read and tiled while a stage is loaded; rough."""
+"""Speed at which textures are read and tiled while a stage is loaded; rough."""
 _TRIANGLES_PER_SECOND = 1.5e6
-"""Of meshes, likewise; the acceleration structure included."""
+"""Speed at which meshes are read and their acceleration structure is built; rough."""
 
 
 @dataclass
@@ -45,14 +45,14 @@ class Estimator:
             self._bias.append(wall_s / guess)
 
     def seconds(self, config: Config) -> float:
-        """Of one run."""
+        """Seconds of one run."""
         known = self.measured.get(config.name)
         if known:
             return statistics.fmean(known)
         return self._guess(config) * (statistics.median(self._bias) if self._bias else 1.0)
 
     def total(self, runs: Iterable[Run]) -> float:
-        """Of all of them."""
+        """Seconds of all of them."""
         return sum(self.seconds(run.config) for run in runs)
 
     def _guess(self, config: Config) -> float:
@@ -65,7 +65,7 @@ class Estimator:
 
 
 def _load_s(config: Config) -> float:
-    """Of a generated stage, beyond the small one."""
+    """Seconds that loading a generated stage takes, beyond those of the small one."""
     if not config.source.scene:
         return 0.0
     from wavecomb.scenes import SceneOptions

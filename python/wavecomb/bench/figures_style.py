@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK = "#1a1b1e"
-"""Of text, axes and what is compared with; becomes the page's own text colour in the report."""
+"""The colour of text, axes and what is compared with; in the report the page's own."""
 FAINT = "#8a8d93"
 GRID = "#8a8d9340"
 WHISKERS = 4.0
 """How far a logarithmic axis goes beyond the points, as a factor."""
 WIDTH = 7.4
-"""Of a figure in inches: a column of text in print."""
+"""Width of a figure in inches: a column of text in print."""
 
 # Okabe and Ito 2008, "Color universal design"; without yellow, which paper does not show.
 BLUE, SKY, ORANGE, RED = "#0072b2", "#56b4e9", "#e69f00", "#d55e00"
@@ -119,7 +119,7 @@ def figure(
 
 
 def policy_colour(policy: str) -> str:
-    """Of a policy, the same in all figures; the bounds are grey."""
+    """The colour of a policy, the same in all figures; the bounds are grey."""
     return _POLICY.get(policy, BROWN)
 
 
@@ -129,7 +129,7 @@ def marker(index: int) -> str:
 
 
 def colour(index: int) -> str:
-    """Of a series without a colour of its own."""
+    """The colour of a series without one of its own."""
     return CYCLE[index % len(CYCLE)]
 
 

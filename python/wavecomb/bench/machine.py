@@ -110,7 +110,7 @@ def frequency_mhz() -> float | None:
 
 
 def load_average() -> tuple[float, float, float]:
-    """Of 1, 5 and 15 minutes."""
+    """Load averages of 1, 5 and 15 minutes."""
     try:
         return os.getloadavg()
     except OSError:

@@ -18,7 +18,7 @@ from wavecomb.bench.suite_model import WAVECOMB, Experiment, StageSource, Suite
 from wavecomb.errors import WavecombError
 
 FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
-"""Of settings that a row names, what is meant where a suite says nothing."""
+"""What settings that a row names are where a suite says nothing."""
 
 _FOR_PICTURE = (
     *("size", "max_depth", "sampler", "filter", "filter_width"),

@@ -66,7 +66,7 @@ def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
 
 
 def _option(row: Setting) -> click.Option:
-    """Of a setting."""
+    """The option of a setting."""
     # The core says what is out of range; only signs are told here.
     return row_option(
         [row.option, row.name],

@@ -62,7 +62,7 @@ def _memory(parts: Mapping[str, int]) -> str:
 
 
 def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
-    """Of adaptive, timed and resumed renders."""
+    """Lines about adaptive, timed and resumed renders."""
     from wavecomb.run.progress import count_text, time_text
     from wavecomb.run.stats import rendered_pixels
 

@@ -11,7 +11,7 @@ from PySide6.QtCore import QAbstractTableModel, QObject, Qt
 ColourRole = Qt.ItemDataRole.UserRole + 10
 """A linear colour, shown as a square before the text."""
 ToneRole = Qt.ItemDataRole.UserRole + 11
-"""Of the text: "dim", "warning", "error", or None."""
+"""The tone of the text: "dim", "warning", "error", or None."""
 
 
 class HeadedModel(QAbstractTableModel):

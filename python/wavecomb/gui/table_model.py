@@ -53,7 +53,7 @@ class Table(HeadedModel):
         return len(self._rows)
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Of one cell."""
+        """What one cell shows."""
         row, column = index.row(), index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             return self._rows[row][column][0]

@@ -122,17 +122,17 @@ def series(n: int) -> QColor:
 
 
 def text() -> QColor:
-    """Of text in plots."""
+    """The colour of text in plots."""
     return QColor(_COLOURS[_name()][4])
 
 
 def dim() -> QColor:
-    """Of text that matters less."""
+    """The colour of text that matters less."""
     return QColor(_COLOURS[_name()][5])
 
 
 def grid() -> QColor:
-    """Of lines behind curves."""
+    """The colour of lines behind curves."""
     colour = QColor(text())
     colour.setAlphaF(0.18)
     return colour
@@ -149,17 +149,17 @@ def surround() -> QColor:
 
 
 def accent() -> QColor:
-    """Of what is chosen."""
+    """The colour of what is chosen."""
     return QColor(_COLOURS[_name()][7])
 
 
 def warning() -> QColor:
-    """Of text that warns."""
+    """The colour of text that warns."""
     return QColor("#e8a33d" if is_dark() else "#9a5b00")
 
 
 def error() -> QColor:
-    """Of text that tells of an error."""
+    """The colour of text that tells of an error."""
     return QColor("#ff7b72" if is_dark() else "#b3261e")
 
 

@@ -70,7 +70,7 @@ def set_quietly(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
 
 
 def set_text_colour(label: QLabel, colour: QColor) -> None:
-    """Of its text alone; the rest goes on following the application."""
+    """Sets the colour of the text alone; the rest goes on following the application."""
     palette = label.palette()
     palette.setColor(label.foregroundRole(), colour)
     label.setPalette(palette)

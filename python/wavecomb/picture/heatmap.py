@@ -23,7 +23,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 DECADES = 4
 Z_RANGE = 5.0
 LEAST_WIDTH = 340
-"""Of the whole in pixels, so that title and numbers fit; a narrower picture has black beside it."""
+"""Width of the whole in pixels, for title and numbers; a narrower picture has black beside it."""
 
 _NOT_FINITE = (0.0, 1.0, 1.0)
 _BAR_HEIGHT = 58

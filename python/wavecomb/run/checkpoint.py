@@ -45,7 +45,7 @@ class Checkpoint:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Of the render, those of the picture only: see ``picture_settings``."""
+        """Settings of the render, those of the picture only: see ``picture_settings``."""
         return dict(self.header["settings"])
 
     @property

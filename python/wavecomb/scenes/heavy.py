@@ -24,9 +24,9 @@ from wavecomb.scenes.textures import Image, TextureInfo
 MAX_MATERIALS = 1024
 MAX_TEXTURE_MB = 8192.0
 LAYERS = 8
-"""Of the heaviest material."""
+"""Layers of the heaviest material."""
 _BYTES_PER_TEXEL = (4.0 + 4.0 + 1.0) * 4.0 / 3.0
-"""Of a material: two colour maps and one of roughness, 8 bits each, with mip levels."""
+"""Memory for a texel of a material: two colour maps and one of roughness, 8 bits, mip levels."""
 _SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 Inputs = dict[str, Any]
@@ -42,7 +42,7 @@ def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def layers(options: SceneOptions, index: int) -> int:
-    """Of material ``index``: none for the first ninth of them, ``LAYERS`` for the last."""
+    """Layers of material ``index``: none on the first ninth of them, ``LAYERS`` on the last."""
     share = index / max(options.materials - 1, 1)
     return min(int((LAYERS + 1) * share), LAYERS)
 

@@ -17,7 +17,7 @@ _TYPES = {
     "vector2": Sdf.ValueTypeNames.Float2,
     "vector3": Sdf.ValueTypeNames.Float3,
 }
-"""Of USD by MaterialX's name."""
+"""USD's types by MaterialX's names."""
 
 
 class Network:

@@ -27,9 +27,9 @@ MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
 MAX_COST = 1000.0
 _OCTAVES_OF_NODE = 8
-"""Of one fractal; dearer materials add several."""
+"""Most octaves of one fractal; dearer materials add several."""
 _BYTES_PER_TEXEL = 4.0 * 4.0 / 3.0
-"""Of 8 bit colour as the core holds it, mip levels included."""
+"""Memory of a texel of 8 bit colour as the core holds it, mip levels included."""
 
 
 def build_spread(writer: StageWriter, options: SceneOptions) -> None:
@@ -53,7 +53,7 @@ def _edge(options: SceneOptions) -> int:
 
 
 def octaves(options: SceneOptions, index: int) -> int:
-    """Of the noise on material ``index``: ``shader_cost`` on the last, geometrically between.
+    """Octaves of noise on material ``index``: ``shader_cost`` on the last, geometrically between.
 
     The first has 1, which stands for its texture alone, without noise.
     """

@@ -20,7 +20,7 @@ from wavecomb.scenes.textures import Image, marble, weave, wood
 STONES = 144
 """At least so many stones lie in a field."""
 MIN_TRIANGLES = 32
-"""Of a stone: a sphere of 4 x 4 cells."""
+"""Fewest triangles of a stone: a sphere of 4 x 4 cells."""
 MAX_TRIANGLES = 60_000_000
 TILE = 8
 """Edges of textures are multiples of it."""

@@ -39,7 +39,7 @@ inline constexpr uint32_t kAovCount = 17;
 
 /// Names in the order of the bits: "albedo", "normal" ... "guide_normal".
 extern const char* const kAovNames[kAovCount];
-/// That of one.
+/// The name of one.
 const char* aov_name(Aov aov);
 
 constexpr uint32_t operator|(Aov a, Aov b) {

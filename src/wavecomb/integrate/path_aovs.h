@@ -30,7 +30,7 @@
 
 namespace wavecomb {
 
-/// Of what the camera's ray met, once it was shaded.
+/// What the AOVs have of the first vertex, once it was shaded.
 template <typename F>
 struct FirstVertexRow {
   Color<F> albedo;

@@ -113,7 +113,7 @@ class SuiteChoice(QWidget):
     # ---- what others call ----------------------------------------------------------------------
 
     def info(self) -> SuiteInfo | None:
-        """Of the suite that is chosen."""
+        """The suite that is chosen."""
         return self._infos.get(str(self.suite.currentData()))
 
     def chosen_stages(self) -> list[str]:

@@ -64,7 +64,7 @@ class FigureView(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Of a readable figure."""
+        """The size of a readable figure."""
         return QSize(theme.em(40), theme.em(26))
 
     def target(self) -> QRectF:

@@ -97,7 +97,7 @@ class Choice:
         return (self.folder / "runs.csv").is_file()
 
     def arguments(self, *, dry: bool = False) -> list[str]:
-        """Of `wavecomb`."""
+        """Arguments of `wavecomb`."""
         words = ["bench", "run", self.suite, "-o", str(self.folder)]
         for stage in self.stages:
             words += ["--stage", stage]

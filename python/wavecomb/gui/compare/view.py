@@ -22,7 +22,7 @@ from wavecomb.picture.heatmap import Scale
 
 ZOOM_STEP = 1.25
 _PAN_STEP = 0.1
-"""Of what is seen, for an arrow key."""
+"""Share of what is seen that an arrow key moves it by."""
 
 
 class CompareView(QWidget):

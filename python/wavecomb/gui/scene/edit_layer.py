@@ -12,7 +12,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.picture.files import replacing
 
 _OWN = {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
-"""Of the stage's root layer: what the layer over it does not repeat."""
+"""What the layer over the stage's root layer does not repeat."""
 
 
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:

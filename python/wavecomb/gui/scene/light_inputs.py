@@ -49,12 +49,12 @@ class LightInput:
 
     @property
     def attribute(self) -> str:
-        """Of the prim."""
+        """The name of the attribute of the prim."""
         return f"inputs:{self.input}"
 
     @property
     def type_name(self) -> Sdf.ValueTypeName:
-        """Of the attribute."""
+        """The type of the attribute."""
         return _TYPES[self.kind]
 
     def read(self, prim: Usd.Prim, time: Usd.TimeCode) -> Any:

@@ -30,7 +30,7 @@ class MaterialCost:
     calibrated_ns: float
     """A record, before the first pass."""
     share: float
-    """Of the shading time of all materials, 0 to 1."""
+    """Its share of the shading time of all materials, 0 to 1."""
 
     @property
     def ns(self) -> float:

@@ -41,12 +41,12 @@ _HEADER = {
 
 
 def measured_colour() -> QColor:
-    """Of what was measured."""
+    """The colour of what was measured."""
     return theme.series(1)
 
 
 def predicted_colour() -> QColor:
-    """Of what was predicted."""
+    """The colour of what was predicted."""
     return theme.series(0)
 
 

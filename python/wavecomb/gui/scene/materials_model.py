@@ -33,7 +33,7 @@ RANGES = {
     "conductor_eta": Range(0.0, 100.0, 0.0, 5.0),
     "conductor_k": Range(0.0, 100.0, 0.0, 10.0),
 }
-"""Of parameters of UsdPreviewSurface that are not within 0 and 1."""
+"""Ranges of parameters of UsdPreviewSurface that are not within 0 and 1."""
 
 LABELS = {"conductor_eta": "eta", "conductor_k": "k"}
 

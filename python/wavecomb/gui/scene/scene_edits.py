@@ -64,7 +64,7 @@ class SceneEdits(QObject):
 
     @property
     def edits(self) -> StageEdits | None:
-        """Of the stage that is open."""
+        """The edits of the stage that is open."""
         return self._sync.edits if self._sync is not None else None
 
     @property
@@ -313,5 +313,5 @@ class SceneEdits(QObject):
 
 
 def _word(word: str) -> Opinion:
-    """Of an attribute ``visibility``."""
+    """A value for an attribute ``visibility``."""
     return Opinion(word, Sdf.ValueTypeNames.Token)

@@ -44,7 +44,7 @@ _COLOURS = {
 
 
 def phase_colour(name: str) -> QColor:
-    """Of a phase; keys, sort and materialize are shades of one, as are the two of traversal."""
+    """The colour of a phase: shades of one for keys, sort and materialize, and for traversal."""
     number, lighter = _COLOURS[name]
     return theme.series(number).lighter(lighter)
 

@@ -33,7 +33,7 @@ class Look:
     """Counters since the start of a run."""
 
     seconds: float
-    """Of rendering, wall time; not that while it was paused."""
+    """Wall time of rendering, without pauses."""
     samples: int = 0
     rays: int = 0
     """Camera, bounce and shadow rays."""

@@ -58,7 +58,7 @@ class Ratio:
     value: float
     low: float
     high: float
-    """Of a 95 % interval; 0 and infinity where nothing can be said."""
+    """End of a 95 % interval that begins at ``low``; 0 and infinity where nothing can be said."""
     repeats: int
     """Pairs of runs; 1: the interval is over stretches of one pair, and misses drift."""
     short: bool = False
@@ -96,7 +96,7 @@ def stretches(run: Run, least_s: float = 0.0) -> list[tuple[Look, Look]]:
 
 
 def rate(run: Run, counter: str) -> Rate:
-    """Of "samples", "rays" or "records", over the whole run."""
+    """The rate of "samples", "rays" or "records" over the whole run."""
     last = run.last
     value = ratio(getattr(last, counter), last.seconds)
     pairs = stretches(run, least_s=0.05)

@@ -37,7 +37,7 @@ class CamerasModel(QAbstractListModel):
 
     @property
     def row(self) -> int:
-        """Of the camera that is looked through."""
+        """The row of the camera that is looked through."""
         pose = self._session.pose
         path = pose.path if pose is not None else None
         return self.paths.index(path) if path in self.paths else 0

@@ -49,12 +49,12 @@ class Frame:
 
     @property
     def width(self) -> int:
-        """Of the arrays, pixels."""
+        """Pixels of a row."""
         return int(self.beauty.shape[1])
 
     @property
     def height(self) -> int:
-        """Of the arrays, pixels."""
+        """Rows of pixels."""
         return int(self.beauty.shape[0])
 
     def names(self) -> list[str]:

@@ -45,7 +45,7 @@ class Pose:
         return {**here, **camera_defaults(), **self.others}
 
     def value(self, name: str) -> Any:
-        """Of ``others``, or its default."""
+        """A value of ``others``, or its default."""
         return {**camera_defaults(), **self.others}[name]
 
     def changed(self, **others: Any) -> Pose:

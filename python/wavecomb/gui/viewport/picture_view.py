@@ -55,7 +55,7 @@ class PictureView(QWidget):
         return self._image
 
     def legend(self) -> Legend | None:
-        """Of the false colours that are shown."""
+        """The legend of the false colours that are shown."""
         return self._legend
 
     # ---- where the picture is ------------------------------------------------------------------
@@ -95,7 +95,7 @@ class PictureView(QWidget):
         self.update()
 
     def picture_rect(self) -> QRectF:
-        """Of the whole picture in the widget."""
+        """Where the whole picture is in the widget."""
         k = self.zoom() / self.devicePixelRatioF()
         wide, high = self._size.width() * k, self._size.height() * k
         middle = QPointF(self.width() / 2, self.height() / 2) + self._shift

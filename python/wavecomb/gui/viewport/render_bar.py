@@ -27,7 +27,7 @@ from wavecomb.run.settings import MAX_EDGE
 
 _MOST: dict[str, dict[str, Any]] = {"width": {"most": MAX_EDGE}, "height": {"most": MAX_EDGE}}
 _NAMES = {"max_depth": "depth"}
-"""Of controls, where they are not those of the settings."""
+"""Names of controls that are not those of their settings."""
 
 
 class RenderBar(QToolBar):

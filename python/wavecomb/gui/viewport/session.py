@@ -129,7 +129,7 @@ class Session(QObject):
 
     @property
     def version(self) -> int:
-        """Of scene and setup; every change has a higher one."""
+        """The version of scene and setup; every change has a higher one."""
         return self._live.version
 
     @property

@@ -31,9 +31,9 @@ from wavecomb.gui.worker import Worker
 from wavecomb.usd.cameras.framing import corners
 
 ORBIT_RADIANS = 0.008
-"""Of turning for each device-independent pixel: half a turn is some 400."""
+"""Angle for each device-independent pixel: half a turn is some 400 pixels."""
 DOLLY_STEP = 0.88
-"""Of the distance, for a notch of the wheel."""
+"""Factor of the distance for a notch of the wheel."""
 ZOOM_STEP = 1.25
 KEY_RADIANS = np.radians(15.0)
 CLICK_PIXELS = 4
@@ -134,7 +134,7 @@ class Viewport(PictureView):
         return self._pivot
 
     def bounds(self) -> np.ndarray:
-        """Of the scene, (2, 3)."""
+        """Bounds of the scene, (2, 3)."""
         scene = self.session.scene
         bounds = np.array(scene.bounds if scene is not None else [[-1.0] * 3, [1.0] * 3], float)
         if not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():

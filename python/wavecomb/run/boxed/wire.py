@@ -33,7 +33,7 @@ _KEPT = 1 << 12
 """Arrays of fewer bytes are sent again rather than remembered."""
 
 TYPES = ("|u1", "<f2", "<f4", "<f8", "<i4", "<u4", "<i8", "<u8")
-"""Of arrays, as NumPy writes them."""
+"""Types of arrays, as NumPy writes them."""
 
 Array = NDArray[Any]
 

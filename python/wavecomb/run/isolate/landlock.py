@@ -53,7 +53,7 @@ def _call(number: int, *arguments: object) -> int:
 
 @cache
 def version() -> int:
-    """Of the interface that this system has; 0: none."""
+    """The version of the interface that this system has; 0: none."""
     if sys.platform != "linux":
         return 0
     try:

@@ -67,7 +67,7 @@ class Lens:
     pixel_aspect: float = 1.0
 
     def options(self) -> dict[str, Any]:
-        """Of ``View``, where they are not the default."""
+        """Options of a ``View``, those that are not the default."""
         out: dict[str, Any] = {}
         if self.conform != CONFORMS[0]:
             out["conform"] = self.conform

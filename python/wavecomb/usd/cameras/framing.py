@@ -64,7 +64,7 @@ def outline(points: NDArray[Any], more: Points | None = None) -> Points:
 def outline_of_balls(
     points: NDArray[Any], radii: NDArray[Any], more: Points | None = None
 ) -> Points:
-    """Of balls about points (n, 3): where they reach farthest."""
+    """Where balls about points (n, 3) reach farthest."""
     directions = with_directions(more)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
     some, size = np.asarray(points, np.float32), np.asarray(radii, np.float32)

@@ -44,7 +44,7 @@ BYTES_PER_TRIANGLE = 210
 """Peak memory for each refined triangle, while it is refined; less in the scene (measured)."""
 
 _COARSE_FACES = 4096
-"""Of a cage: a finer one is where its limit surface is, as far as framing goes."""
+"""Faces of a cage above which framing takes it for its limit surface."""
 
 _BATCH_TRIANGLES = 4_000_000
 """Refined at once: bounds the memory that refinement itself takes."""

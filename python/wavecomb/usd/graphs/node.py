@@ -53,7 +53,7 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Of an input: which."""
+        """Which input it is; "" of other operations."""
         return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
 
     @property

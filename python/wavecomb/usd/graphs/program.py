@@ -32,7 +32,7 @@ class Graph:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its attributes."""
+        """The names of its attributes."""
         return tuple(name for name, _ in self.attributes)
 
     @property

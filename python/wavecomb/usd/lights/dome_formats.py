@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 FORMATS = ("latlong", "mirroredBall", "angular", "cubeMapVerticalCross")
 MAX_HEIGHT = 2048
-"""Of a latlong image that is made."""
+"""Rows of a latlong image that is made."""
 
 _SUBSAMPLES = 2
 _ROWS = 64

@@ -204,7 +204,7 @@ class _Primvars:
 
     @property
     def path(self) -> Sdf.Path:
-        """Of the gprim."""
+        """The path of the gprim."""
         return self._draw.prim.GetPath()
 
     @property

@@ -34,7 +34,7 @@ INHERIT_MATERIAL = 0xFFFFFFFF
 """Same as ``_core.INHERIT_MATERIAL``: what the instance says."""
 
 DEFAULT_COLOUR = (0.5, 0.5, 0.5)
-"""Of what has neither a material nor a display colour."""
+"""The colour of what has neither a material nor a display colour."""
 
 
 BINDING_PURPOSES = ("full", "preview")

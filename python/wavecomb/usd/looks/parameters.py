@@ -87,7 +87,7 @@ class _Tracer:
         self._time = time
 
     def preview(self, program: str) -> dict[str, Parameter]:
-        """Of a UsdPreviewSurface."""
+        """Parameters of a UsdPreviewSurface."""
         wanted = USES.get(program)
         out: dict[str, Parameter] = {}
         for name, (slot, default) in INPUTS.items():
@@ -106,7 +106,7 @@ class _Tracer:
         return out
 
     def materialx(self, model_name: str) -> dict[str, Parameter]:
-        """Of a MaterialX surface: its own inputs, of those that Wavecomb reads."""
+        """Inputs of a MaterialX surface, those that Wavecomb reads."""
         known = mtlx.definitions(model_name, shader_id(self._shader))
         return {name: self._own_input(one) for name, one in known.items()}
 

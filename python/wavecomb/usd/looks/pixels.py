@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
-"""Of memory that decoding one image takes."""
+"""Most memory that decoding one image may take."""
 
 
 class TextureError(ValueError):
@@ -279,7 +279,7 @@ class ReadAhead:
 
     @property
     def bytes(self) -> int:
-        """Of the pixels that are ready or under way; 0 where no limit was set."""
+        """Memory of the pixels that are ready or under way; 0 where no limit was set."""
         return sum(self._sizes[path] for path in self._ready) if self._sizes else 0
 
     def _fits(self, path: str) -> bool:

@@ -108,7 +108,7 @@ class TiledImage:
 
     @property
     def dtype(self) -> Any:
-        """Of the pixels."""
+        """The type of the pixels."""
         return self.first.dtype
 
     @property

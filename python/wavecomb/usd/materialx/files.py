@@ -24,7 +24,7 @@ MAX_CHAIN = 32
 """Files that include each other, one the next: each copies what those below it hold."""
 
 MAX_BYTES = 1 << 26
-"""Of a document with all that it includes."""
+"""Most bytes of a document with all that it includes."""
 
 _INCLUDE = "http://www.w3.org/2001/XInclude include"
 

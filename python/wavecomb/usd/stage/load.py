@@ -81,7 +81,7 @@ class _Choice:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Of the picture."""
+        """Width and height of the picture."""
         return self.options.size
 
 

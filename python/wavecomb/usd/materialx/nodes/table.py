@@ -30,4 +30,4 @@ PRIMITIVES: dict[str, Handler] = {
 """What compiles a category."""
 
 CATEGORIES = frozenset(PRIMITIVES)
-"""Of nodes that graphs of the library keep."""
+"""Categories of nodes that graphs of the library keep."""

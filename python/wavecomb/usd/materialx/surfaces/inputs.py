@@ -16,7 +16,7 @@ from wavecomb.usd.materialx.surfaces.openpbr import layers_of
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
 _MOST = 1e6
-"""Of what MaterialX gives no greatest value."""
+"""The most that an input may be where MaterialX does not say."""
 
 _SHORT = (("index of refraction", "ior"), ("diffuse roughness", "roughness"))
 _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness": 1.0}
