@@ -370,9 +370,6 @@ class SceneBuilder:
         *,
         motion: NDArray[np.float64] | None = None,
         # ---- camera_table(): tools/update_stub ----
-        # x0, x1, y0, y1 of what the picture shows: on the plane z = -1, across the axis of an
-        # orthographic camera, longitude and latitude in radians of a latlong one.
-        window: tuple[float, float, float, float],
         # Of the lens, scene units; 0: all is sharp.
         lens_radius: float = 0,
         # Along -z, scene units; above 0 with a lens.
@@ -381,6 +378,9 @@ class SceneBuilder:
         near_clip: float = 0,
         # Along -z, scene units; of a latlong camera a distance.
         far_clip: float = 1e30,
+        # x0, x1, y0, y1 of what the picture shows: on the plane z = -1, across the axis of an
+        # orthographic camera, longitude and latitude in radians of a latlong one.
+        window: tuple[float, float, float, float],
         # latlong: all directions, longitude to the right, latitude up.
         projection: Literal["perspective", "orthographic", "latlong"] = "perspective",
         # What gives way where the shapes of window and picture differ: UsdRender's

@@ -91,7 +91,7 @@ def test_no_shutter_no_time_codes(tmp_path):
     ("options", "why"),
     [
         ({"shutter": (0.5, 0.0)}, "when it opens"),
-        ({"shutter": (0.0, float("nan"))}, "when it opens"),
+        ({"shutter": (0.0, float("nan"))}, "must be two numbers"),
         ({"motion_steps": 1}, "from 2 to 64"),
     ],
 )
