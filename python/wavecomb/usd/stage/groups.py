@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.run.isolate import memory, patience, trail
-from wavecomb.usd.cameras import framing
 from wavecomb.usd.geometry.attributes import on_shape
 from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
 from wavecomb.usd.geometry.gprims import GprimReader, add_shape
@@ -31,7 +30,7 @@ from wavecomb.usd.stage.group import Group, Matrices, Scope
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.instance_materials import InstanceMaterials
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
-from wavecomb.usd.stage.placing import GroupPlacer
+from wavecomb.usd.stage.placing import GroupPlacer, outline_of
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.shared import MeshStock
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
@@ -233,25 +232,10 @@ class GroupBuilder:
         group.grow(shape.bounds)
         if self.framed is not None:
             more = self.framed if group.number == 0 else None
-            group.reach(self._outline(shape, more), more)
+            group.reach(outline_of(shape, self.surfaces, more), more)
         if isinstance(shape, MeshArrays) and shape.cage is not None:
             self.surfaces.add(group, number, draw, shape, worn)
         self.report.tally(_COUNTS[kind])
-
-    def _outline(
-        self, shape: MeshArrays | CurveArrays, more: NDArray[np.float64] | None
-    ) -> NDArray[np.float64]:
-        """Where a shape reaches farthest, in its group."""
-        points = shape.positions.reshape(-1, 3)
-        if isinstance(shape, CurveArrays):
-            radii = np.tile(shape.radii, len(points) // len(shape.radii))
-            return framing.outline_of_balls(points, radii, more)
-        smooth = None if shape.cage is None else self.surfaces.limit_points(shape.cage)
-        if smooth is not None:
-            return framing.outline(smooth, more)
-        used = np.zeros(shape.positions.shape[-2], bool)
-        used[shape.triangles] = True
-        return framing.outline(shape.positions[..., used, :].reshape(-1, 3), more)
 
     def _draw_alone(
         self,

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from wavecomb.usd.cameras import framing
+from wavecomb.usd.geometry.curves import CurveArrays
+from wavecomb.usd.geometry.mesh_arrays import MeshArrays
+from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.stage.group import Group, Matrices, middle_of
 from wavecomb.usd.stage.identity import Assets
@@ -116,3 +119,19 @@ class GroupPlacer:
             middle = centre @ linear + transforms[:, 3, :3]
             reach = half @ np.abs(linear)
             parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
+
+
+def outline_of(
+    shape: MeshArrays | CurveArrays, surfaces: Surfaces, more: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Where a shape reaches farthest, in its group."""
+    points = shape.positions.reshape(-1, 3)
+    if isinstance(shape, CurveArrays):
+        radii = np.tile(shape.radii, len(points) // len(shape.radii))
+        return framing.outline_of_balls(points, radii, more)
+    smooth = None if shape.cage is None else surfaces.limit_points(shape.cage)
+    if smooth is not None:
+        return framing.outline(smooth, more)
+    used = np.zeros(shape.positions.shape[-2], bool)
+    used[shape.triangles] = True
+    return framing.outline(shape.positions[..., used, :].reshape(-1, 3), more)
