@@ -461,7 +461,8 @@ def test_errors_are_of_the_same_types(good: Path, tmp_path: Path) -> None:
         (WavecombError, {"texture_limit": -1}),
         (WavecombError, {"variants": {"a": "b"}}),
         (WavecombError, {"size": (0, 1)}),
-        (TypeError, {"frame": "soon"}),
+        (WavecombError, {"frame": "soon"}),
+        (AttributeError, {"variants": 3}),
     ]
     with Reader(good) as reader:  # it lives on
         for kind, options in wrong:
