@@ -6,7 +6,7 @@
 
 #include "wave_testing.h"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define WAVECOMB_COUNTS_ALLOCATIONS 1
 
 namespace {
