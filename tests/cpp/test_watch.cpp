@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <stdexcept>
 #include <thread>
@@ -69,20 +70,21 @@ TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
   Watch watch;
   uint64_t steps = 0;  // no atomic: the snapshot may read it
   uint64_t last = 0;
+  std::atomic<uint64_t> told = 0;  // what whoever asks for snapshots knows of the steps
   int snapshots = 0;
   watch.run(
       [&] {
         while (snapshots < 3) {
           while (!watch.halted()) {
-            ++steps;
+            told = ++steps;
             std::this_thread::sleep_for(100us);
           }
           EXPECT_FALSE(watch.stopped());
           watch.rest();
-          EXPECT_FALSE(watch.halted());
+          EXPECT_FALSE(watch.halted());  // nothing is asked for before the next step
         }
       },
-      [] { return Request::kSnapshot; },
+      [&] { return told > last ? Request::kSnapshot : Request::kGoOn; },
       [&] {
         const uint64_t before = steps;
         std::this_thread::sleep_for(10ms);
