@@ -310,19 +310,23 @@ def test_stones_are_closed_and_their_charts_lie_apart(tmp_path: Path) -> None:
 
 
 def test_shader_cost_takes_time(tmp_path: Path) -> None:
-    pictures = []
+    stages = []
     for cost in (1.0, 200.0):
         (tmp_path / str(cost)).mkdir()
         _, loaded = spread_stage(
             tmp_path / str(cost), materials=1, texture_mb=0.5, triangles=5_000, shader_cost=cost
         )
         assert not loaded.report.warnings
-        pictures.append(wavecomb.render(loaded, size=(48, 48), spp=8, threads=1))
+        stages.append(loaded)
 
-    def stone_ns(picture: wavecomb.Picture) -> float:
-        return next(m["ns_per_record"] for m in picture.stats["materials"] if "Stone_" in m["name"])
+    def stone_ns(loaded: Any) -> float:
+        stats = wavecomb.render(loaded, size=(48, 48), spp=8, threads=1).stats
+        return next(m["ns_per_record"] for m in stats["materials"] if "Stone_" in m["name"])
 
-    assert stone_ns(pictures[1]) > 5.0 * stone_ns(pictures[0]) > 0.0
+    # The least of some: whatever else runs on the machine only adds to what a clock says.
+    rounds = [[stone_ns(loaded) for loaded in stages] for _ in range(5)]
+    plain, dear = (min(times) for times in zip(*rounds, strict=True))
+    assert dear > 5.0 * plain > 0.0
 
 
 @pytest.mark.parametrize(
