@@ -136,6 +136,8 @@ class Broker:
         ).resolved()
         for folder in self.outputs.folders():
             own = os.path.join(folder, files.private_name(self.child))
+            with contextlib.suppress(OSError):  # also where nothing is left to write
+                files.remove_leftovers(Path(own))
             with contextlib.suppress(OSError):
                 if os.path.isdir(own):  # of a process that had this number and was killed
                     shutil.rmtree(own)
