@@ -53,22 +53,15 @@ TextureUse texture_use(const nb::dict& d) {
 
 namespace {
 
-Slot slot(const std::string& name) {
+/// The value whose name is the one of that number in `names`; `what` is for an error.
+template <typename Enum, size_t N>
+Enum named(const char* what, const char* const (&names)[N], const std::string& name) {
   std::string list;
-  for (uint32_t s = 0; s < kSlotCount; ++s) {
-    if (name == kSlotNames[s]) return static_cast<Slot>(s);
-    list += (list.empty() ? "" : ", ") + std::string(kSlotNames[s]);
+  for (uint32_t i = 0; i < N; ++i) {
+    if (name == names[i]) return static_cast<Enum>(i);
+    list += (list.empty() ? "" : ", ") + std::string(names[i]);
   }
-  throw Error("texture slot '" + name + "' is not known; it must be one of " + list);
-}
-
-ProgramId program(const std::string& name) {
-  std::string list;
-  for (uint32_t p = 0; p < kProgramCount; ++p) {
-    if (name == kProgramNames[p]) return static_cast<ProgramId>(p);
-    list += (list.empty() ? "" : ", ") + std::string(kProgramNames[p]);
-  }
-  throw Error("program '" + name + "' is not known; it must be one of " + list);
+  throw Error(std::string(what) + " '" + name + "' is not known; it must be one of " + list);
 }
 
 uint32_t add_texture(SceneBuilder& builder,
@@ -121,7 +114,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
                       std::optional<uint32_t> emission_graph) {
   Material m;
   m.name = name;
-  m.program = program(program_name);
+  m.program = named<ProgramId>("program", kProgramNames, program_name);
   m.base_color = vec3(base_color);
   m.specular_color = vec3(specular_color);
   m.emission = vec3(emission);
@@ -141,7 +134,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   m.opacity_graph = opacity_graph.value_or(kNoGraph);
   m.emission_graph = emission_graph.value_or(kNoGraph);
   for (const auto& [key, value] : textures)
-    m.textures[static_cast<size_t>(slot(nb::cast<std::string>(key)))] =
+    m.textures[named<size_t>("texture slot", kSlotNames, nb::cast<std::string>(key))] =
         texture_use(nb::cast<nb::dict>(value));
   return builder.add_material(std::move(m));
 }

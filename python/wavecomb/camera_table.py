@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
 from typing import Any
+
+from wavecomb.core_table import rows_by_name
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,7 @@ def camera_parameters() -> Mapping[str, CameraParameter]:
     """
     from wavecomb import _core
 
-    def plain(value: Any) -> Any:
-        """1e30, and not the double next to the core's float."""
-        return float(f"{value:.7g}") if isinstance(value, float) else value
-
-    rows = [
-        CameraParameter(**{key: plain(value) for key, value in row.items()})
-        for row in _core.camera_table()
-    ]
-    return MappingProxyType({row.name: row for row in rows})
+    return rows_by_name(CameraParameter, _core.camera_table())
 
 
 def camera_defaults() -> dict[str, Any]:

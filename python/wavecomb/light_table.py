@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
 from typing import Any
+
+from wavecomb.core_table import rows_by_name
 
 MESH = "triangle"
 """The kind of lights of meshes: ``SceneBuilder.add_mesh_light``."""
@@ -79,15 +80,7 @@ def light_parameters() -> Mapping[str, LightParameter]:
     """
     from wavecomb import _core
 
-    def plain(value: Any) -> Any:
-        """0.53, and not the double next to the core's float."""
-        return float(f"{value:.7g}") if isinstance(value, float) else value
-
-    rows = [
-        LightParameter(**{key: plain(value) for key, value in row.items()})
-        for row in _core.light_table()
-    ]
-    return MappingProxyType({row.name: row for row in rows})
+    return rows_by_name(LightParameter, _core.light_table())
 
 
 def of_kind(kind: str) -> tuple[LightParameter, ...]:

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
 from typing import Any
+
+from wavecomb.core_table import rows_by_name
 
 
 @dataclass(frozen=True)
@@ -78,15 +79,7 @@ def settings() -> Mapping[str, Setting]:
     """
     from wavecomb import _core
 
-    def number(value: Any) -> Any:
-        """0.3, and not the double next to the core's float."""
-        return float(f"{value:.7g}") if isinstance(value, float) else value
-
-    rows = [
-        Setting(**{key: number(value) for key, value in row.items()})
-        for row in _core.setting_table()
-    ]
-    return MappingProxyType({row.name: row for row in rows})
+    return rows_by_name(Setting, _core.setting_table())
 
 
 def names(group: str, *, without: Iterable[str] = ()) -> tuple[str, ...]:

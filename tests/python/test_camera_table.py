@@ -8,13 +8,12 @@ import importlib.util
 import runpy
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from types import MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from added_rows import add_rows, made_again
 
 from wavecomb import _core as core
 from wavecomb import camera_table
@@ -31,27 +30,14 @@ ADDED = (
 )
 
 
+FOLLOW = ("wavecomb.run.boxed.calls",)
+"""Modules that make something of the table when they are imported."""
+
+
 @pytest.fixture
-def with_rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The table with a few rows more, as if the core had them."""
-    rows = MappingProxyType({**camera_parameters(), **{row.name: row for row in ADDED}})
-    own = camera_table.camera_parameters
-    for module in [one for name, one in sys.modules.items() if name.startswith("wavecomb.")]:
-        for name in [name for name, value in vars(module).items() if value is own]:
-            monkeypatch.setattr(module, name, lambda: rows)
-    yield
-
-
-def _again(name: str) -> ModuleType:
-    """A module as it is made with the table of now, beside the one that there is."""
-    importlib.import_module(name)
-    spec = importlib.util.find_spec(name)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[f"{name}_again"] = made
-    spec.loader.exec_module(made)
-    return made
+    add_rows(monkeypatch, camera_parameters, ADDED, FOLLOW)
 
 
 def _scene(**values: Any) -> core.Scene:
@@ -160,7 +146,7 @@ def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
 def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:
     from wavecomb.run.boxed.wire import Refused
 
-    call = _again("wavecomb.run.boxed.calls").CALLS["set_camera"]
+    call = made_again("wavecomb.run.boxed.calls").CALLS["set_camera"]
     body = {"transform": {"array": 0}, "window": list(WINDOW), "squint": 0.5, "mood": "shaky"}
     got = call.read({**body, "mirrors": [[1, 2, 3, 4]]}, [np.eye(4)])
     assert (got["squint"], got["mood"], got["mirrors"]) == (0.5, "shaky", [(1, 2, 3, 4)])

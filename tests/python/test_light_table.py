@@ -3,21 +3,16 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import runpy
-import sys
-from collections.abc import Iterator
 from pathlib import Path
-from types import MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from added_rows import add_rows, made_again
 from pxr import Sdf, Usd, UsdLux
 
 from wavecomb import _core as core
-from wavecomb import light_table
 from wavecomb.light_table import EDITABLE, MESH, LightParameter, light_parameters, of_kind
 
 ROOT = Path(__file__).parents[2]
@@ -40,33 +35,9 @@ FOLLOW = ("wavecomb.gui.scene.light_inputs", "wavecomb.run.boxed.calls")
 
 
 @pytest.fixture
-def with_rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The table with a few rows more, as if the core had them."""
-    for name in FOLLOW:  # which others use after this test, as they are without those rows
-        importlib.import_module(name)
-    rows = MappingProxyType({**light_parameters(), **{row.name: row for row in ADDED}})
-    own = light_table.light_parameters
-    for module in [one for name, one in sys.modules.items() if name.startswith("wavecomb.")]:
-        for name in [name for name, value in vars(module).items() if value is own]:
-            monkeypatch.setattr(module, name, lambda: rows)
-    yield
-
-
-def _again(name: str) -> ModuleType:
-    """A module as it is made with the table of now, beside the one that there is."""
-    known = importlib.util.find_spec(name)
-    assert known is not None
-    assert known.origin is not None
-    spec = importlib.util.spec_from_file_location(f"{name}_again", known.origin)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = made  # where dataclasses look
-    try:
-        spec.loader.exec_module(made)
-    finally:
-        del sys.modules[spec.name]
-    return made
+    add_rows(monkeypatch, light_parameters, ADDED, FOLLOW)
 
 
 def another(row: LightParameter) -> Any:
@@ -208,7 +179,7 @@ def test_inputs_are_those_of_usdlux() -> None:
 
 
 def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:
-    calls = _again("wavecomb.run.boxed.calls")
+    calls = made_again("wavecomb.run.boxed.calls")
     one, of_meshes = (calls.CALLS[name].more for name in ("add_light", "add_mesh_light"))
     assert {row.name for row in ADDED} <= one.keys()
     assert set(of_meshes) & {row.name for row in ADDED} == {"blades"}

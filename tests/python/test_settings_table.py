@@ -3,23 +3,19 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import runpy
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType, ModuleType
 from typing import Any
 
 import click
 import pytest
+from added_rows import add_rows, made_again
 from click.testing import CliRunner
 
 from wavecomb import _core as core
-from wavecomb import options
 from wavecomb.errors import WavecombError
 from wavecomb.options import Setting, default_text, names, settings
 
@@ -44,27 +40,9 @@ FOLLOW = (
 
 
 @pytest.fixture
-def with_rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The table with a few rows more, as if the core had them."""
-    for name in FOLLOW:  # which others use after this test, as they are without those rows
-        importlib.import_module(name)
-    rows = MappingProxyType({**settings(), **{row.name: row for row in ADDED}})
-    own = options.settings
-    for module in [one for name, one in sys.modules.items() if name.startswith("wavecomb.")]:
-        for name in [name for name, value in vars(module).items() if value is own]:
-            monkeypatch.setattr(module, name, lambda: rows)
-    yield
-
-
-def _again(name: str) -> ModuleType:
-    """A module as it is made with the table of now, beside the one that there is."""
-    importlib.import_module(name)
-    spec = importlib.util.find_spec(name)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    return made
+    add_rows(monkeypatch, settings, ADDED, FOLLOW)
 
 
 def test_rows_are_the_cores() -> None:
@@ -165,17 +143,17 @@ def test_an_added_row_is_an_option(with_rows: None) -> None:
 
 
 def test_an_added_row_is_a_field_of_the_window(with_rows: None) -> None:
-    setup = _again("wavecomb.gui.setup").Setup()
+    setup = made_again("wavecomb.gui.setup").Setup()
     assert (setup.tea_time, setup.biscuit, setup.cups, setup.milk) == (4.5, "plain", 2, False)
-    choices = _again("wavecomb.gui.scheduling.choices")
+    choices = made_again("wavecomb.gui.scheduling.choices")
     shown = {one.field: one for one in choices.fields_of("order")}
     assert list(shown["biscuit"].values) == ["plain", "iced"]
     assert (shown["cups"].least, shown["cups"].most) == (1, 9)
     assert "tea_time" in {one.field for one in choices.fields_of("work")}
-    log = _again("wavecomb.gui.scheduling.run_log")
+    log = made_again("wavecomb.gui.scheduling.run_log")
     assert {"tea_time", "biscuit", "cups"} <= set(log.FIELDS)
     assert "tea_time" in log.WORK
-    same = _again("wavecomb.gui.compare.same_picture")
+    same = made_again("wavecomb.gui.compare.same_picture")
     assert {"tea_time", "milk"} <= set(same.BITS)
     assert not {"biscuit", "cups"} & set(same.BITS)
 

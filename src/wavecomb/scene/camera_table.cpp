@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -111,12 +110,6 @@ std::vector<CameraParameter> make_table() {
                            "points with a x + b y + c z + d < 0 are cut off."),
       number_from<&C::exposure>("exposure", 0, "What light is multiplied by in the picture."),
   };
-}
-
-std::string text(double v) {
-  char digits[32];
-  std::snprintf(digits, sizeof(digits), "%g", v);
-  return digits;
 }
 
 bool finite(const FourNumbers& four) {

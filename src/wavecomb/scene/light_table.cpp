@@ -2,7 +2,6 @@
 #include "wavecomb/scene/light_table.h"
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <type_traits>
 
@@ -201,12 +200,6 @@ std::vector<LightParameter> make_table() {
                               "How its light goes with the glow of the mesh's material."),
                 {"materialGlowTintsLight", "independent", "noMaterialResponse"})),
   };
-}
-
-std::string text(double v) {
-  char digits[32];
-  std::snprintf(digits, sizeof(digits), "%g", v);
-  return digits;
 }
 
 std::string limits(const LightParameter& p) {

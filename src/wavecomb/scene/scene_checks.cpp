@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/scene/scene_checks.h"
 
+#include <cstdio>
 #include <span>
 
 #include "wavecomb/core/error.h"
@@ -8,10 +9,14 @@
 
 namespace wavecomb {
 
-namespace {}
-
 std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
+}
+
+std::string text(double v) {
+  char digits[32];
+  std::snprintf(digits, sizeof(digits), "%g", v);
+  return digits;
 }
 
 void check_material(const Material& material, size_t texture_count, size_t graph_count) {

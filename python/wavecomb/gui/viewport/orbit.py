@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.camera_table import camera_defaults
+from wavecomb.camera_table import camera_defaults, camera_parameters
 from wavecomb.picture.output import camera_window
 
 Matrix = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Pose:
 
     def value(self, name: str) -> Any:
         """A value of ``others``, or its default."""
-        return {**camera_defaults(), **self.others}[name]
+        return self.others[name] if name in self.others else camera_parameters()[name].default
 
     def changed(self, **others: Any) -> Pose:
         """With other values of ``others``."""
