@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -242,7 +243,14 @@ Battery::Battery(std::string name) : name_(std::move(name)) {
 
 void Battery::run(const Case& c) {
   const auto seed = static_cast<uint32_t>(entries_.size() + 1);
+  const auto start = std::chrono::steady_clock::now();
   const Result result = compare(c, seed);
+  if (is_long()) {
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    std::printf("%s: %.1f s, p %.2g\n", c.name.c_str(), seconds.count(),
+                *std::min_element(result.p_values.begin(), result.p_values.end()));
+    std::fflush(stdout);
+  }
   // Closures may refer to what ends with the case.
   entries_.push_back({{c.name, {}, {}, {}, c.odd}, result});
 }
