@@ -17,7 +17,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.frame_names import fill, frame_text, has_place, parse_frames
 from wavecomb.run.sequence import Frames
 from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.stage.shared import FrameStock
+from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.varying import Varying
 
 SMALL = {"size": (24, 24), "spp": 1}
@@ -250,9 +250,9 @@ def test_arrays_that_do_not_change_are_shared(shot):
         def share_texture(self, scene, texture):
             return self.add_texture(scene.textures[texture]["pixels"], srgb=False)
 
-    stock = FrameStock(stage, opening)
+    cache = FrameCache(stage, opening)
     one, two = (
-        load_stage(stage, frame=frame, stock=stock, builder_factory=Shares).scene
+        load_stage(stage, frame=frame, cache=cache, builder_factory=Shares).scene
         for frame in (1, 2)
     )
     for name in ("Q0", "Q2"):
@@ -290,7 +290,7 @@ def test_levels_of_surfaces_follow_the_camera(shot):
 def test_refined_surfaces_are_shared_beside_what_moves(shot):
     vary_beside_surfaces(shot)
     stage = Usd.Stage.Open(shot.GetRootLayer())
-    stock = FrameStock(stage, LoadReport())
+    cache = FrameCache(stage, LoadReport())
     made = []
 
     class Counts(Recorder):
@@ -302,7 +302,7 @@ def test_refined_surfaces_are_shared_beside_what_moves(shot):
             return self.add_texture(scene.textures[texture]["pixels"], srgb=False)
 
     for frame in (1, 2):
-        load_stage(stage, frame=frame, stock=stock, subdivision=2, builder_factory=Counts)
+        load_stage(stage, frame=frame, cache=cache, subdivision=2, builder_factory=Counts)
     # The one with a colour for each point is refined with its colours.
     assert made == [2, 1]
 

@@ -96,17 +96,17 @@ def render_sequence(
             job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames are there")
     picture: Picture | None = None
     report: LoadReport | None = None
-    stock: Frames | None = None
+    opened: Frames | None = None
     files: list[str] = []
     for number, frame in enumerate(wanted, 1):
         place = f"frame {frame_text(frame)}"
         job.reporter.begins(frame_text(frame), number, len(wanted))
         try:
-            if stock is None:
-                stock = open_frames(job, source)
+            if opened is None:
+                opened = open_frames(job, source)
             here = purpose_at(purpose, frame)
             picture, stopped, report = job.run(
-                FrameShot(stock, frame), source.changed(frame=frame), here
+                FrameShot(opened, frame), source.changed(frame=frame), here
             )
             if stopped is not None:
                 done = f"{number - 1} of {len(wanted)} frames are written"

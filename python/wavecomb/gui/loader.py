@@ -14,7 +14,7 @@ from pxr import Sdf, Usd
 from wavecomb.run.boxed.process import Process
 from wavecomb.run.boxed.reader import Reader, is_wanted
 from wavecomb.usd import LoadedStage
-from wavecomb.usd.looks.stock import TextureStock
+from wavecomb.usd.looks.texture_cache import TextureCache
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Request:
     overrides: Sdf.Layer | None = None
     fresh: bool = False
     threads: int = 0
-    textures: TextureStock | None = None
+    textures: TextureCache | None = None
     size: tuple[int, int] = (600, 600)
 
 

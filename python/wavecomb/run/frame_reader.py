@@ -17,10 +17,10 @@ from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.load import load_stage
 from wavecomb.usd.stage.opening import open_stage
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.shared import FrameStock
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.view_options import check_view, seen_on
 
@@ -69,7 +69,7 @@ class FrameReader:
                 path, options.variants, mask=options.mask, session_layer=layer
             )
             mtlx.tell(self._stage, opening)
-            self._stock = FrameStock(self._stage, opening)
+            self._cache = FrameCache(self._stage, opening)
         self._before: LoadedStage | None = None
 
     def read(self, options: LoadOptions, **how: Any) -> LoadedStage:
@@ -85,7 +85,7 @@ class FrameReader:
         self._before = None
         # Those were chosen when it was opened.
         here = replace(options, mask=(), session_layer=None, variants=None)
-        self._before = load_stage(self._stage, here, stock=self._stock, **how)
+        self._before = load_stage(self._stage, here, cache=self._cache, **how)
         return self._before
 
     def look(self, options: LoadOptions) -> Seen | None:
@@ -101,7 +101,7 @@ class FrameReader:
 
     def _look(self, before: LoadedStage, when: Usd.TimeCode, options: LoadOptions) -> Seen | None:
         number = frame_number(when)
-        if not self._stock.varying.is_view_only and before.frame != number:
+        if not self._cache.varying.is_view_only and before.frame != number:
             return None
         if before.leaves_out_levels:
             return None  # another view shows other textures near
@@ -119,9 +119,9 @@ class FrameReader:
         shutter = None if motion is None else motion.shutter
         if view is None or not {*told.lines()} <= {*before.report.lines()}:
             return None
-        if not self._stock.varying.is_view_only and shutter != before.shutter:
+        if not self._cache.varying.is_view_only and shutter != before.shutter:
             return None
-        if not self._stock.has_same_levels(view, options.size):
+        if not self._cache.has_same_levels(view, options.size):
             return None
         moves = camera_motion(seen.camera, motion)
         camera = {"transform": view.transform, **camera_defaults(), **view.options, "motion": moves}

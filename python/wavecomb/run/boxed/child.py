@@ -103,10 +103,10 @@ class Child:
         from wavecomb.usd.stage.opening import open_stage
 
         body, options = message.body, dict(message.body["options"])
-        if body.get("stock") is not None:
+        if body.get("cache") is not None:
             store = body["store"].get("limit_bytes")
-            options["reuse"] = plain.read_stock(
-                body["stock"],
+            options["reuse"] = plain.read_cache(
+                body["cache"],
                 RemoteScene(body["shared"]),
                 None if store is None else RemoteStore(store, self._sender),
             )
@@ -153,12 +153,12 @@ class Child:
     def _answer(self, loaded: LoadedStage) -> None:
         from wavecomb.run.boxed import plain
 
-        stock = loaded.textures
+        cache = loaded.textures
         self._sender.send(
             "stage",
             {
                 "stage": plain.of_stage(loaded),
-                "stock": None if stock is None else plain.of_stock(stock),
+                "cache": None if cache is None else plain.of_cache(cache),
             },
         )
         self._sender.end_frame()

@@ -13,7 +13,7 @@ import numpy as np
 from wavecomb.run.boxed import calls
 from wavecomb.run.boxed.calls import flag, many, maybe, named, number, row, text, whole
 from wavecomb.run.boxed.wire import Array, Refused
-from wavecomb.usd.looks.stock import Image, TextureStock
+from wavecomb.usd.looks.texture_cache import Image, TextureCache
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.report import Finding, LoadReport
@@ -55,7 +55,7 @@ _IMAGE = calls.fields(
 _PLAIN_KEY = row(text, text, text, text, whole)
 _TILES_KEY = row(text, many(row(whole, whole)), row(number, number, number, number))
 _KEY = calls.one_of(_PLAIN_KEY, _TILES_KEY, row(text, text))
-_STOCK = calls.fields(images=named(_IMAGE), ids=many(row(_KEY, whole)))
+_CACHE = calls.fields(images=named(_IMAGE), ids=many(row(_KEY, whole)))
 
 _FOUND = ("notes", "warnings", "unsupported")
 
@@ -138,23 +138,23 @@ def read_stage(
     )
 
 
-def of_stock(stock: TextureStock) -> dict[str, Any]:
+def of_cache(cache: TextureCache) -> dict[str, Any]:
     """What textures were made of as plain data; the scene that holds them is named elsewhere."""
     images = {
         path: {
             "size": image.size, "channels": image.channels, "dtype": np.dtype(image.dtype).str,
             "stamp": image.stamp, "wraps": image.wraps, "encoded": image.encoded,
         }
-        for path, image in stock.images.items()
+        for path, image in cache.images.items()
     }  # fmt: skip
-    return {"images": images, "ids": list(stock.ids.items())}
+    return {"images": images, "ids": list(cache.ids.items())}
 
 
-def read_stock(value: Any, scene: Any, store: Any, textures: int | None = None) -> TextureStock:
-    """A stock of plain data.
+def read_cache(value: Any, scene: Any, store: Any, textures: int | None = None) -> TextureCache:
+    """A cache of plain data.
 
     Args:
-        value: As ``of_stock`` gives it.
+        value: As ``of_cache`` gives it.
         scene: That holds the textures, or what stands for it.
         store: What keeps them.
         textures: That the scene has; None: not known.
@@ -162,12 +162,12 @@ def read_stock(value: Any, scene: Any, store: Any, textures: int | None = None) 
     Raises:
         Refused: It is none.
     """
-    read = _complete(_STOCK(value, ()), ("images", "ids"))
+    read = _complete(_CACHE(value, ()), ("images", "ids"))
     ids = {_frozen(key): at for key, at in read["ids"]}
     if textures is not None and any(at >= textures for at in ids.values()):
         raise Refused("textures that the scene does not have")
     images = {path: _image(entry) for path, entry in read["images"].items()}
-    return TextureStock(scene, images, ids, store)
+    return TextureCache(scene, images, ids, store)
 
 
 def _frozen(value: Any) -> Any:

@@ -22,7 +22,7 @@ from wavecomb.run.boxed.replay import Replay
 from wavecomb.run.boxed.wire import Message, Receiver, Refused, Sender
 from wavecomb.run.isolate import trail
 from wavecomb.run.isolate.memory import MEGABYTE, machine_limit
-from wavecomb.usd.looks.stock import TextureStock
+from wavecomb.usd.looks.texture_cache import TextureCache
 from wavecomb.usd.looks.texture_store import texture_store
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.loaded import LoadedStage
@@ -111,7 +111,7 @@ class Reader:
         *,
         progress: Progress | None = None,
         overrides: str | None = None,
-        reuse: TextureStock | None = None,
+        reuse: TextureCache | None = None,
     ) -> LoadedStage:
         """The stage with its scene.
 
@@ -125,7 +125,7 @@ class Reader:
         if reuse is not None:
             self._scenes = {0: reuse.scene}
             self._store = reuse.store
-            body |= {"stock": plain.of_stock(reuse), "shared": 0}
+            body |= {"cache": plain.of_cache(reuse), "shared": 0}
         return self._stage("load", body, options, progress)
 
     def open(self, options: Mapping[str, Any]) -> None:
@@ -198,11 +198,11 @@ class Reader:
         loaded = plain.read_stage(
             answer.body.get("stage"), answer.arrays, scene, self._path, working_space
         )
-        stock = answer.body.get("stock")
-        if stock is None:
+        cache = answer.body.get("cache")
+        if cache is None:
             return loaded
         count = len(scene.textures)
-        return replace(loaded, textures=plain.read_stock(stock, scene, self._store, count))
+        return replace(loaded, textures=plain.read_cache(cache, scene, self._store, count))
 
     def _checked(self, read: Callable[[], Any]) -> Any:
         """What is read of an answer; no answer but the one that was to come is taken."""
@@ -300,5 +300,5 @@ def _store(
     if not isinstance(limit, (int, float)) or not limit > 0 or math.isnan(limit):
         return None
     scene: Any = None
-    reuse = None if before is None else TextureStock(scene, {}, {}, before)
+    reuse = None if before is None else TextureCache(scene, {}, {}, before)
     return texture_store(limit, reuse, report)

@@ -17,8 +17,8 @@ from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.skeleton import Skeletons
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.shared import MeshStock
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -34,7 +34,7 @@ class GprimReader:
         surfaces: Surfaces,
         skeletons: Skeletons,
         motion: Motion | None = None,
-        stock: MeshStock | None = None,
+        cache: MeshCache | None = None,
     ) -> None:
         """Reads at ``time``.
 
@@ -44,14 +44,14 @@ class GprimReader:
             surfaces: Say what is subdivided or displaced.
             skeletons: Deform what is bound to them.
             motion: Shapes are taken over its shutter; None: at ``time`` only.
-            stock: Arrays to take from and leave there.
+            cache: Arrays to take from and leave there.
         """
         self.time = time
         self.report = report
         self.surfaces = surfaces
         self.skeletons = skeletons
         self.motion = motion
-        self.stock = stock
+        self.cache = cache
 
     def deforms(self, kind: str, prim: Usd.Prim) -> bool:
         """Whether the shape of a gprim may change while the shutter is open."""
@@ -102,10 +102,10 @@ class GprimReader:
                 return meshes.over_shutter(draw.prim, mesh, draw.matrix, draw.track)
             return mesh
 
-        if self.stock is None or self._changes(kind, draw.prim):
+        if self.cache is None or self._changes(kind, draw.prim):
             return read(self.report)
         options = (tuple(names), names is UV_NAMES, displaced)
-        return self.stock.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
+        return self.cache.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
 
 
 def add_shape(

@@ -26,8 +26,8 @@ from wavecomb.usd.stage.report import LoadReport
 if TYPE_CHECKING:
     from wavecomb import _core
     from wavecomb.usd.looks.material import MaterialTable
+    from wavecomb.usd.stage.frame_cache import RefinedCache
     from wavecomb.usd.stage.group import Group
-    from wavecomb.usd.stage.shared import RefinedStock
 
 TARGET_PIXELS = 2.0
 """Edges of refined faces are to be no longer than this, and longer than half of it."""
@@ -126,7 +126,7 @@ class Surfaces:
         self.choice = subdivision
         self.size = size
         self.threads = threads
-        self.stock: RefinedStock | None = None
+        self.cache: RefinedCache | None = None
         self._all: list[Surface] = []
 
     @property
@@ -226,13 +226,13 @@ class Surfaces:
         if levels:
             text = ", ".join(f"{count} at level {level}" for level, count in sorted(levels.items()))
             self.report.note(f"subdivision meshes refined: {text}")
-        if self.stock is None:
+        if self.cache is None:
             self._all = []
 
     def has_same_levels(
         self, world: Group, view: View, size: tuple[int, int] | None = None
     ) -> bool:
-        """Whether another view asks for the levels that ``finish`` chose, which had a stock.
+        """Whether another view asks for the levels that ``finish`` chose, which had a cache.
 
         ``size``: of its picture; None: as it was.
         """
@@ -298,7 +298,7 @@ class Surfaces:
         """Refines meshes, in parallel, and replaces the polygons that stand for them."""
         fresh = []
         for surface in batch:
-            known = self._stocked(surface)
+            known = self._cached(surface)
             if known is None:
                 fresh.append(surface)
             else:
@@ -314,15 +314,15 @@ class Surfaces:
                 what = f"mesh not subdivided, {refined}: drawn as polygons"
                 self.report.warn(what, surface.draw.prim.GetPath())
                 continue
-            if self.stock is not None and surface.is_plain:
-                self.stock.put(surface.cage, surface.level, refined)
+            if self.cache is not None and surface.is_plain:
+                self.cache.put(surface.cage, surface.level, refined)
             self._take(surface, refined)
 
-    def _stocked(self, surface: Surface) -> dict[str, Any] | None:
+    def _cached(self, surface: Surface) -> dict[str, Any] | None:
         """What the frame before made of a surface, if it can be this one's."""
-        if self.stock is None or not surface.is_plain:
+        if self.cache is None or not surface.is_plain:
             return None
-        return self.stock.get(surface.cage, surface.level)
+        return self.cache.get(surface.cage, surface.level)
 
     def _take(self, surface: Surface, refined: dict[str, Any]) -> None:
         if not refined["manifold"]:

@@ -17,8 +17,8 @@ from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.colour_space import linear_colour, space_of
 from wavecomb.usd.looks.network import colour, number
-from wavecomb.usd.looks.stock import Image
 from wavecomb.usd.looks.texture import UDIM, TextureTable, asset_file, tile_files
+from wavecomb.usd.looks.texture_cache import Image
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 

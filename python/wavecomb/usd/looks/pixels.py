@@ -18,7 +18,7 @@ from pxr import Ar
 from wavecomb.machine import usable_cores
 from wavecomb.picture.files import problem_of
 from wavecomb.run.isolate import trail
-from wavecomb.usd.looks.stock import Image, Stamp
+from wavecomb.usd.looks.texture_cache import Image, Stamp
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor

@@ -28,8 +28,8 @@ from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface
 from wavecomb.usd.looks.texture import asset_file
 
 if TYPE_CHECKING:
-    from wavecomb.usd.looks.stock import Image
     from wavecomb.usd.looks.texture import TextureTable, TiledImage
+    from wavecomb.usd.looks.texture_cache import Image
     from wavecomb.usd.stage.report import LoadReport
 
 INPUTS: dict[str, tuple[str, Any]] = {

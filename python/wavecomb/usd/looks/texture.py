@@ -20,7 +20,7 @@ from wavecomb.run.isolate import memory
 from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.looks.halve import halve
 from wavecomb.usd.looks.pixels import ReadAhead, TextureError, read_image, stamp_of
-from wavecomb.usd.looks.stock import Image, TextureStock
+from wavecomb.usd.looks.texture_cache import Image, TextureCache
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ class TextureTable:
         builder: _core.SceneBuilder,
         report: LoadReport,
         threads: int = 0,
-        reuse: TextureStock | None = None,
+        reuse: TextureCache | None = None,
         working: str = "rec709",
         store: _core.TextureStore | None = None,
     ) -> None:
@@ -383,9 +383,9 @@ class TextureTable:
             pixels, srgb=False, wrap_s="repeat", wrap_t="clamp", name=name
         )
 
-    def stock(self, scene: _core.Scene) -> TextureStock:
+    def cache(self, scene: _core.Scene) -> TextureCache:
         """What later scenes can share; scene: that was built of these textures."""
-        return TextureStock(scene, self._taken, self._ids, self.store)
+        return TextureCache(scene, self._taken, self._ids, self.store)
 
     def release(self) -> None:
         """Forgets the pixels that were read."""

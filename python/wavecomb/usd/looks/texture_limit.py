@@ -23,8 +23,8 @@ from wavecomb.usd.geometry.mesh_arrays import UV_NAMES
 from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.looks.material import MaterialTable, bound_materials
 from wavecomb.usd.looks.pixels import TextureError, read_header
-from wavecomb.usd.looks.stock import Image
 from wavecomb.usd.looks.texture import Key, TextureTable, stored_type
+from wavecomb.usd.looks.texture_cache import Image
 from wavecomb.usd.looks.texture_store import MEGABYTE
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport

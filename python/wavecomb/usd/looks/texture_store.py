@@ -11,13 +11,13 @@ from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.looks.stock import TextureStock
+    from wavecomb.usd.looks.texture_cache import TextureCache
 
 MEGABYTE = 1_000_000
 
 
 def texture_store(
-    limit: float | None, reuse: TextureStock | None, report: LoadReport
+    limit: float | None, reuse: TextureCache | None, report: LoadReport
 ) -> _core.TextureStore | None:
     """What keeps textures within ``limit`` MB; None: nothing does.
 

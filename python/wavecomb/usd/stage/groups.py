@@ -26,13 +26,13 @@ from wavecomb.usd.looks.material import (
     MaterialTable,
     bound_materials,
 )
+from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.group import Group, Matrices, Scope
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.instance_materials import InstanceMaterials
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.shared import MeshStock
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
 
 if TYPE_CHECKING:
@@ -69,13 +69,13 @@ class GroupBuilder:
         light_groups: LightGroups,
         report: LoadReport,
         surfaces: Surfaces,
-        stock: MeshStock | None = None,
+        cache: MeshCache | None = None,
         progress: LoadProgress | None = None,
         framed: NDArray[np.float64] | None = None,
     ) -> None:
         """Makes one for a stage.
 
-        ``stock``: arrays of meshes to take from and leave there; ``progress``: is told;
+        ``cache``: arrays of meshes to take from and leave there; ``progress``: is told;
         ``framed``: directions (k, 3) in which a view asks how far the world reaches; groups keep
         outlines for it.
         """
@@ -89,7 +89,7 @@ class GroupBuilder:
         self.surfaces = surfaces
         self.motion = traversal.motion
         self.gprims = GprimReader(
-            self.time, report, surfaces, traversal.skeletons, self.motion, stock
+            self.time, report, surfaces, traversal.skeletons, self.motion, cache
         )
         self.progress = progress
         self.framed = framed

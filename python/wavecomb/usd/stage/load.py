@@ -31,11 +31,12 @@ from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.stock import TextureStock
 from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.looks.texture_cache import TextureCache
 from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
+from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.group import Group, placed_lights
 from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
@@ -43,7 +44,6 @@ from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.named_files import keep_to
 from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.shared import FrameStock
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.traverse import Traversal
 from wavecomb.usd.stage.view_options import Seen, check_view, seen_on
@@ -90,8 +90,8 @@ def load_stage(
     options: LoadOptions | None = None,
     *,
     editable: bool = False,
-    reuse: TextureStock | None = None,
-    stock: FrameStock | None = None,
+    reuse: TextureCache | None = None,
+    cache: FrameCache | None = None,
     progress: LoadProgress | None = None,
     builder_factory: Callable[[], _core.SceneBuilder] | None = None,
     store_factory: Callable[[LoadReport], _core.TextureStore | None] | None = None,
@@ -106,7 +106,7 @@ def load_stage(
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
-        stock: Of a stage that is open and was read at another frame: what did not change is
+        cache: Of a stage that is open and was read at another frame: what did not change is
             shared. Changes nothing else.
         progress: Is told how many of the prims found so far are read.
         builder_factory: Makes the scene builder; None: the native one.
@@ -126,8 +126,8 @@ def load_stage(
     threads = chosen.threads
     report = LoadReport()
     file = _file_of(source)
-    if stock is not None:
-        reuse = stock.textures
+    if cache is not None:
+        reuse = cache.textures
     opened = _opener(source, chosen)
     # What is not finite in a file is found where it is read; NumPy need not say it.
     with captured(report), np.errstate(all="ignore"):
@@ -148,7 +148,7 @@ def load_stage(
 
         try:
             choice = _Choice(opened, chosen, editable)
-            filled = _fill(builder, choice, textures, report, surfaces_of, stock, progress)
+            filled = _fill(builder, choice, textures, report, surfaces_of, cache, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
         except Tf.ErrorException as error:
@@ -162,10 +162,10 @@ def load_stage(
         trail.note("building the scene of", file)
         scene = _build(builder, file)
         trail.note("rendering", file)
-    if stock is not None:
-        stock.textures = textures.stock(scene)
-        stock.end_frame()
-        report.absorb(stock.opening)
+    if cache is not None:
+        cache.textures = textures.cache(scene)
+        cache.end_frame()
+        report.absorb(cache.opening)
     if builder_factory is None:
         give_back_memory()
     return LoadedStage(
@@ -179,7 +179,7 @@ def load_stage(
         filled.materials,
         filled.lights,
         filled.frame,
-        textures.stock(scene) if editable else None,
+        textures.cache(scene) if editable else None,
         filled.shutter,
         filled.render,
         chosen.working_space,
@@ -217,13 +217,13 @@ def _fill(
     textures: TextureTable,
     report: LoadReport,
     surfaces_of: SurfacesOf,
-    stock: FrameStock | None,
+    cache: FrameCache | None,
     progress: LoadProgress | None,
 ) -> _Filled:
     """Fills the builder. A stage that was opened here is closed then."""
     stage = choice.opened()
     keep_to(stage)
-    if stock is None:
+    if cache is None:
         mtlx.tell(stage, report)
     time = time_code(stage, choice.options.frame)
     found = survey(stage)
@@ -240,7 +240,7 @@ def _fill(
         bool(found.lights),
         report,
         surfaces_of(materials),
-        stock,
+        cache,
         progress,
     )
     used = frame_number(time)
@@ -264,7 +264,7 @@ def _read(
     has_lights: bool,
     report: LoadReport,
     surfaces: Surfaces,
-    stock: FrameStock | None,
+    cache: FrameCache | None,
     progress: LoadProgress | None,
 ) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None, NDArray[np.float64] | None]:
     """Fills the builder; gives paths of the camera and of lights, the shutter, the outline."""
@@ -284,8 +284,8 @@ def _read(
         view = read_camera(view_prim, to_world, time, report, seen.lens)
     outline = None
     planes = frame_planes(up_axis, seen.lens, choice.size)
-    meshes = None if stock is None else stock.meshes
-    surfaces.stock = None if stock is None else stock.refined
+    meshes = None if cache is None else cache.meshes
+    surfaces.cache = None if cache is None else cache.refined
     groups_of = GroupBuilder(
         stage, traversal, builder, materials, groups, report, surfaces, meshes, progress,
         framed=planes if view is None else None,
@@ -305,8 +305,8 @@ def _read(
         if moves is not None:
             view.options["motion"] = moves
     surfaces.finish(world, view)
-    if stock is not None:
-        stock.has_same_levels = partial(surfaces.has_same_levels, world)
+    if cache is not None:
+        cache.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
     return chosen, light_paths, None if motion is None else motion.shutter, outline
 

@@ -15,7 +15,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.looks.stock import TextureStock
+    from wavecomb.usd.looks.texture_cache import TextureCache
 
 
 @dataclass
@@ -54,7 +54,7 @@ class LoadedStage:
     material_paths: tuple[str, ...] = ()
     light_paths: tuple[str, ...] = ()
     frame: float | None = None
-    textures: TextureStock | None = None
+    textures: TextureCache | None = None
     shutter: tuple[float, float] | None = None
     render: RenderChoice = field(default_factory=RenderChoice)
     working_space: str = "rec709"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Gf, Usd
 
-from wavecomb.usd.looks.stock import TextureStock
+from wavecomb.usd.looks.texture_cache import TextureCache
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.varying import Varying
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 
 
-class MeshStock:
+class MeshCache:
     """Arrays of gprims that no frame changes, with what there was to say of them.
 
     Those that a frame does not ask for are forgotten at its end.
@@ -65,7 +65,7 @@ class MeshStock:
         self._kept, self._used = self._used, {}
 
 
-class RefinedStock:
+class RefinedCache:
     """Refined surfaces whose cages and levels no frame changes.
 
     Not of those that are displaced or that colour single triangles: materials have a say in them.
@@ -92,7 +92,7 @@ class RefinedStock:
         self._kept, self._used = self._used, {}
 
 
-class FrameStock:
+class FrameCache:
     """For ``load_stage``: what it may take from the frame before, and leaves for the next one.
 
     ``has_same_levels`` says of another view, and the size of its picture (None: as it was), whether
@@ -104,12 +104,12 @@ class FrameStock:
     def __init__(self, stage: Usd.Stage, opening: LoadReport) -> None:
         """``opening``: what there was to say when the stage was opened."""
         self.varying = Varying(stage)
-        self.meshes = MeshStock(self.varying)
-        self.refined = RefinedStock()
+        self.meshes = MeshCache(self.varying)
+        self.refined = RefinedCache()
         self.has_same_levels: Callable[[View, tuple[int, int] | None], bool] = lambda view, size: (
             True
         )
-        self.textures: TextureStock | None = None
+        self.textures: TextureCache | None = None
         self.opening = opening
 
     def end_frame(self) -> None:

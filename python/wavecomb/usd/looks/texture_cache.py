@@ -67,7 +67,7 @@ class Image:
 
 
 @dataclass(frozen=True)
-class TextureStock:
+class TextureCache:
     """The textures of a scene, for later ones to share.
 
     Attributes:
