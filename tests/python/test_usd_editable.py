@@ -231,7 +231,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
     assert inputs.found.keys() <= known.keys()
     for name, default in inputs.found.items():
         assert known[name].default == pytest.approx(default), name
-    for row in MODELS[model].slots.values():
+    for row in MODELS[model].textured.values():
         for name, default in ((row.input, row.default), row.weight):
             if name:
                 assert definitions(model)[name].default == pytest.approx(default), name

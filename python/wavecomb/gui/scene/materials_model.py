@@ -224,15 +224,15 @@ def range_of(parameter: Parameter) -> Range:
     """What a parameter can be."""
     one = parameter.definition
     if one is None:
-        return RANGES.get(parameter.slot, UNIT)
+        return RANGES.get(parameter.name, UNIT)
     decimals = 1 if one.soft_high >= 100.0 else 3
     return Range(one.low, one.high, one.soft_low, one.soft_high, decimals)
 
 
 def row_of(parameter: Parameter) -> FieldRow:
     """The field of a parameter; one that only says what drives it where there is no value."""
-    slot, one = parameter.slot, parameter.definition
-    title = slot.replace("_", " ")
+    name, one = parameter.name, parameter.definition
+    title = name.replace("_", " ")
     driver, kind = "", NUMBER
     if parameter.driven_by or parameter.value is None:
         driver, kind = parameter.driven_by or parameter.reason, DRIVEN
@@ -241,13 +241,13 @@ def row_of(parameter: Parameter) -> FieldRow:
     elif isinstance(parameter.value, tuple):
         kind = COLOUR
     if parameter.attribute is not None:
-        tip = f"{slot}: edits {parameter.attribute}"
+        tip = f"{name}: edits {parameter.attribute}"
     else:
         why = parameter.reason
-        tip = f"{slot}: in the picture only, edits of it cannot be saved: {why}"
+        tip = f"{name}: in the picture only, edits of it cannot be saved: {why}"
     return FieldRow(
-        slot,
-        one.label if one is not None else LABELS.get(slot, title),
+        name,
+        one.label if one is not None else LABELS.get(name, title),
         kind,
         None if kind == DRIVEN else parameter.value,
         title,

@@ -59,19 +59,19 @@ class RenderSync:
     # ---- materials -----------------------------------------------------------------------------
 
     def parameters(self, path: str) -> dict[str, Parameter]:
-        """Parameters of a material by slot; empty of one that no prim is there for."""
+        """Parameters of a material by name; empty of one that no prim is there for."""
         prim = self.prim(path)
         return material_parameters(prim, self.time) if prim else {}
 
     def parameter_value(self, path: str, parameter: Parameter) -> Any:
         """What a parameter is now."""
-        return self.edits.values.get((Sdf.Path(path), f"!{parameter.slot}"), parameter.value)
+        return self.edits.values.get((Sdf.Path(path), f"!{parameter.name}"), parameter.value)
 
     def is_edited(self, path: str, parameter: Parameter) -> bool:
         """Whether a parameter was changed here."""
         attribute = parameter.attribute
         if attribute is None:
-            return (Sdf.Path(path), f"!{parameter.slot}") in self.edits.values
+            return (Sdf.Path(path), f"!{parameter.name}") in self.edits.values
         return self.edits.opinion((attribute.GetPrimPath(), f".{attribute.name}")) is not None
 
     def material_ids(self, path: str) -> list[int]:
@@ -135,11 +135,11 @@ class RenderSync:
         known = self.edits.values.items()
         return {what[1:]: value for (prim, what), value in known if prim == own}
 
-    def can_show(self, path: str, slot: str, value: Any) -> bool:
+    def can_show(self, path: str, name: str, value: Any) -> bool:
         """Whether a value that no attribute can hold can be brought into the picture."""
         known = self.live_values(path)
         before = surface_values(self.prim(path), self.time, known)
-        after = surface_values(self.prim(path), self.time, {**known, slot: value})
+        after = surface_values(self.prim(path), self.time, {**known, name: value})
         return before is None or after is None or before.structure == after.structure
 
     def structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
@@ -176,8 +176,8 @@ class RenderSync:
             wanted = {name: as_stored(value) for name, value in surface.constants.items()}
         else:
             wanted = {
-                slot: as_stored(self.parameter_value(path, parameter))
-                for slot, parameter in self.parameters(path).items()
+                name: as_stored(self.parameter_value(path, parameter))
+                for name, parameter in self.parameters(path).items()
                 if not parameter.driven_by
             }
         for number in self.material_ids(path):
@@ -185,11 +185,11 @@ class RenderSync:
                 continue
             have = scene.material(number)
             have |= have.get("openpbr", {})
-            # A mesh may bring a value for a slot, which a graph reads then.
+            # A mesh may bring a value for a name, which a graph reads then.
             values = {
-                slot: value
-                for slot, value in wanted.items()
-                if slot not in have.get("driven", ()) and as_stored(have[slot]) != value
+                name: value
+                for name, value in wanted.items()
+                if name not in have.get("driven", ()) and as_stored(have[name]) != value
             }
             if values:
                 self._session.edit_material(number, **values)

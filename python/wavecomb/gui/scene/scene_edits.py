@@ -159,7 +159,7 @@ class SceneEdits(QObject):
     # ---- materials -----------------------------------------------------------------------------
 
     def parameters(self, path: str) -> dict[str, Parameter]:
-        """Parameters of a material by slot; empty of one that no prim is there for."""
+        """Parameters of a material by name; empty of one that no prim is there for."""
         return self._sync.parameters(path) if self._sync is not None else {}
 
     def material_ids(self, path: str) -> list[int]:
@@ -174,19 +174,19 @@ class SceneEdits(QObject):
         """Whether a parameter was changed here."""
         return self._sync is not None and self._sync.is_edited(path, parameter)
 
-    def set_parameter(self, path: str, slot: str, value: Any) -> None:
+    def set_parameter(self, path: str, name: str, value: Any) -> None:
         """Changes a parameter of a material; None: as the stage has it."""
-        parameter = self.parameters(path).get(slot)
-        label = f"{slot} of {path}"
+        parameter = self.parameters(path).get(name)
+        label = f"{name} of {path}"
         if parameter is None or parameter.driven_by or self._sync is None:
             return
         opinion: Opinion | None = None
         if parameter.attribute is None:
-            if value is not None and not self._sync.can_show(path, slot, value):
+            if value is not None and not self._sync.can_show(path, name, value):
                 self.session.warned.emit(f"{label}: not changed: {parameter.reason}")
                 self.changed.emit()
                 return
-            key = (Sdf.Path(path), f"!{slot}")
+            key = (Sdf.Path(path), f"!{name}")
             opinion = None if value is None else Opinion(as_stored(value))
         else:
             attribute = parameter.attribute

@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 from wavecomb.usd.graphs.expressions import Expressions, substituted
 from wavecomb.usd.graphs.node import PRIMVAR, Node, Value, is_constant, numbers
 from wavecomb.usd.graphs.surface import graphs_of, plain_use
-from wavecomb.usd.looks.surface import SLOTS, SurfaceGraph
+from wavecomb.usd.looks.surface import TEXTURED_PARAMETERS, SurfaceGraph
 
 if TYPE_CHECKING:
     from wavecomb.usd.looks.surface import Surface
 
 _LOCAL = ("local_position", "local_normal")
+
+_CONSTANTS = {*TEXTURED_PARAMETERS, "ior"} - {"normal"}
+"""Parameters beside those of layers that a constant may stand for."""
 
 
 def bound(
@@ -59,13 +62,13 @@ def bound(
     textures, left = dict(surface.textures), {}
     for parameter, open_value in graph.outputs:
         value = substituted(make, open_value, replaced)
-        use = plain_use(value, len(value) == 3) if parameter in SLOTS else None
+        use = plain_use(value, len(value) == 3) if parameter in TEXTURED_PARAMETERS else None
         plain = value if len(value) > 1 else value[0]
         if use is not None:
             textures[parameter] = use
         elif is_constant(value) and parameter in layers:
             layers[parameter] = plain
-        elif is_constant(value) and parameter in (*SLOTS, "ior") and parameter != "normal":
+        elif is_constant(value) and parameter in _CONSTANTS:
             parameters[parameter] = plain
         else:
             left[parameter] = value

@@ -24,7 +24,7 @@ from wavecomb.usd.graphs.node import (
     nodes_of,
 )
 from wavecomb.usd.graphs.program import Graph, assemble
-from wavecomb.usd.looks.surface import COLOUR_SLOTS, SLOTS, SurfaceGraph
+from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, TEXTURED_PARAMETERS, SurfaceGraph
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 
@@ -126,7 +126,7 @@ class Drivers:
 
     def __init__(self, networks: Networks) -> None:
         self.networks = networks
-        self.slots: dict[str, dict[str, Any]] = {}
+        self.textured: dict[str, dict[str, Any]] = {}
         self._outputs: dict[str, Value] = {}
         self._converted: Networks | None = None
 
@@ -173,9 +173,9 @@ class Drivers:
         value = fit(value, width)
         if is_constant(value):
             return tuple(float(part) for part in value)  # type: ignore[arg-type]
-        use = plain_use(value, width == 3) if parameter in SLOTS else None
+        use = plain_use(value, width == 3) if parameter in TEXTURED_PARAMETERS else None
         if use is not None:
-            self.slots[parameter] = use
+            self.textured[parameter] = use
         else:
             self._outputs[parameter] = value
         return None
@@ -229,7 +229,7 @@ def kind_of(parameter: str) -> str:
         return BASE
     if parameter == "normal":
         return NORMAL
-    return COLOUR if parameter in COLOUR_SLOTS or parameter.endswith("_color") else NUMBER
+    return COLOUR if parameter in COLOUR_PARAMETERS or parameter.endswith("_color") else NUMBER
 
 
 def _of(outputs: Mapping[str, Value]) -> Graph:

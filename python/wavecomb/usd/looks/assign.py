@@ -22,7 +22,7 @@ from wavecomb.usd.graphs.bind import asks_for, bound
 from wavecomb.usd.graphs.node import PARAMETERS, GraphTooLarge
 from wavecomb.usd.looks.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.looks.network import colour, number
-from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface
+from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
 from wavecomb.usd.stage.report import LoadReport
 
 FaceIds = NDArray[np.uint32]
@@ -128,21 +128,21 @@ class Assigner:
             surface = self._with_graph(primvars, surface)
         varying: list[str] = []
         brightest = primvars.highest(surface.emission_attributes())
-        for slot, name in surface.primvars.items():
-            found = primvars.find(name, 3 if slot in COLOUR_SLOTS else 1)
+        for parameter, name in surface.primvars.items():
+            found = primvars.find(name, 3 if parameter in COLOUR_PARAMETERS else 1)
             if found is None:
                 continue
             if found.is_constant:
-                surface = surface.with_value(slot, _plain(found.first))
+                surface = surface.with_value(parameter, _plain(found.first))
                 continue
-            if slot not in PARAMETERS:
-                what = f"varying primvar for {slot} (its mean is used)"
+            if parameter not in PARAMETERS:
+                what = f"varying primvar for {parameter} (its mean is used)"
                 self.report.missing(what, primvars.path)
-                surface = surface.with_value(slot, _plain(found.mean))
+                surface = surface.with_value(parameter, _plain(found.mean))
                 continue
-            varying.append(slot)
+            varying.append(parameter)
             primvars.keep(found)
-            if slot == "emission":
+            if parameter == "emission":
                 brightest = max(brightest, found.highest)
         return self.table.add(self.table.varied(surface, tuple(varying)), brightest)
 
@@ -181,9 +181,9 @@ class Assigner:
         if opacities is not None and opacities.is_constant:
             opacity = min(max(number(float(opacities.first[0]), 1.0), 0.0), 1.0)
         varying = []
-        for slot, found in (("base_color", colours), ("opacity", opacities)):
+        for parameter, found in (("base_color", colours), ("opacity", opacities)):
             if found is not None and not found.is_constant:
-                varying.append(slot)
+                varying.append(parameter)
                 primvars.keep(found)
         shown = colour(colours.first, DEFAULT_COLOUR) if colours.is_constant else DEFAULT_COLOUR
         return self.table.plain(shown, opacity, tuple(varying))

@@ -18,7 +18,7 @@ from wavecomb.usd.graphs.node import GraphTooLarge
 from wavecomb.usd.looks.network import shader_id
 from wavecomb.usd.looks.preview import PreviewReader
 from wavecomb.usd.looks.surface import (
-    COLOUR_SLOTS,
+    COLOUR_PARAMETERS,
     OPENPBR_COLOURS,
     Surface,
     fallback_surface,
@@ -168,21 +168,21 @@ class MaterialTable:
             self.glows = self.glows or brightest >= LAMP
         return number
 
-    def varied(self, surface: Surface, slots: tuple[str, ...]) -> Surface:
-        """A surface whose slots read their primvars at hits."""
-        if not slots:
+    def varied(self, surface: Surface, varying: tuple[str, ...]) -> Surface:
+        """A surface some of whose parameters read their primvars at hits."""
+        if not varying:
             return surface
-        known = self._varied.get((id(surface), slots))
+        known = self._varied.get((id(surface), varying))
         if known is not None:
             return known[1]
         try:
-            varied = with_attributes(surface, slots, self._textures.working)
+            varied = with_attributes(surface, varying, self._textures.working)
         except GraphTooLarge as error:
             what = f"shading network too large for primvars ({error}): left out"
             self._report.missing(what, surface.name)
             varied = surface
         # Holding the surface keeps its address from being used again.
-        self._varied[id(surface), slots] = surface, varied
+        self._varied[id(surface), varying] = surface, varied
         return varied
 
     def _add(self, surface: Surface) -> int:
@@ -240,7 +240,7 @@ class MaterialTable:
             }
             return {**values, **there}
 
-        parameters = converted(parameters, COLOUR_SLOTS)
+        parameters = converted(parameters, COLOUR_PARAMETERS)
         if "openpbr" in parameters:
             parameters["openpbr"] = converted(parameters["openpbr"], OPENPBR_COLOURS)
         return parameters

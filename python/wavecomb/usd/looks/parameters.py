@@ -24,7 +24,7 @@ from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical, linear_colou
 from wavecomb.usd.looks.material import PREVIEW, surface_source
 from wavecomb.usd.looks.network import Source, colour, number, shader_id, source_of, value_of
 from wavecomb.usd.looks.preview import INPUTS, USES, constant, program_of
-from wavecomb.usd.looks.surface import COLOUR_SLOTS
+from wavecomb.usd.looks.surface import COLOUR_PARAMETERS
 from wavecomb.usd.looks.surface_inputs import COLOUR, SWITCH, InputDefinition
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
@@ -37,7 +37,7 @@ class Parameter:
     """One parameter of a material.
 
     Attributes:
-        slot: Keyword argument of ``SceneBuilder.add_material``; of MaterialX the shader's input.
+        name: Keyword argument of ``SceneBuilder.add_material``; of MaterialX the shader's input.
         value: As the loader reads it: a number, three, or a bool; None where it is driven.
         attribute: To author for another value, there already or not; None: there is none.
         type_name: Of that attribute.
@@ -47,7 +47,7 @@ class Parameter:
         definition: What MaterialX says of the input; None of UsdPreviewSurface.
     """
 
-    slot: str
+    name: str
     value: Any = None
     attribute: Sdf.Path | None = None
     type_name: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
@@ -67,7 +67,7 @@ class Parameter:
 
 
 def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
-    """Parameters of a material by slot, in the order of a panel; empty where it has no surface."""
+    """Parameters of a material by name, in a panel's order; empty where it has no surface."""
     material = UsdShade.Material(prim)
     kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
     if not kind:
@@ -90,19 +90,19 @@ class _Tracer:
         """Parameters of a UsdPreviewSurface."""
         wanted = USES.get(program)
         out: dict[str, Parameter] = {}
-        for name, (slot, default) in INPUTS.items():
-            if slot == "normal" or (wanted is not None and slot not in wanted):
+        for name, (parameter, default) in INPUTS.items():
+            if parameter == "normal" or (wanted is not None and parameter not in wanted):
                 continue
-            if slot == "base_color" and program == "dielectric":
+            if parameter == "base_color" and program == "dielectric":
                 default = (1.0, 1.0, 1.0)
-            out[slot] = self._input(slot, name, default)
-        for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
+            out[parameter] = self._input(parameter, name, default)
+        for key, parameter in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
             attribute = self._prim.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
                 black = (0.0, 0.0, 0.0)
                 value = colour(attribute.Get(self._time), black)
                 path, usual = attribute.GetPath(), Sdf.ValueTypeNames.Color3f
-                out[slot] = self._constant(slot, value, path, attribute, usual)
+                out[parameter] = self._constant(parameter, value, path, attribute, usual)
         return out
 
     def materialx(self, model_name: str) -> dict[str, Parameter]:
@@ -137,24 +137,24 @@ class _Tracer:
         own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
         return own if attribute is None else attribute.GetPath()
 
-    def _input(self, slot: str, name: str, default: Any) -> Parameter:
+    def _input(self, parameter: str, name: str, default: Any) -> Parameter:
         source = source_of(self._shader, name, self._time)
         if source is not None and not source.is_value:
-            return Parameter(slot, driven_by=self._driver(source))
+            return Parameter(parameter, driven_by=self._driver(source))
         attribute = None if source is None else source.attribute
-        value = constant(slot, default if source is None else source.value, default)
-        space = space_of(attribute) if slot in COLOUR_SLOTS else ""
+        value = constant(parameter, default if source is None else source.value, default)
+        space = space_of(attribute) if parameter in COLOUR_PARAMETERS else ""
         if space and canonical(space) not in (LINEAR, RAW):
             with contextlib.suppress(ValueError):  # the loader says that it does not know it
                 value = linear_colour(value, attribute)
-            return Parameter(slot, value, reason=f"it is in the colour space {space}")
-        wide = slot in COLOUR_SLOTS
+            return Parameter(parameter, value, reason=f"it is in the colour space {space}")
+        wide = parameter in COLOUR_PARAMETERS
         usual = Sdf.ValueTypeNames.Color3f if wide else Sdf.ValueTypeNames.Float
-        return self._constant(slot, value, self._path_of(name, attribute), attribute, usual)
+        return self._constant(parameter, value, self._path_of(name, attribute), attribute, usual)
 
     def _constant(
         self,
-        slot: str,
+        parameter: str,
         value: Any,
         path: Sdf.Path,
         attribute: Usd.Attribute | None,
@@ -162,15 +162,16 @@ class _Tracer:
     ) -> Parameter:
         """A parameter whose value is that of an attribute, or would be one of the usual type."""
         if self._prim.IsInstanceProxy() or self._prim.IsInPrototype():
-            return Parameter(slot, value, reason=IN_INSTANCE)
+            return Parameter(parameter, value, reason=IN_INSTANCE)
         if not path.HasPrefix(self._prim.GetPath()):
-            return Parameter(slot, value, reason=f"it comes from {path}, outside of the material")
+            reason = f"it comes from {path}, outside of the material"
+            return Parameter(parameter, value, reason=reason)
         if attribute is None:
-            return Parameter(slot, value, path, usual)
+            return Parameter(parameter, value, path, usual)
         type_name = attribute.GetTypeName()
         if _is_triple(usual) != _is_triple(type_name):
-            return Parameter(slot, value, reason=f"{path} is a {type_name}")
-        return Parameter(slot, value, path, type_name)
+            return Parameter(parameter, value, reason=f"{path} is a {type_name}")
+        return Parameter(parameter, value, path, type_name)
 
     def _driver(self, source: Source) -> str:
         shader = source.shader

@@ -24,7 +24,7 @@ from wavecomb.usd.looks.network import (
     value_of,
     word,
 )
-from wavecomb.usd.looks.surface import COLOUR_SLOTS, Surface
+from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
 from wavecomb.usd.looks.texture import asset_file
 
 if TYPE_CHECKING:
@@ -86,12 +86,12 @@ def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> st
     return str(name)
 
 
-def constant(slot: str, value: Any, default: Any) -> Any:
+def constant(parameter: str, value: Any, default: Any) -> Any:
     """What an authored value gives a parameter: finite, in range."""
     if isinstance(default, tuple):
         return colour(value, default)
     result = number(value, default)
-    return min(max(result, 0.0), 1.0) if slot in _UNIT else result
+    return min(max(result, 0.0), 1.0) if parameter in _UNIT else result
 
 
 class PreviewReader:
@@ -106,7 +106,7 @@ class PreviewReader:
         self.report = report
         self.drivers = Drivers(mtlx.networks(material, time, textures, report))
         self.uv_names = self.drivers.networks.uv_names
-        self.slots = self.drivers.slots
+        self.textured = self.drivers.textured
         self.primvars: dict[str, str] = {}
 
     def read(self, shader: UsdShade.Shader) -> Surface:
@@ -114,16 +114,16 @@ class PreviewReader:
         program = program_of(self.material, self.time, self.report)
         wanted = USES.get(program)
         parameters: dict[str, Any] = {}
-        for name, (slot, default) in INPUTS.items():
-            if wanted is not None and slot not in wanted:
+        for name, (parameter, default) in INPUTS.items():
+            if wanted is not None and parameter not in wanted:
                 continue
             source = source_of(shader, name, self.time)
             if source is not None:
-                value = self._input(slot, source, default)
-                if slot == "normal":
+                value = self._input(parameter, source, default)
+                if parameter == "normal":
                     self._flat_normal(value)
                 elif value is not None:
-                    parameters[slot] = value
+                    parameters[parameter] = value
         if parameters.get("ior", 1.0) <= 0.0:
             self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
             parameters["ior"] = 1.5
@@ -134,16 +134,16 @@ class PreviewReader:
             parameters["specular_workflow"] = bool(number(workflow, 0))
             mode = value_of(shader, "opacityMode", self.time, "transparent")
             parameters["presence"] = word(mode) == "presence"
-        for key, slot in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
+        for key, parameter in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
             attribute = self.material.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
-                parameters[slot] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
+                parameters[parameter] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
         displacement = self._displacement(shader)
         return Surface(
             str(self.material.GetPath()),
             program,
             parameters,
-            self.slots,
+            self.textured,
             self.drivers.uv_names,
             self.primvars,
             displacement,
@@ -155,7 +155,7 @@ class PreviewReader:
         if value is None or tuple(value) == INPUTS["normal"][1]:
             return
         texel = np.array(value, np.float32).reshape(1, 1, 3)
-        self.slots["normal"] = {
+        self.textured["normal"] = {
             "texture": self.textures.add_pixels(f"normal {tuple(value)}", texel),
             "channel": "rgb",
             "scale": _ONES,
@@ -178,45 +178,45 @@ class PreviewReader:
             self.report.note(what, self.material.GetPath())
             return None
         value = self._input("displacement", source, 0.0)
-        texture = self.slots.pop("displacement", None)
+        texture = self.textured.pop("displacement", None)
         if self.primvars.pop("displacement", None) is not None:
             self.report.missing("displacement by a primvar", self.material.GetPath())
             return None
         return texture if texture is not None else (float(value or 0.0) or None)
 
-    def _input(self, slot: str, source: Source, default: Any) -> Any:
-        """A constant for a slot, None for its default; a texture goes to ``slots``."""
+    def _input(self, parameter: str, source: Source, default: Any) -> Any:
+        """A constant for a parameter, None for its default; a texture goes to ``textured``."""
         if source.is_value:
-            value = constant(slot, source.value, default)
-            return self._linear(value, source) if slot in COLOUR_SLOTS else value
+            value = constant(parameter, source.value, default)
+            return self._linear(value, source) if parameter in COLOUR_PARAMETERS else value
         shader = source.shader
         identifier = shader_id(shader) if shader else ""
         if shader is not None and identifier == "UsdUVTexture":
-            if slot in ("ior", "opacity_threshold"):
-                self.report.missing(f"a texture for {slot}", self.material.GetPath())
+            if parameter in ("ior", "opacity_threshold"):
+                self.report.missing(f"a texture for {parameter}", self.material.GetPath())
                 return default
-            return self._texture(slot, shader, source.output, default)
+            return self._texture(parameter, shader, source.output, default)
         if shader is not None and identifier.startswith("UsdPrimvarReader_"):
             name = value_of(shader, "varname", self.time, "")
             fallback = value_of(shader, "fallback", self.time)
-            if name and slot == "normal":
+            if name and parameter == "normal":
                 self.report.missing("normals by a primvar of a material", self.material.GetPath())
             elif name:
-                self.primvars[slot] = str(name)
-            return constant(slot, fallback, default)
-        if shader is not None and identifier.startswith("ND_") and slot in PARAMETERS:
-            return self._network(slot, shader, source.output, default)
+                self.primvars[parameter] = str(name)
+            return constant(parameter, fallback, default)
+        if shader is not None and identifier.startswith("ND_") and parameter in PARAMETERS:
+            return self._network(parameter, shader, source.output, default)
         what = identifier or "a shader without info:id"
         self.report.missing(f"shading node {what}", self.material.GetPath())
         return default
 
-    def _network(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
+    def _network(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """A network of MaterialX's nodes: a constant, or None for what it drives."""
-        value = self.drivers.output(shader, output, slot)
+        value = self.drivers.output(shader, output, parameter)
         if value is None:
             return default
-        found = self.drivers.put(slot, value)
-        return None if found is None else constant(slot, found, default)
+        found = self.drivers.put(parameter, value)
+        return None if found is None else constant(parameter, found, default)
 
     def _linear(self, value: Any, source: Source) -> Any:
         """A colour in linear Rec.709, whatever its attribute holds."""
@@ -226,7 +226,7 @@ class PreviewReader:
             self.report.missing(f"{error} (read as linear)", self.material.GetPath())
             return value
 
-    def _texture(self, slot: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
+    def _texture(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """Adds a texture use; gives a constant where there is no image."""
         time = self.time
         scale = _four(value_of(shader, "scale", time), _ONES)
@@ -236,14 +236,15 @@ class PreviewReader:
         image = self.textures.image(path, shader.GetPath())
         channel = output if output in ("rgb", "r", "g", "b", "a") else "rgb"
         if image is None:
-            return self._fallback(slot, shader, channel, scale, bias, default)
+            return self._fallback(parameter, shader, channel, scale, bias, default)
         if channel == "a" and image.channels in (1, 3):
             value = scale[3] + bias[3]
             return (value,) * 3 if isinstance(default, tuple) else value
-        if channel == "rgb" and slot not in (*COLOUR_SLOTS, "normal"):
+        wide = parameter in COLOUR_PARAMETERS
+        if channel == "rgb" and not wide and parameter != "normal":
             channel = "r"
         space = self._colour_space(shader, file)
-        if slot == "normal":
+        if parameter == "normal":
             space = self._linear_normals(space, image, shader)
             bare = scale[:3] == _ONES[:3] and bias[:3] == _ZEROS[:3]
             if bare and image.dtype.name in ("uint8", "float16"):
@@ -256,9 +257,9 @@ class PreviewReader:
         if not any((*matrix[:2], *matrix[3:5])):
             # One texel for all: its border must not be mixed in.
             wraps = ["clamp", "clamp"]
-        self.slots[slot] = {
+        self.textured[parameter] = {
             "texture": self.textures.add(
-                path, image, space, *wraps, is_colour=slot in COLOUR_SLOTS, missing=missing
+                path, image, space, *wraps, is_colour=wide, missing=missing
             ),
             "channel": channel,
             "scale": scale,
@@ -300,7 +301,7 @@ class PreviewReader:
 
     def _fallback(
         self,
-        slot: str,
+        parameter: str,
         shader: UsdShade.Shader,
         channel: str,
         scale: tuple[float, ...],
@@ -314,9 +315,9 @@ class PreviewReader:
             value = [t * s + b for t, s, b in zip(texel, scale, bias, strict=True)]
             if isinstance(default, tuple):
                 return tuple(value[:3]) if channel == "rgb" else (value["rgba".index(channel)],) * 3
-            return constant(slot, value["rgba".index(channel[0])], default)
-        if slot == "base_color":
-            self.slots[slot] = {
+            return constant(parameter, value["rgba".index(channel[0])], default)
+        if parameter == "base_color":
+            self.textured[parameter] = {
                 "texture": self.textures.missing(),
                 "channel": "rgb",
                 "scale": _ONES,

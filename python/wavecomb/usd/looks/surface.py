@@ -35,12 +35,12 @@ class SurfaceGraph:
     outputs: tuple[tuple[str, Value], ...] = field(default=(), compare=False, repr=False)
 
 
-COLOUR_SLOTS = ("base_color", "specular_color", "emission")
+COLOUR_PARAMETERS = ("base_color", "specular_color", "emission")
 OPENPBR_COLOURS = ("transmission_color", "subsurface_color", "fuzz_color", "coat_color")
-"""Which parameters of program openpbr beside slots are colours."""
+"""Which of the further parameters of program openpbr are colours."""
 
-SLOTS = (
-    *COLOUR_SLOTS,
+TEXTURED_PARAMETERS = (
+    *COLOUR_PARAMETERS,
     "roughness",
     "metallic",
     "clearcoat",
@@ -73,9 +73,9 @@ class Surface:
         name: For messages.
         program: diffuse, metal, dielectric, plastic, emissive, principled or openpbr.
         parameters: Keyword arguments of ``SceneBuilder.add_material``.
-        textures: Slots as ``SceneBuilder.add_material`` takes them.
+        textures: By parameter, as ``SceneBuilder.add_material`` takes them.
         uv_names: Primvars that hold texture coordinates, first use first.
-        primvars: Slots read from a primvar of the mesh, where it has that.
+        primvars: By parameter, the primvar of the mesh that it is read from, where there is that.
         displacement: How far points move along their normals: a length, or a texture use; None: not
             at all. Part of the mesh's shape, not of the material's look.
         graph: Computes parameters that neither constants nor plain textures give.
@@ -115,10 +115,10 @@ class Surface:
             return float(max(s + b for s, b in zip(use["scale"][:3], use["bias"][:3], strict=True)))
         return float(max(self.parameters.get("emission", (0.0,))))
 
-    def with_value(self, slot: str, value: Any) -> Surface:
-        """The surface with another constant in a slot, and without that slot's primvar."""
-        rest = {name: primvar for name, primvar in self.primvars.items() if name != slot}
-        return replace(self, parameters={**self.parameters, slot: value}, primvars=rest)
+    def with_value(self, parameter: str, value: Any) -> Surface:
+        """The surface with a constant for a parameter, in place of its primvar."""
+        rest = {name: primvar for name, primvar in self.primvars.items() if name != parameter}
+        return replace(self, parameters={**self.parameters, parameter: value}, primvars=rest)
 
 
 def fallback_surface(
@@ -132,7 +132,7 @@ def fallback_surface(
     ``varying``: which of base_color and opacity have a primvar that differs from place to place.
     """
     parameters: dict[str, Any] = {"base_color": colour}
-    primvars = {slot: _DISPLAY[slot] for slot in varying}
+    primvars = {parameter: _DISPLAY[parameter] for parameter in varying}
     if opacity >= 1.0 and "opacity" not in varying:
         return Surface(name, "diffuse", parameters, primvars=primvars)
     parameters |= {"opacity": max(opacity, 0.0), "roughness": 0.5, "presence": True}

@@ -49,7 +49,7 @@ def read_inputs(model: str) -> frozenset[str]:
     """Inputs of a shading model that have an effect here, without normals."""
     names = _Names()
     layers_of(model, names)
-    for row in MODELS[model].slots.values():
+    for row in MODELS[model].textured.values():
         names.read |= {name for name in (row.input, row.weight[0]) if name}
     return frozenset(names.read)
 
@@ -114,7 +114,7 @@ def _definition(one: Any, model: str) -> InputDefinition:
 
 def _is_number(model: str, name: str) -> bool:
     """Whether one number is read of a colour: opacity."""
-    return MODELS[model].slots["opacity"].input == name
+    return MODELS[model].textured["opacity"].input == name
 
 
 def _label(name: str, group: str) -> str:

@@ -45,14 +45,14 @@ class Model:
     """A shading model.
 
     Attributes:
-        slots: Parameters that plain textures may drive.
+        textured: Parameters that plain textures may drive.
         emission_unit: Emission in the units of a radiance of 1.
         normal: The input that tilts the surface.
-        layers: Parameters beside slots: names are those of ``add_material(openpbr=...)``.
+        layers: All other parameters; names are those of ``add_material(openpbr=...)``.
         ignored: Inputs without effect, said where they are authored.
     """
 
-    slots: dict[str, Row]
+    textured: dict[str, Row]
     emission_unit: float
     normal: str
     layers: dict[str, Row]
@@ -61,7 +61,7 @@ class Model:
 
 MODELS: dict[str, Model] = {
     "standard_surface": Model(
-        slots={
+        textured={
             "base_color": Row("base_color", PALE, weight=("base", 1.0)),
             "specular_color": Row("specular_color", WHITE),
             "roughness": Row("specular_roughness", 0.2),
@@ -108,7 +108,7 @@ MODELS: dict[str, Model] = {
         ),
     ),
     "open_pbr_surface": Model(
-        slots={
+        textured={
             "base_color": Row("base_color", PALE, weight=("base_weight", 1.0)),
             "specular_color": Row("specular_color", WHITE),
             "roughness": Row("specular_roughness", 0.3),
@@ -153,7 +153,7 @@ MODELS: dict[str, Model] = {
         ),
     ),
     "gltf_pbr": Model(
-        slots={
+        textured={
             "base_color": Row("base_color", WHITE),
             "specular_color": Row("specular_color", WHITE),
             "roughness": Row("roughness", 1.0),

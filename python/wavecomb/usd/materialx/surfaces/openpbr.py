@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What program "openpbr" takes beside its slots, from inputs of MaterialX's surface shaders.
+"""The layers of program "openpbr", from inputs of MaterialX's surface shaders.
 
 ``models.MODELS`` says what comes from where; here is what depends on several inputs.
 """
@@ -32,7 +32,7 @@ class Inputs(Protocol):
 
 
 def layers_of(model: str, inputs: Inputs) -> dict[str, Any]:
-    """The parameters of a shading model beside slots."""
+    """The layers of a shading model: its parameters that no plain texture drives."""
     known = MODELS[model]
     inputs.ignored(*known.ignored)
     found = {name: _read(row, inputs) for name, row in known.layers.items()}

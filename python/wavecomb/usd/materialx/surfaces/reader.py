@@ -44,10 +44,10 @@ class MaterialXReader:
         self.drivers = Drivers(Networks(material, time, textures, report))
 
     def read(self, shader: UsdShade.Shader, model_name: str) -> Surface:
-        """The surface: slots, and layers beside them."""
+        """The surface: parameters that textures may drive, and layers beside them."""
         model = MODELS[model_name]
         parameters: dict[str, Any] = {"presence": True}
-        for parameter, row in model.slots.items():
+        for parameter, row in model.textured.items():
             weight = self._value(shader, "", *row.weight)
             if parameter == "emission":
                 weight = self._radiance(weight, model.emission_unit)
@@ -71,7 +71,7 @@ class MaterialXReader:
             str(self.material.GetPath()),
             "openpbr",
             parameters,
-            self.drivers.slots,
+            self.drivers.textured,
             self.drivers.uv_names,
             graph=self.drivers.graph(),
         )
