@@ -21,13 +21,16 @@ struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};
   std::mutex building;
+  TaskOrder order;  ///< Embree's tasks allocate
 
   EmbreeDevice() {
     if (!handle) throw Error("the ray tracer could not start; is this CPU older than SSE2?");
     rtcSetDeviceMemoryMonitorFunction(
         handle,
         [](void* user, ssize_t n, bool) {
-          static_cast<EmbreeDevice*>(user)->bytes += n;
+          auto& device = *static_cast<EmbreeDevice*>(user);
+          const auto count = [&device, n] { device.bytes += n; };
+          device.order.around(count)();
           return true;
         },
         this);
