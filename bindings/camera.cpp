@@ -28,14 +28,11 @@ constexpr const char* kKinds[] = {"number", "choice", "four", "planes"};
 }
 
 uint32_t choice_of(const CameraParameter& p, nb::handle value) {
-  std::string list, chosen;
-  const bool is_text = nb::try_cast(value, chosen);
-  for (uint32_t i = 0; i < p.choices.size(); ++i) {
-    if (is_text && chosen == p.choices[i]) return i;
-    list += (list.empty() ? "" : ", ") + std::string(p.choices[i]);
-  }
-  if (!is_text) fail(p.name, "a name");
-  throw Error("the camera has no " + std::string(p.name) + " '" + chosen + "'; there are " + list);
+  if (const auto chosen = index_in(p.choices, value)) return *chosen;
+  std::string given;
+  if (!nb::try_cast(value, given)) fail(p.name, "a name");
+  throw Error("the camera has no " + std::string(p.name) + " '" + given + "'; there are " +
+              listed(p.choices));
 }
 
 CameraValue from_python(const CameraParameter& p, nb::handle value) {

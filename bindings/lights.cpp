@@ -13,7 +13,7 @@
 #include "bind.h"
 #include "scene_values.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/light_table.h"
+#include "wavecomb/scene/light_kind.h"
 #include "wavecomb/scene/scene_checks.h"
 
 namespace nb = nanobind;
@@ -21,9 +21,8 @@ using namespace wavecomb;
 
 namespace {
 
-// By LightValueKind, LightRefers and LightGroup.
+// By LightValueKind and LightGroup.
 constexpr const char* kValueKinds[] = {"number", "colour", "flag", "choice", "id", "transforms"};
-constexpr const char* kReferred[] = {"", "texture", "profile", "set", "group"};
 constexpr const char* kGroups[] = {"emission", "shape", "shaping", "response"};
 
 std::string prefix(const Light& light) {
@@ -35,13 +34,8 @@ std::string prefix(const Light& light) {
 }
 
 LightValue choice_of(const Light& light, const LightParameter& p, nb::handle value) {
-  std::string list, chosen;
-  const bool is_text = nb::try_cast(value, chosen);
-  for (uint32_t i = 0; i < p.choices.size(); ++i) {
-    if (is_text && chosen == p.choices[i]) return i;
-    list += (list.empty() ? "" : ", ") + std::string(p.choices[i]);
-  }
-  fail(light, p.name, "one of " + list);
+  if (const auto chosen = index_in(p.choices, value)) return *chosen;
+  fail(light, p.name, "one of " + listed(p.choices));
 }
 
 std::vector<Affine> transforms_of(const Light& light, const LightParameter& p, nb::handle value) {
@@ -119,10 +113,11 @@ std::string names(const Known& is_known) {
 
 /// Keywords into a light that has its kind.
 void take(Light& light, SceneBuilder& builder, const nb::kwargs& values) {
-  const bool of_mesh = light.kind == LightKind::kTriangle;
-  // What one kind has not but another does goes without notice: callers give all of them alike.
+  const bool of_mesh = light.kind == kMeshLight;
+  // Placed lights may be told what other kinds have, too, for callers who give all of them alike;
+  // but not what a kind has to itself.
   const auto is_known = [&](const LightParameter& p) {
-    return p.kind != LightValueKind::kChoice && (!of_mesh || p.is_of(LightKind::kTriangle));
+    return p.kind != LightValueKind::kChoice && ((!of_mesh && !p.is_own) || p.is_of(light.kind));
   };
   if (values.contains("name") && !nb::try_cast(values["name"], light.name))
     throw Error("the name of a light must be a text");
@@ -140,7 +135,7 @@ void take(Light& light, SceneBuilder& builder, const nb::kwargs& values) {
 nb::dict row_dict(const LightParameter& p) {
   nb::dict d;
   nb::list kinds, choices;
-  for (uint32_t k = 0; k < kLightKindCount; ++k)
+  for (uint32_t k = 0; k < light_kinds().size(); ++k)
     if (p.is_of(static_cast<LightKind>(k)))
       kinds.append(light_kind_name(static_cast<LightKind>(k)));
   for (const char* one : p.choices) choices.append(one);
@@ -150,7 +145,7 @@ nb::dict row_dict(const LightParameter& p) {
   d["input"] = p.input;
   d["group"] = kGroups[static_cast<size_t>(p.group)];
   d["kind"] = kValueKinds[static_cast<size_t>(p.kind)];
-  d["refers"] = kReferred[static_cast<size_t>(p.refers)];
+  d["refers"] = light_refers_name(p.refers);
   d["least"] = std::isfinite(p.least) ? nb::cast(p.least) : nb::none();
   d["most"] = std::isfinite(p.most) ? nb::cast(p.most) : nb::none();
   d["usual"] = p.usual;
@@ -175,7 +170,7 @@ uint32_t add_light(SceneBuilder& builder, const std::string& kind, const Transfo
 uint32_t add_mesh_light(SceneBuilder& builder, const Transform& transform,
                         const std::string& material_sync, const nb::kwargs& values) {
   Light light;
-  light.kind = LightKind::kTriangle;
+  light.kind = kMeshLight;
   light.to_world = affine(transform);
   take(light, builder, values);
   const LightParameter& sync = *find_light_parameter("material_sync");
@@ -196,7 +191,8 @@ nb::dict light_dict(const Scene& scene, uint32_t light) {
     else if (p.refers == LightRefers::kTexture)
       d[p.name] =
           l.texture == kNoTexture ? nb::none() : nb::cast(scene.textures()[l.texture]->name());
-    else if (p.can_change() || p.refers == LightRefers::kProfile)
+    else if (p.is_own ? p.is_of(l.kind) && p.can_change()
+                      : p.can_change() || p.refers == LightRefers::kProfile)
       d[p.name] = to_python(p, p.read(l));
   }
   return d;
@@ -205,13 +201,15 @@ nb::dict light_dict(const Scene& scene, uint32_t light) {
 Light edited_light(const Scene& scene, uint32_t light, const nb::dict& values) {
   check_index("light", light, scene.lights().size());
   Light changed = scene.lights()[light];
-  const auto can_change = [](const LightParameter& p) { return p.can_change(); };
+  const auto can_change = [&](const LightParameter& p) {
+    return p.can_change() && (!p.is_own || p.is_of(changed.kind));
+  };
   for (const auto& [key, value] : values) {
     const auto name = nb::cast<std::string>(nb::str(key));
     const LightParameter* const p = find_light_parameter(name);
     if (name == "transform")
       changed.to_world = matrix_of(prefix(changed) + name, value);
-    else if (p && p->can_change())
+    else if (p && can_change(*p))
       p->write(changed, from_python(changed, *p, value, nullptr));
     else
       throw Error(quoted("light", changed.name) + " has no parameter '" + name +
@@ -225,5 +223,14 @@ void bind_lights(nb::module_& m) {
     nb::list rows;
     for (const LightParameter& p : light_table()) rows.append(row_dict(p));
     return rows;
+  });
+  m.def("light_kinds", [] {
+    nb::list kinds;
+    for (const LightKindInfo& kind : light_kinds()) {
+      nb::list prims;
+      for (const char* prim : kind.prims) prims.append(prim);
+      kinds.append(nb::make_tuple(kind.name, nb::tuple(prims)));
+    }
+    return kinds;
   });
 }

@@ -163,6 +163,20 @@ void for_each_change(const char* kind, const nb::dict& changes, const Change& ch
 
 }  // namespace
 
+std::optional<uint32_t> index_in(const std::vector<const char*>& choices, nb::handle value) {
+  std::string chosen;
+  if (!nb::try_cast(value, chosen)) return std::nullopt;
+  const auto found = std::find(choices.begin(), choices.end(), chosen);
+  if (found == choices.end()) return std::nullopt;
+  return static_cast<uint32_t>(found - choices.begin());
+}
+
+std::string listed(const std::vector<const char*>& choices) {
+  std::string list;
+  for (const char* one : choices) list += (list.empty() ? "" : ", ") + std::string(one);
+  return list;
+}
+
 void check_index(const char* kind, uint32_t i, size_t count) {
   if (i >= count)
     throw Error(std::string(kind) + " " + std::to_string(i) + " is not there; the scene has " +

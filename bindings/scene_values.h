@@ -4,7 +4,10 @@
 
 #include <nanobind/ndarray.h>
 
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "wavecomb/scene/scene.h"
 
@@ -26,6 +29,11 @@ wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& 
 
 /// Throws Error unless i < count.
 void check_index(const char* kind, uint32_t i, size_t count);
+
+/// Which of the choices a name is; none where it is none of them, or no name.
+std::optional<uint32_t> index_in(const std::vector<const char*>& choices, nanobind::handle value);
+/// "a, b, c".
+std::string listed(const std::vector<const char*>& choices);
 
 /// A map as USD's row-vector matrix, and back: 4 x 4 numbers. Throws Error that begins with `what`
 /// for anything else.

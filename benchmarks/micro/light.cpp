@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "light_testing.h"
+#include "wavecomb/scene/light_table.h"
 #include "widths.h"
 
 namespace wavecomb::micro {
@@ -65,15 +66,14 @@ void light(benchmark::State& state, uint32_t kind) {
   count_items(state, "light_sample", kSamples);
 }
 
-constexpr const char* kKinds[] = {"rect", "disk", "sphere", "distant", "dome", "triangle", "all"};
-static_assert(std::size(kKinds) == kLightKindCount + 1);
-
 const bool registered = [] {
-  for (uint32_t kind = 0; kind <= kLightKindCount; ++kind)
+  for (uint32_t kind = 0; kind <= kLightKindCount; ++kind) {
+    const std::string name =
+        kind < kLightKindCount ? light_kind_name(static_cast<LightKind>(kind)) : "all";
     for_each_width([&]<size_t W>() {
-      benchmark::RegisterBenchmark(("light/" + std::string(kKinds[kind]) + lanes_label(W)).c_str(),
-                                   light<W>, kind);
+      benchmark::RegisterBenchmark(("light/" + name + lanes_label(W)).c_str(), light<W>, kind);
     });
+  }
   return true;
 }();
 

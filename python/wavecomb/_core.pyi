@@ -326,8 +326,8 @@ class SceneBuilder:
         portals: NDArray[np.float64] | None = None,
         # ---- to here ----
     ) -> int:
-        """Kinds: rect, disk, sphere, cylinder, distant, dome, as UsdLux; a parameter that the kind
-        has not is not looked at. wavecomb.light_table says what each parameter is. Raises Error."""
+        """kind: one of light_kinds(). A parameter that it has not is not looked at.
+        wavecomb.light_table says what each is. Raises Error."""
     def add_mesh_light(
         self,
         transform: NDArray[Any],
@@ -406,6 +406,9 @@ class SceneBuilder:
         known."""
     def build(self) -> Scene:
         """Checks all that spans objects and makes the scene. Raises Error."""
+
+def light_kinds() -> list[tuple[str, tuple[str, ...]]]:
+    """Kinds of lights, that of meshes too, each with the types of prims that are drawn as one."""
 
 def light_table() -> list[dict[str, Any]]:
     """The parameters of lights, as wavecomb.light_table.LightParameter has them."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 from wavecomb.core_table import rows_by_name
@@ -90,3 +91,15 @@ def of_kind(kind: str) -> tuple[LightParameter, ...]:
     ['color', 'angle']
     """
     return tuple(row for row in light_parameters().values() if kind in row.kinds)
+
+
+@cache
+def kind_of_prims() -> Mapping[str, str]:
+    """The kind of light that prims of a type are drawn as.
+
+    >>> kind_of_prims()["DomeLight_1"]
+    'dome'
+    """
+    from wavecomb import _core
+
+    return MappingProxyType({prim: kind for kind, prims in _core.light_kinds() for prim in prims})

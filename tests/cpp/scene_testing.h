@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/light/kinds.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/scene/scene.h"
 

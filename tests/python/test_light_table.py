@@ -17,7 +17,7 @@ from wavecomb.light_table import EDITABLE, MESH, LightParameter, light_parameter
 
 ROOT = Path(__file__).parents[2]
 
-KINDS = ("rect", "disk", "sphere", "cylinder", "distant", "dome")
+KINDS = tuple(kind for kind, _ in core.light_kinds() if kind != MESH)
 
 ADDED = (
     LightParameter("blades", "blades", "Of its aperture.", "wavecomb:blades", "shape", "number",
@@ -45,7 +45,8 @@ def another(row: LightParameter) -> Any:
     if row.refers == "group":
         return "key"
     values = {
-        "number": 0.25, "colour": (0.25, 0.5, 0.75), "flag": not row.default, "id": 0,
+        "number": 0.25 if row.default != 0.25 else 0.5, "colour": (0.25, 0.5, 0.75),
+        "flag": not row.default, "id": 0,
         "transforms": np.stack([np.eye(4), np.eye(4)]),
     }  # fmt: skip
     return values[row.kind]
@@ -74,21 +75,21 @@ def build(*lights: dict[str, Any], mesh_light: dict[str, Any] | None = None) -> 
 def test_rows_are_the_cores() -> None:
     rows = light_parameters()
     assert {name for row in rows.values() for name in row.kinds} == {*KINDS, MESH}
-    plain = build({"kind": "rect"})
+    plain = {kind: build({"kind": kind}) for kind in KINDS}
     for name, row in rows.items():
         assert row.help.endswith("."), name
         assert row.label, name
-        if row.kind == "choice":
-            continue
-        changed = build({"kind": "rect", name: another(row)})
-        assert changed.fingerprint()["lights"] != plain.fingerprint()["lights"], name
-        if row.kind in EDITABLE:
-            assert plain.light(0)[name] == pytest.approx(row.default), name
-            assert changed.light(0)[name] == pytest.approx(another(row)), name
-        assert build({"kind": "rect", name: row.default}).fingerprint() == plain.fingerprint()
-    assert plain.light(0).keys() == {
+        for kind in set(row.kinds) - {MESH}:
+            changed, usual = build({"kind": kind, name: another(row)}), plain[kind]
+            assert changed.fingerprint()["lights"] != usual.fingerprint()["lights"], name
+            if row.kind in EDITABLE:
+                assert usual.light(0)[name] == pytest.approx(row.default), name
+                assert changed.light(0)[name] == pytest.approx(another(row)), name
+            again = build({"kind": kind, name: row.default})
+            assert again.fingerprint() == usual.fingerprint(), name
+    assert plain["rect"].light(0).keys() >= {
         "name", "kind", "transform", "group", "texture", "ies",
-        *(name for name, row in rows.items() if row.kind in EDITABLE),
+        *(row.name for row in of_kind("rect") if row.kind in EDITABLE),
     }  # fmt: skip
 
 
@@ -160,22 +161,32 @@ def test_what_is_wrong_of_a_mesh_light_is_said() -> None:
 
 def test_inputs_are_those_of_usdlux() -> None:
     stage = Usd.Stage.CreateInMemory()
-    types = {
-        "rect": UsdLux.RectLight, "disk": UsdLux.DiskLight, "sphere": UsdLux.SphereLight,
-        "cylinder": UsdLux.CylinderLight, "distant": UsdLux.DistantLight, "dome": UsdLux.DomeLight,
-    }  # fmt: skip
-    for kind, schema in types.items():
-        prim = schema.Define(stage, f"/{kind}").GetPrim()
-        UsdLux.ShapingAPI.Apply(prim)
-        for row in of_kind(kind):
-            if not row.input:
-                continue
-            attribute = prim.GetAttribute(f"inputs:{row.input}")
-            assert attribute, row.input
-            usual = {"number": "float", "colour": "color3f", "flag": "bool", "id": "asset"}
-            assert attribute.GetTypeName() == Sdf.ValueTypeNames.Find(usual[row.kind]), row.input
-            if row.group in ("shape", "response"):
-                assert attribute.Get() == pytest.approx(row.default), row.input
+    usual = {"number": "float", "colour": "color3f", "flag": "bool", "id": "asset"}
+    seen = 0
+    for number, (kind, prims) in enumerate(core.light_kinds()):
+        for type_name in prims:
+            prim = stage.DefinePrim(f"/P{number}", type_name)
+            if not prim.HasAPI(UsdLux.LightAPI):
+                continue  # none of UsdLux
+            seen += 1
+            UsdLux.ShapingAPI.Apply(prim)
+            for row in of_kind(kind):
+                if not row.input or row.input.startswith("wavecomb:"):
+                    continue
+                attribute = prim.GetAttribute(f"inputs:{row.input}")
+                assert attribute, row.input
+                assert attribute.GetTypeName() == Sdf.ValueTypeNames.Find(usual[row.kind])
+                if row.group in ("shape", "response"):
+                    assert attribute.Get() == pytest.approx(row.default), row.input
+    assert seen == 7
+
+
+def test_prims_are_drawn_as_kinds() -> None:
+    from wavecomb.usd.lights.light import KINDS as PRIMS
+
+    assert PRIMS["SphereLight"] == "sphere"
+    assert PRIMS["DomeLight_1"] == "dome"
+    assert set(PRIMS.values()) == set(KINDS)
 
 
 def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:

@@ -37,11 +37,11 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   store(valid, select(Mask<U>(take), U(0xffffffffu), U(0u)));
 }
 
-/// Ray i of a packet against the round light that a geometry's user pointer names; 0: missed.
-float meet_round_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
+/// Ray i of a packet against the light that a geometry's user pointer names; 0: missed.
+float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
-  const float t = intersect_round_light(*static_cast<const LightRecord*>(user), o, d);
+  const float t = intersect_own_shape(*static_cast<const PlacedShape*>(user), o, d);
   return t > 0.f && t <= RTCRayN_tfar(ray, n, i) ? t : 0.f;
 }
 
@@ -85,14 +85,14 @@ void closest_filter(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-void intersect_round_lights(const RTCIntersectFunctionNArguments* args) {
+void intersect_lights(const RTCIntersectFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
   const unsigned n = args->N;
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] == 0) continue;
-    const float t = meet_round_light(args->geometryUserPtr, ray, n, i);
+    const float t = meet_light(args->geometryUserPtr, ray, n, i);
     if (t == 0.f || t > best->t[i]) continue;
     // A tie goes to the smaller instance, which the world's is not, then to the smaller geometry.
     if (t == best->t[i] && (RTCHitN_instID(hit, n, i, 0) != RTC_INVALID_GEOMETRY_ID ||
@@ -107,13 +107,13 @@ void intersect_round_lights(const RTCIntersectFunctionNArguments* args) {
   }
 }
 
-void intersect_round_lights_bare(const RTCIntersectFunctionNArguments* args) {
+void intersect_lights_bare(const RTCIntersectFunctionNArguments* args) {
   const unsigned n = args->N;
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] == 0) continue;
-    const float t = meet_round_light(args->geometryUserPtr, ray, n, i);
+    const float t = meet_light(args->geometryUserPtr, ray, n, i);
     if (t == 0.f) continue;
     RTCRayN_tfar(ray, n, i) = t;
     RTCHitN_primID(hit, n, i) = 0;
@@ -122,9 +122,9 @@ void intersect_round_lights_bare(const RTCIntersectFunctionNArguments* args) {
   }
 }
 
-void occlude_round_lights(const RTCOccludedFunctionNArguments* args) {
+void occlude_lights(const RTCOccludedFunctionNArguments* args) {
   for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] != 0 && meet_round_light(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
+    if (args->valid[i] != 0 && meet_light(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
       RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
 }
 
@@ -137,8 +137,8 @@ void put_bounds(const Bounds& b, RTCBounds& out) {
   out.upper_z = b.hi.z;
 }
 
-void round_light_box(const RTCBoundsFunctionArguments* args) {
-  const Bounds b = round_light_bounds(*static_cast<const LightRecord*>(args->geometryUserPtr));
+void light_box(const RTCBoundsFunctionArguments* args) {
+  const Bounds b = own_shape_bounds(*static_cast<const PlacedShape*>(args->geometryUserPtr));
   put_bounds(b, *args->bounds_o);
 }
 

@@ -38,11 +38,11 @@ void closest_filter(const RTCFilterFunctionNArguments* args);
 void put_bounds(const Bounds& b, RTCBounds& out);
 
 // Round lights: user geometries whose user pointer is a LightRecord.
-void round_light_box(const RTCBoundsFunctionArguments* args);
+void light_box(const RTCBoundsFunctionArguments* args);
 /// Keeps the closest hit by the same rule as closest_filter.
-void intersect_round_lights(const RTCIntersectFunctionNArguments* args);
+void intersect_lights(const RTCIntersectFunctionNArguments* args);
 /// The same where any closest hit will do.
-void intersect_round_lights_bare(const RTCIntersectFunctionNArguments* args);
-void occlude_round_lights(const RTCOccludedFunctionNArguments* args);
+void intersect_lights_bare(const RTCIntersectFunctionNArguments* args);
+void occlude_lights(const RTCOccludedFunctionNArguments* args);
 
 }  // namespace wavecomb

@@ -59,37 +59,10 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   return filtered;
 }
 
-/// Shapes of the lights that have one, by record; others are of kind kNoLight.
-std::vector<LightRecord> light_shapes(const Scene& scene) {
-  std::vector<LightRecord> shapes;
-  for (const LightRecord& record : scene.light_set().records) {
-    LightRecord& shape = shapes.emplace_back();
-    shape.kind = kNoLight;
-    const auto kind = static_cast<LightKind>(record.kind);
-    const bool has_shape = kind == LightKind::kRect || kind == LightKind::kDisk ||
-                           kind == LightKind::kCylinder ||
-                           (kind == LightKind::kSphere && record.radius > 0);
-    if (!has_shape || !(record.area > 0) || record.hidden != 0) continue;
-    shape.kind = record.kind;
-    shape.radius = record.radius;
-    for (int i = 0; i < 3; ++i) {
-      shape.p[i] = record.p[i];
-      shape.u[i] = record.u[i];
-      shape.v[i] = record.v[i];
-    }
-  }
-  return shapes;
-}
-
 void set_transform(RTCGeometry g, uint32_t step, const Affine& m) {
   const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y, m.row[1].y, m.row[2].y,
                              m.row[0].z, m.row[1].z, m.row[2].z, m.t.x,      m.t.y,      m.t.z};
   rtcSetGeometryTransform(g, step, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-}
-
-bool same_shape(const LightRecord& a, const LightRecord& b) {
-  return a.kind == b.kind && a.radius == b.radius && std::ranges::equal(a.p, b.p) &&
-         std::ranges::equal(a.u, b.u) && std::ranges::equal(a.v, b.v);
 }
 
 }  // namespace
@@ -136,8 +109,7 @@ size_t EmbreeHierarchy::bytes() const {
 }
 
 bool EmbreeHierarchy::fits(const Scene& scene) const {
-  const std::vector<LightRecord> shapes = light_shapes(scene);
-  return std::equal(shapes.begin(), shapes.end(), shapes_.begin(), shapes_.end(), same_shape) &&
+  return light_shapes(scene) == shapes_ &&
          (rule_ == HitRule::kEmbree || filtered_meshes(scene) == filtered_);
 }
 
@@ -193,9 +165,9 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
   return g;
 }
 
-void EmbreeHierarchy::attach_light(uint32_t id, const LightRecord& light) const {
-  const auto kind = static_cast<LightKind>(light.kind);
-  if (kind == LightKind::kRect) {
+void EmbreeHierarchy::attach_light(uint32_t id, const PlacedShape& shape) const {
+  if (shape.shape == LightShape::kParallelogram) {
+    const LightRecord& light = shape.light;
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* p = static_cast<float*>(
         rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 4));
@@ -215,11 +187,11 @@ void EmbreeHierarchy::attach_light(uint32_t id, const LightRecord& light) const 
   } else {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(g, 1);
-    rtcSetGeometryUserData(g, const_cast<LightRecord*>(&light));  // only read
-    rtcSetGeometryBoundsFunction(g, round_light_box, nullptr);
+    rtcSetGeometryUserData(g, const_cast<PlacedShape*>(&shape));  // only read
+    rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
-        g, rule_ == HitRule::kCanonical ? intersect_round_lights : intersect_round_lights_bare);
-    rtcSetGeometryOccludedFunction(g, occlude_round_lights);
+        g, rule_ == HitRule::kCanonical ? intersect_lights : intersect_lights_bare);
+    rtcSetGeometryOccludedFunction(g, occlude_lights);
     rtcCommitGeometry(g);
     rtcAttachGeometryByID(top_, g, id);
     rtcReleaseGeometry(g);
@@ -288,7 +260,7 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   for (uint32_t mesh : groups[0].meshes) rtcAttachGeometryByID(top_, mesh_geometries_[mesh], id++);
   first_light_ = id;
   for (uint32_t l = 0; l < shapes_.size(); ++l)
-    if (shapes_[l].kind != kNoLight) attach_light(first_light_ + l, shapes_[l]);
+    if (shapes_[l].shape != LightShape::kNone) attach_light(first_light_ + l, shapes_[l]);
   rtcCommitScene(top_);
   check("building the hierarchy");
 }

@@ -10,6 +10,7 @@
 
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/accel/embree_curves.h"
+#include "wavecomb/accel/light_shapes.h"
 
 namespace wavecomb {
 
@@ -46,14 +47,14 @@ class EmbreeHierarchy {
   void check(const char* doing) const;
   RTCScene new_scene() const;
   RTCGeometry make_mesh(uint32_t mesh_id);
-  void attach_light(uint32_t id, const LightRecord& light) const;
+  void attach_light(uint32_t id, const PlacedShape& shape) const;
   void release();
 
   std::shared_ptr<const SceneGeometry> geometry_;
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
   std::vector<uint8_t> filtered_;    ///< by mesh: some of it may be partly present
-  std::vector<LightRecord> shapes_;  ///< where lights are; nothing of what they shine
+  std::vector<PlacedShape> shapes_;  ///< by record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;
   std::vector<RTCGeometry> mesh_geometries_;

@@ -1,20 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays against the round shapes of lights.
+/// Rays against the shapes of lights.
 #pragma once
 
-#include "wavecomb/scene/light_data.h"
+#include <vector>
+
+#include "wavecomb/scene/light_kind.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 
-/// A box around a sphere, disk or cylinder light, a little larger than the shape.
-Bounds round_light_bounds(const LightRecord& light);
+/// Where a light is; nothing of what it shines.
+struct PlacedShape {
+  LightShape shape = LightShape::kNone;
+  LightRecord light{};                  ///< kind, p, u, v and radius
+  const LightKindInfo* kind = nullptr;  ///< of shapes of their own
 
-/// Distance along dir to a sphere, disk or cylinder light, in units of |dir|; 0 where it is not
-/// ahead. From inside a sphere, its far side is met. One ray at a time and in double precision, so
-/// that a hit is the same whatever the rays beside it are: Embree's own spheres and discs round
-/// differently in packets and alone.
-float intersect_round_light(const LightRecord& light, const float (&origin)[3],
-                            const float (&dir)[3]);
+  bool operator==(const PlacedShape& other) const;
+};
+
+/// By record; kNone where rays do not meet it.
+std::vector<PlacedShape> light_shapes(const Scene& scene);
+
+/// A box around a shape of its own, a little larger.
+Bounds own_shape_bounds(const PlacedShape& shape);
+
+/// Distance along dir to a shape of its own, in units of |dir|; 0 where it is not ahead. One ray at
+/// a time and in double precision, so that a hit is the same whatever the rays beside it are:
+/// Embree's own spheres and discs round differently in packets and alone.
+float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3],
+                          const float (&dir)[3]);
 
 }  // namespace wavecomb

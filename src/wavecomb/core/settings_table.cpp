@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <type_traits>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/number_text.h"
 
 namespace wavecomb {
 namespace {
@@ -87,13 +87,6 @@ SettingInfo choice(const char* name, const char* label, std::vector<SettingChoic
   SettingInfo info = row<kMember>(name, label, help);
   info.choices = std::move(choices);
   return info;
-}
-
-std::string text(double v) {
-  if (v == std::floor(v) && std::abs(v) < 1e15) return std::to_string(static_cast<long long>(v));
-  char digits[32];
-  std::snprintf(digits, sizeof(digits), "%g", v);
-  return digits;
 }
 
 std::vector<SettingChoice> ray_orders() {

@@ -136,3 +136,20 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
 }
 
 }  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+struct CylinderKind : NoEscape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_cylinder<F>(q.light, q.from, q.u, q.v);
+  }
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+    return detail::hit_cylinder<F>(m.light, m.origin, m.dir, m.t);
+  }
+};
+
+}  // namespace wavecomb

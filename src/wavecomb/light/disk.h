@@ -29,3 +29,20 @@ inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, cons
 }
 
 }  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+struct DiskKind : NoEscape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_disk<F>(q.light, q.from, q.u, q.v);
+  }
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+    return detail::hit_disk<F>(m.light, m.dir, m.t);
+  }
+};
+
+}  // namespace wavecomb

@@ -38,3 +38,20 @@ inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
 }
 
 }  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+struct DistantKind : NoShape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_distant<F>(q.light, q.u, q.v);
+  }
+  template <typename F>
+  static detail::KindHit<F> escape(const detail::LightEscape<F>& e) {
+    return detail::hit_distant<F>(detail::LightReader<F>(e.light, e.lanes), e.dir);
+  }
+};
+
+}  // namespace wavecomb

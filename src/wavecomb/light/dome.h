@@ -169,3 +169,20 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
 }
 
 }  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+struct DomeKind : NoShape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_dome<F>(q.view, q.index, q.light, q.from, q.u, q.v, q.lanes);
+  }
+  template <typename F>
+  static detail::KindHit<F> escape(const detail::LightEscape<F>& e) {
+    return detail::hit_dome_from<F>(e.view, e.light, e.from, e.dir, e.lanes);
+  }
+};
+
+}  // namespace wavecomb

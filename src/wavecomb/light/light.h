@@ -7,16 +7,11 @@
 #pragma once
 
 #include "wavecomb/core/vec.h"
-#include "wavecomb/light/cylinder.h"
-#include "wavecomb/light/disk.h"
-#include "wavecomb/light/distant.h"
-#include "wavecomb/light/dome.h"
+#include "wavecomb/light/kinds.h"
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/link.h"
 #include "wavecomb/light/mesh_light.h"
-#include "wavecomb/light/rect.h"
 #include "wavecomb/light/shaping.h"
-#include "wavecomb/light/sphere.h"
 #include "wavecomb/light/triangle.h"
 #include "wavecomb/scene/light_data.h"
 
@@ -105,29 +100,6 @@ inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Func
   }
 }
 
-template <typename F>
-inline KindSample<F> sample_kind(LightKind kind, const LightView& view, const UInt<F>& index,
-                                 const LightReader<F>& light, const Vec3<F>& p, const F& u,
-                                 const F& v, const Mask<F>& lanes) {
-  switch (kind) {
-    case LightKind::kRect:
-      return sample_rect<F>(view, light, p, u, v, lanes);
-    case LightKind::kDisk:
-      return sample_disk<F>(light, p, u, v);
-    case LightKind::kSphere:
-      return sample_sphere<F>(light, p, u, v);
-    case LightKind::kCylinder:
-      return sample_cylinder<F>(light, p, u, v);
-    case LightKind::kDistant:
-      return sample_distant<F>(light, u, v);
-    case LightKind::kDome:
-      return sample_dome<F>(view, index, light, p, u, v, lanes);
-    case LightKind::kTriangle:
-      break;  // has no record
-  }
-  return {};
-}
-
 }  // namespace detail
 
 /// The light that sample_light chooses for u_pick, where there is one.
@@ -183,7 +155,8 @@ inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>
         // Often there is one light of a kind, whose record is the same in all
         // its lanes.
         const detail::LightReader<F> light(view.lights, index, lanes);
-        detail::KindSample<F> s = detail::sample_kind<F>(kind, view, index, light, p, u, v, lanes);
+        detail::KindSample<F> s =
+            detail::sample_kind<F>(kind, {view, index, light, p, u, v, lanes});
         if (view.shapings)
           s.radiance =
               detail::shaped<F>(view, light.shaping(), -s.wi, s.radiance, lanes & (s.pdf > 0.f));
@@ -198,8 +171,8 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` (rect, disk, sphere, cylinder) sends back along the ray from.p + t
-/// dir which hit it at distance t. Other kinds and inactive lanes give 0.
+/// Radiance that light `light` sends back along the ray from.p + t dir which hit its shape at
+/// distance t. Kinds without a shape and inactive lanes give 0.
 template <typename F>
 inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
                              const LightReceiver<F>& from, const Vec3<F>& dir, const F& t,
@@ -212,12 +185,7 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
   const F pick_pdf = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, active);
   detail::for_each_kind<F>(
       reader[&LightRecord::kind], active, [&](LightKind kind, const Mask<F>& lanes) {
-        detail::KindHit<F> hit{Color<F>(F(0.f)), F(0.f)};
-        if (kind == LightKind::kRect)
-          hit = detail::hit_rect<F>(view, reader, origin, dir, t, lanes);
-        if (kind == LightKind::kDisk) hit = detail::hit_disk<F>(reader, dir, t);
-        if (kind == LightKind::kSphere) hit = detail::hit_sphere<F>(reader, origin);
-        if (kind == LightKind::kCylinder) hit = detail::hit_cylinder<F>(reader, origin, dir, t);
+        detail::KindHit<F> hit = detail::hit_kind<F>(kind, {view, reader, origin, dir, t, lanes});
         if (view.shapings)
           hit.radiance = detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
         result.radiance = select<F>(lanes, hit.radiance, result.radiance);
@@ -271,10 +239,8 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
                                         bool from_camera = false,
                                         const UInt<F>& link = UInt<F>(0u)) {
   const LightRecord& record = view.lights[light];
-  const bool is_dome = record.kind == static_cast<uint32_t>(LightKind::kDome);
-  detail::KindHit<F> hit =
-      is_dome ? detail::hit_dome_from<F>(view, record, from, dir, active)
-              : detail::hit_distant<F>(detail::LightReader<F>(record, active), dir);
+  detail::KindHit<F> hit = detail::escape_kind<F>(static_cast<LightKind>(record.kind),
+                                                  {view, record, from, dir, active});
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -dir, hit.radiance, active);
   const float pick_pdf = view.by_tree    ? view.tree.infinite_pdf[light]

@@ -59,4 +59,14 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   return select<F>(given, radiance * factor, glow);
 }
 
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h). Records of mesh lights are no lights that
+/// can be chosen; their triangles are rows of their own.
+struct TriangleKind : NoEscape, NoShape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& /*query*/) {
+    return {};
+  }
+};
+
 }  // namespace wavecomb

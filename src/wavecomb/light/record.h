@@ -2,8 +2,8 @@
 /// Reads light records by lane, and what the files of the light kinds share.
 #pragma once
 
-#include "wavecomb/core/fields.h"
 #include "wavecomb/core/math.h"
+#include "wavecomb/core/record_reader.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/scene/light_data.h"
@@ -15,48 +15,14 @@ inline constexpr float kFarAway = 1e30f;
 
 namespace detail {
 
-/// Fields of the light in each lane: one scalar load where all active lanes have the same light,
-/// else gathers. Inactive lanes hold anything that their neighbours hold, or 0.
+/// Fields of the light in each lane.
 template <typename F>
-struct LightReader {
-  const LightRecord* base;
-  UInt<F> first_word;
-  const float* shared;  ///< the record of all active lanes, or null
-  Mask<F> active;
-
+struct LightReader : RecordReader<F> {
   LightReader(const LightRecord* lights, const UInt<F>& light, const Mask<F>& active_)
-      : base(lights),
-        first_word(light * static_cast<uint32_t>(sizeof(LightRecord) / 4)),
-        shared(nullptr),
-        active(active_) {
-    if constexpr (kIsScalar<F>) {
-      if (active_) shared = reinterpret_cast<const float*>(lights + light);
-    } else if (any(active_) && is_uniform<F>(light, active_)) {
-      const auto first = static_cast<size_t>(std::countr_zero(lane_bits<F>(active_)));
-      shared = reinterpret_cast<const float*>(lights + lane(light, first));
-    }
-  }
+      : RecordReader<F>(make_reader<LightRecord, F>(lights, light, active_)) {}
   /// The same record in all lanes.
   LightReader(const LightRecord& record, const Mask<F>& active_)
-      : base(&record),
-        first_word(0u),
-        shared(reinterpret_cast<const float*>(&record)),
-        active(active_) {}
-
-  /// A member of the record: reader[&LightRecord::area].
-  template <typename Record>
-  F operator[](float Record::* member) const {
-    return word(word_of(member));
-  }
-  template <typename Record>
-  UInt<F> operator[](uint32_t Record::* member) const {
-    return float_bits<F>(word(word_of(member)));
-  }
-  template <typename Record>
-  Vec3<F> operator[](float (Record::*member)[3]) const {
-    const uint32_t first = word_of(member);
-    return {word(first), word(first + 1), word(first + 2)};
-  }
+      : RecordReader<F>(make_reader<LightRecord, F>(record, active_)) {}
 
   Vec3<F> p() const { return (*this)[&LightRecord::p]; }
   Vec3<F> u() const { return (*this)[&LightRecord::u]; }
@@ -69,12 +35,6 @@ struct LightReader {
   F pick_pdf() const { return (*this)[&LightRecord::pick_pdf]; }
   UInt<F> texture() const { return (*this)[&LightRecord::texture]; }
   UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
-
- private:
-  F word(uint32_t at) const {
-    if (shared) return F(shared[at]);
-    return gather<F>(base, first_word + at, active);
-  }
 };
 
 /// The record that says what light `light` shines on and how: its own, or that of the mesh light
@@ -108,6 +68,41 @@ struct KindHit {
   F pdf;
 };
 
+/// What a kind is asked to sample: the light in lanes `lanes`, as `from` sees it, by (u, v).
+template <typename F>
+struct LightQuery {
+  const LightView& view;
+  const UInt<F>& index;         ///< of the light in each lane
+  const LightReader<F>& light;  ///< its record
+  const Vec3<F>& from;
+  const F &u, &v;
+  const Mask<F>& lanes;
+};
+
+/// Rays origin + t dir that met the shape of a light.
+template <typename F>
+struct LightMeeting {
+  const LightView& view;
+  const LightReader<F>& light;
+  const Vec3<F>&origin, &dir;
+  const F& t;
+  const Mask<F>& lanes;
+};
+
+/// Rays that left `from` and the scene along `dir`, of which one light is asked.
+template <typename F>
+struct LightEscape {
+  const LightView& view;
+  const LightRecord& light;
+  const Vec3<F>&from, &dir;
+  const Mask<F>& lanes;
+};
+
+template <typename F>
+inline KindHit<F> dark() {
+  return {Color<F>(F(0.f)), F(0.f)};
+}
+
 /// The density over solid angle that a density of 1 / area becomes at distance^2 `d2`, where the
 /// direction makes an angle of cosine `cos_light` with the light's normal; 0 where the light is
 /// seen from behind or on edge, is degenerate, or the density is out of range.
@@ -139,5 +134,22 @@ inline Color<F> not_negative(const Color<F>& c) {
 }
 
 }  // namespace detail
+
+struct LightKindInfo;
+
+/// Kinds that rays which leave the scene do not see.
+struct NoEscape {
+  template <typename F>
+  static detail::KindHit<F> escape(const detail::LightEscape<F>& /*escape*/) {
+    return detail::dark<F>();
+  }
+};
+/// Kinds that rays do not meet.
+struct NoShape {
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+    return detail::dark<F>();
+  }
+};
 
 }  // namespace wavecomb

@@ -258,3 +258,20 @@ inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
 }
 
 }  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+struct RectKind : NoEscape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_rect<F>(q.view, q.light, q.from, q.u, q.v, q.lanes);
+  }
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+    return detail::hit_rect<F>(m.view, m.light, m.origin, m.dir, m.t, m.lanes);
+  }
+};
+
+}  // namespace wavecomb

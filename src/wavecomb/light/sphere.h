@@ -68,3 +68,20 @@ inline KindHit<F> hit_sphere(const LightReader<F>& light, const Vec3<F>& origin)
 }
 
 }  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+struct SphereKind : NoEscape {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_sphere<F>(q.light, q.from, q.u, q.v);
+  }
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+    return detail::hit_sphere<F>(m.light, m.origin);
+  }
+};
+
+}  // namespace wavecomb

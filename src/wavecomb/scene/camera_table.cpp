@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/number_text.h"
 #include "wavecomb/scene/motion.h"
 #include "wavecomb/scene/scene_checks.h"
 

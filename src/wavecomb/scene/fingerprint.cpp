@@ -159,11 +159,12 @@ void add_value(Hash& h, const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// The values of the table; what a light of its kind has not counts too, but for choices.
+/// The values of the table; what a light of its kind has not counts too, but for what another kind
+/// has to itself.
 void add_light(Hash& h, const Light& l) {
   h.add(l.kind, l.to_world);
   for (const LightParameter& p : light_table())
-    if (p.kind != LightValueKind::kChoice || p.is_of(l.kind)) add_value(h, p, p.read(l));
+    if (!p.is_own || p.is_of(l.kind)) add_value(h, p, p.read(l));
 }
 
 uint64_t hash_lights(const Scene& scene) {

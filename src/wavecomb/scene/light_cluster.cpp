@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/scene/light_kind.h"
+
 namespace wavecomb {
 namespace {
 
@@ -13,37 +15,11 @@ double dot(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-void include(LightCluster& c, const float (&p)[3]) {
-  for (size_t k = 0; k < 3; ++k) {
-    c.lo[k] = std::min(c.lo[k], p[k]);
-    c.hi[k] = std::max(c.hi[k], p[k]);
-  }
-}
-
 LightCluster empty_at(const float (&p)[3]) {
   LightCluster c;
   std::copy_n(p, 3, c.lo);
   std::copy_n(p, 3, c.hi);
   return c;
-}
-
-/// The corners that are sums of p and some of u and v.
-LightCluster bound_corners(const float (&p)[3], const float (&u)[3], const float (&v)[3],
-                           bool opposite) {
-  LightCluster c = empty_at(p);
-  for (const float by : {0.f, 1.f})
-    for (const float bx : {0.f, 1.f}) {
-      if (bx + by > 1 && !opposite) continue;
-      include(c, {p[0] + bx * u[0] + by * v[0], p[1] + bx * u[1] + by * v[1],
-                  p[2] + bx * u[2] + by * v[2]});
-    }
-  return c;
-}
-
-/// Normal of a light that shines over a hemisphere.
-void face(LightCluster& c, const float (&n)[3]) {
-  for (size_t k = 0; k < 3; ++k) c.normals.axis[k] = double{n[k]};
-  c.emission = kPiD / 2;
 }
 
 /// Words of a unit vector's components: 65536 steps from -1 to 1.
@@ -58,6 +34,42 @@ uint32_t half_sine(double angle, uint32_t most) {
 }
 
 }  // namespace
+
+void include(LightCluster& c, const float (&p)[3]) {
+  for (size_t k = 0; k < 3; ++k) {
+    c.lo[k] = std::min(c.lo[k], p[k]);
+    c.hi[k] = std::max(c.hi[k], p[k]);
+  }
+}
+
+LightCluster bound_corners(const float (&p)[3], const float (&u)[3], const float (&v)[3],
+                           bool opposite) {
+  LightCluster c = empty_at(p);
+  for (const float by : {0.f, 1.f})
+    for (const float bx : {0.f, 1.f}) {
+      if (bx + by > 1 && !opposite) continue;
+      include(c, {p[0] + bx * u[0] + by * v[0], p[1] + bx * u[1] + by * v[1],
+                  p[2] + bx * u[2] + by * v[2]});
+    }
+  return c;
+}
+
+void bound_normals(LightCluster& c, const float (&n)[3]) {
+  for (size_t k = 0; k < 3; ++k) c.normals.axis[k] = double{n[k]};
+  c.emission = kPiD / 2;
+}
+
+void bound_round(LightCluster& c) {
+  c.normals.angle = kPiD;
+  c.emission = kPiD / 2;
+}
+
+void widen(LightCluster& c, const float (&half)[3]) {
+  for (size_t k = 0; k < 3; ++k) {
+    c.lo[k] -= half[k];
+    c.hi[k] += half[k];
+  }
+}
 
 DirectionCone unite(const DirectionCone& a, const DirectionCone& b) {
   DirectionCone wide = a.angle >= b.angle ? a : b;
@@ -101,44 +113,8 @@ LightCluster unite(const LightCluster& a, const LightCluster& b) {
 LightCluster bound_light(const LightRecord& light, double power) {
   LightCluster c = empty_at(light.p);
   c.intensity = power / kPiD;
-  switch (static_cast<LightKind>(light.kind)) {
-    case LightKind::kRect:
-      c = bound_corners(light.p, light.u, light.v, true);
-      c.intensity = power / kPiD;
-      face(c, light.n);
-      break;
-    case LightKind::kDisk:
-      for (size_t k = 0; k < 3; ++k) {
-        const float half = std::hypot(light.u[k], light.v[k]);
-        c.lo[k] -= half;
-        c.hi[k] += half;
-      }
-      face(c, light.n);
-      break;
-    case LightKind::kSphere:
-      for (size_t k = 0; k < 3; ++k) {
-        c.lo[k] -= light.radius;
-        c.hi[k] += light.radius;
-      }
-      c.normals.angle = kPiD;
-      c.emission = kPiD / 2;
-      c.intensity = power / (4 * kPiD);
-      break;
-    case LightKind::kCylinder:
-      include(c, {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]});
-      for (size_t k = 0; k < 3; ++k) {
-        c.lo[k] -= light.radius;
-        c.hi[k] += light.radius;
-      }
-      c.normals.angle = kPiD;
-      c.emission = kPiD / 2;
-      c.intensity = power / (kPiD * kPiD);  // seen from the side
-      break;
-    case LightKind::kDistant:
-    case LightKind::kDome:
-    case LightKind::kTriangle:
-      break;  // not in the tree, or no record
-  }
+  const LightKindInfo& kind = info_of(static_cast<LightKind>(light.kind));
+  if (kind.bound) kind.bound(c, light, power);
   return c;
 }
 

@@ -23,6 +23,19 @@ struct LightCluster {
   uint32_t next = 0;     ///< node, or kTreeLeaf | light
 };
 
+// Ways to bounds, for kinds of lights.
+/// Widens the box to hold a point.
+void include(LightCluster& cluster, const float (&p)[3]);
+/// Widens the box by `half` on each side.
+void widen(LightCluster& cluster, const float (&half)[3]);
+/// Of the corners p, p + u, p + v and, where there is one `opposite`, p + u + v.
+LightCluster bound_corners(const float (&p)[3], const float (&u)[3], const float (&v)[3],
+                           bool opposite);
+/// Light over the hemisphere about n.
+void bound_normals(LightCluster& cluster, const float (&n)[3]);
+/// Light outwards from something round.
+void bound_round(LightCluster& cluster);
+
 /// A cone around two others (as small as theirs allow: Conty Estevez and Kulla 2018, algorithm 1).
 DirectionCone unite(const DirectionCone& a, const DirectionCone& b);
 /// Bounds of both; `next` is left to the caller.

@@ -2,7 +2,9 @@
 /// Lights as data: what a SceneBuilder takes and what kernels read.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,8 +17,12 @@ namespace wavecomb {
 struct MeshRecord;
 struct InstanceRecord;
 
-enum class LightKind : uint8_t { kRect, kDisk, kSphere, kCylinder, kDistant, kDome, kTriangle };
-inline constexpr uint32_t kLightKindCount = 7;
+/// Numbers of kinds; light/kinds.h lists them.
+enum class LightKind : uint8_t;
+/// LightKind::kTriangle: of lights of meshes.
+inline constexpr LightKind kMeshLight = LightKind{6};
+/// Most parameters that one kind of light can have to itself.
+inline constexpr size_t kMaxOwnParameters = 4;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
@@ -64,7 +70,7 @@ enum class MaterialSync : uint32_t {
 /// UsdLuxDomeLight says).
 struct Light {
   std::string name;
-  LightKind kind = LightKind::kRect;
+  LightKind kind{};  ///< a rect, unless it is said
   Affine to_world;
   /// Emitted radiance (area lights and dome: W / (m^2 sr)); for a distant light of angle 0 and for
   /// a sphere of radius 0 (a point light), see `color`'s use in light/.
@@ -87,7 +93,9 @@ struct Light {
   /// Dome: maps of the unit square in the xy plane, whose -z side is lit, to the portals that guide
   /// its sampling.
   std::vector<Affine> portals;
-  /// Of mesh lights (kind kTriangle), whose to_world leads to the space of the mesh's group.
+  /// Parameters that its kind alone has (LightKindInfo::own), where they are given.
+  std::array<std::optional<float>, kMaxOwnParameters> own;
+  /// Of mesh lights (kind kMeshLight), whose to_world leads to the space of the mesh's group.
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
 

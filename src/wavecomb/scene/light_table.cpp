@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/scene/light_table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <type_traits>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/number_text.h"
+#include "wavecomb/scene/light_kind.h"
 #include "wavecomb/scene/scene_checks.h"
 
 namespace wavecomb {
@@ -13,18 +16,6 @@ namespace {
 
 constexpr uint32_t kNone = 0xffffffffu;
 static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone);
-
-constexpr const char* kKindNames[kLightKindCount] = {"rect",    "disk", "sphere",  "cylinder",
-                                                     "distant", "dome", "triangle"};
-
-template <typename... Kind>
-constexpr uint32_t kinds(Kind... of) {
-  return ((1u << static_cast<uint32_t>(of)) | ...);
-}
-constexpr uint32_t kAll = (1u << kLightKindCount) - 1;
-constexpr uint32_t kPlaced = kAll & ~kinds(LightKind::kTriangle);
-constexpr uint32_t kSized = kAll & ~kinds(LightKind::kDome), kShaped = kSized;
-constexpr uint32_t kSeen = kAll & ~kinds(LightKind::kDistant, LightKind::kDome);
 
 /// A member of a light, or a member of a member.
 template <auto kFirst, auto... kRest, typename Object>
@@ -97,109 +88,133 @@ LightParameter id(LightParameter p, LightRefers refers) {
   p.refers = refers;
   return p;
 }
-LightParameter in(LightGroup group, uint32_t kinds, LightParameter p) {
+LightParameter in(LightGroup group, LightParameter p) {
   p.group = group;
-  p.kinds = kinds;
   return p;
+}
+/// Of all lights, of those of a trait, or (`in`) of kinds that name it.
+LightParameter all(LightGroup group, LightParameter p) {
+  p.is_common = true;
+  return in(group, std::move(p));
+}
+LightParameter with(uint32_t trait, LightGroup group, LightParameter p) {
+  p.trait = trait;
+  return in(group, std::move(p));
 }
 LightParameter choice(LightParameter p, std::vector<const char*> choices) {
   p.choices = std::move(choices);
+  p.is_own = true;
   return p;
 }
 
-std::vector<LightParameter> make_table() {
+std::vector<LightParameter> common_rows() {
   using L = Light;
   using S = Shaping;
   using enum LightGroup;
-  using enum LightKind;
+  using namespace light_trait;
   constexpr auto kS = &L::shaping;
   return {
-      in(kEmission, kAll,
-         positive(row<&L::color>("color", "colour", "color",
-                                 "Emitted radiance, W / (m^2 sr): colour * intensity * "
-                                 "2^exposure * colour temperature."),
-                  1)),
-      in(kShape, kinds(kRect),
+      all(kEmission, positive(row<&L::color>("color", "colour", "color",
+                                             "Emitted radiance, W / (m^2 sr): colour * intensity * "
+                                             "2^exposure * colour temperature."),
+                              1)),
+      in(kShape,
          positive(row<&L::width>("width", "width", "width", "Along x, in its own units."), 10)),
-      in(kShape, kinds(kRect),
+      in(kShape,
          positive(row<&L::height>("height", "height", "height", "Along y, in its own units."), 10)),
-      in(kShape, kinds(kDisk, kSphere, kCylinder),
-         positive(row<&L::radius>("radius", "radius", "radius",
-                                  "In its own units; a sphere of radius 0 is a point."),
-                  10)),
-      in(kShape, kinds(kCylinder),
+      in(kShape, positive(row<&L::radius>("radius", "radius", "radius",
+                                          "In its own units; a sphere of radius 0 is a point."),
+                          10)),
+      in(kShape,
          positive(row<&L::length>("length", "length", "length", "Along x, in its own units."), 10)),
-      in(kShape, kinds(kDistant),
-         positive(row<&L::angle>("angle", "angle", "angle",
-                                 "Apparent diameter in degrees; 0: a single direction."),
-                  10)),
-      in(kEmission, kSized,
-         row<&L::normalize>("normalize", "normalize", "normalize",
-                            "Divides by the area in world space; of a distant light, by UsdLux's "
-                            "sizeFactor.")),
-      in(kEmission, kinds(kRect, kDome),
-         id(row<&L::texture>("texture", "texture", "texture:file",
-                             "What its colour is multiplied by: on a rect with u to the right and "
-                             "v up as seen from the front, on a dome latlong."),
-            LightRefers::kTexture)),
-      in(kEmission, kPlaced,
-         id(row<&L::group>("group", "group", "", "Name of its light group, for AOVs."),
-            LightRefers::kGroup)),
-      in(kResponse, kAll,
-         positive(row<&L::diffuse>("diffuse", "diffuse", "diffuse",
-                                   "Multiplies what it gives to the diffuse response of "
-                                   "materials."),
-                  2)),
-      in(kResponse, kAll,
-         positive(row<&L::specular>("specular", "specular", "specular",
-                                    "Multiplies what it gives to the specular response of "
+      in(kShape, positive(row<&L::angle>("angle", "angle", "angle",
+                                         "Apparent diameter in degrees; 0: a single direction."),
+                          10)),
+      with(kSized, kEmission,
+           row<&L::normalize>("normalize", "normalize", "normalize",
+                              "Divides by the area in world space; of a distant light, by UsdLux's "
+                              "sizeFactor.")),
+      with(
+          kPictured, kEmission,
+          id(row<&L::texture>("texture", "texture", "texture:file",
+                              "What its colour is multiplied by: on a rect with u to the right and "
+                              "v up as seen from the front, on a dome latlong."),
+             LightRefers::kTexture)),
+      with(kPlaced, kEmission,
+           id(row<&L::group>("group", "group", "", "Name of its light group, for AOVs."),
+              LightRefers::kGroup)),
+      all(kResponse,
+          positive(row<&L::diffuse>("diffuse", "diffuse", "diffuse",
+                                    "Multiplies what it gives to the diffuse response of "
                                     "materials."),
-                  2)),
-      in(kShaping, kShaped,
-         usually(row<kS, &S::focus>("focus", "focus", "shaping:focus",
-                                    "Exponent of the cosine off the axis, -z; 0 or less: none."),
-                 50)),
-      in(kShaping, kShaped,
-         row<kS, &S::focus_tint>("focus_tint", "focus tint", "shaping:focusTint",
-                                 "What is left off the axis where there is a focus.")),
-      in(kShaping, kShaped,
-         usually(row<kS, &S::cone_angle>("cone_angle", "cone angle", "shaping:cone:angle",
-                                         "Degrees off the axis where light ends; 180 or more: no "
-                                         "cone."),
-                 180)),
-      in(kShaping, kShaped,
-         row<kS, &S::cone_softness>("cone_softness", "cone softness", "shaping:cone:softness",
-                                    "Share of the cone over which light falls to 0.")),
-      in(kShaping, kShaped,
-         id(row<kS, &S::ies>("ies", "IES profile", "shaping:ies:file",
-                             "Profile that multiplies its radiance, of add_ies."),
-            LightRefers::kProfile)),
-      in(kShaping, kShaped,
-         row<kS, &S::ies_angle_scale>("ies_angle_scale", "IES angle scale",
-                                      "shaping:ies:angleScale",
-                                      "Scales the profile's vertical angles as UsdLux says; 0: "
-                                      "none.")),
-      in(kShaping, kShaped,
-         row<kS, &S::ies_normalize>("ies_normalize", "IES normalize", "shaping:ies:normalize",
-                                    "Divides the profile by its mean over directions.")),
-      in(kResponse, kAll,
-         id(row<&L::light_link>("light_link", "light link", "",
-                                "Set of geometry that it shines on; none: all."),
-            LightRefers::kSet)),
-      in(kResponse, kAll,
-         id(row<&L::shadow_link>("shadow_link", "shadow link", "",
-                                 "Set of geometry that casts shadows in its light; none: all."),
-            LightRefers::kSet)),
-      in(kShape, kSeen, row<&L::visible>("visible", "visible", "", "Whether rays meet its shape.")),
-      in(kShape, kinds(kDome),
+                   2)),
+      all(kResponse,
+          positive(row<&L::specular>("specular", "specular", "specular",
+                                     "Multiplies what it gives to the specular response of "
+                                     "materials."),
+                   2)),
+      with(kShaped, kShaping,
+           usually(row<kS, &S::focus>("focus", "focus", "shaping:focus",
+                                      "Exponent of the cosine off the axis, -z; 0 or less: none."),
+                   50)),
+      with(kShaped, kShaping,
+           row<kS, &S::focus_tint>("focus_tint", "focus tint", "shaping:focusTint",
+                                   "What is left off the axis where there is a focus.")),
+      with(kShaped, kShaping,
+           usually(row<kS, &S::cone_angle>("cone_angle", "cone angle", "shaping:cone:angle",
+                                           "Degrees off the axis where light ends; 180 or more: no "
+                                           "cone."),
+                   180)),
+      with(kShaped, kShaping,
+           row<kS, &S::cone_softness>("cone_softness", "cone softness", "shaping:cone:softness",
+                                      "Share of the cone over which light falls to 0.")),
+      with(kShaped, kShaping,
+           id(row<kS, &S::ies>("ies", "IES profile", "shaping:ies:file",
+                               "Profile that multiplies its radiance, of add_ies."),
+              LightRefers::kProfile)),
+      with(kShaped, kShaping,
+           row<kS, &S::ies_angle_scale>("ies_angle_scale", "IES angle scale",
+                                        "shaping:ies:angleScale",
+                                        "Scales the profile's vertical angles as UsdLux says; 0: "
+                                        "none.")),
+      with(kShaped, kShaping,
+           row<kS, &S::ies_normalize>("ies_normalize", "IES normalize", "shaping:ies:normalize",
+                                      "Divides the profile by its mean over directions.")),
+      all(kResponse, id(row<&L::light_link>("light_link", "light link", "",
+                                            "Set of geometry that it shines on; none: all."),
+                        LightRefers::kSet)),
+      all(kResponse,
+          id(row<&L::shadow_link>("shadow_link", "shadow link", "",
+                                  "Set of geometry that casts shadows in its light; none: all."),
+             LightRefers::kSet)),
+      with(kSeen, kShape,
+           row<&L::visible>("visible", "visible", "", "Whether rays meet its shape.")),
+      in(kShape,
          row<&L::portals>("portals", "portals", "",
                           "Maps of the unit square in the xy plane to rectangles that guide its "
                           "sampling of what is on their -z side: (k, 4, 4).")),
-      in(kEmission, kinds(kTriangle),
+      in(kEmission,
          choice(row<&L::sync>("material_sync", "material sync", "",
                               "How its light goes with the glow of the mesh's material."),
                 {"materialGlowTintsLight", "independent", "noMaterialResponse"})),
   };
+}
+
+std::vector<LightParameter> make_table() {
+  std::vector<LightParameter> table = common_rows();
+  const std::span<const LightKindInfo> kinds = light_kinds();
+  for (const LightKindInfo& kind : kinds)
+    table.insert(table.end(), kind.own.begin(), kind.own.end());
+  for (LightParameter& p : table)
+    for (size_t k = 0; k < kinds.size(); ++k) {
+      const auto is_name = [&](const char* name) { return name == std::string_view(p.name); };
+      const auto is_row = [&](const LightParameter& own) { return is_name(own.name); };
+      const bool has = p.is_common || kinds[k].has(p.trait) ||
+                       std::ranges::any_of(kinds[k].parameters, is_name) ||
+                       std::ranges::any_of(kinds[k].own, is_row);
+      p.kinds |= uint32_t{has} << k;
+    }
+  return table;
 }
 
 std::string limits(const LightParameter& p) {
@@ -211,11 +226,6 @@ std::string limits(const LightParameter& p) {
 
 bool in_range(const LightParameter& p, float v) {
   return std::isfinite(v) && double{v} >= p.least && double{v} <= p.most;
-}
-
-const char* referred(LightRefers refers) {
-  constexpr const char* kWhat[] = {"", "texture", "profile", "set", "group"};
-  return kWhat[static_cast<size_t>(refers)];
 }
 
 void check_value(const std::string& of, const LightParameter& p, const LightValue& value,
@@ -232,7 +242,7 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
   const auto* number = std::get_if<uint32_t>(&value);
   const size_t counts[] = {kNone, there.textures, there.profiles, there.sets, kNone};
   if (!number || *number < counts[static_cast<size_t>(p.refers)]) return;
-  const std::string what = referred(p.refers);
+  const std::string what = light_refers_name(p.refers);
   throw Error(of + p.name + " is " + what + " " + std::to_string(*number) +
               ", which was never added; add " + what + "s before lights");
 }
@@ -240,7 +250,8 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
 void check(const Light& light, const LightReferences& there) {
   const std::string of = quoted("light", light.name) + ": ";
   if (!finite(light.to_world)) throw Error(of + "its transform is not finite; mend it");
-  for (const LightParameter& p : light_table()) check_value(of, p, p.read(light), there);
+  for (const LightParameter& p : light_table())
+    if (!p.is_own || p.is_of(light.kind)) check_value(of, p, p.read(light), there);
 }
 
 }  // namespace
@@ -256,27 +267,35 @@ const LightParameter* find_light_parameter(std::string_view name) {
   return nullptr;
 }
 
+const char* light_refers_name(LightRefers refers) {
+  constexpr const char* kNames[] = {"", "texture", "profile", "set", "group"};
+  return kNames[static_cast<size_t>(refers)];
+}
+
 const char* light_kind_name(LightKind kind) {
-  return kKindNames[static_cast<size_t>(kind)];
+  return info_of(kind).name;
 }
 
 LightKind light_kind(std::string_view name) {
+  const std::span<const LightKindInfo> kinds = light_kinds();
   std::string known;
-  for (uint32_t k = 0; k < static_cast<uint32_t>(LightKind::kTriangle); ++k) {
-    if (name == kKindNames[k]) return static_cast<LightKind>(k);
-    known += (known.empty() ? "" : ", ") + std::string(kKindNames[k]);
+  for (size_t k = 0; k < kinds.size(); ++k) {
+    if (!kinds[k].has(light_trait::kPlaced)) continue;
+    if (name == kinds[k].name) return static_cast<LightKind>(k);
+    known += (known.empty() ? "" : ", ") + std::string(kinds[k].name);
   }
   throw Error("light kind is '" + std::string(name) + "'; it must be one of " + known);
 }
 
 void check_light(const Light& light, const LightReferences& there) {
-  if (static_cast<uint32_t>(light.kind) >= static_cast<uint32_t>(LightKind::kTriangle))
+  const bool is_known = static_cast<size_t>(light.kind) < light_kinds().size();
+  if (!is_known || !info_of(light.kind).has(light_trait::kPlaced))
     throw Error(quoted("light", light.name) + ": its kind has no place of its own");
   check(light, there);
 }
 
 void check_mesh_light(const Light& light, const LightReferences& there) {
-  if (light.kind != LightKind::kTriangle)
+  if (light.kind != kMeshLight)
     throw Error(quoted("light", light.name) + ": it is no light of meshes");
   check(light, there);
 }

@@ -175,7 +175,7 @@ class SceneBuilder {
   /// A profile for Shaping::ies.
   uint32_t add_ies(IesProfile profile);
   uint32_t add_light(Light light);
-  /// A light for Mesh::mesh_light, of kind kTriangle. If not `visible` it shines at any opacity.
+  /// A light for Mesh::mesh_light, of kind kMeshLight. If not `visible` it shines at any opacity.
   uint32_t add_mesh_light(Light light);
   /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
   uint32_t light_group(const std::string& name);

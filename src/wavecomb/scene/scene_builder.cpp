@@ -173,7 +173,7 @@ uint32_t SceneBuilder::add_light(Light light) {
 }
 
 uint32_t SceneBuilder::add_mesh_light(Light light) {
-  light.kind = LightKind::kTriangle;
+  light.kind = kMeshLight;
   check_mesh_light(light, {textures_.size(), profiles_.size(), sets_.size()});
   mesh_lights_.push_back(std::move(light));
   return static_cast<uint32_t>(mesh_lights_.size() - 1);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/scene/scene_checks.h"
 
-#include <cstdio>
 #include <span>
 
 #include "wavecomb/core/error.h"
@@ -11,12 +10,6 @@ namespace wavecomb {
 
 std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
-}
-
-std::string text(double v) {
-  char digits[32];
-  std::snprintf(digits, sizeof(digits), "%g", v);
-  return digits;
 }
 
 void check_material(const Material& material, size_t texture_count, size_t graph_count) {

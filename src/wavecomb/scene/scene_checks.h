@@ -20,8 +20,6 @@ inline bool finite(const Affine& m) {
 
 /// "mesh '/World/Box'", or "mesh" where it has no name.
 std::string quoted(const std::string& kind, const std::string& name);
-/// A number as messages have it, 6 digits: "0.25", "1e+30".
-std::string text(double v);
 
 /// `texture_count`, `graph_count`: textures and graphs that there are.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);

@@ -2,10 +2,8 @@
 /// Reads the slots of materials at hits: constants from records, or textures.
 #pragma once
 
-#include <cstring>
-
-#include "wavecomb/core/fields.h"
 #include "wavecomb/core/math.h"
+#include "wavecomb/core/record_reader.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/scene/material_data.h"
 #include "wavecomb/texture/lookup.h"
@@ -16,72 +14,6 @@ namespace wavecomb {
 inline constexpr float kMaxEmission = 1e18f;
 
 namespace detail {
-
-/// Words of a record, by lane: one scalar load when all active lanes share the record, else
-/// gathers.
-template <typename F>
-struct RecordReader {
-  const void* base;
-  UInt<F> first_word;
-  const std::byte* shared;  ///< the record of all active lanes, or null
-  Mask<F> active;
-
-  /// A member of the record: reader[&MaterialRecord::roughness].
-  template <typename Record>
-  F operator[](float Record::* member) const {
-    return word<F, float>(word_of(member));
-  }
-  template <typename Record>
-  UInt<F> operator[](uint32_t Record::* member) const {
-    return word<UInt<F>, uint32_t>(word_of(member));
-  }
-  template <typename Record>
-  Vec3<F> operator[](float (Record::*member)[3]) const {
-    const uint32_t first = word_of(member);
-    return {word<F, float>(first), word<F, float>(first + 1), word<F, float>(first + 2)};
-  }
-  /// One of an array's.
-  template <typename Record, size_t N>
-  F at(float (Record::*member)[N], size_t i) const {
-    return word<F, float>(word_of(member) + static_cast<uint32_t>(i));
-  }
-  /// The fields of a row that the record begins with.
-  template <template <typename> class Row>
-  Row<F> row() const {
-    Row<F> row;
-    for_each_word<0, F>(row, [&](auto at, auto& value) WAVECOMB_INLINE_LAMBDA {
-      value = word<std::remove_cvref_t<decltype(value)>,
-                   std::conditional_t<std::is_same_v<std::remove_cvref_t<decltype(value)>, F>,
-                                      float, uint32_t>>(at);
-    });
-    return row;
-  }
-
- private:
-  template <typename T, typename Scalar>
-  T word(uint32_t at) const {
-    if (shared) {
-      Scalar value;
-      std::memcpy(&value, shared + size_t{at} * 4, sizeof(value));
-      return T(value);
-    }
-    if constexpr (kIsScalar<F>)
-      return T(0);  // not active: a lane alone shares its record with itself
-    else
-      return gather<T>(base, first_word + at, Mask<T>(active));
-  }
-};
-
-/// Reader of record `index` of the array at `base`, for lanes whose indices are all `uniform` or
-/// not.
-template <typename Record, typename F>
-inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index, bool uniform,
-                                   const Mask<F>& active) {
-  constexpr uint32_t kWords = sizeof(Record) / 4;
-  const std::byte* shared = nullptr;
-  if (uniform) shared = reinterpret_cast<const std::byte*>(base + first_active(index, active));
-  return {base, index * kWords, shared, active};
-}
 
 /// What a slot's texture gives: texel * scale + bias of the chosen channels.
 template <typename F>

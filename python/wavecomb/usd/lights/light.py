@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.light_table import EDITABLE, MESH, LightParameter, light_parameters, of_kind
+from wavecomb.light_table import (
+    EDITABLE,
+    MESH,
+    LightParameter,
+    kind_of_prims,
+    light_parameters,
+    of_kind,
+)
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.links import LinkTable
@@ -22,15 +29,7 @@ from wavecomb.usd.looks.texture_cache import Image
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
-KINDS = {
-    "RectLight": "rect",
-    "DiskLight": "disk",
-    "SphereLight": "sphere",
-    "CylinderLight": "cylinder",
-    "DistantLight": "distant",
-    "DomeLight": "dome",
-    "DomeLight_1": "dome",
-}
+KINDS = kind_of_prims()
 """Lights that are drawn, by prim type."""
 
 _READ_APART = frozenset({

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/light/kinds.h"
+
+#include "wavecomb/light/making.h"
+
+namespace wavecomb {
+
+std::span<const LightKindInfo> light_kinds() {
+#define WAVECOMB_LIGHT_KIND(name) name##Kind::describe(),
+  static const std::vector<LightKindInfo> kinds = {WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)};
+#undef WAVECOMB_LIGHT_KIND
+  return kinds;
+}
+
+MadeLight make_light(const Light& light, LightMaking& making) {
+  const LightKindInfo& kind = info_of(light.kind);
+  MadeLight made;
+  LightRecord& r = made.record;
+  r.kind = static_cast<uint32_t>(light.kind);
+  r.texture = kind.has(light_trait::kPictured) ? light.texture : kNoTexture;
+  r.shaping = kNoShaping;
+  r.portals = kNoPortals;
+  r.distribution = kNoDistribution;
+  r.diffuse = std::max(0.f, light.diffuse);
+  r.specular = std::max(0.f, light.specular);
+  r.hidden = !light.visible && !kind.has(light_trait::kInfinite);
+  r.light_link = light.light_link;
+  r.shadow_link = light.shadow_link;
+  r.sampled_only = r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet;
+  if (kind.make) kind.make(made, light, making);
+  if (!light.shaping.is_plain() && kind.has(light_trait::kShaped))
+    making::add_shaping(made, light, making);
+  return made;
+}
+
+}  // namespace wavecomb

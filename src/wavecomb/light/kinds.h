@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+/// All kinds of lights. A new kind is a pair of files beside this one, their header here, and an
+/// entry at the end of the list.
+///
+/// A kind is a struct <Name>Kind with
+///   describe()   what the scene and the accelerator ask of it (scene/light_kind.h),
+///   sample       a direction from a point to the light, radiance and density,
+///   hit          radiance and density for a ray that met its shape, and
+///   escape       for a ray that left the scene;
+/// of the last two NoShape and NoEscape say nothing.
+#pragma once
+
+#include <cstdint>
+
+#include "wavecomb/light/cylinder.h"
+#include "wavecomb/light/disk.h"
+#include "wavecomb/light/distant.h"
+#include "wavecomb/light/dome.h"
+#include "wavecomb/light/mesh_light.h"
+#include "wavecomb/light/rect.h"
+#include "wavecomb/light/sphere.h"
+
+/// X(name), in the order of the numbers that records and fingerprints hold.
+#define WAVECOMB_LIGHT_KINDS(X) X(Rect) X(Disk) X(Sphere) X(Cylinder) X(Distant) X(Dome) X(Triangle)
+
+namespace wavecomb {
+
+#define WAVECOMB_LIGHT_KIND(name) k##name,
+enum class LightKind : uint8_t { WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND) };
+#undef WAVECOMB_LIGHT_KIND
+#define WAVECOMB_LIGHT_KIND(name) +1
+inline constexpr uint32_t kLightKindCount = 0 WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND);
+#undef WAVECOMB_LIGHT_KIND
+static_assert(LightKind::kTriangle == kMeshLight);
+
+namespace detail {
+
+template <typename F>
+inline KindSample<F> sample_kind(LightKind kind, const LightQuery<F>& query) {
+  switch (kind) {
+#define WAVECOMB_LIGHT_KIND(name) \
+  case LightKind::k##name:        \
+    return name##Kind::sample<F>(query);
+    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+  }
+  return {};
+}
+
+template <typename F>
+inline KindHit<F> hit_kind(LightKind kind, const LightMeeting<F>& meeting) {
+  switch (kind) {
+#define WAVECOMB_LIGHT_KIND(name) \
+  case LightKind::k##name:        \
+    return name##Kind::hit<F>(meeting);
+    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+  }
+  return dark<F>();
+}
+
+template <typename F>
+inline KindHit<F> escape_kind(LightKind kind, const LightEscape<F>& escape) {
+  switch (kind) {
+#define WAVECOMB_LIGHT_KIND(name) \
+  case LightKind::k##name:        \
+    return name##Kind::escape<F>(escape);
+    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+  }
+  return dark<F>();
+}
+
+}  // namespace detail
+
+}  // namespace wavecomb
