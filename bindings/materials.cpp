@@ -104,31 +104,13 @@ uint32_t share_texture(SceneBuilder& builder, const Scene& scene, uint32_t textu
 }
 
 uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
-                      const std::string& name, const Color3& base_color,
-                      const Color3& specular_color, const Color3& emission, float roughness,
-                      float metallic, float clearcoat, float clearcoat_roughness, float opacity,
-                      float ior, float opacity_threshold, const Color3& conductor_eta,
-                      const Color3& conductor_k, bool specular_workflow, bool presence,
-                      const nb::dict& openpbr, const nb::dict& textures,
+                      const std::string& name, const nb::dict& openpbr, const nb::dict& textures,
                       std::optional<uint32_t> graph, std::optional<uint32_t> opacity_graph,
-                      std::optional<uint32_t> emission_graph) {
+                      std::optional<uint32_t> emission_graph, const nb::kwargs& values) {
   Material m;
   m.name = name;
   m.program = named<ProgramId>("program", kProgramNames, program_name);
-  m.base_color = vec3(base_color);
-  m.specular_color = vec3(specular_color);
-  m.emission = vec3(emission);
-  m.roughness = roughness;
-  m.metallic = metallic;
-  m.clearcoat = clearcoat;
-  m.clearcoat_roughness = clearcoat_roughness;
-  m.opacity = opacity;
-  m.ior = ior;
-  m.opacity_threshold = opacity_threshold;
-  m.conductor_eta = vec3(conductor_eta);
-  m.conductor_k = vec3(conductor_k);
-  m.specular_workflow = specular_workflow;
-  m.presence = presence;
+  take_parameters(m, values);
   m.openpbr = openpbr_of(name, openpbr);
   m.graph = graph.value_or(kNoGraph);
   m.opacity_graph = opacity_graph.value_or(kNoGraph);
@@ -143,7 +125,6 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
 
 void def_materials(nb::class_<SceneBuilder>& builder) {
   using namespace nb::literals;
-  const Color3 grey{0.18f, 0.18f, 0.18f}, black{0.f, 0.f, 0.f};
   builder
       .def("add_texture", &add_texture, "pixels"_a, nb::kw_only(), "srgb"_a, "wrap_s"_a = "repeat",
            "wrap_t"_a = "repeat", "name"_a = "")
@@ -152,11 +133,6 @@ void def_materials(nb::class_<SceneBuilder>& builder) {
       .def("add_graph", &add_graph, "ops"_a, "constants"_a, "images"_a, "outputs"_a,
            "attributes"_a = std::vector<std::string>())
       .def("add_material", &add_material, "program"_a, nb::kw_only(), "name"_a = "",
-           "base_color"_a = grey, "specular_color"_a = black, "emission"_a = black,
-           "roughness"_a = 0.5f, "metallic"_a = 0.f, "clearcoat"_a = 0.f,
-           "clearcoat_roughness"_a = 0.01f, "opacity"_a = 1.f, "ior"_a = 1.5f,
-           "opacity_threshold"_a = 0.f, "conductor_eta"_a = black, "conductor_k"_a = black,
-           "specular_workflow"_a = false, "presence"_a = false, "openpbr"_a = nb::dict(),
-           "textures"_a = nb::dict(), "graph"_a = nb::none(), "opacity_graph"_a = nb::none(),
-           "emission_graph"_a = nb::none());
+           "openpbr"_a = nb::dict(), "textures"_a = nb::dict(), "graph"_a = nb::none(),
+           "opacity_graph"_a = nb::none(), "emission_graph"_a = nb::none(), "values"_a);
 }

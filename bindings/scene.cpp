@@ -51,6 +51,7 @@ uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector
 
 void bind_scene(nb::module_& m) {
   using namespace nb::literals;
+  m.def("material_table", &material_rows);
   m.attr("INHERIT_MATERIAL") = kInheritMaterial;
 
   nb::class_<TileStore>(m, "TextureStore")

@@ -8,12 +8,15 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "camera.h"
 #include "lights.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/graph/parameters.h"
+#include "wavecomb/scene/material_table.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -21,25 +24,10 @@ using namespace wavecomb;
 
 namespace {
 
-// Parameters by the names that Python gives them.
+// Inputs of OpenPBR by the names that Python gives them.
 template <typename Class, typename Value>
 using Members = std::vector<std::pair<const char*, Value Class::*>>;
 
-const Members<Material, Vec3<float>> kMaterialColors{{"base_color", &Material::base_color},
-                                                     {"specular_color", &Material::specular_color},
-                                                     {"emission", &Material::emission},
-                                                     {"conductor_eta", &Material::conductor_eta},
-                                                     {"conductor_k", &Material::conductor_k}};
-const Members<Material, float> kMaterialNumbers{
-    {"roughness", &Material::roughness},
-    {"metallic", &Material::metallic},
-    {"clearcoat", &Material::clearcoat},
-    {"clearcoat_roughness", &Material::clearcoat_roughness},
-    {"opacity", &Material::opacity},
-    {"ior", &Material::ior},
-    {"opacity_threshold", &Material::opacity_threshold}};
-const Members<Material, bool> kMaterialSwitches{{"specular_workflow", &Material::specular_workflow},
-                                                {"presence", &Material::presence}};
 // Of an input, where it is of the kind that a list is for.
 #define WAVECOMB_NUMBER_Number(name) {#name, &OpenPbr::name},
 #define WAVECOMB_NUMBER_Colour(name)
@@ -74,17 +62,19 @@ class Reader {
 
   template <typename Class, typename Value>
   void take(Class& object, const Members<Class, Value>& members) {
-    for (const auto& [name, member] : members)
-      if (const nb::object value = next(name); value.is_valid()) read(name, value, object.*member);
+    for (const auto& [name, member] : members) take(name, object.*member);
   }
-  /// Throws where there was more than has been taken.
-  void end() const {
+  template <typename Value>
+  void take(const char* name, Value& to) {
+    if (const nb::object value = next(name); value.is_valid()) read(name, value, to);
+  }
+  /// Throws where there was more than has been taken; `which` says what the others are.
+  void end(const char* which = "") const {
     if (nb::len(values_) == taken_) return;
     for (const auto& [key, value] : values_) {
       const std::string name = nb::cast<std::string>(nb::str(key));
       if (known_.find("'" + name + "'") == std::string::npos)
-        throw Error(what_ + " has no parameter '" + name + "' that can be changed; there are " +
-                    known_);
+        throw Error(what_ + " has no parameter '" + name + "'" + which + "; there are " + known_);
     }
   }
 
@@ -115,6 +105,21 @@ class Reader {
   std::string known_;
   size_t taken_ = 0;
 };
+
+/// Runs visit<Value>() for colours, numbers and switches, in the order that people are shown them.
+template <typename Visit>
+void for_each_kind(const Visit& visit) {
+  visit.template operator()<Vec3<float>>();
+  visit.template operator()<float>();
+  visit.template operator()<bool>();
+}
+
+void take_material(Reader& reader, Material& to) {
+  for_each_kind([&]<typename Value>() {
+    for_each_parameter<Value>(
+        [&](const char* name, auto member) { reader.take(name, to.*member); });
+  });
+}
 
 void take_openpbr(Reader& reader, OpenPbr& to) {
   reader.take(to, kOpenPbrColors);
@@ -218,15 +223,41 @@ Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
   throw Error("a transform must be of float32 or float64");
 }
 
+void take_parameters(Material& material, const nb::kwargs& values) {
+  Reader reader("material '" + material.name + "'", values);
+  take_material(reader, material);
+  reader.end();
+}
+
+nb::list material_rows() {
+  const Material standard;
+  nb::list rows;
+  for (const MaterialParameter& p : material_table()) {
+    nb::dict d;
+    d["name"] = p.name;
+    d["kind"] = std::visit(
+        []<typename Value>(Value Material::*) {
+          return std::is_same_v<Value, float>  ? "number"
+                 : std::is_same_v<Value, bool> ? "flag"
+                                               : "colour";
+        },
+        p.member);
+    d["default"] = std::visit([&](auto member) { return to_python(standard.*member); }, p.member);
+    rows.append(d);
+  }
+  return rows;
+}
+
 nb::dict material_dict(const Scene& scene, uint32_t material) {
   check_index("material", material, scene.materials().size());
   const Material& m = scene.materials()[material];
   nb::dict d, textures;
   d["name"] = m.name;
   d["program"] = kProgramNames[static_cast<size_t>(m.program)];
-  put(d, m, kMaterialColors);
-  put(d, m, kMaterialNumbers);
-  put(d, m, kMaterialSwitches);
+  for_each_kind([&]<typename Value>() {
+    for_each_parameter<Value>(
+        [&](const char* name, auto member) { d[name] = to_python(m.*member); });
+  });
   for (uint32_t s = 0; s < kSlotCount; ++s)
     if (m.has_texture(static_cast<Slot>(s)))
       textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
@@ -250,11 +281,9 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     check_index("material", id, scene.materials().size());
     Material changed = scene.materials()[id];
     Reader reader("material '" + changed.name + "'", values);
-    reader.take(changed, kMaterialColors);
-    reader.take(changed, kMaterialNumbers);
-    reader.take(changed, kMaterialSwitches);
+    take_material(reader, changed);
     if (changed.program == ProgramId::kOpenPbr) take_openpbr(reader, changed.openpbr);
-    reader.end();
+    reader.end(" that can be changed");
     edit.materials[id] = std::move(changed);
   });
   for_each_change("light", lights, [&](uint32_t i, const nb::dict& values) {

@@ -40,6 +40,12 @@ std::string listed(const std::vector<const char*>& choices);
 nanobind::list matrix(const wavecomb::Affine& m);
 wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 
+/// Parameters of material_table() by name into a material that has its name. Throws Error for
+/// others, and for values of another kind.
+void take_parameters(wavecomb::Material& material, const nanobind::kwargs& values);
+/// material_table() as Python reads it.
+nanobind::list material_rows();
+
 /// As add_material takes it. Throws Error for ids that are not there.
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
 

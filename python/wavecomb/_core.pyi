@@ -144,6 +144,7 @@ class SceneBuilder:
         program: str,
         *,
         name: str = "",
+        # ---- material_table(): tools/update_stub ----
         base_color: tuple[float, float, float] = (0.18, 0.18, 0.18),
         specular_color: tuple[float, float, float] = (0, 0, 0),
         emission: tuple[float, float, float] = (0, 0, 0),
@@ -158,6 +159,7 @@ class SceneBuilder:
         conductor_k: tuple[float, float, float] = (0, 0, 0),
         specular_workflow: bool = False,
         presence: bool = False,
+        # ---- to here ----
         openpbr: dict[str, Any] = {},
         textures: dict[str, dict[str, Any]] = {},
         graph: int | None = None,
@@ -409,6 +411,9 @@ class SceneBuilder:
 
 def light_kinds() -> list[tuple[str, tuple[str, ...]]]:
     """Kinds of lights, that of meshes too, each with the types of prims that are drawn as one."""
+
+def material_table() -> list[dict[str, Any]]:
+    """The parameters of materials, as wavecomb.material_table.MaterialParameter has them."""
 
 def light_table() -> list[dict[str, Any]]:
     """The parameters of lights, as wavecomb.light_table.LightParameter has them."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import sys
@@ -168,7 +169,9 @@ class Fake:
 
 def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     """Puts the stand-in where the native module and the loader are imported from."""
-    settings()  # of the core that there is
+    settings()  # of the core that there is, as what these make of its tables
+    importlib.import_module("wavecomb.run.boxed.calls")
+    importlib.import_module("wavecomb.usd.lights.light")
     fake = Fake()
     core = ModuleType("wavecomb._core")
     usd = ModuleType("wavecomb.usd")

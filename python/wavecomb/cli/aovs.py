@@ -23,11 +23,9 @@ def aov_options(command: F) -> F:
         "aovs",
         multiple=True,
         metavar="NAME",
-        help="Layer to keep, may be given again: albedo, normal, depth, position, uv, material_id, "
-        "instance_id, crypto_object, crypto_material, crypto_asset, crypto, emission, direct, "
-        "indirect, light_groups, light_NAME, cost, samples, error, variance, guide_albedo, "
-        "guide_normal, all; beauty is always there (docs/aovs.md).  "
-        "[default: albedo, normal, depth, samples]",
+        help=f"Layer to keep, may be given again: {', '.join(aov_names.NAMES[1:])}, "
+        f"{aov_names.LIGHT}NAME, crypto, all; beauty is always there (docs/aovs.md).  "
+        f"[default: {', '.join(aov_names.DEFAULT[1:])}]",
     )(file_options(command))
     return command
 

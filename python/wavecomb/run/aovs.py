@@ -12,28 +12,32 @@ DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 
 GUIDES = ("guide_albedo", "guide_normal")
 """For denoisers: of what is seen, also in mirrors and through clear glass."""
-_CORE = (
-    "albedo",
-    "normal",
-    "depth",
-    "position",
-    "uv",
-    "material_id",
-    "instance_id",
-    "crypto_object",
-    "crypto_material",
-    "crypto_asset",
-    "emission",
-    "direct",
-    "indirect",
-    "light_groups",
-    "cost",
-    *GUIDES,
-)
+_CORE: dict[str, tuple[int, str]] = {
+    "albedo": (3, "Albedo"),
+    "normal": (3, "Normal"),
+    "depth": (1, "Depth"),
+    "position": (3, "Position"),
+    "uv": (2, "Texture coordinates"),
+    "material_id": (1, "Materials"),
+    "instance_id": (1, "Instances"),
+    "crypto_object": (0, "Objects (Cryptomatte)"),
+    "crypto_material": (0, "Materials (Cryptomatte)"),
+    "crypto_asset": (0, "Assets (Cryptomatte)"),
+    "emission": (3, "Emission"),
+    "direct": (3, "Direct light"),
+    "indirect": (3, "Indirect light"),
+    "light_groups": (0, ""),
+    "cost": (1, "Cost per pixel"),
+    "guide_albedo": (3, ""),
+    "guide_normal": (3, ""),
+}
+"""AOVs that the core keeps: channels, where they are a layer of their own; title in the window, ""
+where it does not offer them."""
 CRYPTO = ("crypto_object", "crypto_material", "crypto_asset")
 ERRORS = ("error", "variance")
 NAMES = ("beauty", *_CORE, "samples", *ERRORS)
 """All AOVs; "light_NAME" is a single light group."""
+TITLES = {name: title for name, (_, title) in _CORE.items() if title}
 GROUPS = {"all": NAMES, "crypto": CRYPTO}
 """Names that stand for several."""
 LIGHT = "light_"
@@ -88,27 +92,10 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
     groups = light_groups if "light_groups" in names else sum(map(_is_light, names))
     total += groups * (24 + 12)
     total += len(names & set(CRYPTO)) * (64 + 48)
-    total += 4 * sum(_CHANNELS.get(name, 0) for name in names)
+    total += 4 * sum(_CORE[name][0] for name in names & _CORE.keys())
     if names & set(ERRORS):
         total += 48 + 4 + 12
     return total + (8 if "cost" in names else 0)
-
-
-_CHANNELS = {
-    "albedo": 3,
-    "normal": 3,
-    "depth": 1,
-    "position": 3,
-    "uv": 2,
-    "material_id": 1,
-    "instance_id": 1,
-    "emission": 3,
-    "direct": 3,
-    "indirect": 3,
-    "cost": 1,
-    "guide_albedo": 3,
-    "guide_normal": 3,
-}
 
 
 def _is_light(name: str) -> bool:

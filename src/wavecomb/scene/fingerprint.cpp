@@ -10,6 +10,7 @@
 
 #include "wavecomb/scene/camera_table.h"
 #include "wavecomb/scene/light_table.h"
+#include "wavecomb/scene/material_table.h"
 
 namespace wavecomb {
 namespace {
@@ -98,9 +99,9 @@ uint64_t hash_geometry(const Scene& scene) {
 uint64_t hash_materials(const Scene& scene) {
   Hash h;
   for (const Material& m : scene.materials()) {
-    h.add(m.program, m.base_color, m.specular_color, m.emission, m.roughness, m.metallic,
-          m.clearcoat, m.clearcoat_roughness, m.opacity, m.ior, m.opacity_threshold,
-          m.conductor_eta, m.conductor_k, m.specular_workflow, m.presence);
+    h.add(m.program);
+    for (const MaterialParameter& p : material_table())
+      std::visit([&](const auto& member) { h.add(m.*member); }, p.member);
     if (m.program == ProgramId::kOpenPbr) {
       const OpenPbr& o = m.openpbr;
 #define WAVECOMB_ADD(kind, name, standard, least, most) h.add(o.name);

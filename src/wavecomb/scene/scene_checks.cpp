@@ -4,6 +4,7 @@
 #include <span>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/material_table.h"
 #include "wavecomb/scene/motion.h"
 
 namespace wavecomb {
@@ -36,22 +37,18 @@ void check_material(const Material& material, size_t texture_count, size_t graph
       throw Error(name + " has a graph that was never added; add graphs before materials");
   const OpenPbr& o = material.openpbr;
   bool good = std::isfinite(o.transmission_depth);
-  for (float x :
-       {material.roughness, material.metallic, material.clearcoat, material.clearcoat_roughness,
-        material.opacity, material.ior, material.opacity_threshold})
-    good = good && std::isfinite(x);
   const auto check_color = [&](const Vec3<float>& v) {
     if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
   };
-  for (const Vec3<float>& v : {material.base_color, material.specular_color, material.emission,
-                               material.conductor_eta, material.conductor_k, o.transmission_color})
-    check_color(v);
   const auto check = [&](const auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, float>)
       good = good && std::isfinite(value);
     else
       check_color(value);
   };
+  for_each_parameter<float>([&](const char*, auto member) { check(material.*member); });
+  for_each_parameter<Vec3<float>>([&](const char*, auto member) { check(material.*member); });
+  check(o.transmission_color);
   std::apply([&](const auto&... input) { (check(input), ...); },
              static_cast<const OpenPbrInputs<float>&>(o).fields());
   if (!good) throw Error(name + " has a parameter that is not finite; give finite numbers");

@@ -31,23 +31,10 @@ EXPOSURE = 10.0
 _TITLES = {
     "beauty": "Beauty",
     "denoised": "Denoised",
-    "albedo": "Albedo",
-    "normal": "Normal",
-    "depth": "Depth",
-    "direct": "Direct light",
-    "indirect": "Indirect light",
-    "emission": "Emission",
-    "cost": "Cost per pixel",
+    **aov_names.TITLES,
     "samples": "Samples",
     "error": "Error",
     "variance": "Variance",
-    "position": "Position",
-    "uv": "Texture coordinates",
-    "material_id": "Materials",
-    "instance_id": "Instances",
-    "crypto_object": "Objects (Cryptomatte)",
-    "crypto_material": "Materials (Cryptomatte)",
-    "crypto_asset": "Assets (Cryptomatte)",
 }
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from wavecomb.camera_table import camera_parameters
 from wavecomb.light_table import MESH, LightParameter, light_parameters, of_kind
+from wavecomb.material_table import material_parameters
 from wavecomb.run.boxed.wire import Array, Refused
 
 Kind = Callable[[Any, Sequence[Array]], Any]
@@ -160,7 +161,7 @@ _SHAPE: dict[str, Kind] = {
     "light_group": text,
     "asset_length": whole,
 }
-_LIGHT_VALUES: dict[str, Kind] = {
+_VALUES: dict[str, Kind] = {
     "number": number, "colour": COLOUR, "flag": flag, "choice": text, "id": maybe(whole),
     "transforms": maybe(array("<f8", 3)),
 }  # fmt: skip
@@ -172,7 +173,7 @@ _CAMERA_VALUES: dict[str, Kind] = {
 
 def _light(row: LightParameter) -> Kind:
     """What a parameter of a light takes."""
-    return text if row.refers == "group" else _LIGHT_VALUES[row.kind]
+    return text if row.refers == "group" else _VALUES[row.kind]
 
 
 _LIGHT: dict[str, Kind] = {
@@ -234,11 +235,8 @@ CALLS: dict[str, Call] = {
     "add_material": Call(
         {"program": text},
         {
-            "name": text, "base_color": COLOUR, "specular_color": COLOUR, "emission": COLOUR,
-            "roughness": number, "metallic": number, "clearcoat": number,
-            "clearcoat_roughness": number, "opacity": number, "ior": number,
-            "opacity_threshold": number, "conductor_eta": COLOUR, "conductor_k": COLOUR,
-            "specular_workflow": flag, "presence": flag,
+            "name": text,
+            **{name: _VALUES[row.kind] for name, row in material_parameters().items()},
             "openpbr": named(one_of(flag, number, COLOUR)), "textures": named(_USE),
             "graph": maybe(whole), "opacity_graph": maybe(whole), "emission_graph": maybe(whole),
         },
