@@ -7,7 +7,9 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 
 BUILD := build/editable
-ASAN := build/asan
+# Of make test-asan: ON, or all.
+CHECKS ?= ON
+ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
 WHEEL := build/wheel
 VENV := .venv/bin
@@ -89,9 +91,10 @@ test-cpp: build build/.setup-test ## C++ tests
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
+# CHECKS=all: every check in packets and tests, too, which takes four times as long to compile.
 test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
-	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=ON -DWAVECOMB_TESTS=ON
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=ON
 	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
@@ -109,7 +112,8 @@ build-naive: build
 test-py: build-naive build/.setup-test ## Python and statistical tests
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
-test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing
+test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
+	@$(MAKE) --no-print-directory test-asan CHECKS=all
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200

@@ -3,6 +3,7 @@
 # set of WAVECOMB_ISAS.
 
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.cpp")
+file(GLOB programs CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
 set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$")
@@ -10,8 +11,33 @@ file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wave
 # Only the core. Not all of -Wconversion: int to float is everyday in kernels that serve float and packets.
 set(core_warnings -Wfloat-conversion)
 
-# wavecomb_add_core(NAME FLAGS [STATIC]): the library NAME, compiled with FLAGS of wavecomb_add_flags. Each
-# *.lanes.cpp is compiled once per width, with -DWAVECOMB_LANES=<width>.
+# What nearly every unit includes, of others; parsing it is half of what a small unit takes.
+set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <limits> <memory> <numeric>
+  <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
+
+# wavecomb_lane_units(VAR WIDTH): units of WIDTH lanes, made in the build tree: one for each *.lanes.cpp, and one
+# for each program, out of program.lanes.cpp.in. They differ from one width to the next by WAVECOMB_LANES.
+function(wavecomb_lane_units var width)
+  set(folder "${PROJECT_BINARY_DIR}/lanes")
+  set(units "")
+  foreach(header IN LISTS programs)
+    get_filename_component(program "${header}" NAME_WE)
+    configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/program.lanes.cpp.in"
+      "${folder}/${program}_${width}.cpp" @ONLY)
+    list(APPEND units "${folder}/${program}_${width}.cpp")
+  endforeach()
+  foreach(source IN LISTS lane_sources)
+    get_filename_component(name "${source}" NAME_WE)
+    file(RELATIVE_PATH source "${PROJECT_SOURCE_DIR}/src" "${source}")
+    file(CONFIGURE OUTPUT "${folder}/all_${name}_${width}.cpp"
+      CONTENT "#define WAVECOMB_LANES ${width}\n#include \"${source}\"\n")
+    list(APPEND units "${folder}/all_${name}_${width}.cpp")
+  endforeach()
+  set(${var} ${units} PARENT_SCOPE)
+endfunction()
+
+# wavecomb_add_core(NAME FLAGS [STATIC]): the library NAME, compiled with FLAGS of wavecomb_add_flags. Scalar
+# units are always there: the reference integrator has their kernels.
 function(wavecomb_add_core name flags)
   add_library(${name} ${ARGN} ${core_sources} ${core_headers})
   target_compile_features(${name} PUBLIC cxx_std_20)
@@ -23,13 +49,38 @@ function(wavecomb_add_core name flags)
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:${flags}> embree TBB::tbb
     OpenSubdiv::osdCPU)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
+  target_precompile_headers(${name} PRIVATE ${wavecomb_pch})
+  list(REMOVE_ITEM widths 1)
+  set(packets "")
   foreach(width IN LISTS widths)
-    set(lanes ${name}_lanes_${width})
-    add_library(${lanes} OBJECT ${lane_sources})
-    target_compile_definitions(${lanes} PRIVATE WAVECOMB_LANES=${width})
+    wavecomb_lane_units(units ${width})
+    list(APPEND packets ${units})
+  endforeach()
+  wavecomb_lane_units(scalar 1)
+  foreach(kind IN ITEMS packets scalar)
+    set(lanes ${name}_${kind})
+    if(NOT ${kind})
+      continue()
+    endif()
+    add_library(${lanes} OBJECT ${${kind}})
     target_include_directories(${lanes} PRIVATE "${PROJECT_SOURCE_DIR}/src")
     target_compile_options(${lanes} PRIVATE ${core_warnings})
     target_link_libraries(${lanes} PRIVATE ${flags} embree TBB::tbb)
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${lanes}>)
   endforeach()
+  # What the units of kernels include, but for programs and for what is compiled for each of them.
+  set(kernel_pch ${wavecomb_pch} <wavecomb/integrate/shared_kernels.h> <wavecomb/integrate/wave.h>
+    <wavecomb/integrate/stages/order_rays.h>)
+  foreach(step IN ITEMS interact emit sample_light scatter survive)
+    list(APPEND kernel_pch <wavecomb/integrate/steps/${step}.h>)
+  endforeach()
+  target_precompile_headers(${name}_scalar PRIVATE ${kernel_pch})
+  if(packets)
+    target_link_libraries(${name}_packets PRIVATE wavecomb_lean)
+    if(WAVECOMB_SANITIZE)
+      target_precompile_headers(${name}_packets PRIVATE ${kernel_pch})
+    else()
+      target_precompile_headers(${name}_packets REUSE_FROM ${name}_scalar)
+    endif()
+  endif()
 endfunction()

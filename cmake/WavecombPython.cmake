@@ -40,6 +40,7 @@ function(wavecomb_add_module name core flags folder)
   nanobind_add_module(${name} NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sources})
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
+  target_precompile_headers(${name} PRIVATE ${wavecomb_pch} <nanobind/nanobind.h> <nanobind/ndarray.h>)
   # Nothing but its entry leaves the module: no other library is to be bound to code of its instruction set.
   if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
     target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")

@@ -4,6 +4,8 @@
 #include "wave_testing.h"
 #include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/run_wave.h"
+#include "wavecomb/integrate/stages/shade_batch.h"
+#include "wavecomb/material/program_table.h"
 
 namespace wavecomb {
 namespace {

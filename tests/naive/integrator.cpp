@@ -9,6 +9,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/material/energy_tables.h"
+#include "wavecomb/material/program_table.h"
 
 namespace wavecomb {
 namespace {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "wavecomb/integrate/aov_tables.h"
-#include "wavecomb/integrate/vertex.h"
+#include "wavecomb/integrate/steps/emit.h"
 
 namespace wavecomb {
 

@@ -14,7 +14,7 @@
 #pragma once
 
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/material/program_table.h"
+#include "wavecomb/material/program_list.h"
 
 namespace wavecomb {
 

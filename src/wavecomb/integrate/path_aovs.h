@@ -25,8 +25,8 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/light_groups.h"
 #include "wavecomb/integrate/path_pool.h"
+#include "wavecomb/integrate/path_state.h"
 #include "wavecomb/integrate/phase_clock.h"
-#include "wavecomb/integrate/vertex.h"
 
 namespace wavecomb {
 

@@ -5,9 +5,11 @@
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
+#include "wavecomb/integrate/program_dispatch.h"
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/integrate/shading_record.h"
-#include "wavecomb/integrate/vertex.h"
+#include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/integrate/steps/survive.h"
 #include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
@@ -208,13 +210,9 @@ class PathTracer {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, time_};
-    VertexResult<F> v{};
-    visit_list(typename Media::template Programs<F>{},
-               static_cast<ProgramId>(scene.material_program[material]), [&]<typename Bsdf>() {
-                 v = shade_vertex<Bsdf, F>({scene, settings_, key, depth, mesh_hit, hit.geom, hit.t,
-                                            material, path, &aovs, true});
-               });
-    return v;
+    constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
+    return kernels[scene.material_program[material]](
+        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true});
   }
 
   const float* times() const { return context_.scene.has_motion ? &time_ : nullptr; }

@@ -2,8 +2,11 @@
 #include "wavecomb/integrate/reference.h"
 
 #include "wavecomb/integrate/path_tracer.h"
+#include "wavecomb/integrate/shared_kernels.h"
 
 namespace wavecomb {
+
+WAVECOMB_SHARED_KERNELS(extern, float);
 
 ReferenceIntegrator::ReferenceIntegrator(const WaveContext& context, uint32_t threads)
     : context_(context) {

@@ -8,13 +8,12 @@
 #include "wavecomb/integrate/steps/sample_light.h"
 #include "wavecomb/integrate/steps/scatter.h"
 #include "wavecomb/integrate/steps/survive.h"
-#include "wavecomb/material/program_table.h"
 
 namespace wavecomb {
 
 /// Shades a vertex of the active lanes' paths with program `Bsdf`.
 template <typename Bsdf, typename F>
-inline VertexResult<F> shade_vertex(const Vertex<F>& v) {
+VertexResult<F> shade_vertex(const Vertex<F>& v) {
   using U = UInt<F>;
   VertexResult<F> out;
   out.emitted = Color<F>(F(0.f));

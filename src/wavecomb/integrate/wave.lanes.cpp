@@ -4,12 +4,11 @@
 #include <cstring>
 
 #include "wavecomb/integrate/run_wave.h"
+#include "wavecomb/integrate/shared_kernels.h"
 
 namespace wavecomb {
 
-// In shade_openpbr.lanes.cpp.
-extern template void shade_batch<OpenPbrBsdf<Lanes<WAVECOMB_LANES>>, Lanes<WAVECOMB_LANES>>(
-    Wave&, const WaveContext&, const ShadeSettings&, uint32_t, size_t, size_t);
+WAVECOMB_SHARED_KERNELS(extern, Lanes<WAVECOMB_LANES>);
 
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
@@ -55,9 +54,8 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
             ? std::min(queue.size,
                        static_cast<size_t>(hits.fill * static_cast<float>(W * batch) + 0.5f))
             : batch_end<F>(queue, begin);
-    visit_program<F>(
-        static_cast<ProgramId>(context.traits[hits.material].program),
-        [&]<typename Bsdf>() { shade_batch<Bsdf, F>(wave, context, settings, 1, begin, end); });
+    kShadeBatch<F, Programs<F>>[context.traits[hits.material].program](wave, context, settings, 1,
+                                                                       begin, end);
     begin = end;
   }
   const auto stop = PhaseClock::Clock::now();

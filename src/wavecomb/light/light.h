@@ -104,8 +104,8 @@ inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Func
 
 /// The light that sample_light chooses for u_pick, where there is one.
 template <typename F>
-inline UInt<F> chosen_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
-                            const Mask<F>& active) {
+UInt<F> chosen_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
+                     const Mask<F>& active) {
   if (view.count == 0 || none(active)) return UInt<F>(kNoLight);
   if (view.by_tree) return detail::choose_by_tree<F>(view, to, u_pick, active).light;
   return detail::pick_light<F>(view, u_pick, active);
@@ -114,8 +114,8 @@ inline UInt<F> chosen_light(const LightView& view, const LightReceiver<F>& to, c
 /// Chooses a light, by power or by tree, and a point on it as seen from `to`. Numbers in [0, 1);
 /// u_pick is a multiple of 2^-24, as samplers give it.
 template <typename F>
-inline LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to,
-                                   const F& u_pick, const F& u, const F& v, const Mask<F>& wanted) {
+LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
+                            const F& u, const F& v, const Mask<F>& wanted) {
   const F zero(0.f);
   const Vec3<F>& p = to.p;
   LightSample<F> result{Vec3<F>(zero, zero, F(1.f)),
@@ -174,9 +174,8 @@ struct LightHit {
 /// Radiance that light `light` sends back along the ray from.p + t dir which hit its shape at
 /// distance t. Kinds without a shape and inactive lanes give 0.
 template <typename F>
-inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
-                             const LightReceiver<F>& from, const Vec3<F>& dir, const F& t,
-                             const Mask<F>& hit_lanes) {
+LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
+                      const Vec3<F>& dir, const F& t, const Mask<F>& hit_lanes) {
   const Vec3<F>& origin = from.p;
   LightHit<F> result{Color<F>(F(0.f)), F(0.f)};
   const Mask<F> active = hit_lanes & Mask<F>(light < UInt<F>(view.first_triangle));
@@ -196,9 +195,8 @@ inline LightHit<F> light_hit(const LightView& view, const UInt<F>& light,
 
 /// The sampling density of triangle light `light` for a hit at distance t along dir; 0 for others.
 template <typename F>
-inline F triangle_light_pdf(const LightView& view, const UInt<F>& light,
-                            const LightReceiver<F>& from, const Vec3<F>& dir, const F& t,
-                            const Mask<F>& active) {
+F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
+                     const Vec3<F>& dir, const F& t, const Mask<F>& active) {
   const Mask<F> lanes = active & Mask<F>(light >= UInt<F>(view.first_triangle));
   if (none(lanes)) return F(0.f);
   const detail::TriangleDensity<F> d = detail::triangle_pdf<F>(view, light, dir, t, lanes);

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// All programs, in the order of ProgramId. A new program is one header, one line here and one id.
+/// All programs with all that they are, for tests. Kernels are compiled for one program at a time.
 #pragma once
 
-#include <cstddef>
-#include <utility>
-
+#include "wavecomb/material/program_list.h"
 #include "wavecomb/material/programs/dielectric.h"
 #include "wavecomb/material/programs/diffuse.h"
 #include "wavecomb/material/programs/emissive.h"
@@ -14,21 +12,6 @@
 #include "wavecomb/material/programs/principled.h"
 
 namespace wavecomb {
-
-template <typename... Bsdf>
-struct ProgramList {
-  static constexpr size_t kSize = sizeof...(Bsdf);
-  /// Whether program i of the list has id i, for all i.
-  static constexpr bool kOrdered = [] {
-    size_t i = 0;
-    return ((static_cast<size_t>(Bsdf::kProgram) == i++) && ...);
-  }();
-};
-
-template <typename F>
-using Programs = ProgramList<DiffuseBsdf<F>, MetalBsdf<F>, DielectricBsdf<F>, PlasticBsdf<F>,
-                             EmissiveBsdf<F>, PrincipledBsdf<F>, OpenPbrBsdf<F>>;
-static_assert(Programs<float>::kSize == kProgramCount && Programs<float>::kOrdered);
 
 /// Calls `visitor.operator()<Bsdf>()` with the class of a list that has the id `id`.
 template <typename... Bsdf, typename Visitor>

@@ -17,8 +17,8 @@ namespace detail {
 
 /// What a slot's texture gives: texel * scale + bias of the chosen channels.
 template <typename F>
-inline Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const Vec2<F>& uv,
-                            const F& uv_width, const Mask<F>& active) {
+Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const Vec2<F>& uv,
+                     const F& uv_width, const Mask<F>& active) {
   using R = TextureUseRecord;
   F m[6];
   for (size_t i = 0; i < 6; ++i) m[i] = use.at(&R::uv, i);

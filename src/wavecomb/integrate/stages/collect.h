@@ -7,7 +7,8 @@
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
-#include "wavecomb/integrate/vertex.h"
+#include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/integrate/steps/survive.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/surface/hit.h"
 

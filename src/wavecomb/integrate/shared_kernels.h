@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What the kernels of all programs call and none inlines: light sampling, textures, curves,
+/// motion, value graphs. It is compiled once for each width, in shared.lanes.cpp, and not in every
+/// program's unit.
+#pragma once
+
+#include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/light/light.h"
+#include "wavecomb/surface/graph_point.h"
+#include "wavecomb/surface/surface.h"
+#include "wavecomb/texture/graph.h"
+#include "wavecomb/texture/lookup.h"
+
+/// Each of them, with `KEYWORD` (extern, or nothing) before it.
+#define WAVECOMB_SHARED_KERNELS(KEYWORD, F)                                                        \
+  KEYWORD template LightSample<F> sample_light<F>(const LightView&, const LightReceiver<F>&,       \
+                                                  const F&, const F&, const F&, const Mask<F>&);   \
+  KEYWORD template LightHit<F> light_hit<F>(const LightView&, const UInt<F>&,                      \
+                                            const LightReceiver<F>&, const Vec3<F>&, const F&,     \
+                                            const Mask<F>&);                                       \
+  KEYWORD template F triangle_light_pdf<F>(const LightView&, const UInt<F>&,                       \
+                                           const LightReceiver<F>&, const Vec3<F>&, const F&,      \
+                                           const Mask<F>&);                                        \
+  KEYWORD template UInt<F> chosen_light<F>(const LightView&, const LightReceiver<F>&, const F&,    \
+                                           const Mask<F>&);                                        \
+  KEYWORD template Color<F> mesh_light_emission<F>(const SceneView&, const UInt<F>&,               \
+                                                   const UInt<F>&, const Color<F>&,                \
+                                                   const PathState<F>&, bool, const Mask<F>&);     \
+  KEYWORD template void run_graph<F>(const GraphView&, const GraphProgram&, const TextureView*,    \
+                                     const GraphPoint<F>&, const Mask<F>&, F*);                    \
+  KEYWORD template GraphPoint<F> graph_point<F>(const SceneView&, const MeshHit<F>&,               \
+                                                const Surface<F>&, const Vec3<F>&, const F&,       \
+                                                const Mask<F>&);                                   \
+  KEYWORD template void detail::setup_curved<F>(const SceneView&, const MeshHit<F>&, bool,         \
+                                                const Mask<F>&, Surface<F>&);                      \
+  KEYWORD template Vec3<F> detail::read_texture<F>(const MaterialView&,                            \
+                                                   const detail::RecordReader<F>&, const Vec2<F>&, \
+                                                   const F&, const Mask<F>&);                      \
+  KEYWORD template Texel<F> detail::lookup_tiles<F>(const TextureView&, const F&, const F&,        \
+                                                    const F&, const Mask<F>&);                     \
+  KEYWORD template MovedTriangle<F> moved_triangle<F>(                                             \
+      const SceneView&, const UInt<F>&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&,   \
+      const detail::InstanceMaps<F>&, const Mask<F>&);                                             \
+  KEYWORD template std::array<Vec3<F>, 3> moved_normals<F>(                                        \
+      const SceneView&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&, const Mask<F>&)

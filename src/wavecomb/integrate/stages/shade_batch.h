@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Stage 3c for one program: a batch of its records, in lanes.
+#pragma once
+
+#include "wavecomb/integrate/shading_record.h"
+#include "wavecomb/integrate/stages/order_rays.h"
+#include "wavecomb/integrate/vertex.h"
+#include "wavecomb/integrate/wave.h"
+
+namespace wavecomb {
+
+/// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. A path's
+/// next ray takes the place of its last in the pool; what became of it is noted by arrival.
+template <typename Bsdf, typename F>
+void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                 uint32_t depth, size_t begin, size_t end) {
+  using U = UInt<F>;
+  using Q = ShadingQueue;
+  const ShadingQueue& queue = wave.shading;
+  const PathPool& pool = wave.pool;
+  VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
+  const bool wants_aovs = wave.aovs.wants_vertex(depth);
+  const bool is_watched = wants_aovs || wave.history;
+  for (size_t i = begin; i < end; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(end - i);
+    const Mask<U> on(active);
+    const U here = lane_index<F>() + static_cast<uint32_t>(i);
+    const U sorted = queue.ordered || queue.moved ? load<U>(queue.sorted_indices + i) : here;
+    const U at = queue.ordered ? sorted : here;
+    const auto r = load_row<ShadingRecord, F>(queue.row(0), at, active);
+    const U slot = r.slot;
+    const U material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, on)
+                                     : load<U>(queue.uints(Q::kMaterial) + i);
+    MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
+    if (context.scene.has_motion) [[unlikely]]
+      hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
+    const auto path = load_row<PathRow, F>(pool.paths, slot, active);
+    const F t = r.t;
+    PathState<F> state{path.d,
+                       path.throughput,
+                       path.pdf,
+                       path.eta_scale,
+                       fma(path.cone_spread, t, path.cone_width),
+                       path.cone_spread,
+                       path.o,
+                       path.receiver};
+    if (context.links() && context.scene.mesh_lights && depth > 0) [[unlikely]]
+      state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
+    const VertexResult<F> v =
+        shade_vertex<Bsdf, F>({context.scene, settings, path.key, depth, hit, r.geom, t, material,
+                               state, wants_aovs ? &aovs : nullptr, active});
+
+    const Mask<F> emits = active & not_(is_black(v.emitted));
+    if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
+    U lit_by(0u);
+    if (aovs.wants_lights) {
+      wave.aovs.template add<F>(slot, wave.aovs.template group_of<F>(aovs.emitter, emits),
+                                v.emitted, emits);
+      lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
+    }
+    if (is_watched) {
+      if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
+      if (wave.history)
+        wave.history.template vertex<F>(depth, slot, state, t, material, v, pool.radiance, active);
+    }
+    const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
+                      select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
+                      (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |
+                      (direction_key<F>(v.shadow_d) << Q::kShadowKeyShift);
+    scatter<U>(queue.outcome, outcome, sorted, on);
+    if (any(v.has_shadow))
+      store_row<ShadowRow, F>(
+          pool.shadows, slot,
+          {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, lit_by, v.shadow_set}, v.has_shadow);
+    if (any(v.alive))
+      store_row<PathRow, F>(pool.paths, slot,
+                            {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
+                             v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
+                            v.alive);
+    if (context.links())
+      scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
+    ++wave.counts.packets;
+    wave.counts.packet_lanes += kWidth<F>;
+  }
+}
+
+}  // namespace wavecomb
