@@ -116,7 +116,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   m.opacity_graph = opacity_graph.value_or(kNoGraph);
   m.emission_graph = emission_graph.value_or(kNoGraph);
   for (const auto& [key, value] : textures)
-    m.textures[named<size_t>("texture slot", kSlotNames, nb::cast<std::string>(key))] =
+    m.textures[named<size_t>("textured input", kInputNames, nb::cast<std::string>(key))] =
         texture_use(nb::cast<nb::dict>(value));
   return builder.add_material(std::move(m));
 }

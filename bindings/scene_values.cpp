@@ -258,9 +258,9 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
     for_each_parameter<Value>(
         [&](const char* name, auto member) { d[name] = to_python(m.*member); });
   });
-  for (uint32_t s = 0; s < kSlotCount; ++s)
-    if (m.has_texture(static_cast<Slot>(s)))
-      textures[kSlotNames[s]] = texture_use_dict(scene, m.textures[s]);
+  for (uint32_t s = 0; s < kInputCount; ++s)
+    if (m.has_texture(static_cast<Input>(s)))
+      textures[kInputNames[s]] = texture_use_dict(scene, m.textures[s]);
   d["textures"] = textures;
   if (m.graph != kNoGraph) d["driven"] = driven_names(scene, m.graph);
   if (m.program == ProgramId::kOpenPbr) {

@@ -16,7 +16,7 @@ using namespace scene_testing;
 
 constexpr uint32_t kRecords = 4096;
 constexpr uint32_t kMixed = 4;
-constexpr uint32_t kAllSlots = (1u << kSlotCount) - 1;
+constexpr uint32_t kAllInputs = (1u << kInputCount) - 1;
 
 Graph twenty(float seed) {
   Graph g;
@@ -85,8 +85,8 @@ void fetch(benchmark::State& state, Kind kind) {
         at.position = {column(2), column(3), column(4)};
         return at;
       };
-      const auto p = OpenPbrParams<F>::template fetch<kAllSlots>(view, load<UInt<F>>(&material[i]),
-                                                                 uv, F(0.f), point, Mask<F>(true));
+      const auto p = OpenPbrParams<F>::template fetch<kAllInputs>(view, load<UInt<F>>(&material[i]),
+                                                                  uv, F(0.f), point, Mask<F>(true));
       keep(F(p.base_color.x + p.roughness + p.coat_ior));
     }
   }

@@ -19,7 +19,7 @@ ScenePtr make_scene(ProgramId program, bool textured) {
   Material material = make_material(program, {0.6f, 0.5f, 0.4f}, 0.4f);
   if (program == ProgramId::kEmissive) material.emission = {1, 1, 1};
   if (textured)
-    material.textures[static_cast<size_t>(Slot::kBaseColor)] =
+    material.textures[static_cast<size_t>(Input::kBaseColor)] =
         use(add_texture(b, kEdge, kEdge, 3, random_texels(kEdge * kEdge * 3, 0.2f, 0.8f, 1)));
   const uint32_t id = b.add_material(material);
   b.add_to_group(0, b.add_mesh(make_mesh(sphere(32, true), id)));

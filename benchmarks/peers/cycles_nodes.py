@@ -79,7 +79,7 @@ class Nodes:
             value = split.outputs["rgb".index(channel)]
         return value
 
-    def slot(self, m: dict[str, Any], name: str, default: Any) -> Any:
+    def parameter(self, m: dict[str, Any], name: str, default: Any) -> Any:
         """A parameter: texture or value."""
         use = m.get("textures", {}).get(name)
         return self.texture(use) if use is not None else m.get(name, default)
@@ -159,12 +159,12 @@ def _normal(nodes: Nodes, m: dict[str, Any]) -> dict[str, Any]:
 
 
 def _roughness(nodes: Nodes, m: dict[str, Any]) -> Any:
-    value = nodes.slot(m, "roughness", 0.5)
+    value = nodes.parameter(m, "roughness", 0.5)
     return 0.0 if isinstance(value, float) and value < _SMOOTH else value
 
 
 def _diffuse(nodes: Nodes, m: dict[str, Any]) -> Any:
-    colour = nodes.slot(m, "base_color", (0.18,) * 3)
+    colour = nodes.parameter(m, "base_color", (0.18,) * 3)
     node = nodes.add("ShaderNodeBsdfDiffuse", Color=colour, Roughness=0.0, **_normal(nodes, m))
     return node.outputs[0]
 
@@ -176,7 +176,7 @@ def _metal(nodes: Nodes, m: dict[str, Any]) -> Any:
         inputs |= {"IOR": m["conductor_eta"], "Extinction": m["conductor_k"]}
     else:
         tint = m.get("specular_color", (0, 0, 0))
-        inputs["Base_Color"] = nodes.slot(m, "base_color", (0.18,) * 3)
+        inputs["Base_Color"] = nodes.parameter(m, "base_color", (0.18,) * 3)
         inputs["Edge_Tint"] = tint if any(tint) else (1.0,) * 3
     node = nodes.add("ShaderNodeBsdfMetallic", **inputs)
     node.fresnel_type = "PHYSICAL_CONDUCTOR" if measured else "F82"
@@ -203,12 +203,12 @@ def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
     """Plastic, too: a diffuse base under an interface."""
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
-        Base_Color=nodes.slot(m, "base_color", (0.18,) * 3),
+        Base_Color=nodes.parameter(m, "base_color", (0.18,) * 3),
         Roughness=_roughness(nodes, m),
-        Metallic=nodes.slot(m, "metallic", 0.0),
+        Metallic=nodes.parameter(m, "metallic", 0.0),
         IOR=float(m.get("ior", 1.5)),
-        Coat_Weight=nodes.slot(m, "clearcoat", 0.0),
-        Coat_Roughness=nodes.slot(m, "clearcoat_roughness", 0.01),
+        Coat_Weight=nodes.parameter(m, "clearcoat", 0.0),
+        Coat_Roughness=nodes.parameter(m, "clearcoat_roughness", 0.01),
         **_normal(nodes, m),
     )
     node.distribution = "MULTI_GGX"

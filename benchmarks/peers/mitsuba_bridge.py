@@ -458,16 +458,16 @@ class MitsubaScene:
 
     # ---- textures --------------------------------------------------------------------------------
 
-    def _colour(self, m: dict[str, Any], slot: str, default: tuple[float, ...]) -> Any:
-        use = m.get("textures", {}).get(slot)
+    def _colour(self, m: dict[str, Any], parameter: str, default: tuple[float, ...]) -> Any:
+        use = m.get("textures", {}).get(parameter)
         if use is None:
-            return self._rgb(np.array(m.get(slot, default)))
+            return self._rgb(np.array(m.get(parameter, default)))
         return self._bitmap(use, np.clip(self._values(use), 0.0, 1.0))
 
-    def _number(self, m: dict[str, Any], slot: str, default: float) -> Any:
-        use = m.get("textures", {}).get(slot)
+    def _number(self, m: dict[str, Any], parameter: str, default: float) -> Any:
+        use = m.get("textures", {}).get(parameter)
         if use is None:
-            return float(m.get(slot, default))
+            return float(m.get(parameter, default))
         return self._bitmap(use, np.clip(self._values(use), 0.0, 1.0))
 
     def _values(self, use: dict[str, Any]) -> NDArray[np.float32]:

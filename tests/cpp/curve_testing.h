@@ -92,7 +92,7 @@ inline ScenePtr hairy() {
   std::vector<uint32_t> materials;
   Material m = make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f});
   materials.push_back(b.add_material(m));
-  m.textures[static_cast<size_t>(Slot::kBaseColor)] = use(picture);
+  m.textures[static_cast<size_t>(Input::kBaseColor)] = use(picture);
   materials.push_back(b.add_material(m));
   materials.push_back(b.add_material(make_material(ProgramId::kDielectric, {1, 1, 1}, 0)));
   materials.push_back(b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.7f, 0.3f}, 0.3f)));
@@ -100,7 +100,7 @@ inline ScenePtr hairy() {
   m.presence = true;
   m.opacity = 0.5f;
   materials.push_back(b.add_material(m));
-  m.textures[static_cast<size_t>(Slot::kOpacity)] = use(mask, 0);
+  m.textures[static_cast<size_t>(Input::kOpacity)] = use(mask, 0);
   materials.push_back(b.add_material(m));
   m = make_material(ProgramId::kEmissive);
   m.emission = {2, 1, 0.5f};

@@ -35,9 +35,9 @@ struct Lights {
   /// A material whose emission is a texture.
   uint32_t add_material(uint32_t texture, std::array<float, 4> scale = {1, 1, 1, 1}) {
     const auto id = static_cast<uint32_t>(records.size());
-    records.emplace_back().texture_slots = slot_bit(Slot::kEmission);
-    uses.resize(uses.size() + kSlotCount);
-    uses[id * kSlotCount + static_cast<uint32_t>(Slot::kEmission)] = {
+    records.emplace_back().textured_inputs = input_bit(Input::kEmission);
+    uses.resize(uses.size() + kInputCount);
+    uses[id * kInputCount + static_cast<uint32_t>(Input::kEmission)] = {
         texture, 4, {scale[0], scale[1], scale[2], scale[3]}, {0, 0, 0, 0}, {1, 0, 0, 0, 1, 0}};
     return id;
   }

@@ -9,6 +9,7 @@
 #include "wavecomb/core/warp.h"
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/path_state.h"
+#include "wavecomb/material/bsdf.h"
 
 namespace wavecomb::media_testing {
 

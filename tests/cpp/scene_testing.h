@@ -297,15 +297,15 @@ inline ScenePtr mixed() {
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));
   std::vector<uint32_t> materials;
   const auto add = [&](const Material& m) { materials.push_back(b.add_material(m)); };
-  const auto at = [](Material& m, Slot s) -> TextureUse& {
+  const auto at = [](Material& m, Input s) -> TextureUse& {
     return m.textures[static_cast<size_t>(s)];
   };
 
   Material m = make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f});
-  at(m, Slot::kBaseColor) = use(picture);
+  at(m, Input::kBaseColor) = use(picture);
   add(m);
   m = make_material(ProgramId::kMetal, {0.9f, 0.7f, 0.3f}, 0.3f);
-  at(m, Slot::kRoughness) = use(grey, 0);
+  at(m, Input::kRoughness) = use(grey, 0);
   add(m);
   m = make_material(ProgramId::kMetal, {}, 0.15f);
   m.conductor_eta = {0.2f, 0.92f, 1.1f};
@@ -314,9 +314,9 @@ inline ScenePtr mixed() {
   add(make_material(ProgramId::kDielectric, {1, 1, 1}, 0));
   add(make_material(ProgramId::kDielectric, {0.9f, 1, 0.95f}, 0.4f));
   m = make_material(ProgramId::kPlastic, {0.1f, 0.3f, 0.7f}, 0.2f);
-  at(m, Slot::kNormal) = use(bumps);
-  at(m, Slot::kNormal).scale = {2, 2, 2, 1};
-  at(m, Slot::kNormal).bias = {-1, -1, -1, 0};
+  at(m, Input::kNormal) = use(bumps);
+  at(m, Input::kNormal).scale = {2, 2, 2, 1};
+  at(m, Input::kNormal).bias = {-1, -1, -1, 0};
   add(m);
   m = make_material(ProgramId::kEmissive);
   m.emission = {3, 2, 1};
@@ -325,15 +325,15 @@ inline ScenePtr mixed() {
   m.metallic = 0.4f;
   m.clearcoat = 0.7f;
   m.clearcoat_roughness = 0.1f;
-  at(m, Slot::kBaseColor) = use(picture);
-  at(m, Slot::kBaseColor).uv = {3, 1, 0.2f, -1, 2, 0.1f};
-  at(m, Slot::kMetallic) = use(grey, 0);
+  at(m, Input::kBaseColor) = use(picture);
+  at(m, Input::kBaseColor).uv = {3, 1, 0.2f, -1, 2, 0.1f};
+  at(m, Input::kMetallic) = use(grey, 0);
   add(m);
   m = make_material(ProgramId::kPrincipled, {0.2f, 0.6f, 0.3f}, 0.6f);
   m.opacity = 0.4f;
   add(m);
   m = make_material(ProgramId::kPrincipled, {0.1f, 0.1f, 0.1f}, 0.6f);
-  at(m, Slot::kEmission) = use(picture);
+  at(m, Input::kEmission) = use(picture);
   add(m);
 
   b.add_to_group(0, b.add_mesh(make_mesh(ground(6, -1), materials[0])));
@@ -392,7 +392,7 @@ inline ScenePtr emissive_meshes() {
   Material lamp = make_material(ProgramId::kEmissive);
   lamp.emission = {5, 4, 3};
   const uint32_t constant = b.add_material(lamp);
-  lamp.textures[static_cast<size_t>(Slot::kEmission)] = use(picture);
+  lamp.textures[static_cast<size_t>(Input::kEmission)] = use(picture);
   const uint32_t textured = b.add_material(lamp);
   Material both = make_material(ProgramId::kPrincipled, {0.3f, 0.5f, 0.7f}, 0.4f);
   both.emission = {0.4f, 0.1f, 0.1f};
@@ -422,7 +422,7 @@ inline ScenePtr presence() {
     Material m = make_material(ProgramId::kPrincipled, {0.3f, 0.6f, 0.2f}, 0.7f);
     m.presence = true;
     if (i < 3) m.opacity = 0.5f * static_cast<float>(i);
-    if (i >= 3) m.textures[static_cast<size_t>(Slot::kOpacity)] = use(mask, 0);
+    if (i >= 3) m.textures[static_cast<size_t>(Input::kOpacity)] = use(mask, 0);
     if (i == 4) m.opacity_threshold = 0.5f;
     if (i == 5) {
       m.presence = false;

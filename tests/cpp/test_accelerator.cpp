@@ -633,7 +633,7 @@ std::shared_ptr<const Scene> leaves(int n, float opacity, float threshold, bool 
   m.opacity_threshold = threshold;
   if (textured) {
     const uint32_t t = add_texture(b, 2, 1, 1, {0.f, 1.f}, Wrap::kClamp);
-    m.textures[static_cast<size_t>(Slot::kOpacity)] = use(t, 0);
+    m.textures[static_cast<size_t>(Input::kOpacity)] = use(t, 0);
   }
   const uint32_t leaf = b.add_material(m);
   const uint32_t group = b.add_group("leaf");

@@ -59,7 +59,7 @@ TEST(Cryptomatte, FewIdsAreCountedExactly) {
   std::map<uint32_t, uint32_t> expected;
   for (uint32_t i = 0; i < 3600; ++i) ++expected[100 + i % 8 * (i % 8 + 1) / 2];
   ASSERT_EQ(expected.size(), 8u);
-  for (uint32_t k = 0; k < CryptoPixel::kSlots; ++k) EXPECT_EQ(p.count[k], expected[p.id[k]]);
+  for (uint32_t k = 0; k < CryptoPixel::kIds; ++k) EXPECT_EQ(p.count[k], expected[p.id[k]]);
 }
 
 TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
@@ -77,15 +77,15 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
     }
     ASSERT_GT(exact.size(), 50u);
     uint32_t sum = 0;
-    for (uint32_t k = 0; k < CryptoPixel::kSlots; ++k) {
+    for (uint32_t k = 0; k < CryptoPixel::kIds; ++k) {
       sum += p.count[k];
       EXPECT_GE(p.count[k], exact[p.id[k]]);
-      EXPECT_LE(p.count[k], exact[p.id[k]] + kSamples / CryptoPixel::kSlots);
+      EXPECT_LE(p.count[k], exact[p.id[k]] + kSamples / CryptoPixel::kIds);
     }
     EXPECT_EQ(sum, kSamples);
     for (const auto& [id, count] : exact)
-      if (count > kSamples / CryptoPixel::kSlots) {
-        EXPECT_NE(std::find(p.id, p.id + CryptoPixel::kSlots, id), p.id + CryptoPixel::kSlots);
+      if (count > kSamples / CryptoPixel::kIds) {
+        EXPECT_NE(std::find(p.id, p.id + CryptoPixel::kIds, id), p.id + CryptoPixel::kIds);
       }
   }
 }

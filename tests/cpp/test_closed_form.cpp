@@ -304,8 +304,8 @@ DirectLight direct_light(const std::shared_ptr<const Scene>& scene, uint32_t blo
   visit_program<float>(
       static_cast<ProgramId>(view.material_program[material]), [&]<typename Bsdf>() {
         const auto anywhere = [](const auto&) { return GraphPoint<float>{}; };
-        const auto params = fetch_for<Bsdf, Bsdf::kSlots, float>(view.materials, material, s.uv,
-                                                                 0.f, anywhere, true);
+        const auto params = fetch_for<Bsdf, Bsdf::kInputs, float>(view.materials, material, s.uv,
+                                                                  0.f, anywhere, true);
         const Bsdf bsdf(params, false);
         for (uint32_t block = 0; block < blocks; ++block) {
           double bsdf_sum = 0, light_sum = 0;

@@ -46,7 +46,7 @@ ScenePtr build(const Values& v) {
   for (uint32_t m = 0; m < v.materials.size(); ++m) {
     Material material = v.materials[m];
     material.name = "/World/Material" + std::to_string(m);
-    if (m == kLamp) material.textures[static_cast<size_t>(Slot::kRoughness)] = use(mask, 0);
+    if (m == kLamp) material.textures[static_cast<size_t>(Input::kRoughness)] = use(mask, 0);
     b.add_material(material);
   }
   b.add_to_group(0, b.add_mesh(make_mesh(ground(4, -1), kFloor, "/World/Floor")));

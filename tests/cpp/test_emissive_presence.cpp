@@ -62,7 +62,7 @@ struct Case {
   std::function<Vec3<float>(const Scene&, const Place&)> emission = {};
 };
 
-void add_image(SceneBuilder& b, Material& m, Slot slot, uint32_t seed, uint32_t channel) {
+void add_image(SceneBuilder& b, Material& m, Input slot, uint32_t seed, uint32_t channel) {
   const std::vector<float> values = image(seed);
   TextureDesc desc{"image", values.data(), kTexels, kTexels, 4, TexelFormat::kF32};
   TextureUse& use = m.textures[static_cast<size_t>(slot)];
@@ -87,13 +87,13 @@ std::vector<Case> cases() {
   all.push_back({"texture",
                  [](SceneBuilder& b, Material& m) {
                    m.opacity = 0;  // does not count
-                   add_image(b, m, Slot::kOpacity, 1, 3);
+                   add_image(b, m, Input::kOpacity, 1, 3);
                  },
                  [](const Scene& s, const Place& at) { return texel(s, 0, at).a; }});
   all.push_back({"texture and threshold",
                  [](SceneBuilder& b, Material& m) {
                    m.opacity_threshold = 0.5f;
-                   add_image(b, m, Slot::kOpacity, 2, 0);
+                   add_image(b, m, Input::kOpacity, 2, 0);
                  },
                  [](const Scene& s, const Place& at) {
                    const float value = texel(s, 0, at).r;
@@ -102,8 +102,8 @@ std::vector<Case> cases() {
                  }});
   all.push_back({"emission and opacity by textures",
                  [](SceneBuilder& b, Material& m) {
-                   add_image(b, m, Slot::kOpacity, 3, 0);
-                   add_image(b, m, Slot::kEmission, 4, 4);
+                   add_image(b, m, Input::kOpacity, 3, 0);
+                   add_image(b, m, Input::kEmission, 4, 4);
                  },
                  [](const Scene& s, const Place& at) { return texel(s, 0, at).r; },
                  [](const Scene& s, const Place& at) {
@@ -112,7 +112,7 @@ std::vector<Case> cases() {
                  }});
   all.push_back({"emission by a texture, constant opacity",
                  [](SceneBuilder& b, Material& m) {
-                   add_image(b, m, Slot::kEmission, 5, 4);
+                   add_image(b, m, Input::kEmission, 5, 4);
                    m.opacity = 0.25f;
                  },
                  [](const Scene&, const Place&) { return 0.25f; },
@@ -127,8 +127,8 @@ std::vector<Case> cases() {
                  [](const Scene&, const Place& at) { return at.local.y + 0.5f; }});
   all.push_back({"a graph takes the place of a texture",
                  [](SceneBuilder& b, Material& m) {
-                   add_image(b, m, Slot::kOpacity, 6, 0);
-                   add_image(b, m, Slot::kEmission, 7, 4);
+                   add_image(b, m, Input::kOpacity, 6, 0);
+                   add_image(b, m, Input::kEmission, 7, 4);
                    m.opacity_graph = b.add_graph(ramp("opacity", 1, GraphInput::kLocalPosition, 0));
                    m.emission_graph = b.add_graph(ramp("emission", 1, GraphInput::kUv, 0));
                  },

@@ -14,7 +14,7 @@
 namespace wavecomb {
 namespace {
 
-constexpr uint32_t kAllSlots = (1u << kSlotCount) - 1;
+constexpr uint32_t kAllInputs = (1u << kInputCount) - 1;
 
 GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_list<uint16_t> from,
            uint8_t steps = 0, uint16_t number = 0) {
@@ -111,7 +111,7 @@ std::vector<F> parameters(const MaterialView& view, const UInt<F>& material, con
     at.uv_width = width;
     return at;
   };
-  auto p = OpenPbrParams<F>::template fetch<kAllSlots>(view, material, uv, width, point, active);
+  auto p = OpenPbrParams<F>::template fetch<kAllInputs>(view, material, uv, width, point, active);
   std::vector<F> all;
   for (const F* place : parameter_places(p)) all.push_back(*place);
   const Color<F> emission = fetch_emission<F>(view, material, uv, width, active);

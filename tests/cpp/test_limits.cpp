@@ -36,7 +36,7 @@ TEST(Limits, scene_counts_end_where_words_do) {
   // Words of a record times the last index stay below 2^31, those of rows below 2^32.
   const Limit limits[] = {
       {&SceneCounts::meshes, 134217728, "134,217,729 meshes"},
-      {&SceneCounts::materials, (1ull << 31) / (kSlotCount * 16), "materials"},
+      {&SceneCounts::materials, (1ull << 31) / (kInputCount * 16), "materials"},
       {&SceneCounts::instances, 134217727, "134,217,728 instances"},
       {&SceneCounts::grouped, 2147483648, "2,147,483,649 meshes in groups"},
       {&SceneCounts::placed, 2147483648, "2,147,483,649 meshes in instances"},

@@ -13,9 +13,9 @@ namespace wavecomb {
 namespace {
 
 using Vec = Vec3<float>;
-constexpr uint32_t kAllSlots = (1u << kSlotCount) - 1;
+constexpr uint32_t kAllInputs = (1u << kInputCount) - 1;
 
-/// Three materials and two textures: constants only, textures in every slot, and a mixture.
+/// Three materials and two textures: constants only, textures in every input, and a mixture.
 class ParamsTest : public ::testing::Test {
  protected:
   ParamsTest() {
@@ -51,11 +51,12 @@ class ParamsTest : public ::testing::Test {
       r.opacity = unit(rng);
       r.ior = 1 + unit(rng);
       r.flags = m;
-      r.texture_slots =
-          m == 0 ? 0
-                 : (m == 1 ? kAllSlots : slot_bit(Slot::kRoughness) | slot_bit(Slot::kBaseColor));
-      for (uint32_t s = 0; s < kSlotCount; ++s) {
-        TextureUseRecord& u = uses_[m * kSlotCount + s];
+      r.textured_inputs =
+          m == 0
+              ? 0
+              : (m == 1 ? kAllInputs : input_bit(Input::kRoughness) | input_bit(Input::kBaseColor));
+      for (uint32_t s = 0; s < kInputCount; ++s) {
+        TextureUseRecord& u = uses_[m * kInputCount + s];
         u = TextureUseRecord{};
         u.texture = (m + s) % 2;
         u.channel = s % 5;
@@ -74,7 +75,7 @@ class ParamsTest : public ::testing::Test {
   std::vector<std::unique_ptr<Texture>> textures_;
   std::vector<TextureView> views_;
   std::array<MaterialRecord, 3> records_;
-  std::array<TextureUseRecord, 3 * kSlotCount> uses_;
+  std::array<TextureUseRecord, 3 * kInputCount> uses_;
   MaterialView view_;
 };
 
@@ -83,7 +84,7 @@ constexpr size_t kValues = 29;
 template <typename F>
 void record(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv, const F& width,
             const Mask<F>& active, float* out) {
-  const auto p = fetch_params<kAllSlots, F>(view, material, uv, width, active);
+  const auto p = fetch_params<kAllInputs, F>(view, material, uv, width, active);
   const Color<F> emission = fetch_emission<F>(view, material, uv, width, active);
   const F values[kValues] = {p.base_color.x,
                              p.base_color.y,
@@ -158,7 +159,7 @@ TEST_F(ParamsTest, UniformAndMixedLanesEqualScalar) {
 }
 
 TEST_F(ParamsTest, ConstantsComeThrough) {
-  const auto p = fetch_params<kAllSlots, float>(view_, 0u, {0.3f, 0.4f}, 0.f, true);
+  const auto p = fetch_params<kAllInputs, float>(view_, 0u, {0.3f, 0.4f}, 0.f, true);
   EXPECT_EQ(p.base_color.y, records_[0].base_color[1]);
   EXPECT_EQ(p.emission.z, records_[0].emission[2]);
   EXPECT_EQ(p.roughness, records_[0].roughness);
@@ -167,15 +168,15 @@ TEST_F(ParamsTest, ConstantsComeThrough) {
   EXPECT_EQ((fetch_opacity<float>(view_, 0u, {0.3f, 0.4f}, 0.f, true)), 1.f);
 }
 
-TEST_F(ParamsTest, SlotsThatAProgramDoesNotUseReadNoTexture) {
+TEST_F(ParamsTest, InputsThatAProgramDoesNotUseReadNoTexture) {
   const auto p =
-      fetch_params<slot_bit(Slot::kRoughness), float>(view_, 1u, {0.3f, 0.4f}, 0.f, true);
+      fetch_params<input_bit(Input::kRoughness), float>(view_, 1u, {0.3f, 0.4f}, 0.f, true);
   EXPECT_EQ(p.base_color.x, records_[1].base_color[0]);
   EXPECT_NE(p.roughness, records_[1].roughness);
 }
 
 TEST_F(ParamsTest, TextureValueIsScaledBiasedAndPicked) {
-  TextureUseRecord& use = uses_[1 * kSlotCount + static_cast<uint32_t>(Slot::kMetallic)];
+  TextureUseRecord& use = uses_[1 * kInputCount + static_cast<uint32_t>(Input::kMetallic)];
   const float s = use.uv[0] * 0.2f + use.uv[1] * 0.7f + use.uv[2];
   const float t = use.uv[3] * 0.2f + use.uv[4] * 0.7f + use.uv[5];
   const Texel<float> texel = lookup<float>(views_[use.texture], s, t, 0.f, true);
@@ -184,7 +185,7 @@ TEST_F(ParamsTest, TextureValueIsScaledBiasedAndPicked) {
     use.channel = c;
     use.scale[c] = 0.5f;
     use.bias[c] = 0.125f;
-    const auto p = fetch_params<kAllSlots, float>(view_, 1u, {0.2f, 0.7f}, 0.f, true);
+    const auto p = fetch_params<kAllInputs, float>(view_, 1u, {0.2f, 0.7f}, 0.f, true);
     EXPECT_NEAR(p.metallic, channels[c] * 0.5f + 0.125f, 1e-5f);
   }
 }
@@ -201,7 +202,7 @@ TEST_F(ParamsTest, ValuesAreBroughtIntoRange) {
   r.emission[1] = -2;
   r.ior = 0;
   r.normal[0] = r.normal[1] = r.normal[2] = 0;
-  auto p = fetch_params<kAllSlots, float>(view_, 0u, {0, 0}, 0.f, true);
+  auto p = fetch_params<kAllInputs, float>(view_, 0u, {0, 0}, 0.f, true);
   EXPECT_EQ(p.roughness, 0.f);
   EXPECT_EQ(p.metallic, 1.f);
   EXPECT_EQ(p.clearcoat, 0.f);
@@ -214,7 +215,7 @@ TEST_F(ParamsTest, ValuesAreBroughtIntoRange) {
   r.normal[0] = 2;
   r.normal[2] = -1;  // from below: bent up to the horizon
   r.ior = nan;
-  p = fetch_params<kAllSlots, float>(view_, 0u, {0, 0}, 0.f, true);
+  p = fetch_params<kAllInputs, float>(view_, 0u, {0, 0}, 0.f, true);
   EXPECT_GT(p.normal.z, 0.f);
   EXPECT_NEAR(length(p.normal), 1.f, 1e-6f);
   EXPECT_TRUE(std::isfinite(p.ior));
@@ -224,7 +225,7 @@ TEST_F(ParamsTest, OpacityIsPresenceOrTransparency) {
   MaterialRecord& r = records_[0];
   const auto both = [&] {
     return std::pair{fetch_opacity<float>(view_, 0u, {0, 0}, 0.f, true),
-                     fetch_params<kAllSlots, float>(view_, 0u, {0, 0}, 0.f, true).opacity};
+                     fetch_params<kAllInputs, float>(view_, 0u, {0, 0}, 0.f, true).opacity};
   };
   r.opacity = 0.4f;
   r.flags = 0;

@@ -170,7 +170,7 @@ class Integrator {
   /// A surface at a hit, with what its material says there.
   template <typename Bsdf>
   struct Point {
-    static constexpr uint32_t kSlots = kVertexSlots<Bsdf>;
+    static constexpr uint32_t kInputs = kVertexInputs<Bsdf>;
     Surface<F> s;
     MaterialRecord record;
     bool reads_texture;
@@ -185,7 +185,7 @@ class Integrator {
           const Ray& ray, const Surface<F>& surface)
         : s(surface),
           record(scene.materials.materials[material]),
-          reads_texture((record.texture_slots & (kSlots | kReadsGraph)) != 0),
+          reads_texture((record.textured_inputs & (kInputs | kReadsGraph)) != 0),
           params(fetch(scene, at, material, ray)) {}
 
     auto fetch(const SceneView& scene, const MeshHit<F>& at, uint32_t material, const Ray& ray) {
@@ -194,14 +194,14 @@ class Integrator {
       const auto make_point = [&](const Mask<F>& lanes) {
         return graph_point<F>(scene, at, s, ray.d, uv_width, lanes);
       };
-      return fetch_for<Bsdf, kSlots, F>(scene.materials, material, s.uv, uv_width, make_point,
-                                        true);
+      return fetch_for<Bsdf, kInputs, F>(scene.materials, material, s.uv, uv_width, make_point,
+                                         true);
     }
     /// The shading frame: along the texture where one is read, bent by a normal map.
     Frame<F> frame(const Ray& ray) const {
       if (!reads_texture) return make_frame<F>(s.ns);
       Vec3<F> n = s.ns;
-      if ((record.texture_slots & (slot_bit(Slot::kNormal) | kGraphNormal)) != 0) {
+      if ((record.textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != 0) {
         n = normalize(make_frame<F>(n, s.dpdu).to_world(params.normal));
         // A normal that looks away is bent until it is seen edge-on.
         const F towards = dot(ray.d, s.ng) < 0 ? 1.f : -1.f, seen = -dot(ray.d, n) * towards;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "wavecomb/light/kinds.h"
 #include "wavecomb/scene/light_data.h"
 
 namespace wavecomb {

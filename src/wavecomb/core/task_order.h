@@ -54,19 +54,19 @@ class TaskOrder {
   char begun_ = 0, ended_ = 0;
 };
 
-/// Tasks that use one slot of an arena come one behind the other; `slot` is what they share.
-class SlotOrder {
+/// Tasks of one worker come one behind the other; `worker` is what they share.
+class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)
-  explicit SlotOrder(void* slot) : slot_(slot) { __tsan_acquire(slot_); }
-  ~SlotOrder() { __tsan_release(slot_); }
-  SlotOrder(const SlotOrder&) = delete;
-  SlotOrder& operator=(const SlotOrder&) = delete;
+  explicit WorkerOrder(void* worker) : worker_(worker) { __tsan_acquire(worker_); }
+  ~WorkerOrder() { __tsan_release(worker_); }
+  WorkerOrder(const WorkerOrder&) = delete;
+  WorkerOrder& operator=(const WorkerOrder&) = delete;
 
  private:
-  void* slot_;
+  void* worker_;
 #else
-  explicit SlotOrder(const void*) {}
+  explicit WorkerOrder(const void*) {}
 #endif
 };
 

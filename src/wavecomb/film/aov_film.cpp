@@ -85,9 +85,9 @@ AovLayer AovFilm::crypto_layer(Aov level, const std::vector<uint32_t>& samples) 
   const std::vector<CryptoPixel>& pixels = crypto_[level_index(level)];
   return make_layer(aov_name(level), 2 * kCryptoRanks, pixels_, [&](size_t i, float* out) {
     const CryptoPixel& p = pixels[i];
-    uint32_t order[CryptoPixel::kSlots];
-    for (uint32_t k = 0; k < CryptoPixel::kSlots; ++k) order[k] = k;
-    std::sort(order, order + CryptoPixel::kSlots, [&](uint32_t a, uint32_t b) {
+    uint32_t order[CryptoPixel::kIds];
+    for (uint32_t k = 0; k < CryptoPixel::kIds; ++k) order[k] = k;
+    std::sort(order, order + CryptoPixel::kIds, [&](uint32_t a, uint32_t b) {
       return p.count[a] != p.count[b] ? p.count[a] > p.count[b] : p.id[a] < p.id[b];
     });
     for (uint32_t rank = 0; rank < kCryptoRanks; ++rank) {

@@ -27,19 +27,19 @@ uint32_t crypto_id(std::string_view name);
 
 /// The ids in one pixel and how many samples each got, in bounded room.
 ///
-/// While there are at most kSlots ids, all counts are exact. A further one takes the place of the
+/// While there are at most kIds ids, all counts are exact. A further one takes the place of the
 /// id with the fewest samples, and its count with it (A. Metwally, D. Agrawal, A. El Abbadi,
 /// "Efficient Computation of Frequent and Top-k Elements in Data Streams", 2005): counts always add
 /// up to the samples that hit something, no count is too small, and every id with more than
-/// 1 / kSlots of the samples is there.
+/// 1 / kIds of the samples is there.
 struct CryptoPixel {
-  static constexpr uint32_t kSlots = 8;
-  uint32_t id[kSlots] = {};
-  uint32_t count[kSlots] = {};  ///< 0: free; free slots come last
+  static constexpr uint32_t kIds = 8;
+  uint32_t id[kIds] = {};
+  uint32_t count[kIds] = {};  ///< 0: free; free places come last
 
   void add(uint32_t new_id) {
     uint32_t least = 0;
-    for (uint32_t i = 0; i < kSlots; ++i) {
+    for (uint32_t i = 0; i < kIds; ++i) {
       if (count[i] != 0 && id[i] == new_id) {
         ++count[i];
         return;

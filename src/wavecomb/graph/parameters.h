@@ -17,7 +17,7 @@ struct GraphParameter {
   float low, high;
 };
 
-/// Slots and ior first, then what program "openpbr" has beside them, as OpenPbrRecord has it.
+/// Inputs and ior first, then what program "openpbr" has beside them, as OpenPbrRecord has it.
 inline constexpr GraphParameter kGraphParameters[] = {{"base_color", 3, 0, 1},
                                                       {"specular_color", 3, 0, 1},
                                                       {"emission", 3, 0, 1e18f},

@@ -4,11 +4,11 @@
 /// program's unit.
 #pragma once
 
+#include "wavecomb/graph/hit_point.h"
+#include "wavecomb/graph/run.h"
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/light/light.h"
-#include "wavecomb/surface/graph_point.h"
 #include "wavecomb/surface/surface.h"
-#include "wavecomb/texture/graph.h"
 #include "wavecomb/texture/lookup.h"
 
 /// Each of them, with `KEYWORD` (extern, or nothing) before it.

@@ -5,7 +5,7 @@
 /// A program is a class template `Bsdf<F>` with
 ///
 ///   static constexpr ProgramId kProgram;
-///   static constexpr uint32_t kSlots;      what it reads
+///   static constexpr uint32_t kInputs;      what it reads
 ///   BsdfTraits, or what differs from them
 ///   using Params;                          where it takes more than ShadingParams (params.h)
 ///   Bsdf(const Params&, bool schlick);
@@ -76,7 +76,7 @@ inline BsdfSample<F> select_sample(const Mask<F>& m, const BsdfSample<F>& a,
           select(m, a.eta, b.eta),  select(m, a.roughness, b.roughness)};
 }
 
-/// Values of all slots at one hit, as fetch_params gives them.
+/// Values of all inputs at one hit, as fetch_params gives them.
 template <typename F>
 struct ShadingParams {
   Color<F> base_color, specular_color, emission;

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Beside the slots: base_color, metallic, roughness (specular), specular_color, clearcoat and
+/// Beside the inputs: base_color, metallic, roughness (specular), specular_color, clearcoat and
 /// clearcoat_roughness (coat), ior. Meanings are those of OpenPbr.
 template <typename F>
 struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
@@ -18,7 +18,7 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   const float* energy;  ///< EnergyTables
 
   /// fetch_params for this program.
-  template <uint32_t kSlots, typename MakePoint>
+  template <uint32_t kInputs, typename MakePoint>
   static OpenPbrParams fetch(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                              const F& uv_width, const MakePoint& make_point, const Mask<F>& active);
 
@@ -38,15 +38,15 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
 template <typename F>
 inline std::array<F*, kGraphOutputCount> parameter_places(OpenPbrParams<F>& p) {
   std::array<F*, kGraphOutputCount> all;
-  const auto slots = parameter_places(static_cast<ShadingParams<F>&>(p));
-  std::copy(slots.begin(), slots.end(), all.begin());
+  const auto inputs = parameter_places(static_cast<ShadingParams<F>&>(p));
+  std::copy(inputs.begin(), inputs.end(), all.begin());
   detail::for_each_word<0, F>(static_cast<OpenPbrInputs<F>&>(p),
                               [&](auto at, F& value) { all[kFirstOpenPbrOutput + at] = &value; });
   return all;
 }
 
 template <typename F>
-template <uint32_t kSlots, typename MakePoint>
+template <uint32_t kInputs, typename MakePoint>
 inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const UInt<F>& material,
                                                 const Vec2<F>& uv, const F& uv_width,
                                                 const MakePoint& make_point,
@@ -54,7 +54,7 @@ inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const 
   using R = OpenPbrRecord;
   OpenPbrParams p;
   static_cast<ShadingParams<F>&>(p) =
-      detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
+      detail::evaluate_params<kInputs, F>(view, material, uv, uv_width, active);
   const bool uniform = any(active) && is_uniform<F>(material, active);
   const UInt<F> record = detail::make_reader<MaterialRecord, F>(view.materials, material, uniform,
                                                                 active)[&MaterialRecord::openpbr];

@@ -5,7 +5,7 @@
 #include "wavecomb/core/math.h"
 #include "wavecomb/graph/drive.h"
 #include "wavecomb/material/bsdf.h"
-#include "wavecomb/surface/slots.h"
+#include "wavecomb/surface/inputs.h"
 #include "wavecomb/surface/values.h"
 
 namespace wavecomb {
@@ -15,33 +15,33 @@ inline constexpr float kMaxIor = 10.f;
 
 namespace detail {
 
-template <uint32_t kSlots, typename F>
+template <uint32_t kInputs, typename F>
 WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const UInt<F>& material,
                                                  const Vec2<F>& uv, const F& uv_width,
                                                  const Mask<F>& active) {
   using R = MaterialRecord;
-  const SlotReader<F> slots(view, material, uv, uv_width, active);
-  const auto& r = slots.record;
-  const auto color = [&](Slot s, float (R::*member)[3]) {
+  const InputReader<F> inputs(view, material, uv, uv_width, active);
+  const auto& r = inputs.record;
+  const auto color = [&](Input s, float (R::*member)[3]) {
     const Vec3<F> constant = r[member];
-    return (kSlots & slot_bit(s)) ? slots.value(s, constant) : constant;
+    return (kInputs & input_bit(s)) ? inputs.value(s, constant) : constant;
   };
-  const auto real = [&](Slot s, float R::* member) {
+  const auto real = [&](Input s, float R::* member) {
     const F constant = r[member];
-    return saturate((kSlots & slot_bit(s)) ? slots.value(s, constant) : constant);
+    return saturate((kInputs & input_bit(s)) ? inputs.value(s, constant) : constant);
   };
   ShadingParams<F> p;
-  p.base_color = saturate(color(Slot::kBaseColor, &R::base_color));
-  p.specular_color = saturate(color(Slot::kSpecularColor, &R::specular_color));
-  p.emission = sane_emission(color(Slot::kEmission, &R::emission));
-  p.roughness = real(Slot::kRoughness, &R::roughness);
-  p.metallic = real(Slot::kMetallic, &R::metallic);
-  p.clearcoat = real(Slot::kClearcoat, &R::clearcoat);
-  p.clearcoat_roughness = real(Slot::kClearcoatRoughness, &R::clearcoat_roughness);
-  p.opacity = real(Slot::kOpacity, &R::opacity);
+  p.base_color = saturate(color(Input::kBaseColor, &R::base_color));
+  p.specular_color = saturate(color(Input::kSpecularColor, &R::specular_color));
+  p.emission = sane_emission(color(Input::kEmission, &R::emission));
+  p.roughness = real(Input::kRoughness, &R::roughness);
+  p.metallic = real(Input::kMetallic, &R::metallic);
+  p.clearcoat = real(Input::kClearcoat, &R::clearcoat);
+  p.clearcoat_roughness = real(Input::kClearcoatRoughness, &R::clearcoat_roughness);
+  p.opacity = real(Input::kOpacity, &R::opacity);
   const F threshold = r[&R::opacity_threshold];
-  p.opacity = select(opacity_is_presence(slots, threshold), F(1.f), p.opacity);
-  p.normal = sane_normal(color(Slot::kNormal, &R::normal));
+  p.opacity = select(opacity_is_presence(inputs, threshold), F(1.f), p.opacity);
+  p.normal = sane_normal(color(Input::kNormal, &R::normal));
   p.ior = clamp(r[&R::ior], F(1.f / kMaxIor), F(kMaxIor));
   p.conductor_eta = max(r[&R::conductor_eta], Color<F>(F(0.f)));
   p.conductor_k = max(r[&R::conductor_k], Color<F>(F(0.f)));
@@ -72,25 +72,25 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
   }
 }
 
-/// The parameters of material `material` at `uv`, in sane ranges. Only slots in `kSlots` read
+/// The parameters of material `material` at `uv`, in sane ranges. Only inputs in `kInputs` read
 /// textures; the others give their constants. `uv_width` is the ray's footprint in uv units.
 /// `opacity` is 1 where it is presence, which fetch_opacity gives. Inactive lanes hold anything
 /// finite. Graphs are given what `make_point` says.
-template <uint32_t kSlots, typename F, typename MakePoint>
+template <uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const F& uv_width,
                                               const MakePoint& make_point, const Mask<F>& active) {
-  auto p = detail::evaluate_params<kSlots, F>(view, material, uv, uv_width, active);
+  auto p = detail::evaluate_params<kInputs, F>(view, material, uv, uv_width, active);
   complete_params<F>(view, material, make_point, active, p);
   return p;
 }
 /// The same where graphs have nothing but uv.
-template <uint32_t kSlots, typename F>
+template <uint32_t kInputs, typename F>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const F& uv_width,
                                               const Mask<F>& active) {
-  return fetch_params<kSlots, F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width},
-                                 active);
+  return fetch_params<kInputs, F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width},
+                                  active);
 }
 
 namespace detail {
@@ -110,15 +110,15 @@ template <typename Bsdf, typename F>
 using ParamsOf = typename detail::ParamsOf<Bsdf, F>::Type;
 
 /// fetch_params for program `Bsdf`.
-template <typename Bsdf, uint32_t kSlots, typename F, typename MakePoint>
+template <typename Bsdf, uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
                                             const Vec2<F>& uv, const F& uv_width,
                                             const MakePoint& make_point, const Mask<F>& active) {
   if constexpr (requires { typename Bsdf::Params; })
-    return Bsdf::Params::template fetch<kSlots>(materials, material, uv, uv_width, make_point,
-                                                active);
+    return Bsdf::Params::template fetch<kInputs>(materials, material, uv, uv_width, make_point,
+                                                 active);
   else
-    return fetch_params<kSlots, F>(materials, material, uv, uv_width, make_point, active);
+    return fetch_params<kInputs, F>(materials, material, uv, uv_width, make_point, active);
 }
 
 }  // namespace wavecomb

@@ -29,7 +29,7 @@ std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uin
 }
 
 PassRunner::PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size)
-    : integrator_(integrator), wave_size_(wave_size), slots_(threads) {}
+    : integrator_(integrator), wave_size_(wave_size), workers_(threads) {}
 
 void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) {
   const std::vector<WaveGroup> groups = wave_groups(plan, wave_size_, threads());
@@ -51,7 +51,7 @@ void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) 
 
 void PassRunner::run_wave(const WaveTask& task) {
   const auto worker = static_cast<size_t>(tbb::this_task_arena::current_thread_index());
-  const SlotOrder slot(&slots_[worker]);
+  const WorkerOrder in_order(&workers_[worker]);
   const DenormalsOff denormals_off;
   const auto rays = [&]() -> uint64_t {
     const Counts* counts = integrator_.worker(worker).counts;

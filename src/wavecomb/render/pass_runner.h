@@ -34,7 +34,7 @@ class PassRunner {
   void run(const PassPlan& plan, const std::function<bool()>& halted);
 
   const Integrator& integrator() const { return integrator_; }
-  uint32_t threads() const { return static_cast<uint32_t>(slots_.size()); }
+  uint32_t threads() const { return static_cast<uint32_t>(workers_.size()); }
   uint32_t wave_size() const { return wave_size_; }
   /// So far; may be read while waves run.
   uint64_t samples_done() const { return samples_; }
@@ -47,7 +47,7 @@ class PassRunner {
 
   Integrator& integrator_;
   uint32_t wave_size_;
-  std::vector<char> slots_;  ///< one for each worker, by whose addresses they are told apart
+  std::vector<char> workers_;  ///< one for each worker, by whose addresses they are told apart
   std::atomic<uint64_t> samples_{0}, rays_{0};
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double first_samples_s_ = 0;

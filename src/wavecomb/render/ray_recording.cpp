@@ -157,7 +157,7 @@ ReplayTimes RayRecording::replay(const Replay& how) {
   const auto trace_waves = [&](const tbb::blocked_range<size_t>& range) {
     const DenormalsOff denormals_off;
     Buffers& own = buffers[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
-    const SlotOrder slot(&own);
+    const WorkerOrder in_order(&own);
     for (size_t w = range.begin(); w != range.end(); ++w)
       for (const Stage& stage : *waves_[w])
         if (how.wanted[static_cast<size_t>(stage.kind)]) trace(stage, how, own, own.times);

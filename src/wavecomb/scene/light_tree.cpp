@@ -104,7 +104,7 @@ double cost(const Bin& bin, const MeasureTable& measure) {
 /// Where a range is cut, and the way to it from the root.
 struct Range {
   size_t begin, end;
-  uint32_t slot;  ///< node
+  uint32_t place;  ///< node
   uint32_t depth, trail;
   size_t size() const { return end - begin; }
 };
@@ -152,8 +152,8 @@ class Builder {
   /// Halves of a range. Nodes are depth first, a range of n items has n - 1.
   static std::pair<Range, Range> children(const Range& r, size_t cut) {
     const auto left_nodes = static_cast<uint32_t>(cut - r.begin - 1);
-    return {{r.begin, cut, r.slot + 1, r.depth + 1, r.trail},
-            {cut, r.end, r.slot + 1 + left_nodes, r.depth + 1, r.trail | 1u << r.depth}};
+    return {{r.begin, cut, r.place + 1, r.depth + 1, r.trail},
+            {cut, r.end, r.place + 1 + left_nodes, r.depth + 1, r.trail | 1u << r.depth}};
   }
 
   LightCluster build(const Range& r) {
@@ -172,10 +172,10 @@ class Builder {
   }
 
   LightCluster join(const Range& r, const LightCluster& a, const LightCluster& b) {
-    tree_.nodes[r.slot].child[0] = encode(a);
-    tree_.nodes[r.slot].child[1] = encode(b);
+    tree_.nodes[r.place].child[0] = encode(a);
+    tree_.nodes[r.place].child[1] = encode(b);
     LightCluster c = unite(a, b);
-    c.next = r.slot;
+    c.next = r.place;
     return c;
   }
 

@@ -27,13 +27,13 @@ enum class ProgramId : uint8_t {
 inline constexpr uint32_t kProgramCount = 7;
 inline constexpr const char* kProgramNames[kProgramCount] = {
     "diffuse", "metal", "dielectric", "plastic", "emissive", "principled", "openpbr"};
-/// Whether a program reads the emission slot.
+/// Whether a program reads the emission input.
 inline constexpr bool can_emit(ProgramId p) {
   return p == ProgramId::kEmissive || p == ProgramId::kPrincipled || p == ProgramId::kOpenPbr;
 }
 
 /// Parameters that a texture can drive. Each has a constant, used where no texture is connected.
-enum class Slot : uint8_t {
+enum class Input : uint8_t {
   kBaseColor,      ///< rgb: albedo; metal: reflectance at normal incidence (F0); dielectric: tint
   kSpecularColor,  ///< rgb: metal: tint at 82 degrees (F82); principled, specular workflow: F0
   kEmission,       ///< rgb: radiance
@@ -44,15 +44,15 @@ enum class Slot : uint8_t {
   kOpacity,
   kNormal,  ///< rgb: tangent-space normal, already scaled and biased to [-1, 1]
 };
-inline constexpr uint32_t kSlotCount = 9;
-inline constexpr const char* kSlotNames[kSlotCount] = {
+inline constexpr uint32_t kInputCount = 9;
+inline constexpr const char* kInputNames[kInputCount] = {
     "base_color", "specular_color",      "emission", "roughness", "metallic",
     "clearcoat",  "clearcoat_roughness", "opacity",  "normal"};
-inline constexpr uint32_t slot_bit(Slot s) {
+inline constexpr uint32_t input_bit(Input s) {
   return 1u << static_cast<uint32_t>(s);
 }
 
-/// How a slot reads a texture: value = texel * scale + bias at uv' = transform(uv).
+/// How an input reads a texture: value = texel * scale + bias at uv' = transform(uv).
 struct TextureUse {
   uint32_t texture = kNoTexture;
   /// 0..3: that channel for all of r, g, b; 4: rgb.
@@ -80,18 +80,18 @@ struct Material {
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
   bool specular_workflow = false;  ///< principled: F0 from specular_color rather than metallic
   bool presence = false;  ///< principled: opacity is presence (cut-out) rather than transparency
-  std::array<TextureUse, kSlotCount> textures;
+  std::array<TextureUse, kInputCount> textures;
   OpenPbr openpbr;  ///< read by the program of that name alone
   /// What computes parameters at hits, in place of constants and textures: ids of
   /// SceneBuilder::add_graph or kNoGraph. The parts that drive opacity and emission alone stand
   /// beside the whole, for rays and lights that ask for nothing else.
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
-  bool has_texture(Slot s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
-  /// Whether it can shine: its program reads the emission slot and finds something there.
+  bool has_texture(Input s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
+  /// Whether it can shine: its program reads the emission input and finds something there.
   bool emits() const {
     return can_emit(program) && (emission.x > 0 || emission.y > 0 || emission.z > 0 ||
-                                 has_texture(Slot::kEmission) || emission_graph != kNoGraph);
+                                 has_texture(Input::kEmission) || emission_graph != kNoGraph);
   }
   /// Whether rays must ask how much of the surface is there.
   bool needs_presence() const {
@@ -99,7 +99,7 @@ struct Material {
            (opacity < 1 || opacity < opacity_threshold || opacity_varies());
   }
   /// Whether opacity is not the same all over what wears the material.
-  bool opacity_varies() const { return has_texture(Slot::kOpacity) || opacity_graph != kNoGraph; }
+  bool opacity_varies() const { return has_texture(Input::kOpacity) || opacity_graph != kNoGraph; }
 };
 
 /// A material as lanes read it: 32 floats side by side, so that one record is two cache lines.
@@ -109,14 +109,14 @@ struct alignas(64) MaterialRecord {
   float normal[3];
   float ior, opacity_threshold;
   float conductor_eta[3], conductor_k[3];
-  uint32_t texture_slots;  ///< bit s: slot s reads a texture
-  uint32_t flags;          ///< MaterialFlags
+  uint32_t textured_inputs;  ///< bit s: input s reads a texture
+  uint32_t flags;            ///< MaterialFlags
   uint32_t program;
   uint32_t openpbr;  ///< its OpenPbrRecord
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 };
 static_assert(sizeof(MaterialRecord) == 128);
-/// A bit of MaterialRecord::texture_slots beside those of slots: the program needs a frame along
+/// A bit of MaterialRecord::textured_inputs beside those of inputs: the program needs a frame along
 /// the texture, though it may read none.
 inline constexpr uint32_t kNeedsTangent = 1u << 31;
 /// Likewise: a graph drives parameters; one drives the normal.
@@ -135,7 +135,7 @@ struct alignas(64) TextureUseRecord {
 };
 static_assert(sizeof(TextureUseRecord) == 64);
 
-/// What kernels need of all materials. Uses are at `material * kSlotCount + slot`.
+/// What kernels need of all materials. Uses are at `material * kInputCount + input`.
 struct MaterialView {
   const MaterialRecord* materials = nullptr;
   const TextureUseRecord* uses = nullptr;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Inputs of the program "openpbr" beyond the slots that all programs share: one table, from which
+/// Inputs of the program "openpbr" beyond the inputs that all programs share: one table, from which
 /// descriptions, checks, records, parameters at hits, outputs of graphs and Python's names follow.
 #pragma once
 
@@ -10,8 +10,8 @@
 #include "wavecomb/core/vec3.h"
 
 /// X(kind, name, default, least, most), in the order of records and of graph outputs. Defaults are
-/// those of OpenPBR Surface 1.1, but for the weights of its slots. A Derived colour is what kernels
-/// and graphs have, while callers give what it follows from.
+/// those of OpenPBR Surface 1.1, but for the weights of its inputs. A Derived colour is what
+/// kernels and graphs have, while callers give what it follows from.
 ///
 ///   specular_weight        scales the reflectance at normal incidence
 ///   anisotropy, rotation   of specular roughness; of the grain, in turns from the tangent towards

@@ -22,8 +22,8 @@ bool same(const TextureUse& a, const TextureUse& b) {
   return a.texture == b.texture && a.channel == b.channel && a.scale == b.scale &&
          a.bias == b.bias && a.uv == b.uv;
 }
-bool same_texture(const Material& a, const Material& b, Slot slot) {
-  const auto s = static_cast<size_t>(slot);
+bool same_texture(const Material& a, const Material& b, Input input) {
+  const auto s = static_cast<size_t>(input);
   return same(a.textures[s], b.textures[s]);
 }
 
@@ -32,7 +32,7 @@ bool same_presence(const Material& a, const Material& b) {
   if (!a.needs_presence() && !b.needs_presence()) return true;
   return a.needs_presence() == b.needs_presence() && a.opacity == b.opacity &&
          a.opacity_threshold == b.opacity_threshold && a.opacity_graph == b.opacity_graph &&
-         same_texture(a, b, Slot::kOpacity);
+         same_texture(a, b, Input::kOpacity);
 }
 
 /// Whether a surface shines alike with either of two materials. What does not emit may be a mesh
@@ -41,7 +41,7 @@ bool same_emission(const Material& a, const Material& b, bool any_mesh_lights) {
   if (a.emits() != b.emits()) return false;
   if (!a.emits()) return !any_mesh_lights || same_presence(a, b);
   return same(a.emission, b.emission) && a.emission_graph == b.emission_graph &&
-         same_texture(a, b, Slot::kEmission) && same_presence(a, b);
+         same_texture(a, b, Input::kEmission) && same_presence(a, b);
 }
 
 [[noreturn]] void throw_unknown(const char* kind, uint32_t id, size_t count) {

@@ -71,7 +71,7 @@ uint32_t SceneBuilder::add_graph(const Graph& graph) {
 uint32_t SceneBuilder::add_material(Material material) {
   check_material(material, textures_.size(), graphs_.programs.size());
   const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
-                     material.emission.z > 0 || material.has_texture(Slot::kEmission);
+                     material.emission.z > 0 || material.has_texture(Input::kEmission);
   if (glows && !material.emits())
     warnings_.push_back(quoted("material", material.name) + " has emission, which its program '" +
                         kProgramNames[static_cast<size_t>(material.program)] +

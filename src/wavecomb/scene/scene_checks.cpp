@@ -15,7 +15,7 @@ std::string quoted(const std::string& kind, const std::string& name) {
 
 void check_material(const Material& material, size_t texture_count, size_t graph_count) {
   const auto name = quoted("material", material.name);
-  for (uint32_t s = 0; s < kSlotCount; ++s) {
+  for (uint32_t s = 0; s < kInputCount; ++s) {
     const TextureUse& use = material.textures[s];
     if (use.texture == kNoTexture) continue;
     if (use.texture >= texture_count)

@@ -81,7 +81,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
   // A hidden light shines though no ray meets its mesh.
   if (mesh.mesh_light == kNoLight || geometry.mesh_lights[mesh.mesh_light].visible)
     set_mean_opacity(geometry, materials, m, t);
-  if (m.has_texture(Slot::kEmission) || m.emission_graph != kNoGraph || t.opacity_varies)
+  if (m.has_texture(Input::kEmission) || m.emission_graph != kNoGraph || t.opacity_varies)
     t.material = material;
   return t;
 }

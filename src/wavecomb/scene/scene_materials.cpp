@@ -37,22 +37,22 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   r.opacity_threshold = m.opacity_threshold;
   put(r.conductor_eta, m.conductor_eta);
   put(r.conductor_k, m.conductor_k);
-  for (uint32_t s = 0; s < kSlotCount; ++s)
-    if (m.has_texture(static_cast<Slot>(s))) r.texture_slots |= 1u << s;
+  for (uint32_t s = 0; s < kInputCount; ++s)
+    if (m.has_texture(static_cast<Input>(s))) r.textured_inputs |= 1u << s;
   if (m.specular_workflow) r.flags |= kSpecularWorkflow;
   if (m.needs_presence()) r.flags |= kPresence;
   if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
   if (m.emits()) r.flags |= kEmits;
   r.program = static_cast<uint32_t>(m.program);
   if (m.program == ProgramId::kOpenPbr && m.openpbr.anisotropy != 0)
-    r.texture_slots |= kNeedsTangent;
+    r.textured_inputs |= kNeedsTangent;
   r.graph = m.graph;
   r.opacity_graph = m.opacity_graph;
   r.emission_graph = m.emission_graph;
   if (m.graph != kNoGraph) {
     r.flags |= kHasGraph;
-    r.texture_slots |= kReadsGraph;
-    if (drives(graphs, m.graph, kNormalOutput)) r.texture_slots |= kGraphNormal;
+    r.textured_inputs |= kReadsGraph;
+    if (drives(graphs, m.graph, kNormalOutput)) r.textured_inputs |= kGraphNormal;
   }
   return r;
 }

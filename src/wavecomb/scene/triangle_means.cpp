@@ -13,7 +13,7 @@ namespace {
 /// of the light of a triangle is looked for at least.
 constexpr float kLeastOpacity = 1.f / 16;
 
-/// The mean of a texture as a slot reads it.
+/// The mean of a texture as an input reads it.
 Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
   const float* mean = geometry.textures[use.texture]->mean();
   const auto value = [&](uint32_t c) {
@@ -79,8 +79,8 @@ void set_mean_emission(const SceneGeometry& geometry, const SceneMaterials& mate
   Vec3<float> radiance{0, 0, 0};
   if (can_aim_at(material, *materials.graphs)) {
     radiance = material.emission;
-    if (material.has_texture(Slot::kEmission))
-      radiance = mean_texture(geometry, material.textures[static_cast<size_t>(Slot::kEmission)]);
+    if (material.has_texture(Input::kEmission))
+      radiance = mean_texture(geometry, material.textures[static_cast<size_t>(Input::kEmission)]);
     if (material.emission_graph != kNoGraph)
       radiance = mean_graph(geometry, materials, material.emission_graph, kEmissionOutput, radiance,
                             t, [](const Vec3<float>& value) { return value; });
@@ -102,9 +102,9 @@ void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& mater
   const auto unit = [](float x) { return std::clamp(x, 0.f, 1.f); };
   float opacity = unit(material.opacity);
   // Of a texture with a threshold, as much is there as its mean says: it is 0 or 1 nearly all over.
-  if (material.has_texture(Slot::kOpacity))
+  if (material.has_texture(Input::kOpacity))
     opacity =
-        unit(mean_texture(geometry, material.textures[static_cast<size_t>(Slot::kOpacity)]).x);
+        unit(mean_texture(geometry, material.textures[static_cast<size_t>(Input::kOpacity)]).x);
   if (material.opacity_graph != kNoGraph)
     opacity = mean_graph(geometry, materials, material.opacity_graph, kOpacityOutput,
                          Vec3<float>(opacity), t,

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Emission and opacity of materials at hits, the same for all that ask: shading's own emission is
-/// read by the same slots and graphs (material/params.h).
+/// read by the same inputs and graphs (material/params.h).
 ///
 /// What a graph drives takes the place of a texture, which takes the place of a constant, component
 /// by component.
 #pragma once
 
 #include "wavecomb/graph/value.h"
-#include "wavecomb/surface/slots.h"
+#include "wavecomb/surface/inputs.h"
 
 namespace wavecomb {
 
@@ -35,10 +35,10 @@ template <typename F, typename MakePoint>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                                const F& uv_width, const MakePoint& make_point,
                                const Mask<F>& active) {
-  const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
-  const Vec3<F> constant = slots.record[&MaterialRecord::emission];
-  const Color<F> plain = detail::sane_emission(slots.value(Slot::kEmission, constant));
-  const UInt<F> graph = slots.record[&MaterialRecord::emission_graph];
+  const detail::InputReader<F> inputs(view, material, uv, uv_width, active);
+  const Vec3<F> constant = inputs.record[&MaterialRecord::emission];
+  const Color<F> plain = detail::sane_emission(inputs.value(Input::kEmission, constant));
+  const UInt<F> graph = inputs.record[&MaterialRecord::emission_graph];
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
   if (none(driven)) return plain;
   return graph_value<F>(view, graph, kEmissionOutput, make_point(driven), driven, plain);
@@ -57,17 +57,17 @@ template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const F& uv_width, const MakePoint& make_point, const Mask<F>& active) {
   using R = MaterialRecord;
-  const detail::SlotReader<F> slots(view, material, uv, uv_width, active);
-  F opacity = detail::saturate(slots.value(Slot::kOpacity, slots.record[&R::opacity]));
-  const UInt<F> graph = slots.record[&R::opacity_graph];
+  const detail::InputReader<F> inputs(view, material, uv, uv_width, active);
+  F opacity = detail::saturate(inputs.value(Input::kOpacity, inputs.record[&R::opacity]));
+  const UInt<F> graph = inputs.record[&R::opacity_graph];
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
   if (any(driven))
     opacity =
         graph_value<F>(view, graph, kOpacityOutput, make_point(driven), driven, Vec3<F>(opacity)).x;
-  const F threshold = slots.record[&R::opacity_threshold];
+  const F threshold = inputs.record[&R::opacity_threshold];
   const F cut = select(opacity < threshold, F(0.f), F(1.f));
   const F present = select(threshold > 0.f, cut, opacity);
-  return select(detail::opacity_is_presence(slots, threshold), present, F(1.f));
+  return select(detail::opacity_is_presence(inputs, threshold), present, F(1.f));
 }
 /// The same where graphs have nothing but uv.
 template <typename F>

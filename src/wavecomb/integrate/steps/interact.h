@@ -16,16 +16,16 @@ namespace wavecomb {
 
 /// Slots that a vertex of program `Bsdf` reads: those of its BSDF, and emission.
 template <typename Bsdf>
-inline constexpr uint32_t kVertexSlots =
-    Bsdf::kSlots | (Bsdf::kEmits ? slot_bit(Slot::kEmission) : 0u);
+inline constexpr uint32_t kVertexInputs =
+    Bsdf::kInputs | (Bsdf::kEmits ? input_bit(Input::kEmission) : 0u);
 
 /// A surface as a path has met it. Steps after this one know of it `bsdf`, `throughput` and the
 /// functions, which whatever else a path meets has, too; `emit` alone is for surfaces.
 template <typename Bsdf, typename F>
 struct SurfaceInteraction {
-  UInt<F> slots;          ///< MaterialRecord::texture_slots
-  Mask<F> reads_texture;  ///< lanes that need uv and a frame along it
-  bool textured;          ///< whether any does
+  UInt<F> textured_inputs;  ///< MaterialRecord::textured_inputs
+  Mask<F> reads_texture;    ///< lanes that need uv and a frame along it
+  bool textured;            ///< whether any does
   Surface<F> s;
   ParamsOf<Bsdf, F> params;
   Bsdf bsdf;
@@ -51,10 +51,10 @@ WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F>& v)
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   const PathState<F>& path = v.path;
-  const U slots = gather_member<F>(scene.materials.materials, &MaterialRecord::texture_slots,
-                                   v.material, v.active);
+  const U textured_inputs = gather_member<F>(
+      scene.materials.materials, &MaterialRecord::textured_inputs, v.material, v.active);
   const Mask<F> reads_texture =
-      v.active & Mask<F>((slots & (kVertexSlots<Bsdf> | kReadsGraph)) != U(0u));
+      v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) != U(0u));
   const bool textured = any(reads_texture);
   const bool wants_uv = textured || (v.aovs && v.aovs->wants_uv);
   const Surface<F> s =
@@ -72,12 +72,13 @@ WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F>& v)
     const F width = uv_width;
     return graph_point<F>(scene, at, surface, dir, width, lanes);
   };
-  const auto params = fetch_for<Bsdf, kVertexSlots<Bsdf>, F>(materials, v.material, s.uv, uv_width,
-                                                             make_point, v.active);
+  const auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(materials, v.material, s.uv, uv_width,
+                                                              make_point, v.active);
   Color<F> throughput = path.throughput;
   if constexpr (Bsdf::kAbsorbs) throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
-  return {slots,     reads_texture, textured, s, params, Bsdf(params, v.settings.schlick_fresnel),
-          throughput};
+  return {
+      textured_inputs, reads_texture, textured, s, params, Bsdf(params, v.settings.schlick_fresnel),
+      throughput};
 }
 
 /// What program `Bsdf` has met.
@@ -99,7 +100,7 @@ WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F>& v) 
   Vec3<F> n = s.ns;
   const Vec3<F> tangent = select<F>(reads_texture, s.dpdu, Vec3<F>(F(0.f)));
   const Mask<F> mapped =
-      v.active & Mask<F>((slots & (slot_bit(Slot::kNormal) | kGraphNormal)) != U(0u));
+      v.active & Mask<F>((textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != U(0u));
   if (any(mapped)) {
     // A normal that looks away is bent until it is seen edge-on.
     Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));

@@ -14,8 +14,8 @@ class DielectricBsdf : public BsdfTraits {
   static constexpr ProgramId kProgram = ProgramId::kDielectric;
   static constexpr bool kTransmits = true;
   static constexpr bool kHasTerminator = false;
-  static constexpr uint32_t kSlots =
-      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
+  static constexpr uint32_t kInputs =
+      input_bit(Input::kBaseColor) | input_bit(Input::kRoughness) | input_bit(Input::kNormal);
 
   DielectricBsdf(const ShadingParams<F>& params, bool schlick)
       : tint_(params.base_color),

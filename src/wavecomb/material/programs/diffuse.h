@@ -12,7 +12,7 @@ template <typename F>
 class DiffuseBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kDiffuse;
-  static constexpr uint32_t kSlots = slot_bit(Slot::kBaseColor) | slot_bit(Slot::kNormal);
+  static constexpr uint32_t kInputs = input_bit(Input::kBaseColor) | input_bit(Input::kNormal);
 
   DiffuseBsdf(const ShadingParams<F>& params, bool /*schlick*/) : base_(params.base_color) {}
 

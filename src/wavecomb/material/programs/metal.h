@@ -17,8 +17,9 @@ template <typename F>
 class MetalBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kMetal;
-  static constexpr uint32_t kSlots = slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) |
-                                     slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
+  static constexpr uint32_t kInputs = input_bit(Input::kBaseColor) |
+                                      input_bit(Input::kSpecularColor) |
+                                      input_bit(Input::kRoughness) | input_bit(Input::kNormal);
 
   MetalBsdf(const ShadingParams<F>& params, bool schlick)
       : eta_(params.conductor_eta), k_(params.conductor_k), roughness_(params.roughness) {

@@ -29,10 +29,10 @@ class OpenPbrBsdf : public BsdfTraits {
   static constexpr bool kAbsorbs = true;
   static constexpr bool kTransmits = true;
   using Params = OpenPbrParams<F>;
-  static constexpr uint32_t kSlots =
-      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) | slot_bit(Slot::kRoughness) |
-      slot_bit(Slot::kMetallic) | slot_bit(Slot::kClearcoat) | slot_bit(Slot::kClearcoatRoughness) |
-      slot_bit(Slot::kNormal) | kNeedsTangent;
+  static constexpr uint32_t kInputs =
+      input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
+      input_bit(Input::kRoughness) | input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
+      input_bit(Input::kClearcoatRoughness) | input_bit(Input::kNormal) | kNeedsTangent;
 
   /// Fresnel's formulas are always exact.
   OpenPbrBsdf(const Params& p, bool /*schlick*/)

@@ -17,8 +17,8 @@ template <typename F>
 class PlasticBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kPlastic;
-  static constexpr uint32_t kSlots =
-      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kRoughness) | slot_bit(Slot::kNormal);
+  static constexpr uint32_t kInputs =
+      input_bit(Input::kBaseColor) | input_bit(Input::kRoughness) | input_bit(Input::kNormal);
 
   PlasticBsdf(const ShadingParams<F>& params, bool schlick)
       : base_(params.base_color),

@@ -29,10 +29,11 @@ class PrincipledBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
   static constexpr bool kEmits = true;
-  static constexpr uint32_t kSlots =
-      slot_bit(Slot::kBaseColor) | slot_bit(Slot::kSpecularColor) | slot_bit(Slot::kRoughness) |
-      slot_bit(Slot::kMetallic) | slot_bit(Slot::kClearcoat) | slot_bit(Slot::kClearcoatRoughness) |
-      slot_bit(Slot::kOpacity) | slot_bit(Slot::kNormal);
+  static constexpr uint32_t kInputs =
+      input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
+      input_bit(Input::kRoughness) | input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
+      input_bit(Input::kClearcoatRoughness) | input_bit(Input::kOpacity) |
+      input_bit(Input::kNormal);
 
   PrincipledBsdf(const ShadingParams<F>& params, bool schlick)
       : roughness_(params.roughness),

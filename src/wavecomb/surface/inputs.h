@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads the slots of materials at hits: constants from records, or textures.
+/// Reads the inputs of materials at hits: constants from records, or textures.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -15,7 +15,7 @@ inline constexpr float kMaxEmission = 1e18f;
 
 namespace detail {
 
-/// What a slot's texture gives: texel * scale + bias of the chosen channels.
+/// What an input's texture gives: texel * scale + bias of the chosen channels.
 template <typename F>
 Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const Vec2<F>& uv,
                      const F& uv_width, const Mask<F>& active) {
@@ -43,9 +43,9 @@ Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const
   return {select(rgb, c[0], one), select(rgb, c[1], one), select(rgb, c[2], one)};
 }
 
-/// Values of slots at a hit.
+/// Values of inputs at a hit.
 template <typename F>
-struct SlotReader {
+struct InputReader {
   const MaterialView& view;
   const UInt<F>& material;
   const Vec2<F>& uv;
@@ -53,10 +53,10 @@ struct SlotReader {
   Mask<F> active;
   bool uniform;
   RecordReader<F> record;
-  UInt<F> texture_slots;
+  UInt<F> textured_inputs;
 
-  SlotReader(const MaterialView& view_, const UInt<F>& material_, const Vec2<F>& uv_,
-             const F& uv_width_, const Mask<F>& active_)
+  InputReader(const MaterialView& view_, const UInt<F>& material_, const Vec2<F>& uv_,
+              const F& uv_width_, const Mask<F>& active_)
       : view(view_),
         material(material_),
         uv(uv_),
@@ -64,18 +64,18 @@ struct SlotReader {
         active(active_),
         uniform(any(active_) && is_uniform<F>(material_, active_)),
         record(make_reader<MaterialRecord, F>(view_.materials, material_, uniform, active_)),
-        texture_slots(record[&MaterialRecord::texture_slots]) {}
+        textured_inputs(record[&MaterialRecord::textured_inputs]) {}
 
-  /// The value of slot `s`: `constant`, or the texture's in the lanes that have one.
-  Vec3<F> value(Slot s, const Vec3<F>& constant) const {
-    const uint32_t bit = slot_bit(s);
-    const Mask<F> textured = Mask<F>((texture_slots & UInt<F>(bit)) != UInt<F>(0u)) & active;
+  /// The value of input `s`: `constant`, or the texture's in the lanes that have one.
+  Vec3<F> value(Input s, const Vec3<F>& constant) const {
+    const uint32_t bit = input_bit(s);
+    const Mask<F> textured = Mask<F>((textured_inputs & UInt<F>(bit)) != UInt<F>(0u)) & active;
     if (none(textured)) return constant;
-    const UInt<F> index = material * kSlotCount + static_cast<uint32_t>(s);
+    const UInt<F> index = material * kInputCount + static_cast<uint32_t>(s);
     const auto use = make_reader<TextureUseRecord, F>(view.uses, index, uniform, textured);
     return select<F>(textured, read_texture<F>(view, use, uv, uv_width, textured), constant);
   }
-  F value(Slot s, const F& constant) const { return value(s, Vec3<F>(constant)).x; }
+  F value(Input s, const F& constant) const { return value(s, Vec3<F>(constant)).x; }
 };
 
 template <typename F>
@@ -95,8 +95,8 @@ inline Color<F> sane_emission(const Color<F>& c) {
 
 /// Lanes whose opacity is presence: it says how much of the surface is there, not how it transmits.
 template <typename F>
-inline Mask<F> opacity_is_presence(const SlotReader<F>& slots, const F& threshold) {
-  const UInt<F> flags = slots.record[&MaterialRecord::flags];
+inline Mask<F> opacity_is_presence(const InputReader<F>& inputs, const F& threshold) {
+  const UInt<F> flags = inputs.record[&MaterialRecord::flags];
   return Mask<F>((flags & UInt<F>(uint32_t{kPresence})) != UInt<F>(0u)) | (threshold > 0.f);
 }
 
