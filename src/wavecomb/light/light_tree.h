@@ -170,7 +170,7 @@ template <typename F>
     return unit_float<F>(UInt<F>(bits ^ (bits >> 15)));
   };
   const auto below_one = [](const F& x) { return min(x, F(kOneMinusEpsilon)); };
-  F u = below_one(F((F(Int<F>(number)) + fresh()) / static_cast<float>(tree.numbers)));
+  F u = below_one(F((F(Int<F>(number)) + fresh()) / F(static_cast<float>(tree.numbers))));
   LightChoice<F> choice = descend<F>(tree, to, in_tree, [&](const F& p_left, const Mask<F>& going) {
     const Mask<F> right = going & not_(u < p_left);
     const F p = select(right, F(1.f - p_left), p_left);
