@@ -56,12 +56,10 @@ namespace {
 /// The value whose name is the one of that number in `names`; `what` is for an error.
 template <typename Enum, size_t N>
 Enum named(const char* what, const char* const (&names)[N], const std::string& name) {
-  std::string list;
-  for (uint32_t i = 0; i < N; ++i) {
+  for (uint32_t i = 0; i < N; ++i)
     if (name == names[i]) return static_cast<Enum>(i);
-    list += (list.empty() ? "" : ", ") + std::string(names[i]);
-  }
-  throw Error(std::string(what) + " '" + name + "' is not known; it must be one of " + list);
+  throw Error(std::string(what) + " '" + name + "' is not known; it must be one of " +
+              listed(names));
 }
 
 uint32_t add_texture(SceneBuilder& builder,

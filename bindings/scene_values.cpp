@@ -176,7 +176,7 @@ std::optional<uint32_t> index_in(const std::vector<const char*>& choices, nb::ha
   return static_cast<uint32_t>(found - choices.begin());
 }
 
-std::string listed(const std::vector<const char*>& choices) {
+std::string listed(std::span<const char* const> choices) {
   std::string list;
   for (const char* one : choices) list += (list.empty() ? "" : ", ") + std::string(one);
   return list;

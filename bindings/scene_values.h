@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,7 @@ void check_index(const char* kind, uint32_t i, size_t count);
 /// Which of the choices a name is; none where it is none of them, or no name.
 std::optional<uint32_t> index_in(const std::vector<const char*>& choices, nanobind::handle value);
 /// "a, b, c".
-std::string listed(const std::vector<const char*>& choices);
+std::string listed(std::span<const char* const> choices);
 
 /// A map as USD's row-vector matrix, and back: 4 x 4 numbers. Throws Error that begins with `what`
 /// for anything else.

@@ -21,8 +21,14 @@ void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
   finish_area(made, light, 2 * kPiD * radius * length(axis));
 }
 
+/// The end of the axis, which begins at p.
+Vec3<float> axis_end(const LightRecord& light) {
+  return {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]};
+}
+
 void bound(LightCluster& cluster, const LightRecord& light, double power) {
-  include(cluster, {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]});
+  const Vec3<float> end = axis_end(light);
+  include(cluster, {end.x, end.y, end.z});
   widen(cluster, {light.radius, light.radius, light.radius});
   bound_round(cluster);
   cluster.intensity = power / (kPiD * kPiD);  // seen from the side
@@ -33,9 +39,8 @@ LightShape shape(const LightRecord& /*light*/) {
 }
 
 Bounds box(const LightRecord& light) {
-  return box_around(light.p,
-                    {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]},
-                    {light.radius, light.radius, light.radius});
+  const Vec3<float> end = axis_end(light);
+  return box_around(light.p, {end.x, end.y, end.z}, {light.radius, light.radius, light.radius});
 }
 
 /// The nearer point ahead of the open cylinder of axis u from 0 on.

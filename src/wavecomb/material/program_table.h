@@ -13,17 +13,13 @@
 
 namespace wavecomb {
 
-/// Calls `visitor.operator()<Bsdf>()` with the class of a list that has the id `id`.
-template <typename... Bsdf, typename Visitor>
-inline void visit_list(ProgramList<Bsdf...>, ProgramId id, Visitor&& visitor) {
-  (void)((id == Bsdf::kProgram && (visitor.template operator()<Bsdf>(), true)) || ...);
-}
-
 /// Calls `visitor.operator()<Bsdf>()` with the class of program `id`:
 ///   visit_program<F>(id, [&]<typename Bsdf>() { shade<Bsdf>(batch); });
 template <typename F, typename Visitor>
 inline void visit_program(ProgramId id, Visitor&& visitor) {
-  visit_list(Programs<F>{}, id, visitor);
+  [&]<typename... Bsdf>(ProgramList<Bsdf...>) {
+    (void)((id == Bsdf::kProgram && (visitor.template operator()<Bsdf>(), true)) || ...);
+  }(Programs<F>{});
 }
 
 }  // namespace wavecomb
