@@ -11,6 +11,7 @@
 namespace wavecomb {
 namespace {
 
+using lane_testing::for_each_lane_type;
 using lane_testing::for_each_packet;
 using namespace scene_testing;
 
@@ -455,6 +456,44 @@ TEST(Surface, LanesAgreeWhateverTheirNeighboursAre) {
             ASSERT_TRUE(lane_testing::same_bits(scalar[c][i], tail[c][i])) << c << ", " << i;
       });
     }
+}
+
+TEST(Facing, BentNormalsAreSeenAndMirrorWhatIsAboveTheSurface) {
+  for_each_lane_type([]<typename F>() {
+    std::mt19937 rng(5);
+    std::normal_distribution<float> normal;
+    const auto direction = [&] {
+      const Vec3<float> v(normal(rng), normal(rng), normal(rng));
+      return normalize(v);
+    };
+    const auto all = [](const Vec3<float>& v) { return Vec3<F>(F(v.x), F(v.y), F(v.z)); };
+    int lifted = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const Vec3<float> ng = direction(), n = direction();
+      Vec3<float> dir = direction();
+      if (i % 2 == 0)  // at grazing angles
+        dir = normalize(
+            dir - ng * (dot(dir, ng) * (1 - std::pow(10.f, -0.001f * static_cast<float>(i)))));
+      if (std::abs(dot(dir, ng)) < 1e-6f || dot(n, ng) < 0.05f) continue;
+      const Vec3<F> facing = facing_normal<F>(all(dir), all(ng), all(n));
+      const Vec3<F> bent = reflecting_normal<F>(all(dir), all(ng), facing);
+      const V3 w = -1.0 * wide(dir), b{lane(bent.x, 0), lane(bent.y, 0), lane(bent.z, 0)};
+      const double side = dot3(w, wide(ng)) > 0 ? 1 : -1, c = side * dot3(w, wide(ng));
+      const V3 mirrored = 2 * dot3(w, b) * b - w;
+      EXPECT_NEAR(dot3(b, b), 1, 1e-5);
+      EXPECT_GT(side * dot3(w, b), 0) << i;
+      EXPECT_GT(side * dot3(mirrored, wide(ng)), 0.8 * std::min(0.9 * c, 0.01) - 1e-6) << i;
+      // What mirrors above the surface stays as it is.
+      const V3 f{lane(facing.x, 0), lane(facing.y, 0), lane(facing.z, 0)};
+      const V3 before = 2 * dot3(w, f) * f - w;
+      if (side * dot3(before, wide(ng)) > 0.011) {
+        EXPECT_EQ(b, f);
+      } else {
+        ++lifted;
+      }
+    }
+    EXPECT_GT(lifted, 500);
+  });
 }
 
 }  // namespace

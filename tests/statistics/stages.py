@@ -154,6 +154,7 @@ def sphere(
 
 
 _KINDS = {
+    "normal": "normal3f",
     "diffuseColor": "color3f",
     "specularColor": "color3f",
     "emissiveColor": "color3f",

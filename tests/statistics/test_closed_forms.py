@@ -61,6 +61,30 @@ def test_diffuse_furnace_with_all_bounces(shot: Any) -> None:
     assert abs(picture.mean() - 1.0) < 1e-3
 
 
+@pytest.mark.parametrize("behind", [False, True])
+@pytest.mark.parametrize("tilt", [(0.7, 0.0), (-0.7, 0.0), (0.0, 0.7), (0.5, -0.6)])
+def test_mirrors_with_tilted_normals_see_the_sky(
+    shot: Any, tilt: tuple[float, float], behind: bool
+) -> None:
+    """A mirror under an even dome shows 1, however its normal map tilts it.
+
+    At 80 degrees it would mirror what is below its own surface.
+    """
+    normal = (*tilt, float(np.sqrt(1.0 - np.hypot(*tilt) ** 2)))
+    mirror = material(
+        *("M", "metal"), diffuseColor=(1, 1, 1), metallic=1.0, roughness=0.0, normal=normal
+    )
+    height = -np.cos(np.radians(80.0)) if behind else np.cos(np.radians(80.0))
+    eye = (6 * np.sin(np.radians(80.0)), 6 * height, 0.0)
+    floor = [(-4, 0, 4), (4, 0, 4), (4, 0, -4), (-4, 0, -4)]
+    uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    picture = shot(
+        *(camera(eye, (0, 0, 0), half=0.02), WHITE, mirror, quad("Floor", floor, "M", uv=uv)),
+        spp=16,
+    )
+    assert np.abs(picture - 1.0).max() < 1e-3
+
+
 def test_grey_furnace(shot: Any) -> None:
     """A body of albedo a shows a."""
     albedo = np.array((0.8, 0.5, 0.2))

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/curve/surface.h"
+#include "wavecomb/surface/facing.h"
 #include "wavecomb/surface/surface_reader.h"
 #include "wavecomb/surface/uv.h"
 
@@ -120,15 +121,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     const Mask<F> curved = lanes & not_(active);
     if (any(curved)) detail::setup_curved<F>(scene, hit, with_uv, curved, s);
   }
-  // A shading normal that looks away from the viewer is bent until it is seen edge-on.
-  const F towards = select(dot(dir, s.ng) < 0.f, F(1.f), F(-1.f));  // +1: seen from outside
-  const F seen = -dot(dir, s.ns) * towards;
-  constexpr float kEdge = 1e-3f;
-  const Mask<F> away = seen < kEdge;
-  if (any(away & lanes)) {
-    const Vec3<F> bent = normalize(fma(dir, F(-towards * (kEdge - seen)), s.ns));
-    s.ns = select<F>(away, bent, s.ns);
-  }
+  s.ns = facing_normal<F>(dir, s.ng, s.ns);
   return s;
 }
 

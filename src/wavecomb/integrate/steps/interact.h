@@ -10,6 +10,7 @@
 #include "wavecomb/graph/hit_point.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/material/params.h"
+#include "wavecomb/surface/facing.h"
 #include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
@@ -102,13 +103,9 @@ WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F>& v) 
   const Mask<F> mapped =
       v.active & Mask<F>((textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != U(0u));
   if (any(mapped)) {
-    // A normal that looks away is bent until it is seen edge-on.
-    Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
-    const F towards = select(dot(dir, s.ng) < 0.f, F(1.f), F(-1.f));
-    const F seen = -dot(dir, bumped) * towards;
-    bumped =
-        select<F>(seen < 1e-3f, normalize(fma(dir, F(-towards * (1e-3f - seen)), bumped)), bumped);
-    n = select<F>(mapped, bumped, n);
+    const Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
+    const Vec3<F> seen = facing_normal<F>(dir, s.ng, bumped);
+    n = select<F>(mapped, reflecting_normal<F>(dir, s.ng, seen), n);
   }
   return make_frame<F>(n, tangent);
 }
