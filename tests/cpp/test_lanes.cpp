@@ -47,6 +47,25 @@ TEST(Lanes, ClampSendsNanToTheLowerBound) {
   });
 }
 
+template <typename F, typename Number>
+concept Divides = requires(F x, Number n) { x / n; } || requires(F x, Number n) { x /= n; };
+
+TEST(Lanes, PacketsAreNotDividedByNumbers) {
+  static_assert(!Divides<FloatP<4>, float> && !Divides<FloatP<8>, float>);
+  static_assert(!Divides<FloatP<16>, float> && !Divides<FloatP<8>, double>);
+  static_assert(!Divides<FloatP<16>, int> && !Divides<FloatP<64>, float>);
+  static_assert(Divides<FloatP<8>, FloatP<8>> && Divides<float, float>);
+  static_assert(Divides<UInt<FloatP<8>>, uint32_t>);
+  // A packet of the number is what one lane computes; a product with its reciprocal is not.
+  const auto x = padded({}, 5000, 0.f, 1.f, 4);
+  int reciprocal_differs = 0;
+  for (const float number : {3.f, 7.f, 49.f, 90.f, 0.7f}) {
+    expect_lanes_agree(x, [=](auto v) { return v / decltype(v)(number); }, "a number");
+    for (const float v : x) reciprocal_differs += !same_bits(v / number, v * (1.f / number));
+  }
+  EXPECT_GT(reciprocal_differs, 1000);
+}
+
 TEST(Lanes, ArithmeticRoundsAlike) {
   const auto awkward = all_pairs(awkward_floats());
   auto a = padded(awkward[0], 5000, -1e4f, 1e4f, 2), b = padded(awkward[1], 5000, -3.f, 3.f, 3);

@@ -72,6 +72,21 @@ concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
 using drjit::select;
 
+/// Dr.Jit multiplies a packet that is divided by a number by the reciprocal of the number, which
+/// differs in the last bit from what one lane computes. Divide by a packet: `x / F(number)`.
+template <typename T, size_t W, typename Number>
+  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+void operator/(const drjit::Packet<T, W>&, const Number&) = delete;
+template <typename T, size_t W, typename Number>
+  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+void operator/(const drjit::Array<T, W>&, const Number&) = delete;
+template <typename T, size_t W, typename Number>
+  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+void operator/=(drjit::Packet<T, W>&, const Number&) = delete;
+template <typename T, size_t W, typename Number>
+  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+void operator/=(drjit::Array<T, W>&, const Number&) = delete;
+
 #if defined(__AVX512F__)
 // Dr.Jit 1.x compares unsigned lanes as signed ones at width 16 alone; these are a better match.
 namespace detail {
