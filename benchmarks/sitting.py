@@ -97,7 +97,7 @@ def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
         "schema": schema,
         "commit": git("rev-parse", "HEAD"),
         "changed": changed.splitlines(),
-        "command": " ".join([f"benchmarks/{script}", *sys.argv[1:]]),
+        "command": " ".join([f"benchmarks/{script}", *_what_counts(sys.argv[1:])]),
         "machine": machine(),
         "load": os.getloadavg(),
         **content,
@@ -105,6 +105,15 @@ def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as part:
         part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def _what_counts(words: Sequence[str]) -> list[str]:
+    """Arguments without those that say where files go on this machine."""
+    kept, places = [], ("--folder", "--output")
+    for before, word in zip(("", *words), words, strict=False):
+        if before not in places and word.split("=")[0] not in places:
+            kept.append(word)
+    return kept
 
 
 def head(*names: str) -> list[str]:
