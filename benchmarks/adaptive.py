@@ -30,7 +30,7 @@ def main() -> None:
     options = parser.parse_args()
     shuffle = random.Random(1)
     for path in options.stages:
-        stage = wavecomb.load(path)
+        stage = wavecomb.load(path).scene
 
         def render(**settings: str) -> dict[str, object]:
             size = (options.size, options.size)

@@ -76,7 +76,7 @@ class Stage:
         """One render; its times are kept."""
         full = {"spp": self.args.spp, "size": self.args.size, "threads": self.args.threads} | choice
         edge = full.pop("size")
-        picture = wavecomb.render(self.loaded, size=(edge, edge), **full)
+        picture = wavecomb.render(self.loaded.scene, size=(edge, edge), **full)
         found = hashlib.sha256(picture.beauty.tobytes()).hexdigest()
         if self._pictures.setdefault((edge, full["spp"]), found) != found:
             sys.exit(f"{self.name}: {_key(choice)} gives another picture")
@@ -306,7 +306,7 @@ def measure(name: str, args: argparse.Namespace) -> Stage:
         for choice in CLAIMS[claim][0](args):
             if choice not in choices:
                 choices.append(choice)
-    wavecomb.render(stage.loaded, size=(args.size, args.size), spp=1, threads=args.threads)
+    wavecomb.render(stage.loaded.scene, size=(args.size, args.size), spp=1, threads=args.threads)
     shuffle = random.Random(args.seed)
     started = time.perf_counter()
     for number in range(args.rounds):

@@ -79,8 +79,8 @@ def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
             "heavy", path, materials=args.materials, texture_mb=texture_mb,
             triangles=args.triangles,
         )  # fmt: skip
-    stage = wavecomb.load(path)
-    textures = sum(size for _, size in stage.scene.textures)
+    stage = wavecomb.load(path).scene
+    textures = sum(size for _, size in stage.textures)
     shuffle = random.Random(1)
     times: dict[str, list[dict[str, float]]] = {}
     picture: np.ndarray | None = None

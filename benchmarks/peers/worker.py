@@ -40,7 +40,8 @@ def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     import wavecomb
     from wavecomb import _core
 
-    stage = wavecomb.load(args.stage, isolate=False)
+    # A scene keeps nothing from render to render: each weighs its lights anew.
+    stage = wavecomb.load(args.stage, isolate=False).scene
     settings = {
         "filter": "box",
         "filter_width": 1.0,

@@ -131,7 +131,8 @@ def render(
     >>> picture.beauty.shape  # doctest: +SKIP
     (540, 960, 3)
 
-    A stage that is rendered more than once is best loaded once:
+    A stage that is rendered more than once is best loaded once; it keeps its hierarchy, and what
+    was found out of its lights, from render to render:
 
     >>> stage = wavecomb.load("mixed.usdc")  # doctest: +SKIP
     >>> for seed in range(4):  # doctest: +SKIP
@@ -160,8 +161,11 @@ def render(
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
-    result = _render(scene, chosen, progress, own, profile, watcher, state)
+    again = loaded if loaded is source else None
+    result, is_built = _render(scene, again, chosen, progress, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded)
+    if not is_built:
+        stats["seconds"]["build"] = 0.0
     return picture_of(result, stats, scene=scene, aovs=names)
 
 
@@ -251,13 +255,19 @@ def _resolve(
 
 def _render(
     scene: Scene,
+    again: LoadedStage | None,
     settings: Settings,
     progress: Progress | None,
     policy: SchedulingPolicy | None,
     costs: dict[str, dict[str, float]] | None,
     watcher: Watcher | None,
     state: dict[str, Any] | None,
-) -> Result:
+) -> tuple[Result, bool]:
+    """Also whether a hierarchy was built. again: the stage, where it may be rendered once more."""
     from wavecomb import _core
 
-    return _core.render(scene, settings, progress, policy, costs, watcher=watcher, state=state)
+    if again is None:
+        named: dict[str, Any] = {"watcher": watcher, "state": state}
+        return _core.render(scene, settings, progress, policy, costs, **named), True
+    with again.renderer(settings.threads) as (renderer, is_new):
+        return renderer.render(settings, progress, policy, costs, watcher, state), is_new

@@ -227,7 +227,7 @@ def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
                 path: Path = tmp_path_factory.mktemp("stages") / f"{name}.usdc"
                 write_scene(name, path, triangles=20_000, teapot_level=8, texture_size=256)
-                _loaded[name] = wavecomb.load(path).scene
+                _loaded[name] = wavecomb.load(path)
         return _loaded[name]
 
     return scene
@@ -353,6 +353,19 @@ def test_every_choice(scene: str, roulette: str, scene_of: Any) -> None:
         settings = dict(zip(names, choice, strict=True))
         settings |= {"roulette": roulette, "costs": "model", "shadow_order": settings["ray_order"]}
         expect_equal(render(scene_of(scene), size, spp, **settings), expected, settings)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
+    """Hierarchy and shares of lights: of one thread or many, of other settings before, or new."""
+    stage = scene_of(scene)
+    alone = getattr(stage, "scene", stage)
+    for threads in (1, 2, 5):
+        render(stage, (20, 16), 2, max_depth=3, threads=2)
+        kept = render(stage, (32, 24), 8, roulette="off", threads=threads, costs="model")
+        new = render(alone, (32, 24), 8, roulette="off", threads=threads, costs="model")
+        expect_equal(kept, new, threads)
+        expect_equal(kept, plain(scene_of, scene, "off", (32, 24), 8), threads)
 
 
 @pytest.mark.slow

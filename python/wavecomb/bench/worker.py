@@ -58,7 +58,7 @@ def run(job: Job) -> dict[str, Any]:
     if profile is not None:
         settings["costs"] = profile
     for _ in range(int(job.get("warm", 0))):
-        api.render(stage, size=size, spp=1, **settings)
+        api.render(stage.scene, size=size, spp=1, **settings)  # keeps nothing for the next
     switch = Switch(job.get("perf"))
     switch.start()
     picture = api.render(stage, size=size, spp=spp, **settings)

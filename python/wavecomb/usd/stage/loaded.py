@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,3 +62,29 @@ class LoadedStage:
     working_space: str = "rec709"
     leaves_out_levels: bool = False
     outline: NDArray[np.float64] | None = None
+    _kept: list[tuple[_core.Scene, _core.Renderer]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+
+    @contextlib.contextmanager
+    def renderer(self, threads: int = 0) -> Iterator[tuple[_core.Renderer, bool]]:
+        """A renderer of the scene, to be had by one caller at a time, and whether it was built now.
+
+        The last one that nobody has any more stays with the stage, with its hierarchy and what it
+        found out of the lights, for whoever renders it next; `threads` are for building one.
+        """
+        from wavecomb import _core
+
+        renderer = None
+        with contextlib.suppress(IndexError):  # others may have it: pop() alone is safe
+            scene, renderer = self._kept.pop()
+            if scene is not self.scene:
+                renderer = None
+        is_new = renderer is None
+        if renderer is None:
+            renderer = _core.Renderer(self.scene, threads)
+        scene = self.scene
+        try:
+            yield renderer, is_new
+        finally:
+            self._kept[:] = [(scene, renderer)]
