@@ -24,10 +24,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from wavecomb.picture.files import replacing
-from wavecomb.run.stats import machine
+from sitting import RESULTS, write_result
 
-RESULTS = Path(__file__).resolve().parent / "results" / "loading.json"
 STAGES = ("cornell", "mixed", "dragon")
 TIMES = ("python", "imports", "load", "build", "first_sample", "render", "first_picture", "process")
 MEMORY = ("imports_mb", "peak_mb", "parts_mb", "ratio")
@@ -115,14 +113,6 @@ def make_stage(name: str, folder: Path) -> Path:
     return path
 
 
-def commit() -> str:
-    """The commit that is checked out, with "+" where files differ from it."""
-    git = ["git", "-C", str(RESULTS.parent)]
-    run = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
-    changed = subprocess.run([*git, "diff", "--quiet", "HEAD"], check=False).returncode
-    return run.stdout.strip() + ("+" if changed else "")
-
-
 def main() -> None:
     """Runs the sitting."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -131,7 +121,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--size", type=int, default=600)
     parser.add_argument("--threads", type=int, default=0, help="0: all")
-    parser.add_argument("--output", type=Path, default=RESULTS)
+    parser.add_argument("--output", type=Path, default=RESULTS / "loading.json")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     stages = {name: make_stage(name, options.folder) for name in options.stages}
@@ -142,20 +132,12 @@ def main() -> None:
     for _ in range(options.rounds):
         for name in shuffle.sample(list(stages), len(stages)):
             turns[name].append(turn(stages[name], options.size, options.threads))
-    document = {
-        "command": " ".join(["benchmarks/loading.py", *sys.argv[1:]]),
-        "commit": commit(),
-        "machine": machine(),
-        "size": options.size,
-        "threads": options.threads,
-        "stages": {n: {"summary": summary(t), "turns": t} for n, t in turns.items()},
-    }
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(options.output) as part:
-        part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    found = {n: {"summary": summary(t), "turns": t} for n, t in turns.items()}
+    chosen = {name: getattr(options, name) for name in ("rounds", "size", "threads")}
+    write_result(options.output, "wavecomb-loading/1", {**chosen, "stages": found})
     print("| stage | " + " | ".join((*TIMES, *MEMORY)) + " |")
     print("| --- |" + " --- |" * len((*TIMES, *MEMORY)))
-    for name, entry in document["stages"].items():
+    for name, entry in found.items():
         cells = []
         for key in (*TIMES, *MEMORY):
             f, form = entry["summary"][key], ".0f" if key.endswith("mb") else ".2f"

@@ -163,9 +163,7 @@ def render(
     watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
     again = loaded if loaded is source else None
     result, is_built = _render(scene, again, chosen, progress, own, profile, watcher, state)
-    stats = make_stats(result, stage=stage, loaded=loaded)
-    if not is_built:
-        stats["seconds"]["build"] = 0.0
+    stats = make_stats(result, stage=stage, loaded=loaded, is_built=is_built)
     return picture_of(result, stats, scene=scene, aovs=names)
 
 

@@ -368,6 +368,16 @@ def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
         expect_equal(kept, plain(scene_of, scene, "off", (32, 24), 8), threads)
 
 
+def test_a_stage_does_not_keep_what_was_edited(scene_of: Any) -> None:
+    stage = scene_of("cornell")
+    with stage.renderer() as (renderer, _):
+        renderer.edit(materials={0: {"emission": (1, 2, 3)}})
+    picture = render(stage, (32, 24), 8, roulette="off", costs="model")
+    expect_equal(picture, plain(scene_of, "cornell", "off", (32, 24), 8), "edited")
+    with stage.renderer() as (renderer, is_new):
+        assert not is_new and renderer.scene is stage.scene
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_full_waves_of_64_k(scene: str, scene_of: Any) -> None:

@@ -148,10 +148,8 @@ class Frames:
 
     def stats(self, result: Result, **options: Any) -> dict[str, Any]:
         """``make_stats`` of what was rendered last; options: further ones of it."""
-        stats = make_stats(result, stage=os.fspath(self._path), loaded=self._loaded, **options)
-        if not self._is_built:
-            stats["seconds"]["build"] = 0.0
-        return stats
+        options |= {"loaded": self._loaded, "is_built": self._is_built}
+        return make_stats(result, stage=os.fspath(self._path), **options)
 
 
 def render_frames(

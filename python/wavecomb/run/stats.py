@@ -47,16 +47,20 @@ def make_stats(
     stage: str | None = None,
     loaded: LoadedStage | None = None,
     resumed_s: float = 0.0,
+    is_built: bool = True,
 ) -> dict[str, Any]:
     """The statistics of a result, with what the core does not know: stage, load time, machine.
 
-    ``resumed_s`` is what was spent on rendering before this run took over.
+    ``resumed_s`` is what was spent on rendering before this run took over; without ``is_built`` the
+    hierarchy was there, and building it took no time.
 
     Every key of the schema is there; a figure that the core did not give is 0. What the core gives
     beyond the schema is passed on.
     """
     core = dict(result.stats)
     seconds = dict(core.pop("seconds", {}))
+    if not is_built:
+        seconds["build"] = 0.0
     phases, counts = dict(core.pop("phases_s", {})), dict(core.pop("counts", {}))
     phases, counts = (
         {**dict.fromkeys(PHASES, 0.0), **phases},

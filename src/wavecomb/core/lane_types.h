@@ -74,18 +74,12 @@ using drjit::select;
 
 /// Dr.Jit multiplies a packet that is divided by a number by the reciprocal of the number, which
 /// differs in the last bit from what one lane computes. Divide by a packet: `x / F(number)`.
-template <typename T, size_t W, typename Number>
+template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
   requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
-void operator/(const drjit::Packet<T, W>&, const Number&) = delete;
-template <typename T, size_t W, typename Number>
+void operator/(const P<T, W>&, const Number&) = delete;
+template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
   requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
-void operator/(const drjit::Array<T, W>&, const Number&) = delete;
-template <typename T, size_t W, typename Number>
-  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
-void operator/=(drjit::Packet<T, W>&, const Number&) = delete;
-template <typename T, size_t W, typename Number>
-  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
-void operator/=(drjit::Array<T, W>&, const Number&) = delete;
+void operator/=(P<T, W>&, const Number&) = delete;
 
 #if defined(__AVX512F__)
 // Dr.Jit 1.x compares unsigned lanes as signed ones at width 16 alone; these are a better match.

@@ -62,9 +62,7 @@ class LoadedStage:
     working_space: str = "rec709"
     leaves_out_levels: bool = False
     outline: NDArray[np.float64] | None = None
-    _kept: list[tuple[_core.Scene, _core.Renderer]] = field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
+    _kept: list[_core.Renderer] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @contextlib.contextmanager
     def renderer(self, threads: int = 0) -> Iterator[tuple[_core.Renderer, bool]]:
@@ -75,16 +73,12 @@ class LoadedStage:
         """
         from wavecomb import _core
 
-        renderer = None
-        with contextlib.suppress(IndexError):  # others may have it: pop() alone is safe
-            scene, renderer = self._kept.pop()
-            if scene is not self.scene:
-                renderer = None
-        is_new = renderer is None
-        if renderer is None:
-            renderer = _core.Renderer(self.scene, threads)
-        scene = self.scene
+        kept = None
+        with contextlib.suppress(IndexError):  # other threads may have it
+            kept = self._kept.pop()
+        is_new = kept is None or kept.scene is not self.scene  # edited
+        renderer = _core.Renderer(self.scene, threads) if kept is None or is_new else kept
         try:
             yield renderer, is_new
         finally:
-            self._kept[:] = [(scene, renderer)]
+            self._kept[:] = [renderer]
