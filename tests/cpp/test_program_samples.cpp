@@ -123,12 +123,15 @@ struct ByCosine {
     return ShadeSettings(s);
   }();
 
+  /// What of a vertex says so.
+  static constexpr bool has(Feature /*feature*/) { return true; }
+
   BsdfEval<float> eval(const Vec& wo, const Vec& wi) const {
     const BsdfEval<float> e = bsdf.eval(wo, wi);
-    return {e.f_cos, bounce_pdf<Bsdf, float>(settings, bsdf, wo, wi, e)};
+    return {e.f_cos, bounce_pdf<Bsdf, float>(*this, bsdf, wo, bsdf.view(wo), wi, e)};
   }
   BsdfSample<float> sample(const Vec& wo, float l, float u, float v) const {
-    return sample_bounce<Bsdf, float>(settings, bsdf, wo, {l, u, v, 0.f});
+    return sample_bounce<Bsdf, float>(*this, bsdf, wo, bsdf.view(wo), {l, u, v, 0.f});
   }
 };
 

@@ -371,6 +371,51 @@ TEST(Programs, PacketEqualsScalarBitForBit) {
   }
 }
 
+/// `p` as a material that shows these parts only.
+P with_parts(P p, ProgramId program, uint32_t parts) {
+  const auto lacks = [parts](Part part) { return (parts & part) == 0; };
+  if (lacks(kMetals)) {
+    p.metallic = 0;
+    p.flags &= ~uint32_t{kSpecularWorkflow};
+  }
+  if (lacks(kCoats)) p.clearcoat = 0;
+  if (lacks(kPasses)) p.transmission_weight = 0;
+  if (lacks(kPasses) && program == ProgramId::kPrincipled) p.opacity = 1;
+  if (lacks(kBacks)) (p.metallic > 0.5f ? p.thin_walled : p.subsurface_weight) = 0;
+  if (lacks(kFuzzes)) p.fuzz_weight = 0;
+  if (lacks(kFilms)) p.film_weight = 0;
+  if (lacks(kBrushes)) p.anisotropy = p.rotation = 0;
+  return p;
+}
+
+template <uint32_t kVariant>
+void expect_variant_equals_program() {
+  constexpr ProgramId kId = program_of(kVariant);
+  using Full = Program<kId, float>;
+  using Least = VariantBsdf<kVariant, float>;
+  if constexpr (!std::is_same_v<Full, Least>) {
+    std::mt19937 rng(500 + kVariant);
+    for (int round = 0; round < 20000; ++round) {
+      const Inputs in = random_inputs(rng);
+      const P params = with_parts(in.params, kId, kVariants[kVariant].parts);
+      float full[kRecorded], least[kRecorded];
+      record_bits<Full, float>(Full(params, round % 5 == 0), in.wo, in.wi, in.l, in.u, in.v, full);
+      record_bits<Least, float>(Least(params, round % 5 == 0), in.wo, in.wi, in.l, in.u, in.v,
+                                least);
+      for (size_t k = 0; k < kRecorded; ++k)
+        ASSERT_EQ(std::bit_cast<uint32_t>(full[k]), std::bit_cast<uint32_t>(least[k]))
+            << kVariants[kVariant].name << " value " << k << ": " << full[k] << " and " << least[k]
+            << " round " << round;
+    }
+  }
+}
+
+TEST(Programs, VariantsEqualTheirProgramsBitForBit) {
+  [&]<size_t... kVariant>(std::index_sequence<kVariant...>) {
+    (expect_variant_equals_program<kVariant>(), ...);
+  }(std::make_index_sequence<kVariantCount>());
+}
+
 TEST(Programs, NoInputGivesNonsense) {
   std::mt19937 rng(77);
   for (uint32_t id = 0; id < kProgramCount; ++id)

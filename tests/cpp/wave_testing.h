@@ -6,6 +6,7 @@
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/material/energy_tables.h"
 #include "wavecomb/render/pixel_order.h"
 #include "wavecomb/scene/light_tree.h"
 
@@ -47,6 +48,9 @@ class WaveRun {
       context_.wants_position |= (policy->columns() & kPositionColumn) != 0;
     }
     context_.scene = scene_->view();
+    for (const Material& m : scene_->materials())
+      if (m.program == ProgramId::kOpenPbr)
+        context_.scene.materials.energy = EnergyTables::shared(true).data();
     context_.scene.lights.by_tree =
         chooses_by_tree(case_.settings.light_selection, context_.scene.lights);
     context_.accel = accel_.get();

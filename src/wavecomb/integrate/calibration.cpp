@@ -48,9 +48,10 @@ std::vector<CalibrationHits> find_calibration_hits(const Scene& scene) {
 
 std::vector<MaterialTraits> material_traits(const Scene& scene) {
   std::vector<MaterialTraits> traits;
+  const SceneView view = scene.view();
   for (const Material& material : scene.materials()) {
     MaterialTraits t;
-    t.program = static_cast<uint32_t>(material.program);
+    t.program = view.material_variant[traits.size()];
     for (const TextureUse& use : material.textures) {
       if (use.texture == kNoTexture) continue;
       const uint64_t bytes = scene.textures()[use.texture]->spanned_bytes();

@@ -7,6 +7,7 @@
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/core/vec.h"
+#include "wavecomb/integrate/features.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/hit.h"
 #include "wavecomb/surface/surface.h"
@@ -102,8 +103,8 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
 
 /// What all steps of a vertex are told of it. `depth` 0 is the first one; `t` is the length of the
 /// ray that led there. `hit` and `geom` (geometry within the instance's group) are of a surface;
-/// where the vertex is on none, `hit.inst` is kNoSurface.
-template <typename F>
+/// where the vertex is on none, `hit.inst` is kNoSurface. `kFeatures` is what the kernel knows of.
+template <typename F, uint32_t kFeatures = kEverything>
 struct Vertex {
   const SceneView& scene;
   const ShadeSettings& settings;
@@ -117,7 +118,11 @@ struct Vertex {
   VertexAovs<F>* aovs;  ///< null where none are wanted
   const Mask<F>& active;
 
-  bool wants_lights() const { return aovs && aovs->wants_lights; }
+  static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
+  /// What AOVs are to be given; null where nothing is.
+  VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
+  bool wants_lights() const { return notes() && aovs->wants_lights; }
+  bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 
 /// A shadow ray ends at this share of the way to the light, and so before its surface.

@@ -14,32 +14,46 @@
 namespace wavecomb {
 
 // In stages/shade_batch.h and vertex.h.
-template <typename Bsdf, typename F>
+template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end);
-template <typename Bsdf, typename F>
-VertexResult<F> shade_vertex(const Vertex<F>& v);
+template <typename Bsdf, typename F, uint32_t kFeatures>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v);
 
 namespace detail {
+template <typename F>
+using BatchKernels =
+    std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything>), kVariantCount>;
+
 template <typename F, typename... Bsdf>
 constexpr auto batch_kernels(ProgramList<Bsdf...>) {
-  std::array<decltype(&shade_batch<DiffuseBsdf<F>, F>), kProgramCount> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F>), ...);
+  BatchKernels<F> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F, kEverything>), ...);
+  for (uint32_t v = kProgramCount; v < kVariantCount; ++v)
+    kernels[v] = kernels[static_cast<size_t>(program_of(v))];
   return kernels;
+}
+template <typename F, size_t... kVariant>
+constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
+  return BatchKernels<F>{&shade_batch<VariantBsdf<kVariant, F>, F, kPlain>...};
 }
 template <typename F, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
-  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F>), kProgramCount> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F>), ...);
+  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kEverything>), ...);
   return kernels;
 }
 }  // namespace detail
 
-/// By ProgramId, the kernels of the programs of a list: shade_batch, for the wave, and
-/// shade_vertex, for the reference.
+/// The kernels of the programs of a list: shade_batch, for the wave, by variant (all of a program
+/// are the program), and shade_vertex, for the reference, by ProgramId.
 template <typename F, typename List>
 inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
 template <typename F, typename List>
 inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
+/// Plain kernels by variant; only where kHasPlain.
+template <typename F>
+inline constexpr auto kShadePlain =
+    detail::plain_batch_kernels<F>(std::make_index_sequence<kVariantCount>());
 
 }  // namespace wavecomb

@@ -12,8 +12,8 @@
 namespace wavecomb {
 
 /// Shades a vertex of the active lanes' paths with program `Bsdf`.
-template <typename Bsdf, typename F>
-VertexResult<F> shade_vertex(const Vertex<F>& v) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
   using U = UInt<F>;
   VertexResult<F> out;
   out.emitted = Color<F>(F(0.f));
@@ -33,16 +33,18 @@ VertexResult<F> shade_vertex(const Vertex<F>& v) {
   const Vec3<F> wo = frame.to_local(-v.path.dir);
   at.note(v, frame);
   if (v.depth >= v.settings.max_depth) return out;
-  if (v.scene.lights.links.members) [[unlikely]]
+  if (v.has_links()) [[unlikely]]
     out.next.link = at.link_class(v);
+
+  const auto seen = at.bsdf.view(wo);
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
-  sample_light<Bsdf, F>(v, at, frame, wo, r_light, receiver, out);
+  sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, receiver, out);
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
-  scatter<Bsdf, F>(v, at, frame, wo, r_bsdf, receiver, out);
+  scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, receiver, out);
   survive<F>(v, r_light.w, out);
   return out;
 }

@@ -46,6 +46,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     store_row<RadianceRow, float>(wave.pool.radiance, i, {}, true);
     if (wave.pool.cold) store_row<PathColdRow, float>(wave.pool.cold, i, {u, 0u}, true);
   }
+  const auto& kernels = kernels_for<F, NoMedia>(wave, context, settings, 1);
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {
     // Packets that are to be filled in part only are batches of their own.
@@ -54,8 +55,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
             ? std::min(queue.size,
                        static_cast<size_t>(hits.fill * static_cast<float>(W * batch) + 0.5f))
             : batch_end<F>(queue, begin);
-    kShadeBatch<F, Programs<F>>[context.traits[hits.material].program](wave, context, settings, 1,
-                                                                       begin, end);
+    kernels[context.traits[hits.material].program](wave, context, settings, 1, begin, end);
     begin = end;
   }
   const auto stop = PhaseClock::Clock::now();

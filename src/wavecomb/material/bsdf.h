@@ -11,10 +11,12 @@
 ///   Bsdf(const Params&, bool schlick);
 ///   Color<F> albedo() const;               for the AOV: diffuse and specular colour
 ///   Mask<F> has_non_delta() const;         lanes where light sampling makes sense
+///   View view(wo) const;                   what depends on wo alone; wo itself in the simple ones
 ///   F delta_probability(wo) const;         with which sample() chooses a delta lobe
 ///   BsdfEval<F> eval(wo, wi) const;
 ///   Color<F> diffuse_f_cos(wo, wi) const;  the part of eval's that counts as diffuse
 ///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    numbers in [0, 1)
+/// The four of them take a view in place of wo, too.
 ///
 /// A program that shades what is no surface (kOnSurface false: an event in a medium) is the same
 /// with a phase function in place of the BSDF, without a cosine, and has
@@ -34,7 +36,14 @@ struct BsdfTraits {
   static constexpr bool kHasNonDelta = true;    ///< has lobes that light sampling makes sense for
   static constexpr bool kTransmits = false;     ///< those may lead to the other side
   static constexpr bool kHasTerminator = true;  ///< rays start beyond the terminator of its normals
+  static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
   static constexpr bool kOnSurface = true;      ///< shades hits; or else it has an `interact`
+
+  /// What depends on wo alone, as the functions below take it: wo, unless a program says more.
+  template <typename Wo>
+  static const Wo& view(const Wo& wo) {
+    return wo;
+  }
 };
 
 /// f(wo, wi) |cos theta_i| and the solid-angle density with which sample() would have chosen wi.

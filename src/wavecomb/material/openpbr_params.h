@@ -18,7 +18,7 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   const float* energy;  ///< EnergyTables
 
   /// fetch_params for this program.
-  template <uint32_t kInputs, typename MakePoint>
+  template <uint32_t kInputs, bool kGraphs = true, typename MakePoint>
   static OpenPbrParams fetch(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                              const F& uv_width, const MakePoint& make_point, const Mask<F>& active);
 
@@ -46,7 +46,7 @@ inline std::array<F*, kGraphOutputCount> parameter_places(OpenPbrParams<F>& p) {
 }
 
 template <typename F>
-template <uint32_t kInputs, typename MakePoint>
+template <uint32_t kInputs, bool kGraphs, typename MakePoint>
 inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const UInt<F>& material,
                                                 const Vec2<F>& uv, const F& uv_width,
                                                 const MakePoint& make_point,
@@ -62,7 +62,7 @@ inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const 
   static_cast<OpenPbrInputs<F>&>(p) = r.template row<OpenPbrInputs>();
   p.thin_walled = r[&R::thin_walled];
   p.energy = view.energy;
-  complete_params<F>(view, material, make_point, active, p);
+  if constexpr (kGraphs) complete_params<F>(view, material, make_point, active, p);
   return p;
 }
 

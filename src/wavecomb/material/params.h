@@ -74,14 +74,15 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
 
 /// The parameters of material `material` at `uv`, in sane ranges. Only inputs in `kInputs` read
 /// textures; the others give their constants. `uv_width` is the ray's footprint in uv units.
-/// `opacity` is 1 where it is presence, which fetch_opacity gives. Inactive lanes hold anything
-/// finite. Graphs are given what `make_point` says.
-template <uint32_t kInputs, typename F, typename MakePoint>
+/// Materials without graphs may say so by kGraphs. `opacity` is 1 where it is presence, which
+/// fetch_opacity gives. Inactive lanes hold anything finite. Graphs are given what `make_point`
+/// says.
+template <uint32_t kInputs, typename F, bool kGraphs = true, typename MakePoint>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const F& uv_width,
                                               const MakePoint& make_point, const Mask<F>& active) {
   auto p = detail::evaluate_params<kInputs, F>(view, material, uv, uv_width, active);
-  complete_params<F>(view, material, make_point, active, p);
+  if constexpr (kGraphs) complete_params<F>(view, material, make_point, active, p);
   return p;
 }
 /// The same where graphs have nothing but uv.
@@ -115,10 +116,11 @@ WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const
                                             const Vec2<F>& uv, const F& uv_width,
                                             const MakePoint& make_point, const Mask<F>& active) {
   if constexpr (requires { typename Bsdf::Params; })
-    return Bsdf::Params::template fetch<kInputs>(materials, material, uv, uv_width, make_point,
-                                                 active);
+    return Bsdf::Params::template fetch<kInputs, Bsdf::kTextured>(materials, material, uv, uv_width,
+                                                                  make_point, active);
   else
-    return fetch_params<kInputs, F>(materials, material, uv, uv_width, make_point, active);
+    return fetch_params<kInputs, F, Bsdf::kTextured>(materials, material, uv, uv_width, make_point,
+                                                     active);
 }
 
 }  // namespace wavecomb

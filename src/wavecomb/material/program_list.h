@@ -8,7 +8,7 @@
 #include <tuple>
 #include <type_traits>
 
-#include "wavecomb/scene/material_data.h"
+#include "wavecomb/scene/material_parts.h"
 
 namespace wavecomb {
 
@@ -22,9 +22,9 @@ template <typename F>
 class PlasticBsdf;
 template <typename F>
 class EmissiveBsdf;
-template <typename F>
+template <typename F, uint32_t kParts = kAllParts>
 class PrincipledBsdf;
-template <typename F>
+template <typename F, uint32_t kParts = kAllParts>
 class OpenPbrBsdf;
 
 template <typename... Bsdf>
@@ -36,13 +36,6 @@ template <typename F>
 using Programs = ProgramList<DiffuseBsdf<F>, MetalBsdf<F>, DielectricBsdf<F>, PlasticBsdf<F>,
                              EmissiveBsdf<F>, PrincipledBsdf<F>, OpenPbrBsdf<F>>;
 static_assert(Programs<float>::kSize == kProgramCount);
-
-/// The id of the program called `name`; no constant where there is none.
-constexpr ProgramId program_id(std::string_view name) {
-  uint32_t i = 0;
-  while (name != kProgramNames[i]) ++i;
-  return static_cast<ProgramId>(i);
-}
 
 namespace detail {
 template <typename Wanted, typename... Bsdf>
@@ -68,5 +61,23 @@ constexpr size_t id_of() {
 /// The class of program `kId`.
 template <ProgramId kId, typename F>
 using Program = decltype(detail::program_at<static_cast<size_t>(kId)>(Programs<F>{}));
+
+namespace detail {
+template <uint32_t kVariant, typename F>
+auto variant_class() {
+  constexpr ProgramId kId = program_of(kVariant);
+  constexpr uint32_t kParts = kVariants[kVariant].parts;
+  if constexpr (kParts == kAllParts)
+    return std::type_identity<Program<kId, F>>();
+  else if constexpr (kId == ProgramId::kPrincipled)
+    return std::type_identity<PrincipledBsdf<F, kParts>>();
+  else
+    return std::type_identity<OpenPbrBsdf<F, kParts>>();
+}
+}  // namespace detail
+
+/// The class of a variant.
+template <uint32_t kVariant, typename F>
+using VariantBsdf = typename decltype(detail::variant_class<kVariant, F>())::type;
 
 }  // namespace wavecomb

@@ -21,7 +21,7 @@ std::vector<MaterialStatistics> material_statistics(const std::vector<WorkerView
   for (size_t m = 0; m < context.traits.size(); ++m) {
     MaterialStatistics material;
     material.name = scene.materials()[m].name;
-    material.program = kProgramNames[context.traits[m].program];
+    material.program = kProgramNames[static_cast<size_t>(scene.materials()[m].program)];
     for (const WorkerView& worker : workers)
       if (worker.costs) material.records += worker.costs->seen()[m];
     material.timed_records = costs.total_timed()[m];

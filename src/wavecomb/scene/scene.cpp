@@ -67,6 +67,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.emissive_lights = lights_->emissive.data();
   v.mesh_lights = lights_->mesh_lights.empty() ? nullptr : lights_->mesh_lights.data();
   v.material_program = materials_->programs.data();
+  v.material_variant = materials_->variants.data();
   v.materials.materials = materials_->records.data();
   v.materials.uses = materials_->uses.data();
   v.materials.textures = geometry_->texture_views.data();

@@ -25,6 +25,7 @@ struct SceneView {
   /// Likewise the record of a mesh light, or kNoLight. Null where there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
   const uint32_t* material_program = nullptr;
+  const uint32_t* material_variant = nullptr;  ///< material_parts.h
   MaterialView materials;
   LightView lights;
   MotionView motion;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "wavecomb/graph/parameters.h"
+#include "wavecomb/scene/material_parts.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
@@ -107,6 +108,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     }
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
+    variants.push_back(least_variant(m.program, parts_of(m, *graphs)));
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();
   }

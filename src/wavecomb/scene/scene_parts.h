@@ -114,7 +114,8 @@ struct SceneMaterials {
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
-  std::vector<uint32_t> programs;
+  std::vector<uint32_t> programs;      ///< by material
+  std::vector<uint32_t> variants;      ///< by material: of its program, the least one
   std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
   bool has_presence = false, has_emission = false;
 };

@@ -10,19 +10,21 @@
 namespace wavecomb {
 
 /// Everything about the surface at a hit. `with_uv`: uv, dpdu and uv_per_length are wanted.
-/// `dir` is the unit direction of the ray that hit.
+/// `dir` is the unit direction of the ray that hit. Scenes without curves, and those where nothing
+/// moves, may say so to the compiler.
 ///
 /// The offset bounds the distance between p and the true surface: interpolation, transform and the
 /// traversal's own rounding, in the manner of Pharr, Jakob, Humphreys, "Physically Based
 /// Rendering", section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator",
 /// Ray Tracing Gems II.
-template <typename F>
+template <typename F, bool kWithCurves = true, bool kWithMotion = true>
 WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
                                          const Vec3<F>& dir, bool with_uv, bool with_terminator,
                                          const Mask<F>& lanes) {
   using U = UInt<F>;
   Mask<F> active = lanes;
-  if (scene.has_curves) active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
+  if (kWithCurves && scene.has_curves)
+    active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
   const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const U corner = hit.prim * 3u;
@@ -31,7 +33,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
   Vec3<F> p2 = mesh.vec3(&MeshRecord::positions, i2, active);
   F moved_size(0.f);
-  if (scene.has_motion) [[unlikely]] {
+  if (kWithMotion && scene.has_motion) [[unlikely]] {
     const MovedTriangle<F> moved =
         moved_triangle<F>(scene, hit.inst, hit.mesh, {i0, i1, i2}, hit.time, maps, active);
     p0 = moved.p[0];
@@ -62,7 +64,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   s.offset =
       max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
   // And what lies between steps was rounded as they are.
-  if (scene.has_motion) [[unlikely]]
+  if (kWithMotion && scene.has_motion) [[unlikely]]
     s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
 
   s.ns = s.ng;
@@ -77,7 +79,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
     Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
     Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
-    if (scene.has_motion) [[unlikely]] {
+    if (kWithMotion && scene.has_motion) [[unlikely]] {
       const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
       n0 = moved[0];
       n1 = moved[1];
@@ -117,7 +119,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     const Vec3<F> tangent = maps.vector(e1 * d2.y - e2 * d1.y);
     s.dpdu = select<F>(det < 0.f, -tangent, tangent);
   }
-  if (scene.has_curves) {
+  if (kWithCurves && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);
     if (any(curved)) detail::setup_curved<F>(scene, hit, with_uv, curved, s);
   }

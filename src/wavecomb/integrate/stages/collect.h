@@ -99,7 +99,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     U material = hit_material<F>(scene, inherited, mesh, prim, surface);
     if constexpr (Media::kAny)
       material = select(Mask<U>(flight.stopped), flight.material, material);
-    const U program = gather<U>(scene.material_program, material, Mask<U>(recorded()));
+    const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
     if (notes_hits)
       wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,
                                surface);

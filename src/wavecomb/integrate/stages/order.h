@@ -65,7 +65,7 @@ struct PacketEstimate {
 };
 inline PacketEstimate estimate_packets(std::span<const uint32_t> program, size_t width) {
   PacketEstimate e;
-  std::array<uint32_t, kProgramCount> histogram{};
+  std::array<uint32_t, kVariantCount> histogram{};
   size_t run = 0;
   for (size_t i = 0; i < program.size(); ++i) {
     ++histogram[program[i]];

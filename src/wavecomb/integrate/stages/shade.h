@@ -52,10 +52,29 @@ inline void spread_batch(Wave& wave, size_t begin, size_t end,
   wave.aovs.spread_cost(end - begin, start, slot);
 }
 
+/// Whether vertices of this depth ask for nothing that plain kernels know nothing of.
+inline bool is_plain(const Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                     uint32_t depth) {
+  const SceneView& scene = context.scene;
+  return !scene.has_motion && !scene.has_curves && !context.links() && !scene.mesh_lights &&
+         !scene.lights.has_sampled_only && !wave.aovs.wants_vertex(depth) && !wave.history &&
+         !settings.cosine_sampling && !settings.schlick_fresnel;
+}
+
+/// The kernels, by variant, for vertices of this depth.
+template <typename F, typename Media>
+const detail::BatchKernels<F>& kernels_for(const Wave& wave, const WaveContext& context,
+                                           const ShadeSettings& settings, uint32_t depth) {
+  if constexpr (kHasPlain<F> && !Media::kAny)
+    if (is_plain(wave, context, settings, depth)) return kShadePlain<F>;
+  return kShadeBatch<F, typename Media::template Programs<F>>;
+}
+
 /// Shades the whole queue, batch by batch.
 template <typename F, typename Media>
 void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
   const ShadingQueue& queue = wave.shading;
+  const auto& kernels = kernels_for<F, Media>(wave, context, settings, depth);
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
     const size_t end = batch_end<F>(queue, begin);
@@ -64,8 +83,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
     if (timed || wave.aovs.wants_cost()) start = PhaseClock::Clock::now();
-    kShadeBatch<F, typename Media::template Programs<F>>[program](wave, context, settings, depth,
-                                                                  begin, end);
+    kernels[program](wave, context, settings, depth, begin, end);
     if (timed) charge_batch(wave, begin, end, start);
     if (wave.aovs.wants_cost()) spread_batch(wave, begin, end, start);
     begin = end;

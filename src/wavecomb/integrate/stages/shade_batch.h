@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-/// Shades records [begin, end) of the queue's order, all of program `Bsdf`, W at a time. A path's
+/// Shades records [begin, end) of the queue's order, all of variant `Bsdf`, W at a time. A path's
 /// next ray takes the place of its last in the pool; what became of it is noted by arrival.
-template <typename Bsdf, typename F>
+template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {
   using U = UInt<F>;
@@ -19,8 +19,10 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
   VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
-  const bool wants_aovs = wave.aovs.wants_vertex(depth);
-  const bool is_watched = wants_aovs || wave.history;
+  using V = Vertex<F, kFeatures>;
+  const bool wants_aovs = V::has(kNotes) && wave.aovs.wants_vertex(depth);
+  const bool is_watched = wants_aovs || (V::has(kNotes) && wave.history);
+  const bool links = V::has(kLinks) && context.links();
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(end - i);
     const Mask<U> on(active);
@@ -32,7 +34,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     const U material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, on)
                                      : load<U>(queue.uints(Q::kMaterial) + i);
     MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
-    if (context.scene.has_motion) [[unlikely]]
+    if (V::has(kMotion) && context.scene.has_motion) [[unlikely]]
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
     const auto path = load_row<PathRow, F>(pool.paths, slot, active);
     const F t = r.t;
@@ -44,16 +46,16 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                        path.cone_spread,
                        path.o,
                        path.receiver};
-    if (context.links() && context.scene.mesh_lights && depth > 0) [[unlikely]]
+    if (links && context.scene.mesh_lights && depth > 0) [[unlikely]]
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
     const VertexResult<F> v =
-        shade_vertex<Bsdf, F>({context.scene, settings, path.key, depth, hit, r.geom, t, material,
-                               state, wants_aovs ? &aovs : nullptr, active});
+        shade_vertex<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
+                                state, wants_aovs ? &aovs : nullptr, active});
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
     U lit_by(0u);
-    if (aovs.wants_lights) {
+    if (V::has(kNotes) && aovs.wants_lights) {
       wave.aovs.template add<F>(slot, wave.aovs.template group_of<F>(aovs.emitter, emits),
                                 v.emitted, emits);
       lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
@@ -77,8 +79,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
                              v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
                             v.alive);
-    if (context.links())
-      scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
+    if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }

@@ -15,35 +15,36 @@
 namespace wavecomb {
 
 /// Whether bounces of program `Bsdf` are sampled by cosine.
-template <typename Bsdf>
-inline bool samples_by_cosine(const ShadeSettings& settings) {
-  return settings.cosine_sampling && !Bsdf::kTransmits;
+template <typename Bsdf, typename V>
+inline bool samples_by_cosine(const V& vertex) {
+  return V::has(kExperiments) && vertex.settings.cosine_sampling && !Bsdf::kTransmits;
 }
 
 /// Density of a bounce by cosine.
-template <typename Bsdf, typename F>
-inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
-  const F rest = max(F(1.f - bsdf.delta_probability(wo)), F(0.f));
+template <typename Bsdf, typename F, typename View>
+inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const View& seen,
+                           const Vec3<F>& wi) {
+  const F rest = max(F(1.f - bsdf.delta_probability(seen)), F(0.f));
   return select(F(wo.z * wi.z) > 0.f, F(rest * cosine_hemisphere_pdf(abs(wi.z))), F(0.f));
 }
 
 /// Density with which a bounce would have gone along wi, where the BSDF is `e`.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE F bounce_pdf(const ShadeSettings& settings, const Bsdf& bsdf, const Vec3<F>& wo,
+template <typename Bsdf, typename F, typename V, typename View>
+WAVECOMB_INLINE F bounce_pdf(const V& v, const Bsdf& bsdf, const Vec3<F>& wo, const View& seen,
                              const Vec3<F>& wi, const BsdfEval<F>& e) {
-  return samples_by_cosine<Bsdf>(settings) ? cosine_bounce_pdf(bsdf, wo, wi) : e.pdf;
+  return samples_by_cosine<Bsdf>(v) ? cosine_bounce_pdf(bsdf, wo, seen, wi) : e.pdf;
 }
 
 /// A bounce, by the numbers of `r`.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE BsdfSample<F> sample_bounce(const ShadeSettings& settings, const Bsdf& bsdf,
-                                            const Vec3<F>& wo, const Sample4<F>& r) {
-  BsdfSample<F> b = bsdf.sample(wo, r.x, r.y, r.z);
-  if (samples_by_cosine<Bsdf>(settings)) {
+template <typename Bsdf, typename F, typename V, typename View>
+WAVECOMB_INLINE BsdfSample<F> sample_bounce(const V& vertex, const Bsdf& bsdf, const Vec3<F>& wo,
+                                            const View& seen, const Sample4<F>& r) {
+  BsdfSample<F> b = bsdf.sample(seen, r.x, r.y, r.z);
+  if (samples_by_cosine<Bsdf>(vertex)) {
     Vec3<F> wi = square_to_cosine_hemisphere(r.y, r.z);
     wi.z = select(wo.z < 0.f, F(-wi.z), wi.z);
-    const F pdf = cosine_bounce_pdf(bsdf, wo, wi);
-    const BsdfEval<F> e = bsdf.eval(wo, wi);
+    const F pdf = cosine_bounce_pdf(bsdf, wo, seen, wi);
+    const BsdfEval<F> e = bsdf.eval(seen, wi);
     const Mask<F> use = not_(b.is_delta) & (pdf > 0.f);
     const F inv = 1.f / select(pdf > 0.f, pdf, F(1.f));
     b.wi = select<F>(use, wi, b.wi);

@@ -59,12 +59,13 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
 }
 
 /// What a path gets of the surface at a vertex that glows itself. Notes the emitter for AOVs.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE Color<F> emit(const Vertex<F>& v, const SurfaceInteraction<Bsdf, F>& at) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
+                              const SurfaceInteraction<Bsdf, F>& at) {
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   Color<F> emission = at.params.emission;
-  if (scene.mesh_lights) [[unlikely]]
+  if (v.has(kMeshLights) && scene.mesh_lights) [[unlikely]]
     emission =
         mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);
   const Mask<F> emits = v.active & not_(is_black(emission));

@@ -33,11 +33,14 @@ struct SurfaceInteraction {
   Color<F> throughput;  ///< of the path, up to the surface
 
   /// What the BSDF's directions are local to: z is the shading normal.
-  Frame<F> frame(const Vertex<F>& v) const;
+  template <uint32_t kFeatures>
+  Frame<F> frame(const Vertex<F, kFeatures>& v) const;
   /// Notes for AOVs what is seen here, where they are wanted.
-  void note(const Vertex<F>& v, const Frame<F>& frame) const;
+  template <uint32_t kFeatures>
+  void note(const Vertex<F, kFeatures>& v, const Frame<F>& frame) const;
   /// The class that linking knows it by.
-  UInt<F> link_class(const Vertex<F>& v) const;
+  template <uint32_t kFeatures>
+  UInt<F> link_class(const Vertex<F, kFeatures>& v) const;
   /// Where a ray starts that leaves along `dir`.
   Vec3<F> origin(const Vec3<F>& dir) const;
   /// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light
@@ -47,24 +50,30 @@ struct SurfaceInteraction {
 
 /// The surface with the values of its material. Texture coordinates are worked out only where a
 /// texture or an AOV asks for them.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F>& v) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F, kFeatures>& v) {
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   const PathState<F>& path = v.path;
-  const U textured_inputs = gather_member<F>(
-      scene.materials.materials, &MaterialRecord::textured_inputs, v.material, v.active);
-  const Mask<F> reads_texture =
-      v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) != U(0u));
-  const bool textured = any(reads_texture);
-  const bool wants_uv = textured || (v.aovs && v.aovs->wants_uv);
-  const Surface<F> s =
-      setup_surface<F>(scene, v.hit, path.dir, wants_uv, Bsdf::kHasTerminator, v.active);
+  U textured_inputs(0u);
+  Mask<F> reads_texture(false);
+  bool textured = false;
+  if constexpr (Bsdf::kTextured) {
+    textured_inputs = gather_member<F>(scene.materials.materials, &MaterialRecord::textured_inputs,
+                                       v.material, v.active);
+    reads_texture =
+        v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) != U(0u));
+    textured = any(reads_texture);
+  }
+  const bool wants_uv = textured || (v.notes() && v.aovs->wants_uv);
+  const Surface<F> s = setup_surface<F, v.has(kCurves), v.has(kMotion)>(
+      scene, v.hit, path.dir, wants_uv, Bsdf::kHasTerminator, v.active);
   const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
   const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
 
   MaterialView materials = scene.materials;
-  materials.schlick_fresnel = v.settings.schlick_fresnel;
+  const bool schlick = v.has(kExperiments) && v.settings.schlick_fresnel;
+  materials.schlick_fresnel = schlick;
   const auto make_point = [&](const Mask<F>& lanes) {
     // Copies, as everything is that only graphs are given.
     const MeshHit<F> at = v.hit;
@@ -77,14 +86,12 @@ WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F>& v)
                                                               make_point, v.active);
   Color<F> throughput = path.throughput;
   if constexpr (Bsdf::kAbsorbs) throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
-  return {
-      textured_inputs, reads_texture, textured, s, params, Bsdf(params, v.settings.schlick_fresnel),
-      throughput};
+  return {textured_inputs, reads_texture, textured, s, params, Bsdf(params, schlick), throughput};
 }
 
 /// What program `Bsdf` has met.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE auto interact(const Vertex<F>& v) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE auto interact(const Vertex<F, kFeatures>& v) {
   if constexpr (Bsdf::kOnSurface)
     return interact_surface<Bsdf, F>(v);
   else
@@ -94,9 +101,10 @@ WAVECOMB_INLINE auto interact(const Vertex<F>& v) {
 /// The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing
 /// but its own hit, whatever its neighbours are.
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F>& v) const {
+template <uint32_t kFeatures>
+WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {
   using U = UInt<F>;
-  if (!textured) return make_frame<F>(s.ns);
+  if (!Bsdf::kTextured || !textured) return make_frame<F>(s.ns);
   const Vec3<F>& dir = v.path.dir;
   Vec3<F> n = s.ns;
   const Vec3<F> tangent = select<F>(reads_texture, s.dpdu, Vec3<F>(F(0.f)));
@@ -111,9 +119,10 @@ WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F>& v) 
 }
 
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE void SurfaceInteraction<Bsdf, F>::note(const Vertex<F>& v,
+template <uint32_t kFeatures>
+WAVECOMB_INLINE void SurfaceInteraction<Bsdf, F>::note(const Vertex<F, kFeatures>& v,
                                                        const Frame<F>& frame) const {
-  if (!v.aovs) return;
+  if (!v.notes()) return;
   v.aovs->albedo = bsdf.albedo();
   v.aovs->normal = select<F>(dot(v.path.dir, s.ng) > 0.f, -frame.n, frame.n);
   v.aovs->is_clear = not_(bsdf.has_non_delta());
@@ -121,7 +130,9 @@ WAVECOMB_INLINE void SurfaceInteraction<Bsdf, F>::note(const Vertex<F>& v,
 }
 
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE UInt<F> SurfaceInteraction<Bsdf, F>::link_class(const Vertex<F>& v) const {
+template <uint32_t kFeatures>
+WAVECOMB_INLINE UInt<F> SurfaceInteraction<Bsdf, F>::link_class(
+    const Vertex<F, kFeatures>& v) const {
   return wavecomb::link_class<F>(v.scene, v.hit.inst, v.geom, v.active);
 }
 

@@ -14,9 +14,9 @@
 namespace wavecomb {
 
 /// Who light is chosen for; its place is set where light is sampled.
-template <typename Bsdf, typename F>
-WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F>& v, const Frame<F>& frame,
-                                                const Vec3<F>& wo) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
+                                                const Frame<F>& frame, const Vec3<F>& wo) {
   LightReceiver<F> receiver(Vec3<F>(F(0.f)));
   if (v.scene.lights.by_tree) {
     // What reflects alone is lit on the side that it is seen from.
@@ -30,10 +30,11 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F>& v, const Frame<
 
 /// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
 /// known.
-template <typename Bsdf, typename F, typename Interaction>
-WAVECOMB_INLINE void sample_light(const Vertex<F>& v, const Interaction& at, const Frame<F>& frame,
-                                  const Vec3<F>& wo, const Sample4<F>& r,
-                                  LightReceiver<F>& receiver, VertexResult<F>& out) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
+WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                  const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
+                                  const Sample4<F>& r, LightReceiver<F>& receiver,
+                                  VertexResult<F>& out) {
   using U = UInt<F>;
   const LightView& lights = v.scene.lights;
   const Mask<F> lit = v.active & at.bsdf.has_non_delta();
@@ -42,21 +43,22 @@ WAVECOMB_INLINE void sample_light(const Vertex<F>& v, const Interaction& at, con
   receiver.p = at.origin(-v.path.dir);
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, lit);
   const Vec3<F> wi = frame.to_local(l.wi);
-  const BsdfEval<F> e = at.bsdf.eval(wo, wi);
-  const F p_bsdf = bounce_pdf(v.settings, at.bsdf, wo, wi, e);
+  const BsdfEval<F> e = at.bsdf.eval(seen, wi);
+  const F p_bsdf = bounce_pdf(v, at.bsdf, wo, seen, wi, e);
   F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bsdf), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
   U light(kNoLight);
-  if (lights.has_sampled_only || lights.links.members || v.wants_lights()) [[unlikely]]
+  const bool sampled_only = v.has(kMeshLights) && lights.has_sampled_only;
+  if (sampled_only || v.has_links() || v.wants_lights()) [[unlikely]]
     light = chosen_light<F>(lights, receiver, r.x, lit);
-  if (lights.has_sampled_only) [[unlikely]] {
+  if (sampled_only) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);
-    const Color<F> diffuse = at.bsdf.diffuse_f_cos(wo, wi);
+    const Color<F> diffuse = at.bsdf.diffuse_f_cos(seen, wi);
     f_cos = select<F>(effect.sampled_only,
                       fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
     w = select(effect.sampled_only, F(1.f), w);
   }
-  if (lights.links.members) [[unlikely]] {
+  if (v.has_links()) [[unlikely]] {
     w = select(shines_on<F>(lights, out.next.link, light, lit), w, F(0.f));
     out.shadow_set = shadow_set<F>(lights, light, lit);
   }

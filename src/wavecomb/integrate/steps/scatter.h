@@ -9,12 +9,13 @@
 
 namespace wavecomb {
 
-template <typename Bsdf, typename F, typename Interaction>
-WAVECOMB_INLINE void scatter(const Vertex<F>& v, const Interaction& at, const Frame<F>& frame,
-                             const Vec3<F>& wo, const Sample4<F>& r,
-                             const LightReceiver<F>& receiver, VertexResult<F>& out) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
+WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& at,
+                             const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
+                             const Sample4<F>& r, const LightReceiver<F>& receiver,
+                             VertexResult<F>& out) {
   const PathState<F>& path = v.path;
-  const BsdfSample<F> b = sample_bounce<Bsdf, F>(v.settings, at.bsdf, wo, r);
+  const BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, seen, r);
   const Vec3<F> d = normalize(frame.to_world(b.wi));
   out.next.dir = d;
   out.next.throughput = at.throughput * b.weight;

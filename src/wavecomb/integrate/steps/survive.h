@@ -49,8 +49,8 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
 }
 
 /// Roulette by throughput, after a vertex; `u` in [0, 1).
-template <typename F>
-WAVECOMB_INLINE void survive(const Vertex<F>& v, const F& u, VertexResult<F>& out) {
+template <typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const F& u, VertexResult<F>& out) {
   if (!v.settings.roulette || v.depth + 1 < v.settings.roulette_depth) return;
   const F largest = max_component(out.next.throughput);
   const F q = min(F(largest * out.next.eta_scale * kRouletteGain), F(1.f));

@@ -9,6 +9,7 @@
 #include "wavecomb/material/lobes/rough_dielectric.h"
 #include "wavecomb/material/lobes/thin_film.h"
 #include "wavecomb/material/openpbr_params.h"
+#include "wavecomb/scene/material_parts.h"
 
 namespace wavecomb {
 
@@ -35,7 +36,7 @@ struct OpenPbrFacet {
   /// Probability with which a facet is sampled for reflection.
   F reflect_share() const {
     const F up = importance(reflect) * ways.up, down = importance(transmit) * ways.down;
-    return select(F(up + down) > 0.f, F(up / max(F(up + down), F(1e-20f))), F(1.f));
+    return select(down > 0.f, F(up / max(F(up + down), F(1e-20f))), F(1.f));
   }
 };
 
@@ -54,8 +55,10 @@ struct OpenPbrFacet {
 /// to: s is the same sum for the bare, unbrushed interface whose E_R + E_T the table has, so that a
 /// film changes how a facet shares its light out and not how much there is; for brushed ones s = 1,
 /// and nothing else is given back.
-template <typename F>
+template <typename F, uint32_t kParts = kAllParts>
 struct OpenPbrBase {
+  static constexpr bool kGlass = (kParts & kPasses) != 0, kFilm = (kParts & kFilms) != 0,
+                        kBrush = (kParts & kBrushes) != 0;
   F metal, opaque, glass;  ///< shares; their sum is 1
   F roughness;
   AnisotropicGgx<F> ggx;
@@ -71,13 +74,20 @@ struct OpenPbrBase {
   explicit OpenPbrBase(const OpenPbrParams<F>& p) {
     const F coat = p.clearcoat;
     metal = p.metallic;
-    glass = F(1.f - metal) * p.transmission_weight;
-    opaque = F(1.f - metal) * F(1.f - p.transmission_weight);
+    opaque = F(1.f - metal);
+    glass = F(0.f);
+    if constexpr (kGlass) {
+      glass = F(1.f - metal) * p.transmission_weight;
+      opaque = F(1.f - metal) * F(1.f - p.transmission_weight);
+    }
     // Light that crosses a rough coat meets a rougher base ("Coat roughening").
     const F r4 = sqr(F(p.roughness * p.roughness));
-    const F c4 = sqr(F(p.clearcoat_roughness * p.clearcoat_roughness));
-    const F rougher = sqrt(sqrt(min(fma(c4, F(2.f), r4), F(1.f))));
-    roughness = select(coat > 0.f, fma(coat, F(rougher - p.roughness), p.roughness), p.roughness);
+    roughness = p.roughness;
+    if constexpr ((kParts & kCoats) != 0) {
+      const F c4 = sqr(F(p.clearcoat_roughness * p.clearcoat_roughness));
+      const F rougher = sqrt(sqrt(min(fma(c4, F(2.f), r4), F(1.f))));
+      roughness = select(coat > 0.f, fma(coat, F(rougher - p.roughness), p.roughness), p.roughness);
+    }
     const F alpha = roughness * roughness;
     const F narrow = 1.f - p.anisotropy;
     const F along = min(F(alpha * sqrt(F(2.f / fma(narrow, narrow, F(1.f))))), F(1.f));
@@ -92,7 +102,9 @@ struct OpenPbrBase {
     tint = p.transmission_tint;
     glass_ior = scaled_ior(ior);
     glass_f0 = f0_from_ior(glass_ior);
-    const F under = select(coat > 0.f, F(ior / fma(coat, F(p.coat_ior - 1.f), F(1.f))), ior);
+    F under = ior;
+    if constexpr ((kParts & kCoats) != 0)
+      under = select(coat > 0.f, F(ior / fma(coat, F(p.coat_ior - 1.f), F(1.f))), ior);
     gloss_ior = scaled_ior(max(under, F(1.f / under)));
     metal_fresnel = F82Tint<F>(p.base_color, p.specular_color);
     film = {p.film_weight, p.film_thickness, p.film_ior};
@@ -118,16 +130,21 @@ struct OpenPbrBase {
   View view(const Vec3<F>& o, const Mask<F>& below, const float* energy) const {
     View v;
     const F z = o.z;
-    v.inside = below & (glass > 0.f) & not_(thin);
-    v.eta = select(v.inside, F(1.f / ior), ior);
-    v.brushed = (ggx.ax != ggx.ay) & not_(smooth);
-    v.by_facet = (v.brushed | (film.weight > 0.f) | (glass_ior != ior)) & (glass > 0.f) &
-                 not_(thin) & not_(smooth);
+    v.inside = v.brushed = v.by_facet = Mask<F>(false);
+    v.eta = ior;
+    if constexpr (kGlass) {
+      v.inside = below & (glass > 0.f) & not_(thin);
+      v.eta = select(v.inside, F(1.f / ior), ior);
+    }
+    if constexpr (kBrush) v.brushed = (ggx.ax != ggx.ay) & not_(smooth);
+    if constexpr (kGlass)
+      v.by_facet = (v.brushed | (film.weight > 0.f) | (glass_ior != ior)) & (glass > 0.f) &
+                   not_(thin) & not_(smooth);
     F alpha = sqrt(F(ggx.ax * ggx.ay));
-    if (any(v.brushed)) alpha = select(v.brushed, ggx.seen_alpha(o), alpha);
+    if (kBrush && any(v.brushed)) alpha = select(v.brushed, ggx.seen_alpha(o), alpha);
     const EnergyLookup<F> look(energy, z, sqrt(alpha));
     F one_bounce = look.white(), glossy = look.reflected(gloss_ior);
-    if (any(v.brushed)) {
+    if (kBrush && any(v.brushed)) {
       // As much more or less as for the index that is tabulated.
       const BrushedLookup<F> brush(energy, o, ggx.ax, ggx.ay);
       constexpr float kIndex = EnergyTables::kBrushedIndex;
@@ -142,7 +159,7 @@ struct OpenPbrBase {
     v.metal_scale = one + metal_fresnel.f0 * lost;
     v.gloss_scale = fma(f0_from_ior(gloss_ior), lost, F(1.f));
     v.glass_scale = F(1.f);
-    if (any(Mask<F>(glass > 0.f))) {
+    if (kGlass && any(Mask<F>(glass > 0.f))) {
       const F scattered = select(thin, white, max(look.scattered(v.eta), F(1e-3f)));
       v.glass_scale = select(smooth | (v.brushed & not_(thin)), F(1.f), F(1.f / scattered));
     }
@@ -150,7 +167,7 @@ struct OpenPbrBase {
     const F rough = glossy * v.gloss_scale;
     const F gloss = min(select(smooth, mirror, rough), F(1.f));
     v.gloss = Color<F>(gloss);
-    if (any(Mask<F>(film.weight > 0.f)))
+    if (kFilm && any(Mask<F>(film.weight > 0.f)))
       v.gloss = lerp(v.gloss, filmed_gloss(v, z, look), film.weight);
     const OpenPbrFacet<F> f = facet(v, z);
     v.albedo = min(Color<F>(f.reflect + f.transmit), one);
@@ -164,19 +181,19 @@ struct OpenPbrBase {
     const Mask<F> filmed = film.weight > 0.f;
     Color<F> m = metal_fresnel(c);
     Color<F> d(fresnel_dielectric(c, gloss_ior).reflectance);
-    if (any(filmed)) {
+    if (kFilm && any(filmed)) {
       m = lerp(m, film.over_metal(c, m), film.weight);
       d = lerp(d, film.over_dielectric(c, gloss_ior), film.weight);
     }
     const Color<F> metallic = m * v.metal_scale * F(metal * min(specular_weight, F(1.f)));
     OpenPbrFacet<F> f{metallic + specular_color * d * F(opaque * v.gloss_scale), Color<F>(F(0.f)),
                       ways};
-    if (any(Mask<F>(glass > 0.f))) {
+    if (kGlass && any(Mask<F>(glass > 0.f))) {
       const F bent = refracted_cos(c, v.eta);
       const F outer = select(v.inside, bent, c);
       const Mask<F> total = not_(thin) & not_(Mask<F>(bent > 0.f));
       Color<F> g(fresnel_dielectric(outer, glass_ior).reflectance);
-      if (any(filmed)) {
+      if (kFilm && any(filmed)) {
         // Never all or nothing, so that each facet has a way for its light.
         const Color<F> r = film.over_dielectric(outer, glass_ior);
         const Color<F> least(F(1e-3f));
@@ -187,7 +204,7 @@ struct OpenPbrBase {
       const Color<F> wall(wall_of(g.x), wall_of(g.y), wall_of(g.z));
       g = select<F>(thin, wall, g);
       Color<F> scale(F(glass * v.glass_scale));
-      if (any(v.by_facet)) {
+      if (kGlass && any(v.by_facet)) {
         const F bare = select(total, F(1.f), fresnel_dielectric(outer, ior).reflectance);
         const auto sum = [&ways](const F& r) { return fma(r, ways.up, F(F(1.f - r) * ways.down)); };
         const F whole = select(v.brushed, F(1.f), sum(bare));
@@ -212,6 +229,7 @@ struct OpenPbrBase {
   F radiance_scale(const View& v) const { return select(thin, F(1.f), F(1.f / sqr(v.eta))); }
 
   BsdfEval<F> eval(const View& v, const Vec3<F>& wo, const Vec3<F>& wi) const {
+    if constexpr (!kGlass) return eval_reflection(v, wo, wi);
     const Mask<F> up = wi.z > 0.f;
     const Mask<F> bends = not_(up) & not_(thin);
     const Vec3<F> i(wi.x, wi.y, select(bends, wi.z, abs(wi.z)));
@@ -231,7 +249,7 @@ struct OpenPbrBase {
     const F g1 = 0.5f / max(F(abs(wo.z) + ggx.s(wo)), F(1e-20f));
     const F oc = clamp(oh, F(0.f), F(1.f));
     FacetWays<F> ways;
-    if (any(v.by_facet)) {
+    if (kGlass && any(v.by_facet)) {
       const F t = refracted_cos(oc, v.eta);
       const Vec3<F> other = select<F>(up, refract(wo, h, oc, t, v.eta), reflect(wo, h));
       // Where nothing goes through, refract is of no use.
@@ -245,6 +263,23 @@ struct OpenPbrBase {
     return {color * F(base * g2), F(base * g1) * select(up, share, F(1.f - share))};
   }
 
+  /// The same where nothing is transmitted.
+  BsdfEval<F> eval_reflection(const View& v, const Vec3<F>& wo, const Vec3<F>& wi) const {
+    const Vec3<F> sum = wi + wo;
+    const F len2 = length_squared(sum);
+    const Mask<F> nonzero = (len2 > 1e-20f) & (wi.z > 0.f) & (wo.z > 0.f);
+    const F inv_len = 1.f / sqrt(select(nonzero, len2, F(1.f)));
+    const Vec3<F> h = sum * inv_len;
+    const F oh = dot(wo, h), ih = dot(wi, h);
+    const Mask<F> valid = nonzero & not_(smooth) & (oh > 0.f) & (h.z > 0.f) & (ih > 0.f);
+    const F d = ggx.d(select<F>(valid, h, Vec3<F>(F(0.f), F(0.f), F(1.f))));
+    const F base = select(valid, d, F(0.f));
+    const F g2 = ggx.g2_over_4cos(wo, wi) * abs(wi.z);
+    const F g1 = 0.5f / max(F(abs(wo.z) + ggx.s(wo)), F(1e-20f));
+    const OpenPbrFacet<F> f = facet(v, clamp(oh, F(0.f), F(1.f)));
+    return {f.reflect * F(base * g2), F(base * g1)};
+  }
+
   struct Sample {
     Vec3<F> wi;
     Mask<F> crosses;
@@ -256,14 +291,15 @@ struct OpenPbrBase {
     const F c = clamp(dot(wo, h), F(0.f), F(1.f));
     const Vec3<F> mirrored = reflect(wo, h);
     FacetWays<F> ways;
-    if (any(v.by_facet)) {
+    if (kGlass && any(v.by_facet)) {
       const F t = refracted_cos(c, v.eta);
       const Vec3<F> none(F(0.f), F(0.f), F(1.f));
       ways = ways_of(v, wo, mirrored, select<F>(t > 0.f, refract(wo, h, c, t, v.eta), none));
     }
-    const Mask<F> crosses = not_(Mask<F>(choice < facet(v, c, ways).reflect_share()));
+    Mask<F> crosses(false);
+    if constexpr (kGlass) crosses = not_(Mask<F>(choice < facet(v, c, ways).reflect_share()));
     Vec3<F> wi = mirrored;
-    if (any(crosses)) {
+    if (kGlass && any(crosses)) {
       const Vec3<F> straight(mirrored.x, mirrored.y, F(-mirrored.z));
       const Vec3<F> bent = refract(wo, h, c, refracted_cos(c, v.eta), v.eta);
       wi = select<F>(crosses, select<F>(thin, straight, bent), wi);

@@ -10,6 +10,7 @@
 #include "wavecomb/material/lobes/microfacet_reflection.h"
 #include "wavecomb/material/lobes/openpbr_base.h"
 #include "wavecomb/material/openpbr_params.h"
+#include "wavecomb/material/program_list.h"
 
 namespace wavecomb {
 
@@ -21,45 +22,54 @@ namespace wavecomb {
 /// Opaque and thin-walled surfaces are alike from both sides. A solid that transmits is seen from
 /// inside without fuzz and without the coat's reflection. Subsurface scattering is approximated as
 /// diffuse.
-template <typename F>
+///
+/// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
+/// show no others.
+template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public BsdfTraits {
+  static constexpr bool kCoat = (kParts & kCoats) != 0, kFuzz = (kParts & kFuzzes) != 0,
+                        kBack = (kParts & kBacks) != 0, kTurned = (kParts & kBrushes) != 0;
+  using Base = OpenPbrBase<F, kParts>;
+
  public:
   static constexpr ProgramId kProgram = ProgramId::kOpenPbr;
-  static constexpr bool kEmits = true;
-  static constexpr bool kAbsorbs = true;
+  static constexpr bool kEmits = (kParts & kGlows) != 0;
+  static constexpr bool kAbsorbs = (kParts & kPasses) != 0;
+  // Not by parts: which lights the tree chooses goes by it.
   static constexpr bool kTransmits = true;
+  static constexpr bool kTextured = (kParts & (kVaries | kBrushes)) != 0;
   using Params = OpenPbrParams<F>;
+  /// All, or none: a frame lies along the texture where any of them has one.
   static constexpr uint32_t kInputs =
-      input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
-      input_bit(Input::kRoughness) | input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
-      input_bit(Input::kClearcoatRoughness) | input_bit(Input::kNormal) | kNeedsTangent;
+      !kTextured ? 0u
+                 : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
+                       input_bit(Input::kRoughness) | input_bit(Input::kMetallic) |
+                       input_bit(Input::kClearcoat) | input_bit(Input::kClearcoatRoughness) |
+                       input_bit(Input::kNormal) | kNeedsTangent;
 
   /// Fresnel's formulas are always exact.
   OpenPbrBsdf(const Params& p, bool /*schlick*/)
       : base_(p), eon_(p.diffuse_roughness), energy_(p.energy) {
-    fuzz_ = p.fuzz_weight;
-    fuzz_roughness_ = p.fuzz_roughness;
-    fuzz_color_ = p.fuzz_color;
-    coat_ = p.clearcoat;
-    coat_roughness_ = p.clearcoat_roughness;
-    coat_ior_ = coat_ior(p.coat_ior);
-    coat_f0_ = f0_from_ior(coat_ior_);
-    const F coat_alpha = alpha_from_roughness(coat_roughness_);
-    coat_smooth_ = coat_alpha < kDeltaAlpha;
-    coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
-    // Half of the logarithm: light crosses the coat twice.
-    const auto half_log = [](const F& c) { return F(0.5f * log(max(c, F(1e-6f)))); };
-    coat_color_ = p.coat_color;
-    coat_log_ = {half_log(p.coat_color.x), half_log(p.coat_color.y), half_log(p.coat_color.z)};
-    darkening_ = p.coat_darkening;
+    if constexpr (kFuzz) {
+      fuzz_ = p.fuzz_weight;
+      fuzz_roughness_ = p.fuzz_roughness;
+      fuzz_color_ = p.fuzz_color;
+    }
+    if constexpr (kCoat) set_coat(p);
     // Thin walls let a part of the diffuse light through.
-    const F sub = p.subsurface_weight, thin = p.thin_walled;
-    const F through = F(0.5f * F(1.f + p.subsurface_anisotropy)) * thin;
-    diffuse_ = lerp(p.base_color, p.subsurface_color * F(1.f - through), sub);
-    back_ = p.subsurface_color * F(sub * through);
-    const F cs = sincos_2pi(p.rotation).cos, sn = sincos_2pi(p.rotation).sin;
-    turn_cos_ = cs;
-    turn_sin_ = sn;
+    const F sub = p.subsurface_weight;
+    Color<F> under = p.subsurface_color;
+    back_ = Color<F>(F(0.f));
+    if constexpr (kBack) {
+      const F through = F(0.5f * F(1.f + p.subsurface_anisotropy)) * p.thin_walled;
+      under = under * F(1.f - through);
+      back_ = p.subsurface_color * F(sub * through);
+    }
+    diffuse_ = lerp(p.base_color, under, sub);
+    if constexpr (kTurned) {
+      turn_cos_ = sincos_2pi(p.rotation).cos;
+      turn_sin_ = sincos_2pi(p.rotation).sin;
+    }
   }
 
   Color<F> albedo() const {
@@ -69,31 +79,90 @@ class OpenPbrBsdf : public BsdfTraits {
     return min(c, Color<F>(F(1.f)));
   }
   Mask<F> has_non_delta() const {
-    return ((base_.opaque > 0.f) & not_(is_black(Color<F>(diffuse_ + back_)))) |
-           (not_(base_.smooth) & base_.present) | (not_(coat_smooth_) & (coat_ > 0.f)) |
-           (fuzz_ > 0.f);
+    Mask<F> any_lobe = ((base_.opaque > 0.f) & not_(is_black(Color<F>(diffuse_ + back_)))) |
+                       (not_(base_.smooth) & base_.present);
+    if constexpr (kCoat) any_lobe = any_lobe | (not_(coat_smooth_) & (coat_ > 0.f));
+    if constexpr (kFuzz) any_lobe = any_lobe | (fuzz_ > 0.f);
+    return any_lobe;
   }
 
-  F delta_probability(const Vec3<F>& wo) const {
-    const View v = make_view(wo);
-    const F mirrors =
-        select(base_.smooth, v.p_base, F(0.f)) + select(coat_smooth_, v.p_coat, F(0.f));
+  /// What depends on wo alone. `o` is above: the frame is mirrored and turned along the grain.
+  struct View {
+    F side;
+    Vec3<F> o;
+    typename Base::View base;
+    typename EonDiffuse<F>::Sampler eon;
+    FuzzLobe<F> fuzz;
+    Color<F> glossy;        ///< of the diffuse lobe: what the interface lets pass
+    F fuzz_on, coat_on;     ///< weights on this side
+    F under_fuzz;           ///< share below the fuzz
+    F coat_compensation;    ///< for energy that one bounce loses
+    Color<F> bare, coated;  ///< share below: bare + coated coat_color^(1 / 2 mu_i)
+    F p_diffuse, p_back, p_fuzz, p_coat, p_base;
+  };
+
+  View view(const Vec3<F>& wo) const {
+    View v;
+    v.side = side_of(wo);
+    v.o = turned(mirror_z(wo, v.side));
+    const F z = v.o.z;
+    v.base = base_.view(v.o, wo.z < 0.f, energy_);
+    v.eon = eon_.sampler(z);
+    v.glossy = (Color<F>(F(1.f)) - v.base.gloss) * base_.opaque;
+    // A solid that transmits has its layers on the outside.
+    const F outside = select(v.base.inside, F(0.f), F(1.f));
+    if constexpr (kFuzz) v.fuzz_on = fuzz_ * outside;
+    if constexpr (kCoat) v.coat_on = coat_ * outside;
+    v.under_fuzz = F(1.f);
+    v.fuzz.albedo = F(0.f);
+    v.fuzz.inv_a = F(1.f);
+    v.fuzz.inv_b = F(0.f);
+    if (has_fuzz(v)) {
+      v.fuzz = FuzzLobe<F>(z, fuzz_roughness_);
+      v.under_fuzz = fnma(v.fuzz_on, v.fuzz.albedo, F(1.f));
+    }
+    v.bare = Color<F>(v.under_fuzz);
+    v.coated = Color<F>(F(0.f));
+    v.coat_compensation = F(1.f);
+    F coat_albedo(0.f);
+    if (has_coat()) {
+      const EnergyLookup<F> look(energy_, z, coat_roughness_);
+      const F white = max(look.white(), F(1e-3f));
+      v.coat_compensation =
+          select(coat_smooth_, F(1.f), fma(coat_f0_, F(F(1.f - white) / white), F(1.f)));
+      const F rough = look.reflected(coat_ior_) * v.coat_compensation;
+      const F smooth = fresnel_dielectric(z, coat_ior_).reflectance;
+      coat_albedo = v.coat_on * min(select(coat_smooth_, smooth, rough), F(1.f));
+      v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_)));
+      v.coated = darkened(v, z) * coat_tint(z) * F(v.under_fuzz * F(coat_ - coat_albedo));
+    }
+    choose_shares(v, F(v.under_fuzz * coat_albedo));
+    return v;
+  }
+
+  F delta_probability(const Vec3<F>& wo) const { return delta_probability(view(wo)); }
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const { return eval(view(wo), wi); }
+  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    return diffuse_f_cos(view(wo), wi);
+  }
+  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
+    return sample(view(wo), u_lobe, u, v);
+  }
+
+  F delta_probability(const View& v) const {
+    F mirrors = select(base_.smooth, v.p_base, F(0.f));
+    if constexpr (kCoat) mirrors = mirrors + select(coat_smooth_, v.p_coat, F(0.f));
     return select(v.o.z > 0.f, mirrors, F(0.f));
   }
 
-  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    const View v = make_view(wo);
-    return eval_view(v, to_view(v, wi));
-  }
+  BsdfEval<F> eval(const View& v, const Vec3<F>& wi) const { return eval_view(v, to_view(v, wi)); }
 
-  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi_) const {
-    const View v = make_view(wo);
+  Color<F> diffuse_f_cos(const View& v, const Vec3<F>& wi_) const {
     const Vec3<F> wi = to_view(v, wi_);
     return diffuse_part(v, wi) * v.glossy * below(v, wi);
   }
 
-  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
-    const View view = make_view(wo);
+  BsdfSample<F> sample(const View& view, const F& u_lobe, const F& u, const F& v) const {
     // Which lobe, and what is left of the number that chose it.
     F from = F(0.f), left = F(0.f);
     Mask<F> open = Mask<F>(true);
@@ -105,21 +174,24 @@ class OpenPbrBsdf : public BsdfTraits {
       from = to;
       return here;
     };
-    const Mask<F> is_diffuse = choose(view.p_diffuse), is_back = choose(view.p_back),
-                  is_fuzz = choose(view.p_fuzz), is_coat = choose(view.p_coat);
+    const Mask<F> is_diffuse = choose(view.p_diffuse);
+    Mask<F> is_back(false), is_fuzz(false), is_coat(false);
+    if constexpr (kBack) is_back = choose(view.p_back);
+    if constexpr (kFuzz) is_fuzz = choose(view.p_fuzz);
+    if constexpr (kCoat) is_coat = choose(view.p_coat);
     const Mask<F> is_base = choose(view.p_base) | (open & (view.p_base > 0.f));
     left = clamp(left, F(0.f), F(kOneMinusEpsilon));
 
     const Vec3<F>& o = view.o;
     Vec3<F> wi(F(0.f), F(0.f), F(1.f));
     if (any(is_diffuse)) wi = select<F>(is_diffuse, eon_.sample(view.eon, o, left, u, v), wi);
-    if (any(is_back)) {
+    if (kBack && any(is_back)) {
       const Vec3<F> c = square_to_cosine_hemisphere(u, v);
       wi = select<F>(is_back, Vec3<F>(c.x, c.y, F(-c.z)), wi);
     }
-    if (any(is_fuzz)) wi = select<F>(is_fuzz, view.fuzz.sample(o, u, v), wi);
+    if (kFuzz && any(is_fuzz)) wi = select<F>(is_fuzz, view.fuzz.sample(o, u, v), wi);
     const Vec3<F> mirror(-o.x, -o.y, o.z);
-    if (any(is_coat)) {
+    if (kCoat && any(is_coat)) {
       // A facet of the coat may reflect to below, where only what the base transmits has a density:
       // no sample.
       const Vec3<F> c = sample_microfacet(coat_ggx_, o, u, v);
@@ -136,7 +208,8 @@ class OpenPbrBsdf : public BsdfTraits {
     const BsdfEval<F> e = eval_view(view, wi);
     const Mask<F> above = o.z > 0.f;
     const Mask<F> delta_base = is_base & base_.smooth & above;
-    const Mask<F> delta_coat = is_coat & coat_smooth_ & above;
+    Mask<F> delta_coat(false);
+    if constexpr (kCoat) delta_coat = is_coat & coat_smooth_ & above;
     // What is smooth is eval'd as nothing; a mirrored direction may still meet other lobes.
     const Mask<F> delta = delta_base | delta_coat;
     const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
@@ -150,9 +223,13 @@ class OpenPbrBsdf : public BsdfTraits {
       const Color<F> base =
           select<F>(refracted, facet.transmit * base_.radiance_scale(view.base), facet.reflect) *
           below(view, wi);
-      const F p = max(select(delta_coat, view.p_coat, F(view.p_base * p_way)), F(1e-20f));
-      const Color<F> f =
-          select<F>(delta_coat, Color<F>(F(view.under_fuzz * coat_reflectance(view, o.z))), base);
+      F p_lobe = view.p_base * p_way;
+      Color<F> f = base;
+      if constexpr (kCoat) {
+        p_lobe = select(delta_coat, view.p_coat, p_lobe);
+        f = select<F>(delta_coat, Color<F>(F(view.under_fuzz * coat_reflectance(view, o.z))), base);
+      }
+      const F p = max(p_lobe, F(1e-20f));
       s.weight = select<F>(delta, f * F(1.f / p), s.weight);
       s.pdf = select(delta, p, s.pdf);
       s.is_delta = delta;
@@ -163,38 +240,57 @@ class OpenPbrBsdf : public BsdfTraits {
     }
     const Mask<F> good = s.pdf > 0.f;
     s.wi = select<F>(good, from_view(view, wi), Vec3<F>(F(0.f), F(0.f), F(1.f)));
-    const Mask<F> bends = refracted & good & not_(base_.thin);
-    s.eta = select(bends, view.base.eta, F(1.f));
-    const F lobe = select(is_coat, coat_roughness_, select(is_base, base_.roughness, F(1.f)));
+    if constexpr (Base::kGlass) {
+      const Mask<F> bends = refracted & good & not_(base_.thin);
+      s.eta = select(bends, view.base.eta, F(1.f));
+    }
+    F lobe = select(is_base, base_.roughness, F(1.f));
+    if constexpr (kCoat) lobe = select(is_coat, coat_roughness_, lobe);
     s.roughness = select(s.is_delta, F(0.f), lobe);
     return s;
   }
 
  private:
-  /// What depends on wo alone. `o` is above: the frame is mirrored and turned along the grain.
-  struct View {
-    F side;
-    Vec3<F> o;
-    typename OpenPbrBase<F>::View base;
-    typename EonDiffuse<F>::Sampler eon;
-    FuzzLobe<F> fuzz;
-    Color<F> glossy;        ///< of the diffuse lobe: what the interface lets pass
-    F fuzz_on, coat_on;     ///< weights on this side
-    F under_fuzz;           ///< share below the fuzz
-    F coat_compensation;    ///< for energy that one bounce loses
-    Color<F> bare, coated;  ///< share below: bare + coated coat_color^(1 / 2 mu_i)
-    F p_diffuse, p_back, p_fuzz, p_coat, p_base;
-  };
+  bool has_coat() const {
+    if constexpr (kCoat) return any(Mask<F>(coat_ > 0.f));
+    return false;
+  }
+  static bool has_fuzz(const View& v) {
+    if constexpr (kFuzz) return any(Mask<F>(v.fuzz_on > 0.f));
+    return false;
+  }
+
+  void set_coat(const Params& p) {
+    coat_ = p.clearcoat;
+    coat_roughness_ = p.clearcoat_roughness;
+    coat_ior_ = coat_ior(p.coat_ior);
+    coat_f0_ = f0_from_ior(coat_ior_);
+    const F coat_alpha = alpha_from_roughness(coat_roughness_);
+    coat_smooth_ = coat_alpha < kDeltaAlpha;
+    coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
+    // Half of the logarithm: light crosses the coat twice.
+    const auto half_log = [](const F& c) { return F(0.5f * log(max(c, F(1e-6f)))); };
+    coat_color_ = p.coat_color;
+    coat_log_ = {half_log(p.coat_color.x), half_log(p.coat_color.y), half_log(p.coat_color.z)};
+    darkening_ = p.coat_darkening;
+  }
 
   Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
+  /// Along the grain, and back. What is not turned stays as it is, to the sign of a zero.
   Vec3<F> turned(const Vec3<F>& w) const {
-    return {fma(turn_cos_, w.x, F(turn_sin_ * w.y)), fma(turn_cos_, w.y, F(-(turn_sin_ * w.x))),
-            w.z};
+    if constexpr (!kTurned) return w;
+    const Vec3<F> t(fma(turn_cos_, w.x, F(turn_sin_ * w.y)),
+                    fma(turn_cos_, w.y, F(-(turn_sin_ * w.x))), w.z);
+    return select<F>(turn_sin_ != 0.f, t, w);
   }
-  Vec3<F> from_view(const View& v, const Vec3<F>& w) const {
+  Vec3<F> turned_back(const Vec3<F>& w) const {
+    if constexpr (!kTurned) return w;
     const Vec3<F> t(fma(turn_cos_, w.x, F(-(turn_sin_ * w.y))),
                     fma(turn_sin_, w.x, F(turn_cos_ * w.y)), w.z);
-    return mirror_z(t, v.side);
+    return select<F>(turn_sin_ != 0.f, t, w);
+  }
+  Vec3<F> from_view(const View& v, const Vec3<F>& w) const {
+    return mirror_z(turned_back(w), v.side);
   }
 
   /// coat_color^(1 / 2 mu), mu the cosine in the coat.
@@ -208,50 +304,11 @@ class OpenPbrBsdf : public BsdfTraits {
   }
   /// Share of the base that is seen through what is above it.
   Color<F> below(const View& v, const Vec3<F>& wi) const {
-    if (none(Mask<F>(coat_ > 0.f))) return v.bare;
+    if (!has_coat()) return v.bare;
     return fma_color(v.coated, coat_tint(wi.z), v.bare);
   }
   static Color<F> fma_color(const Color<F>& a, const Color<F>& b, const Color<F>& c) {
     return {fma(a.x, b.x, c.x), fma(a.y, b.y, c.y), fma(a.z, b.z, c.z)};
-  }
-
-  View make_view(const Vec3<F>& wo) const {
-    View v;
-    v.side = side_of(wo);
-    v.o = turned(mirror_z(wo, v.side));
-    const F z = v.o.z;
-    v.base = base_.view(v.o, wo.z < 0.f, energy_);
-    v.eon = eon_.sampler(z);
-    v.glossy = (Color<F>(F(1.f)) - v.base.gloss) * base_.opaque;
-    // A solid that transmits has its layers on the outside.
-    const F outside = select(v.base.inside, F(0.f), F(1.f));
-    v.fuzz_on = fuzz_ * outside;
-    v.coat_on = coat_ * outside;
-    v.under_fuzz = F(1.f);
-    v.fuzz.albedo = F(0.f);
-    v.fuzz.inv_a = F(1.f);
-    v.fuzz.inv_b = F(0.f);
-    if (any(Mask<F>(v.fuzz_on > 0.f))) {
-      v.fuzz = FuzzLobe<F>(z, fuzz_roughness_);
-      v.under_fuzz = fnma(v.fuzz_on, v.fuzz.albedo, F(1.f));
-    }
-    v.bare = Color<F>(v.under_fuzz);
-    v.coated = Color<F>(F(0.f));
-    v.coat_compensation = F(1.f);
-    F coat_albedo(0.f);
-    if (any(Mask<F>(coat_ > 0.f))) {
-      const EnergyLookup<F> look(energy_, z, coat_roughness_);
-      const F white = max(look.white(), F(1e-3f));
-      v.coat_compensation =
-          select(coat_smooth_, F(1.f), fma(coat_f0_, F(F(1.f - white) / white), F(1.f)));
-      const F rough = look.reflected(coat_ior_) * v.coat_compensation;
-      const F smooth = fresnel_dielectric(z, coat_ior_).reflectance;
-      coat_albedo = v.coat_on * min(select(coat_smooth_, smooth, rough), F(1.f));
-      v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_)));
-      v.coated = darkened(v, z) * coat_tint(z) * F(v.under_fuzz * F(coat_ - coat_albedo));
-    }
-    choose_shares(v, F(v.under_fuzz * coat_albedo));
-    return v;
   }
 
   /// The coat sends light back down to the base, which absorbs again: (1 - K) / (1 - K E_base)
@@ -274,7 +331,8 @@ class OpenPbrBsdf : public BsdfTraits {
   }
 
   void choose_shares(View& v, const F& coat) const {
-    const Color<F> through = fma_color(v.coated, coat_color_, v.bare);
+    Color<F> through = v.bare;
+    if constexpr (kCoat) through = fma_color(v.coated, coat_color_, v.bare);
     const F floor(0.04f);
     const auto share = [&floor](const Mask<F>& on, const F& estimate) {
       return select(on, max(estimate, floor), F(0.f));
@@ -282,9 +340,11 @@ class OpenPbrBsdf : public BsdfTraits {
     const Mask<F> opaque = base_.opaque > 0.f;
     const Color<F> seen = v.glossy * through;
     const F diffuse = share(opaque & not_(is_black(diffuse_)), importance(seen * diffuse_));
-    const F back = share(opaque & not_(is_black(back_)), importance(seen * back_));
-    const F fuzz = share(v.fuzz_on > 0.f, F(v.fuzz_on * v.fuzz.albedo * importance(fuzz_color_)));
-    const F coated = share(v.coat_on > 0.f, coat);
+    F back(0.f), fuzz(0.f), coated(0.f);
+    if constexpr (kBack) back = share(opaque & not_(is_black(back_)), importance(seen * back_));
+    if constexpr (kFuzz)
+      fuzz = share(v.fuzz_on > 0.f, F(v.fuzz_on * v.fuzz.albedo * importance(fuzz_color_)));
+    if constexpr (kCoat) coated = share(v.coat_on > 0.f, coat);
     const F base = share(base_.present, importance(v.base.albedo * through));
     const F sum = F(diffuse + back) + F(fuzz + coated) + base;
     const F inv = select(sum > 0.f, F(1.f / max(sum, F(1e-20f))), F(0.f));
@@ -298,7 +358,7 @@ class OpenPbrBsdf : public BsdfTraits {
   /// Of both sides, below the interface.
   Color<F> diffuse_part(const View& v, const Vec3<F>& wi) const {
     Color<F> f = eon_.eval(diffuse_, v.o, wi);
-    if (any(Mask<F>(v.p_back > 0.f))) f += back_ * back_cos(v.o, wi);
+    if (kBack && any(Mask<F>(v.p_back > 0.f))) f += back_ * back_cos(v.o, wi);
     return f;
   }
   static F back_cos(const Vec3<F>& o, const Vec3<F>& wi) {
@@ -312,7 +372,7 @@ class OpenPbrBsdf : public BsdfTraits {
     if (any(Mask<F>(base_.opaque > 0.f))) {
       f = diffuse_part(v, wi) * v.glossy;
       pdf = v.p_diffuse * eon_.pdf(v.eon, o, wi);
-      if (any(Mask<F>(v.p_back > 0.f))) pdf = fma(v.p_back, back_cos(o, wi), pdf);
+      if (kBack && any(Mask<F>(v.p_back > 0.f))) pdf = fma(v.p_back, back_cos(o, wi), pdf);
     }
     if (!all(base_.smooth)) {
       const BsdfEval<F> e = base_.eval(v.base, o, wi);
@@ -320,15 +380,16 @@ class OpenPbrBsdf : public BsdfTraits {
       pdf = fma(v.p_base, e.pdf, pdf);
     }
     f = f * below(v, wi);
-    const Mask<F> rough_coat = not_(coat_smooth_) & (v.coat_on > 0.f);
-    if (any(rough_coat)) {
+    Mask<F> rough_coat(false);
+    if constexpr (kCoat) rough_coat = not_(coat_smooth_) & (v.coat_on > 0.f);
+    if (kCoat && any(rough_coat)) {
       const MicrofacetEval<F> m = eval_microfacet(coat_ggx_, o, wi);
       const F on = select(rough_coat, F(1.f), F(0.f));
       const F glossy = m.f_cos * on * coat_reflectance(v, m.cos_h) * v.under_fuzz;
       f += Color<F>(glossy);
       pdf = fma(F(v.p_coat * on), m.pdf, pdf);
     }
-    if (any(Mask<F>(v.fuzz_on > 0.f))) {
+    if (has_fuzz(v)) {
       const F d = v.fuzz.density(o, wi);
       f += fuzz_color_ * F(v.fuzz_on * v.fuzz.albedo * d);
       pdf = fma(v.p_fuzz, d, pdf);
@@ -336,7 +397,7 @@ class OpenPbrBsdf : public BsdfTraits {
     return {f, pdf};
   }
 
-  OpenPbrBase<F> base_;
+  Base base_;
   EonDiffuse<F> eon_;
   const float* energy_;
   F fuzz_, fuzz_roughness_, coat_, coat_roughness_, coat_ior_, coat_f0_, darkening_;

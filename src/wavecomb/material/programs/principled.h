@@ -8,6 +8,7 @@
 #include "wavecomb/material/lobes/microfacet_reflection.h"
 #include "wavecomb/material/lobes/multiple_scattering.h"
 #include "wavecomb/material/lobes/rough_interface.h"
+#include "wavecomb/material/program_list.h"
 
 namespace wavecomb {
 
@@ -24,32 +25,44 @@ namespace wavecomb {
 ///                  albedo at the flatter of the two directions, which is reciprocal and never
 ///                  gains energy.
 /// docs/decisions/preview-surface.md compares it with the specification and other renderers.
-template <typename F>
+///
+/// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
+/// show no others.
+template <typename F, uint32_t kParts>
 class PrincipledBsdf : public BsdfTraits {
+  static constexpr bool kMetal = (kParts & kMetals) != 0, kCoat = (kParts & kCoats) != 0,
+                        kStraight = (kParts & kPasses) != 0;
+
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
-  static constexpr bool kEmits = true;
+  static constexpr bool kEmits = (kParts & kGlows) != 0;
+  static constexpr bool kTextured = (kParts & kVaries) != 0;
+  /// All, or none: a frame lies along the texture where any of them has one.
   static constexpr uint32_t kInputs =
-      input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
-      input_bit(Input::kRoughness) | input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
-      input_bit(Input::kClearcoatRoughness) | input_bit(Input::kOpacity) |
-      input_bit(Input::kNormal);
+      !kTextured ? 0u
+                 : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
+                       input_bit(Input::kRoughness) | input_bit(Input::kMetallic) |
+                       input_bit(Input::kClearcoat) | input_bit(Input::kClearcoatRoughness) |
+                       input_bit(Input::kOpacity) | input_bit(Input::kNormal);
 
-  PrincipledBsdf(const ShadingParams<F>& params, bool schlick)
-      : roughness_(params.roughness),
-        coat_roughness_(params.clearcoat_roughness),
-        clearcoat_(params.clearcoat),
-        transparency_(1.f - params.opacity),
-        coat_(coat_ior(params.ior), F(schlick ? 0.f : 1.f)) {
-    const Mask<F> specular_workflow =
-        Mask<F>((params.flags & UInt<F>(uint32_t{kSpecularWorkflow})) != UInt<F>(0u));
-    const F metallic = select(specular_workflow, F(0.f), params.metallic);
+  PrincipledBsdf(const ShadingParams<F>& params, bool schlick) : roughness_(params.roughness) {
     const F ior = coat_ior(params.ior);
-    f0_ = lerp(Color<F>(f0_from_ior(ior)), params.base_color, metallic);
-    f0_ = select<F>(specular_workflow, params.specular_color, f0_);
-    diffuse_ = params.base_color * F(F(1.f - metallic) * params.opacity);
-    // Metals and the specular workflow follow Schlick's formula, dielectrics the exact one.
-    const F exact = schlick ? F(0.f) : select(specular_workflow, F(0.f), F(1.f - metallic));
+    f0_ = Color<F>(f0_from_ior(ior));
+    diffuse_ = params.base_color;
+    F exact(schlick ? 0.f : 1.f);
+    F metallic(0.f);
+    if constexpr (kMetal) {
+      const Mask<F> specular_workflow =
+          Mask<F>((params.flags & UInt<F>(uint32_t{kSpecularWorkflow})) != UInt<F>(0u));
+      metallic = select(specular_workflow, F(0.f), params.metallic);
+      f0_ = lerp(f0_, params.base_color, metallic);
+      f0_ = select<F>(specular_workflow, params.specular_color, f0_);
+      // Metals and the specular workflow follow Schlick's formula, dielectrics the exact one.
+      if (!schlick) exact = select(specular_workflow, F(0.f), F(1.f - metallic));
+    }
+    if constexpr (kMetal || kStraight)
+      diffuse_ = diffuse_ * F(F(1.f - metallic) * (kStraight ? params.opacity : F(1.f)));
+    if constexpr (kStraight) transparency_ = F(1.f - params.opacity);
     interface_ = CoatFresnel<F>(ior, exact);
     const F alpha = alpha_from_roughness(roughness_);
     smooth_ = alpha < kDeltaAlpha;
@@ -58,10 +71,14 @@ class PrincipledBsdf : public BsdfTraits {
     multiple_ = select<F>(smooth_, Color<F>(F(0.f)), lost_.tint(interface_.average(f0_)));
     rough_ = RoughInterface<F>(interface_, roughness_, ggx_.alpha, lost_, smooth_);
     average_ = rough_.average(f0_, multiple_);
+    if constexpr (!kCoat) return;
+    clearcoat_ = params.clearcoat;
+    coat_roughness_ = params.clearcoat_roughness;
+    coat_ = CoatFresnel<F>(ior, F(schlick ? 0.f : 1.f));
     const F coat_alpha = alpha_from_roughness(coat_roughness_);
     coat_smooth_ = coat_alpha < kDeltaAlpha;
     coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
-    if (any(Mask<F>(clearcoat_ > 0.f))) {
+    if (has_coat()) {
       coat_lost_ = LostEnergy<F>(coat_ggx_.alpha);
       rough_coat_ =
           RoughInterface<F>(coat_, coat_roughness_, coat_ggx_.alpha, coat_lost_, coat_smooth_);
@@ -70,55 +87,109 @@ class PrincipledBsdf : public BsdfTraits {
 
   Color<F> albedo() const { return min(Color<F>(diffuse_ + f0_), Color<F>(F(1.f))); }
   Mask<F> has_non_delta() const {
-    return not_(is_black(diffuse_)) | not_(smooth_) | (not_(coat_smooth_) & (clearcoat_ > 0.f));
+    Mask<F> any_lobe = not_(is_black(diffuse_)) | not_(smooth_);
+    if constexpr (kCoat) any_lobe = any_lobe | (not_(coat_smooth_) & (clearcoat_ > 0.f));
+    return any_lobe;
   }
 
-  F delta_probability(const Vec3<F>& wo) const {
-    const View v = make_view(Vec3<F>(wo.x, wo.y, abs(wo.z)));
-    const F mirrors =
-        select(smooth_, v.p_specular, F(0.f)) + select(coat_smooth_, v.p_coat, F(0.f));
-    return select(wo.z != 0.f, F(mirrors + v.p_straight), F(0.f));
+  /// What depends on wo alone: albedos towards it, which are the reflectances of what is smooth,
+  /// and the probabilities of the lobes. `o` is wo, above the surface.
+  struct View {
+    F side;
+    Vec3<F> o;
+    F coat, lost;
+    Color<F> specular, straight;
+    F p_diffuse, p_specular, p_coat, p_straight;
+  };
+
+  View view(const Vec3<F>& wo) const {
+    View v;
+    v.side = side_of(wo);
+    v.o = mirror_z(wo, v.side);
+    v.coat = F(0.f);
+    const F z = max(v.o.z, F(0.f));
+    if (has_coat()) v.coat = coat_albedo(z);
+    v.lost = lost_(z);
+    v.specular = specular_albedo(z);
+    const F below = 1.f - v.coat;
+    const Color<F> passed = Color<F>(F(1.f)) - v.specular;
+    v.straight = Color<F>(F(0.f));
+    if constexpr (kStraight) v.straight = passed * F(below * transparency_);
+    // Estimated contributions; a lobe that can contribute gets at least 2 % before normalisation.
+    const F floor(0.02f);
+    const F multiple = F(below * v.lost) * luminance(multiple_);
+    const F diffuse = select(is_black(diffuse_), multiple,
+                             max(fma(below, luminance(diffuse_ * passed), multiple), floor));
+    const F specular = max(F(below * luminance(v.specular)), floor);
+    F coat(0.f), straight(0.f);
+    if constexpr (kCoat) coat = select(clearcoat_ > 0.f, max(v.coat, floor), F(0.f));
+    if constexpr (kStraight)
+      straight = select(transparency_ > 0.f, max(luminance(v.straight), floor), F(0.f));
+    const F inv = 1.f / F(F(diffuse + specular) + F(coat + straight));
+    v.p_diffuse = diffuse * inv;
+    v.p_specular = specular * inv;
+    v.p_coat = coat * inv;
+    v.p_straight = straight * inv;
+    return v;
   }
 
-  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    const F side = side_of(wo);
-    const Vec3<F> o = mirror_z(wo, side);
-    return eval_above(o, mirror_z(wi, side), make_view(o));
-  }
-
+  F delta_probability(const Vec3<F>& wo) const { return delta_probability(view(wo)); }
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const { return eval(view(wo), wi); }
   Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    const F side = side_of(wo);
-    const Vec3<F> o = mirror_z(wo, side), i = mirror_z(wi, side);
+    return diffuse_f_cos(view(wo), wi);
+  }
+  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
+    return sample(view(wo), u_lobe, u, v);
+  }
+
+  F delta_probability(const View& v) const {
+    F mirrors = select(smooth_, v.p_specular, F(0.f));
+    if constexpr (kCoat) mirrors = mirrors + select(coat_smooth_, v.p_coat, F(0.f));
+    return select(v.o.z != 0.f, F(mirrors + v.p_straight), F(0.f));
+  }
+
+  BsdfEval<F> eval(const View& v, const Vec3<F>& wi) const {
+    return eval_above(v.o, mirror_z(wi, v.side), v);
+  }
+
+  Color<F> diffuse_f_cos(const View& v, const Vec3<F>& wi) const {
+    const Vec3<F>& o = v.o;
+    const Vec3<F> i = mirror_z(wi, v.side);
     const F cosine = select(o.z > 0.f, lambert_cos(i), F(0.f));
     const Color<F> through =
         seen_through_coat(specular_albedo(o.z), specular_albedo(max(i.z, F(0.f))), average_);
-    const Mask<F> coated = clearcoat_ > 0.f;
-    const F passed = any(coated) ? select(coated, below_coat(o, i), F(1.f)) : F(1.f);
+    F passed(1.f);
+    if (has_coat()) passed = select(clearcoat_ > 0.f, below_coat(o, i), F(1.f));
     return diffuse_ * through * F(cosine * passed);
   }
 
-  BsdfSample<F> sample(const Vec3<F>& wo_, const F& u_lobe, const F& u, const F& v) const {
-    const F side = side_of(wo_);
-    const Vec3<F> wo = mirror_z(wo_, side);
-    const View view = make_view(wo);
+  BsdfSample<F> sample(const View& view, const F& u_lobe, const F& u, const F& v) const {
+    const F& side = view.side;
+    const Vec3<F>& wo = view.o;
     const F before_specular = view.p_diffuse;
     const F before_coat = before_specular + view.p_specular;
     const F before_straight = before_coat + view.p_coat;
     const Mask<F> specular = (u_lobe >= before_specular) & (u_lobe < before_coat);
-    const Mask<F> coat = (u_lobe >= before_coat) & (u_lobe < before_straight);
-    const Mask<F> straight = (u_lobe >= before_straight) & (view.p_straight > 0.f);
+    Mask<F> coat(false), straight(false), rough_coat(false), smooth_coat(false);
+    if constexpr (kCoat) {
+      coat = (u_lobe >= before_coat) & (u_lobe < before_straight);
+      smooth_coat = coat & coat_smooth_;
+      rough_coat = coat & not_(coat_smooth_);
+    }
+    if constexpr (kStraight) straight = (u_lobe >= before_straight) & (view.p_straight > 0.f);
     const Mask<F> above = wo.z > 0.f;
-    const Mask<F> mirrors = ((specular & smooth_) | (coat & coat_smooth_)) & above;
+    const Mask<F> mirrors = ((specular & smooth_) | smooth_coat) & above;
     const Mask<F> passes = straight & above;
 
     Vec3<F> wi = square_to_cosine_hemisphere(u, v);
-    const Mask<F> glossy = (specular & not_(smooth_)) | (coat & not_(coat_smooth_));
+    const Mask<F> glossy = (specular & not_(smooth_)) | rough_coat;
     if (any(glossy)) {
-      const Ggx<F> ggx{select(coat, coat_ggx_.alpha, ggx_.alpha)};
+      Ggx<F> ggx{ggx_.alpha};
+      if constexpr (kCoat) ggx.alpha = select(coat, coat_ggx_.alpha, ggx_.alpha);
       wi = select<F>(glossy, sample_microfacet(ggx, wo, u, v), wi);
     }
     wi = select<F>(mirrors, Vec3<F>(-wo.x, -wo.y, wo.z), wi);
-    wi = select<F>(passes, -wo, wi);
+    if constexpr (kStraight) wi = select<F>(passes, -wo, wi);
 
     const BsdfEval<F> e = eval_above(wo, wi, view);
     const Mask<F> delta = mirrors | passes;
@@ -128,14 +199,21 @@ class PrincipledBsdf : public BsdfTraits {
     s.wi = mirror_z(wi, side);
     s.weight = select<F>(valid, e.f_cos * F(1.f / select(valid, e.pdf, F(1.f))), zero);
     s.pdf = select(valid, e.pdf, F(0.f));
-    const F p_delta = select(passes, view.p_straight, select(coat, view.p_coat, view.p_specular));
-    const Color<F> mirrored =
-        select<F>(coat, Color<F>(view.coat), view.specular * F(1.f - view.coat));
-    const Color<F> f_delta = select<F>(passes, view.straight, mirrored);
+    F p_delta = view.p_specular;
+    Color<F> f_delta = view.specular;
+    if constexpr (kCoat) {
+      p_delta = select(coat, view.p_coat, p_delta);
+      f_delta = select<F>(coat, Color<F>(view.coat), f_delta * F(1.f - view.coat));
+    }
+    if constexpr (kStraight) {
+      p_delta = select(passes, view.p_straight, p_delta);
+      f_delta = select<F>(passes, view.straight, f_delta);
+    }
     s.weight = select<F>(delta, f_delta * F(1.f / max(p_delta, F(1e-20f))), s.weight);
     s.pdf = select(delta, p_delta, s.pdf);
     s.is_delta = delta;
-    const F lobe_roughness = select(coat, coat_roughness_, select(specular, roughness_, F(1.f)));
+    F lobe_roughness = select(specular, roughness_, F(1.f));
+    if constexpr (kCoat) lobe_roughness = select(coat, coat_roughness_, lobe_roughness);
     s.roughness = select(delta, F(0.f), lobe_roughness);
     return s;
   }
@@ -146,13 +224,11 @@ class PrincipledBsdf : public BsdfTraits {
     return F(1.f - coat_albedo(max(min(wo.z, abs(wi.z)), F(0.f))));
   }
 
-  /// What depends on wo alone: albedos towards it, which are the reflectances of what is smooth,
-  /// and the probabilities of the lobes.
-  struct View {
-    F coat, lost;
-    Color<F> specular, straight;
-    F p_diffuse, p_specular, p_coat, p_straight;
-  };
+  /// Whether a lane has a clearcoat.
+  bool has_coat() const {
+    if constexpr (kCoat) return any(Mask<F>(clearcoat_ > 0.f));
+    return false;
+  }
 
   F coat_reflectance(const F& cos_i) const { return clearcoat_ * coat_(coat_.f0_exact, cos_i); }
   F coat_albedo(const F& z) const {
@@ -161,32 +237,6 @@ class PrincipledBsdf : public BsdfTraits {
   }
   Color<F> specular_albedo(const F& z) const {
     return rough_.albedo(f0_, multiple_, z, select(smooth_, F(0.f), lost_(z)));
-  }
-
-  View make_view(const Vec3<F>& wo) const {
-    View v;
-    v.coat = F(0.f);
-    if (any(Mask<F>(clearcoat_ > 0.f))) v.coat = coat_albedo(max(wo.z, F(0.f)));
-    const F z = max(wo.z, F(0.f));
-    v.lost = lost_(z);
-    v.specular = specular_albedo(z);
-    const F below = 1.f - v.coat;
-    const Color<F> passed = Color<F>(F(1.f)) - v.specular;
-    v.straight = passed * F(below * transparency_);
-    // Estimated contributions; a lobe that can contribute gets at least 2 % before normalisation.
-    const F floor(0.02f);
-    const F multiple = F(below * v.lost) * luminance(multiple_);
-    const F diffuse = select(is_black(diffuse_), multiple,
-                             max(fma(below, luminance(diffuse_ * passed), multiple), floor));
-    const F specular = max(F(below * luminance(v.specular)), floor);
-    const F coat = select(clearcoat_ > 0.f, max(v.coat, floor), F(0.f));
-    const F straight = select(transparency_ > 0.f, max(luminance(v.straight), floor), F(0.f));
-    const F inv = 1.f / F(F(diffuse + specular) + F(coat + straight));
-    v.p_diffuse = diffuse * inv;
-    v.p_specular = specular * inv;
-    v.p_coat = coat * inv;
-    v.p_straight = straight * inv;
-    return v;
   }
 
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const View& view) const {
@@ -201,8 +251,8 @@ class PrincipledBsdf : public BsdfTraits {
       f += interface_(f0_, m.cos_h) * select(smooth_, F(0.f), m.f_cos);
       pdf = fma(view.p_specular, select(smooth_, F(0.f), m.pdf), pdf);
     }
-    const Mask<F> coated = clearcoat_ > 0.f;
-    if (any(coated)) {
+    if (has_coat()) {
+      const Mask<F> coated = clearcoat_ > 0.f;
       f = select<F>(coated, f * below_coat(wo, wi), f);
       const Mask<F> rough = coated & not_(coat_smooth_);
       if (any(rough)) {

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What kernels of a vertex are compiled with or without. There are two of each: with everything,
+/// and plain ones for scenes and settings that ask for nothing of it.
+#pragma once
+
+#include <cstdint>
+
+#include "wavecomb/core/lane_types.h"
+
+namespace wavecomb {
+
+enum Feature : uint32_t {
+  kMotion = 1,        ///< meshes or instances that move
+  kCurves = 2,        ///< curves and points
+  kLinks = 4,         ///< lights that are linked
+  kMeshLights = 8,    ///< mesh lights, and lights that bounces do not find
+  kNotes = 16,        ///< AOVs of vertices, histories of paths
+  kExperiments = 32,  ///< cosine sampling, Schlick's approximation
+};
+inline constexpr uint32_t kPlain = 0, kEverything = 63;
+
+/// Whether there are plain kernels and least variants for packets of F: for the widest ones.
+/// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.
+template <typename F>
+inline constexpr bool kHasPlain = !kIsScalar<F> && kWidth<F> == WAVECOMB_PLAIN;
+
+}  // namespace wavecomb

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Variants of programs: the same code without the parts that a material cannot show.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "wavecomb/scene/material_data.h"
+
+namespace wavecomb {
+
+/// What materials of programs principled and openpbr may do without.
+enum Part : uint32_t {
+  kVaries = 1,     ///< reads textures or a value graph
+  kGlows = 2,      ///< emission
+  kMetals = 4,     ///< metallic above 0, or F0 by specular_color
+  kCoats = 8,      ///< a clearcoat
+  kPasses = 16,    ///< transmission, straight or refracted
+  kBacks = 32,     ///< openpbr: diffuse light through thin walls
+  kFuzzes = 64,    ///< openpbr: fuzz
+  kFilms = 128,    ///< openpbr: a thin film
+  kBrushes = 256,  ///< openpbr: anisotropy and its rotation
+};
+inline constexpr uint32_t kAllParts = 511;
+
+/// The variants, each the cheapest that has its parts: X(name, program, parts). Each program with
+/// all of its parts comes first, in the order of ProgramId; the others in the order of what they
+/// cost. CMake reads this list, too: there is a compile unit for each.
+#define WAVECOMB_VARIANTS(X)                       \
+  X(diffuse, diffuse, kAllParts)                   \
+  X(metal, metal, kAllParts)                       \
+  X(dielectric, dielectric, kAllParts)             \
+  X(plastic, plastic, kAllParts)                   \
+  X(emissive, emissive, kAllParts)                 \
+  X(principled, principled, kAllParts)             \
+  X(openpbr, openpbr, kAllParts)                   \
+  X(gloss, principled, 0)                          \
+  X(textured_gloss, principled, kVaries)           \
+  X(textured_metal, principled, kVaries | kMetals) \
+  X(base, openpbr, kMetals)                        \
+  X(textured_base, openpbr, kVaries | kMetals)
+
+struct Variant {
+  const char* name;
+  const char* program;
+  uint32_t parts;
+};
+inline constexpr Variant kVariants[] = {
+#define WAVECOMB_VARIANT(name, program, parts) {#name, #program, parts},
+    WAVECOMB_VARIANTS(WAVECOMB_VARIANT)
+#undef WAVECOMB_VARIANT
+};
+inline constexpr uint32_t kVariantCount = sizeof(kVariants) / sizeof(Variant);
+
+/// The id of the program called `name`; no constant where there is none.
+constexpr ProgramId program_id(std::string_view name) {
+  uint32_t i = 0;
+  while (name != kProgramNames[i]) ++i;
+  return static_cast<ProgramId>(i);
+}
+/// The program that a variant is of.
+constexpr ProgramId program_of(uint32_t variant) {
+  return program_id(kVariants[variant].program);
+}
+
+/// Parts that a material may show, whatever its textures and graphs give.
+uint32_t parts_of(const Material& material, const GraphSet& graphs);
+
+/// The cheapest variant of a program that has all of these parts.
+uint32_t least_variant(ProgramId program, uint32_t parts);
+
+}  // namespace wavecomb
