@@ -22,6 +22,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/fingerprint.h"
 #include "wavecomb/scene/light_table.h"
+#include "wavecomb/scene/object_bounds.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/texture/tile_store.h"
 
@@ -45,6 +46,11 @@ uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector
   IesProfile profile{std::move(vertical), std::move(horizontal), {}};
   profile.candela.assign(candela.data(), candela.data() + candela.size());
   return builder.add_ies(std::move(profile));
+}
+
+/// Least and greatest corner.
+std::pair<Color3, Color3> corners(const Bounds& b) {
+  return {Color3{b.lo.x, b.lo.y, b.lo.z}, Color3{b.hi.x, b.hi.y, b.hi.z}};
 }
 
 }  // namespace
@@ -119,10 +125,14 @@ void bind_scene(nb::module_& m) {
       .def_prop_ro("moves",
                    [](const Scene& s) { return s.view().has_motion || !s.camera().steps.empty(); })
       .def_prop_ro("warnings", &Scene::warnings)
-      .def_prop_ro("bounds", [](const Scene& s) {
-        const Bounds& b = s.bounds();
-        return std::make_pair(Color3{b.lo.x, b.lo.y, b.lo.z}, Color3{b.hi.x, b.hi.y, b.hi.z});
-      });
+      .def_prop_ro("bounds", [](const Scene& s) { return corners(s.bounds()); })
+      .def(
+          "bounds_of",
+          [](const Scene& s, const std::string& prim) {
+            const Bounds b = object_bounds(s, prim);
+            return b.empty() ? std::nullopt : std::optional(corners(b));
+          },
+          "prim"_a, nb::call_guard<nb::gil_scoped_release>());
 
   nb::class_<SceneBuilder> builder(m, "SceneBuilder");
   builder

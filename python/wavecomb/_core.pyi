@@ -74,6 +74,10 @@ class Scene:
     def warnings(self) -> list[str]: ...
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
+    def bounds_of(
+        self, prim: str
+    ) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
+        """World bounds of the meshes that are a prim or are in it; None where there are none."""
 
 class TextureStore:
     """Keeps the textures of scenes within a limit of memory, and the rest in a temporary file."""

@@ -6,8 +6,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pxr import Sdf, Usd
 
@@ -15,6 +16,9 @@ from wavecomb.run.boxed.process import Process
 from wavecomb.run.boxed.reader import Reader, is_wanted
 from wavecomb.usd import LoadedStage
 from wavecomb.usd.looks.texture_cache import TextureCache
+
+if TYPE_CHECKING:
+    from wavecomb.usd.stage.outline import Outline
 
 
 @dataclass(frozen=True)
@@ -89,34 +93,58 @@ class Spare:
 _spare = Spare()
 
 
-def read(request: Request) -> tuple[Usd.Stage, LoadedStage]:
-    """The stage, open, and its scene.
+@dataclass(frozen=True)
+class Read:
+    """What was read.
 
-    The scene is read in a sandbox, before this process opens anything: what it then looks at and
-    edits was composed there. Images, and files that the stage names in values, are read there only.
+    Attributes:
+        stage: Its scene, and what is known beside.
+        usd: The stage to look at and to edit: in memory only, where it was read in a sandbox.
+        content: What its root layer is to hold from now on; None: what it holds.
+    """
+
+    stage: LoadedStage
+    usd: Usd.Stage
+    content: Sdf.Layer | None = None
+
+    def settle(self) -> None:
+        """Brings the content onto the stage, on the thread that owns it."""
+        if self.content is not None:
+            self.usd.GetRootLayer().TransferContent(self.content)
+
+
+def read(request: Request) -> Read:
+    """A stage and its scene.
+
+    They are read in a sandbox. What this process then looks at and edits is a stage in memory, of
+    the outline that came out: no file of the stage is opened here. With WAVECOMB_ISOLATE=0 it is
+    the stage itself.
 
     Raises:
         WavecombError: It cannot be rendered.
     """
+    return _read_elsewhere(request) if is_wanted() else _read_both_here(request)
+
+
+def _overrides(request: Request) -> Sdf.Layer | None:
+    if request.overrides is None and request.usd is not None:
+        return request.usd.GetSessionLayer()
+    return request.overrides
+
+
+def _read_both_here(request: Request) -> Read:
+    """In this process: the stage, and another one of it that is loaded."""
     from wavecomb.usd import LoadReport, mtlx, open_editable
     from wavecomb.usd.stage.diagnostics import captured
 
-    usd, loaded = request.usd, None
-    if is_wanted() and (usd is None or request.fresh):
-        overrides = request.overrides
-        if overrides is None and usd is not None:
-            overrides = usd.GetSessionLayer()
-        loaded = _read_elsewhere(request, overrides)
+    usd = request.usd
     if usd is None:
         usd = open_editable(request.source.path, request.source.variants)
     elif request.fresh:
         with captured(LoadReport()):
             mtlx.reload(usd)
     overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()
-    if loaded is None:
-        how = _read_elsewhere if is_wanted() else _read_here
-        loaded = how(request, overrides)
-    return usd, loaded
+    return Read(_read_here(request, overrides), usd)
 
 
 def _options(request: Request) -> dict[str, Any]:
@@ -128,17 +156,40 @@ def _options(request: Request) -> dict[str, Any]:
     return options if source.purposes is None else {**options, "purposes": source.purposes}
 
 
-def _read_elsewhere(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
-    """The scene of a file, with what a session layer holds; None: with the variants asked for."""
-    source, options = request.source, _options(request)
+def _read_elsewhere(request: Request) -> Read:
+    """In a sandbox, with what a session layer holds; without one: with the variants asked for."""
+    source, options, overrides = request.source, _options(request), _overrides(request)
     text = None if overrides is None else overrides.ExportToString()
     if overrides is None and source.variants:
         options["variants"] = dict(source.variants)
     try:
         with Reader(source.path, process=_spare.take()) as reader:
-            return reader.load(options, overrides=text, reuse=request.textures)
+            loaded = reader.load(options, overrides=text, reuse=request.textures, outline=True)
+            assert reader.outline is not None
+            return reader.checked(partial(_outlined, request, loaded, reader.outline))
     finally:
         _spare.prepare()
+
+
+def _outlined(request: Request, loaded: LoadedStage, outline: Outline) -> Read:
+    """A stage in memory of an outline, or what the one that is open is to hold."""
+    from wavecomb.run.boxed.outline import digest
+    from wavecomb.usd import LoadReport
+    from wavecomb.usd.stage.diagnostics import captured
+    from wavecomb.usd.stage.outline_layer import content_of, layer_of
+
+    content = digest(outline)
+    usd = request.usd
+    if usd is not None and content_of(usd.GetRootLayer()) == content:
+        return Read(loaded, usd)
+    with captured(LoadReport()):
+        layer = layer_of(outline, request.source.path, content)
+        if usd is not None:
+            return Read(loaded, usd, layer)
+        session = Sdf.Layer.CreateAnonymous("session.usda")
+        for path, name, choice in outline.selected:
+            Sdf.CreatePrimInLayer(session, path).variantSelections[name] = choice
+        return Read(loaded, Usd.Stage.Open(layer, session, Usd.Stage.LoadAll))
 
 
 def _read_here(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:

@@ -10,6 +10,7 @@ from pxr import Sdf, Usd
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture.files import replacing
+from wavecomb.usd.stage.outline_layer import file_of, other_files
 
 _OWN = {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
 """What the layer over the stage's root layer does not repeat."""
@@ -25,7 +26,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     root = stage.GetRootLayer()
     layer = Sdf.Layer.CreateAnonymous("edits.usda")
     layer.TransferContent(stage.GetSessionLayer())
-    base = Path(root.realPath)
+    base = Path(file_of(root))
     try:
         name = os.path.relpath(base, folder)
     except ValueError:  # another drive
@@ -49,10 +50,11 @@ def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
     if target.suffix.lower() not in (".usda", ".usd"):
         raise WavecombError(f"{target}: edits are saved as text: give a name that ends in .usda")
     root = stage.GetRootLayer()
-    if not root.realPath:
+    if not file_of(root):
         raise WavecombError("the stage is no file, so no layer can be put over it")
-    used = {Path(layer.realPath).resolve() for layer in stage.GetUsedLayers() if layer.realPath}
-    if target.resolve() in used:
+    used = {layer.realPath for layer in stage.GetUsedLayers()} | {file_of(root)}
+    used |= set(other_files(root))
+    if target.resolve() in {Path(one).resolve() for one in used if one}:
         raise WavecombError(f"{target}: is a file of the stage; give another name")
     text = edit_layer(stage, target.resolve().parent).ExportToString()
     try:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pxr import Usd
 
     from wavecomb._core import Renderer, Scene
+    from wavecomb.usd import LoadedStage
 
 
 def camera_pose(usd: Usd.Stage, path: str, time: float | None) -> Pose | None:
@@ -67,31 +68,33 @@ def edits_again(
     return edit
 
 
-def prim_bounds(usd: Usd.Stage, path: str, time: float | None) -> NDArray[np.float64] | None:
-    """World bounds of a prim, (2, 3); None where it has none.
+def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.float64] | None:
+    """World bounds of what is drawn of a prim, and of lights in it, (2, 3); None: it has none.
 
     Args:
         usd: The stage.
+        loaded: Its scene.
         path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
             "/World/Forest".
-        time: Time code; None: the stage's start.
     """
-    from pxr import Sdf, UsdGeom
-
-    from wavecomb.usd.stage.times import time_code
+    from pxr import Gf, Sdf, Usd, UsdGeom
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):
         return None
-    prim = usd.GetPrimAtPath(plain)
-    if not prim:
+    found = Gf.Range3d()
+    for corner in loaded.scene.bounds_of(plain) or ():
+        found.UnionWith(Gf.Vec3d(*corner))
+    time = Usd.TimeCode.Default() if loaded.frame is None else Usd.TimeCode(loaded.frame)
+    boxes = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
+    for light in loaded.lights:
+        if light == plain or light.startswith(f"{plain}/"):
+            prim = usd.GetPrimAtPath(light)
+            if prim:
+                found.UnionWith(boxes.ComputeWorldBound(prim).ComputeAlignedRange())
+    if found.IsEmpty():
         return None
-    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
-    box = UsdGeom.BBoxCache(time_code(usd, time), purposes).ComputeWorldBound(prim)
-    aligned = box.ComputeAlignedRange()
-    if aligned.IsEmpty():
-        return None
-    return np.array([aligned.GetMin(), aligned.GetMax()], np.float64)
+    return np.array([found.GetMin(), found.GetMax()], np.float64)
 
 
 def light_key(scene: Scene, index: int) -> tuple[str, int]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from wavecomb.gui.loader import Request, Source, copied, read
+from wavecomb.gui.loader import Read, Request, Source, copied, read
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.display import Look
 from wavecomb.gui.viewport.engine import Edit
@@ -210,12 +210,13 @@ class Session(QObject):
         self._tasks.begin("load", what)
         self._loader.submit(partial(read, request), self._reading)
 
-    def _take(self, number: int, found: tuple[Usd.Stage, LoadedStage]) -> None:
-        request, (usd, loaded) = self._request_wanted, found
+    def _take(self, number: int, found: Read) -> None:
+        request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
             return  # a newer one is under way
         from pxr import UsdGeom
 
+        found.settle()
         again = request.usd is not None
         if not again or request.fresh:
             self.material_edits.clear()
@@ -330,9 +331,9 @@ class Session(QObject):
 
     def selected_bounds(self) -> NDArray[np.float64] | None:
         """Least and greatest corner of the selected prim in world space, (2, 3), or None."""
-        if self.selection is None or self.usd is None or self._request is None:
+        if self.selection is None or self.stage is None or self.usd is None:
             return None
-        return prim_bounds(self.usd, self.selection, self._request.source.time)
+        return prim_bounds(self.usd, self.stage, self.selection)
 
     def pause(self) -> None:
         """The render and its twins stand still."""

@@ -112,22 +112,35 @@ class Child:
             )
         source: Any = body["path"]
         said: LoadReport | None = None
-        if body.get("overrides") is not None:
+        if body.get("overrides") is not None or body.get("outline"):
             from pxr import Sdf
 
             from wavecomb.usd.stage.diagnostics import captured
             from wavecomb.usd.stage.report import LoadReport
 
             layer = Sdf.Layer.CreateAnonymous("overrides.usda")
-            layer.ImportFromString(body["overrides"])
+            layer.ImportFromString(body.get("overrides") or "#usda 1.0")
             said = LoadReport()
             with captured(said):
-                source = open_stage(_path(source), overrides=layer)
+                variants = options.pop("variants", None)
+                source = open_stage(_path(source), variants, overrides=layer)
         loaded = load_stage(source, **options, **self._factories(body, options))
         if said is not None:
             loaded.report.absorb(said)
         self._held = None
-        self._answer(loaded)
+        outline = self._outline(source, options.get("frame")) if body.get("outline") else None
+        self._answer(loaded, outline)
+
+    def _outline(self, stage: Any, frame: float | None) -> dict[str, Any]:
+        """The outline of a stage, which is looked at no more, as plain data."""
+        from wavecomb.run.boxed.outline import of_outline
+        from wavecomb.usd.stage.diagnostics import captured
+        from wavecomb.usd.stage.outline_of import outline_of
+        from wavecomb.usd.stage.report import LoadReport
+        from wavecomb.usd.stage.times import time_code
+
+        with captured(LoadReport()):
+            return of_outline(outline_of(stage, time_code(stage, frame)))
 
     def _factories(self, body: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of ``load_stage`` that send what it reads."""
@@ -150,7 +163,7 @@ class Child:
             "progress": progress if body["progress"] else None,
         }
 
-    def _answer(self, loaded: LoadedStage) -> None:
+    def _answer(self, loaded: LoadedStage, outline: dict[str, Any] | None = None) -> None:
         from wavecomb.run.boxed import plain
 
         cache = loaded.textures
@@ -159,6 +172,7 @@ class Child:
             {
                 "stage": plain.of_stage(loaded),
                 "cache": None if cache is None else plain.of_cache(cache),
+                "tree": outline,
             },
         )
         self._sender.end_frame()

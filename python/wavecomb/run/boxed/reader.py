@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wavecomb import _core
 from wavecomb.errors import WavecombError
@@ -27,6 +27,9 @@ from wavecomb.usd.looks.texture_store import texture_store
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb.usd.stage.outline import Outline
 
 Progress = Callable[[int, int], Any]
 
@@ -56,6 +59,9 @@ class Reader:
     the process crashes, or sends what it should not. It ends with ``close``, or with this process.
 
     Contract: one thread at a time.
+
+    Attributes:
+        outline: Of the stage that was loaded last, where that was asked for.
     """
 
     def __init__(
@@ -86,6 +92,7 @@ class Reader:
         self._store: _core.TextureStore | None = None
         self._count = 0
         self._is_closed = False
+        self.outline: Outline | None = None
 
     def __enter__(self) -> Reader:
         return self
@@ -112,6 +119,7 @@ class Reader:
         progress: Progress | None = None,
         overrides: str | None = None,
         reuse: TextureCache | None = None,
+        outline: bool = False,
     ) -> LoadedStage:
         """The stage with its scene.
 
@@ -120,8 +128,11 @@ class Reader:
             progress: As of ``load_stage``.
             overrides: What the session layer holds, as .usda.
             reuse: Textures to share; the answer has some only for ``editable``.
+            outline: Have ``outline`` made, too.
         """
-        body: dict[str, Any] = {"path": os.fspath(self._path), "overrides": overrides}
+        body: dict[str, Any] = {
+            "path": os.fspath(self._path), "overrides": overrides, "outline": outline,
+        }  # fmt: skip
         if reuse is not None:
             self._scenes = {0: reuse.scene}
             self._store = reuse.store
@@ -179,6 +190,8 @@ class Reader:
         scene = self._built(builder)
         self._scenes = {self._count: scene}
         loaded = self._checked(lambda: self._loaded(answer, scene, options))
+        if body.get("outline"):
+            self.outline = self._checked(lambda: _outline(answer))
         self._receiver.end_frame()
         give_back_memory()
         return replace(loaded, seconds=time.perf_counter() - started)
@@ -203,6 +216,17 @@ class Reader:
             return loaded
         count = len(scene.textures)
         return replace(loaded, textures=plain.read_cache(cache, scene, self._store, count))
+
+    def checked(self, make: Callable[[], Any]) -> Any:
+        """What is made of an outline; one that USD does not take is refused.
+
+        Raises:
+            WavecombError: It is.
+        """
+        try:
+            return make()
+        except ValueError as error:
+            raise self._refusal(Refused(str(error))) from None
 
     def _checked(self, read: Callable[[], Any]) -> Any:
         """What is read of an answer; no answer but the one that was to come is taken."""
@@ -277,6 +301,12 @@ class Reader:
     def _out_of_memory(self) -> str:
         limit = "" if self._most is None else f"; the limit is {self._most / MEGABYTE:.0f} MB"
         return f"{self._path}: out of memory while it was read{limit}"
+
+
+def _outline(answer: Message) -> Outline:
+    from wavecomb.run.boxed.outline import read_outline
+
+    return read_outline(answer.body.get("tree"), answer.arrays)
 
 
 def _choices(answer: Message) -> list[RenderChoice]:
