@@ -165,7 +165,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"holder": "a/b"}, "something for the name of a prim"),
     ({"names": np.frombuffer(b"\xff\xfe", np.uint8)}, "names that are no text"),
     ({"names": names("World")}, "columns of an outline that differ in length"),
-    ({"names": names(*["a b"] * 12)}, "the name of a prim"),
+    ({"names": names(*["a b"] * 14)}, "the name of a prim"),
     ({"parents": (1, 1)}, "prims that are in none before them"),
     ({"parents": (1, 9)}, "prims that are in none before them"),
     ({"parents": np.zeros(3, np.uint32)}, "columns of an outline that differ in length"),
