@@ -48,9 +48,7 @@ class WaveRun {
       context_.wants_position |= (policy->columns() & kPositionColumn) != 0;
     }
     context_.scene = scene_->view();
-    for (const Material& m : scene_->materials())
-      if (m.program == ProgramId::kOpenPbr)
-        context_.scene.materials.energy = EnergyTables::shared(true).data();
+    context_.scene.materials.energy = energy_tables(scene_->materials());
     context_.scene.lights.by_tree =
         chooses_by_tree(case_.settings.light_selection, context_.scene.lights);
     context_.accel = accel_.get();

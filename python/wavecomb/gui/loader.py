@@ -126,9 +126,10 @@ def read(request: Request) -> Read:
     return _read_elsewhere(request) if is_wanted() else _read_both_here(request)
 
 
-def _overrides(request: Request) -> Sdf.Layer | None:
-    if request.overrides is None and request.usd is not None:
-        return request.usd.GetSessionLayer()
+def _overrides(request: Request, usd: Usd.Stage | None) -> Sdf.Layer | None:
+    """What is to lie over the files: as asked for, or what lies over a stage that is open."""
+    if request.overrides is None and usd is not None:
+        return usd.GetSessionLayer()
     return request.overrides
 
 
@@ -143,8 +144,7 @@ def _read_both_here(request: Request) -> Read:
     elif request.fresh:
         with captured(LoadReport()):
             mtlx.reload(usd)
-    overrides = request.overrides if request.overrides is not None else usd.GetSessionLayer()
-    return Read(_read_here(request, overrides), usd)
+    return Read(_read_here(request, _overrides(request, usd)), usd)
 
 
 def _options(request: Request) -> dict[str, Any]:
@@ -158,7 +158,8 @@ def _options(request: Request) -> dict[str, Any]:
 
 def _read_elsewhere(request: Request) -> Read:
     """In a sandbox, with what a session layer holds; without one: with the variants asked for."""
-    source, options, overrides = request.source, _options(request), _overrides(request)
+    source, options = request.source, _options(request)
+    overrides = _overrides(request, request.usd)
     text = None if overrides is None else overrides.ExportToString()
     if overrides is None and source.variants:
         options["variants"] = dict(source.variants)

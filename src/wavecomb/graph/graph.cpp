@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/graph/graph.h"
 
+#include <algorithm>
+
 #include <array>
 
 #include "wavecomb/core/error.h"
@@ -69,6 +71,14 @@ constexpr std::array<uint32_t, kGraphInputCount> kInputWidths{2, 3, 3, 3, 3, 3, 
 constexpr uint32_t kMaxOctaves = 32;
 
 }  // namespace
+
+bool GraphSet::drives(uint32_t graph, uint32_t parameter) const {
+  if (graph == kNoGraph) return false;
+  const GraphProgram& p = programs[graph];
+  const auto first = outputs.begin() + p.first_output;
+  return std::any_of(first, first + p.output_count,
+                     [&](const GraphOutput& o) { return o.parameter == parameter; });
+}
 
 void GraphSet::add(const Graph& graph) {
   programs.push_back({static_cast<uint32_t>(ops.size()), static_cast<uint32_t>(graph.ops.size()),

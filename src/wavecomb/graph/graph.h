@@ -146,6 +146,8 @@ struct GraphSet {
 
   /// Adds a program that check_graph found good, with the scene's numbers of attributes.
   void add(const Graph& graph);
+  /// Whether program `graph` (kNoGraph: none) drives component `parameter`.
+  bool drives(uint32_t graph, uint32_t parameter) const;
   GraphView view() const {
     if (programs.empty()) return {};
     return {programs.data(), ops.data(), constants.data(), images.data(), outputs.data(),

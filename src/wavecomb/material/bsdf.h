@@ -69,6 +69,25 @@ struct BsdfSample {
   F roughness;
 };
 
+/// Base of a program whose view is more than wo: its functions of a view, given wo. Programs make
+/// them visible by a using-declaration.
+template <typename Bsdf, typename F>
+struct ViewedBsdf : BsdfTraits {
+  F delta_probability(const Vec3<F>& wo) const { return self().delta_probability(self().view(wo)); }
+  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    return self().eval(self().view(wo), wi);
+  }
+  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    return self().diffuse_f_cos(self().view(wo), wi);
+  }
+  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
+    return self().sample(self().view(wo), u_lobe, u, v);
+  }
+
+ private:
+  const Bsdf& self() const { return static_cast<const Bsdf&>(*this); }
+};
+
 /// No sample: weight 0 and pdf 0.
 template <typename F>
 inline BsdfSample<F> empty_sample() {

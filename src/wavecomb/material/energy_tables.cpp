@@ -164,4 +164,14 @@ const EnergyTables& EnergyTables::shared(bool brushed) {
   return tables;
 }
 
+const float* energy_tables(std::span<const Material> materials) {
+  bool layered = false, brushed = false;
+  for (const Material& m : materials) {
+    if (m.program != ProgramId::kOpenPbr) continue;
+    layered = true;
+    brushed |= m.openpbr.anisotropy != 0 || m.graph != kNoGraph;
+  }
+  return layered ? EnergyTables::shared(brushed).data() : nullptr;
+}
+
 }  // namespace wavecomb

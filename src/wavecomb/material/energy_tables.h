@@ -4,10 +4,12 @@
 /// 2019).
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/vec.h"
+#include "wavecomb/scene/material_data.h"
 
 namespace wavecomb {
 
@@ -43,6 +45,9 @@ class EnergyTables {
   void add_brushed();
   std::vector<float> values_;
 };
+
+/// The tables that these materials read, or nullptr: MaterialView::energy.
+const float* energy_tables(std::span<const Material> materials);
 
 /// Reads the tables in lanes; `table` is EnergyTables::data().
 template <typename F>

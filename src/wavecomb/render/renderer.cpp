@@ -107,17 +107,6 @@ struct WavefrontRenderer::Impl {
 
 namespace {
 
-/// The tables that the scene's materials read, or nullptr.
-const float* energy_tables(const Scene& scene) {
-  bool layered = false, brushed = false;
-  for (const Material& m : scene.materials()) {
-    if (m.program != ProgramId::kOpenPbr) continue;
-    layered = true;
-    brushed |= m.openpbr.anisotropy != 0 || m.graph != kNoGraph;
-  }
-  return layered ? EnergyTables::shared(brushed).data() : nullptr;
-}
-
 /// Says that a render goes on, for as long as it lives.
 template <typename Impl>
 class Running {
@@ -243,7 +232,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const uint32_t wave_size = wave_size_for(settings, pixels);
   SceneView scene_view = scene.view();
   scene_view.lights.by_tree = chooses_by_tree(settings.light_selection, scene_view.lights);
-  scene_view.materials.energy = energy_tables(scene);
+  scene_view.materials.energy = energy_tables(scene.materials());
   WaveContext context{
       scene_view,
       impl_->accel.get(),

@@ -6,22 +6,10 @@
 #include "wavecomb/graph/parameters.h"
 
 namespace wavecomb {
-namespace {
-
-/// Whether program `graph` drives the parameter that begins at component `output`.
-bool drives(const GraphSet& graphs, uint32_t graph, uint32_t output) {
-  if (graph == kNoGraph) return false;
-  const GraphProgram& p = graphs.programs[graph];
-  const auto first = graphs.outputs.begin() + p.first_output;
-  return std::any_of(first, first + p.output_count,
-                     [&](const GraphOutput& o) { return o.parameter == output; });
-}
-
-}  // namespace
 
 uint32_t parts_of(const Material& m, const GraphSet& graphs) {
   const auto varies = [&](const char* parameter) {
-    return drives(graphs, m.graph, graph_parameter(parameter));
+    return graphs.drives(m.graph, graph_parameter(parameter));
   };
   const auto above_0 = [&](Input input, const char* parameter, float constant) {
     return constant != 0 || m.has_texture(input) || varies(parameter);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/scene/object_bounds.h"
 
-#include <string>
 #include <unordered_map>
 
 #include "wavecomb/scene/names.h"
@@ -15,8 +14,9 @@ bool is_in(std::string_view object, std::string_view prim) {
   return object.size() == prim.size() || object[prim.size()] == '/' || object[prim.size()] == '[';
 }
 
-/// Bounds of a mesh in its own space, all steps and radii with it.
-Bounds own_bounds(const Mesh& mesh) {
+}  // namespace
+
+Bounds mesh_bounds(const Mesh& mesh) {
   Bounds out;
   const auto& p = mesh.positions;
   for (size_t i = 0; i + 2 < p.size(); i += 3) {
@@ -27,38 +27,35 @@ Bounds own_bounds(const Mesh& mesh) {
   return out;
 }
 
-/// Adds the corners of a box that is placed.
-void add_placed(Bounds& out, const Bounds& box, const Affine& to_world) {
+void add_placed(Bounds& out, const Bounds& box, const Instance& instance,
+                std::span<const MatrixStep> steps) {
   if (box.empty()) return;
-  for (int corner = 0; corner < 8; ++corner)
-    out.add(to_world.point({corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
-                            corner & 4 ? box.hi.z : box.lo.z}));
+  const auto add_box = [&](const Affine& to_world) {
+    for (int corner = 0; corner < 8; ++corner)
+      out.add(to_world.point({corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
+                              corner & 4 ? box.hi.z : box.lo.z}));
+  };
+  if (!instance.motion.moves()) add_box(instance.to_world);
+  for (uint32_t k = 0; instance.motion.moves() && k <= instance.motion.segments; ++k)
+    add_box(steps[instance.motion.first + k].affine());
 }
-
-}  // namespace
 
 Bounds object_bounds(const Scene& scene, std::string_view prim) {
   const ObjectNames names(scene);
-  const SceneGeometry& geometry = *scene.geometry();
   std::unordered_map<uint32_t, Bounds> known;
   const auto bounds_of = [&](uint32_t mesh) -> const Bounds& {
     const auto [at, is_new] = known.try_emplace(mesh);
-    if (is_new) at->second = own_bounds(scene.meshes()[mesh]);
+    if (is_new) at->second = mesh_bounds(scene.meshes()[mesh]);
     return at->second;
   };
   Bounds out;
   uint32_t object = 0;
   for (uint32_t mesh : scene.groups()[0].meshes)
-    if (is_in(names.object(object++), prim)) add_placed(out, bounds_of(mesh), Affine{});
-  for (const Instance& instance : scene.instances()) {
-    for (uint32_t mesh : scene.groups()[instance.group].meshes) {
-      if (!is_in(names.object(object++), prim)) continue;
-      const Bounds& box = bounds_of(mesh);
-      if (!instance.motion.moves()) add_placed(out, box, instance.to_world);
-      for (uint32_t k = 0; instance.motion.moves() && k <= instance.motion.segments; ++k)
-        add_placed(out, box, geometry.steps[instance.motion.first + k].affine());
-    }
-  }
+    if (is_in(names.object(object++), prim)) out.add(bounds_of(mesh));
+  for (const Instance& instance : scene.instances())
+    for (uint32_t mesh : scene.groups()[instance.group].meshes)
+      if (is_in(names.object(object++), prim))
+        add_placed(out, bounds_of(mesh), instance, scene.geometry()->steps);
   return out;
 }
 

@@ -10,14 +10,6 @@
 namespace wavecomb {
 namespace {
 
-/// Whether program `graph` drives parameter component `output`.
-bool drives(const GraphSet& graphs, uint32_t graph, uint32_t output) {
-  const GraphProgram& p = graphs.programs[graph];
-  const auto first = graphs.outputs.begin() + p.first_output;
-  return std::any_of(first, first + p.output_count,
-                     [&](const GraphOutput& o) { return o.parameter == output; });
-}
-
 MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   MaterialRecord r{};
   const auto put = [](float* to, const Vec3<float>& v) {
@@ -53,7 +45,7 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   if (m.graph != kNoGraph) {
     r.flags |= kHasGraph;
     r.textured_inputs |= kReadsGraph;
-    if (drives(graphs, m.graph, kNormalOutput)) r.textured_inputs |= kGraphNormal;
+    if (graphs.drives(m.graph, kNormalOutput)) r.textured_inputs |= kGraphNormal;
   }
   return r;
 }

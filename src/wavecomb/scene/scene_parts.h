@@ -37,6 +37,11 @@ struct Bounds {
     lo = {p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z};
     hi = {p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z};
   }
+  void add(const Bounds& b) {
+    if (b.empty()) return;
+    add(b.lo);
+    add(b.hi);
+  }
 };
 
 /// A group of meshes that is committed once and instanced any number of times.

@@ -5,6 +5,7 @@
 
 #include "wavecomb/curve/check.h"
 #include "wavecomb/scene/mesh_attributes.h"
+#include "wavecomb/scene/object_bounds.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 
@@ -113,15 +114,7 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     geometry.geometry_mesh.insert(geometry.geometry_mesh.end(), in_group.begin(), in_group.end());
   }
   parallel_for(geometry.groups.size(), [&](size_t g) {
-    for (uint32_t mesh : geometry.groups[g].meshes) {
-      const auto& p = meshes[mesh].positions;
-      const auto& radii = meshes[mesh].radii;
-      for (size_t i = 0; i + 2 < p.size(); i += 3) {
-        const float r = radii.empty() ? 0.f : radii[i / 3 % radii.size()];
-        bounds[g].add({p[i] - r, p[i + 1] - r, p[i + 2] - r});
-        bounds[g].add({p[i] + r, p[i + 1] + r, p[i + 2] + r});
-      }
-    }
+    for (uint32_t mesh : geometry.groups[g].meshes) bounds[g].add(mesh_bounds(meshes[mesh]));
   });
   geometry.instance_records.reserve(geometry.instances.size() + 1);
   geometry.instance_records.push_back(make_instance_record(Affine{}, grey));
@@ -137,17 +130,7 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     r.emissive = emissive;
     emissive += static_cast<uint32_t>(geometry.groups[i.group].meshes.size());
     geometry.instance_records.push_back(r);
-    const Bounds& b = bounds[i.group];
-    if (b.empty()) continue;
-    const auto add_box = [&](const Affine& to_world) {
-      for (int corner = 0; corner < 8; ++corner)
-        geometry.bounds.add(
-            to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
-                            corner & 4 ? b.hi.z : b.lo.z}));
-    };
-    if (!i.motion.moves()) add_box(i.to_world);
-    for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
-      add_box(geometry.steps[i.motion.first + k].affine());
+    add_placed(geometry.bounds, bounds[i.group], i, geometry.steps);
   }
   if (geometry.bounds.empty()) return;
   const Bounds& b = geometry.bounds;

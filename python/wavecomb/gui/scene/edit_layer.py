@@ -10,10 +10,8 @@ from pxr import Sdf, Usd
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture.files import replacing
+from wavecomb.usd.stage.outline import OWN_FACTS
 from wavecomb.usd.stage.outline_layer import file_of, other_files
-
-_OWN = {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
-"""What the layer over the stage's root layer does not repeat."""
 
 
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
@@ -35,7 +33,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]
     # Up axis, units, default prim, times: USD takes them from the strongest layer only.
     for key in root.pseudoRoot.ListInfoKeys():
-        if key not in _OWN and not layer.pseudoRoot.HasInfo(key):
+        if key not in OWN_FACTS and not layer.pseudoRoot.HasInfo(key):
             layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))
     return layer
 

@@ -19,6 +19,7 @@ from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
 from wavecomb.usd.looks.parameters import Parameter, as_stored
 from wavecomb.usd.stage.outline_layer import content_of
+from wavecomb.usd.stage.times import code_of
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
@@ -291,15 +292,13 @@ class SceneEdits(QObject):
         usd = self.session.usd
         if usd is None or loaded is None:
             return
+        before, self._content = self._content, content_of(usd.GetRootLayer())
         if self._sync is None or self._sync.edits.stage != usd:
-            time = Usd.TimeCode.Default() if loaded.frame is None else Usd.TimeCode(loaded.frame)
-            self._forget(RenderSync(self.session, StageEdits(usd, time)))
-            self._content = content_of(usd.GetRootLayer())
+            self._forget(RenderSync(self.session, StageEdits(usd, code_of(loaded.frame))))
             self.changed.emit()
             return
         self.scene_changed.emit()
-        if self._content != content_of(usd.GetRootLayer()):
-            self._content = content_of(usd.GetRootLayer())
+        if self._content != before:
             self.structure_changed.emit()
         # What was edited, or taken back, while the stage was read is not in the scene yet.
         for prim in {path for path, _ in self._sync.edits.edited()} | self._touched:

@@ -77,7 +77,9 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
         path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
             "/World/Forest".
     """
-    from pxr import Gf, Sdf, Usd, UsdGeom
+    from pxr import Gf, Sdf, UsdGeom
+
+    from wavecomb.usd.stage.times import code_of
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):
@@ -85,8 +87,8 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
     found = Gf.Range3d()
     for corner in loaded.scene.bounds_of(plain) or ():
         found.UnionWith(Gf.Vec3d(*corner))
-    time = Usd.TimeCode.Default() if loaded.frame is None else Usd.TimeCode(loaded.frame)
-    boxes = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
+    drawn = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+    boxes = UsdGeom.BBoxCache(code_of(loaded.frame), drawn)
     for light in loaded.lights:
         if light == plain or light.startswith(f"{plain}/"):
             prim = usd.GetPrimAtPath(light)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
 from PySide6.QtCore import QObject, Signal
 
 from wavecomb.gui.loader import Read, Request, Source, copied, read
@@ -39,8 +40,6 @@ from wavecomb.gui.viewport.tasks import Tasks
 from wavecomb.gui.worker import Worker
 
 if TYPE_CHECKING:
-    from pxr import Usd
-
     from wavecomb._core import Scene
     from wavecomb.usd import LoadedStage, LoadReport
 
@@ -214,8 +213,6 @@ class Session(QObject):
         request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
             return  # a newer one is under way
-        from pxr import UsdGeom
-
         found.settle()
         again = request.usd is not None
         if not again or request.fresh:

@@ -45,10 +45,14 @@ def of_outline(outline: Outline) -> dict[str, Any]:
     return {**found, "names": "\n".join(outline.names).encode()}
 
 
+def _is_short(found: str) -> bool:
+    """Whether a text has a sensible length, and nothing that ends one for C."""
+    return len(found) <= _LONGEST and "\0" not in found
+
+
 def _short(value: Any, arrays: Sequence[Array]) -> str:
-    """A text of a sensible length, without what ends one for C."""
     found = text(value, arrays)
-    if len(found) > _LONGEST or "\0" in found:
+    if not _is_short(found):
         raise Refused("a text that is none")
     return found
 
@@ -244,7 +248,7 @@ def _is_value(type_name: str, value: Any) -> bool:
     if type_name == "bool":
         return type(value) is bool
     if type_name == "asset" or type_name in TEXTS:
-        return isinstance(value, str) and len(value) <= _LONGEST and "\0" not in value
+        return isinstance(value, str) and _is_short(value)
     return _is_number(value, INTEGERS if type_name in INTEGERS else FLOATS)
 
 

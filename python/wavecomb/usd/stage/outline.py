@@ -16,6 +16,11 @@ NOTHING = 0xFFFFFFFF
 """In place of a parent: a root; of a prototype: no instance."""
 
 SPECIFIERS = ("SpecifierDef", "SpecifierOver", "SpecifierClass")
+OWN_FACTS = frozenset(
+    {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
+)
+"""Metadata of a root layer that nothing over it repeats."""
+
 MOST_PRIMS = 1 << 25
 MOST_NESTING = 256
 """Prims above one another, with what instances bring."""

@@ -13,6 +13,7 @@ from wavecomb.usd.stage.outline import (
     MATRICES,
     MOST_VALUES,
     NOTHING,
+    OWN_FACTS,
     ROWS,
     SPECIFIERS,
     TYPES,
@@ -127,15 +128,13 @@ class _Outliner:
 
     def _path(self, path: Sdf.Path) -> str:
         """A path of the stage; in prototypes that of the outline's."""
-        if self._of_prototype:
-            text = str(path)
-            if text.startswith("/__Prototype_"):
-                top = path.GetPrefixes()[0]
-                number = self._of_prototype.get(top)
-                if number is not None:
-                    return f"/{self._holder}/P{number}{text[len(str(top)) :]}"
-            return text
-        return str(path)
+        text = str(path)
+        if text.startswith("/__Prototype_"):
+            top = path.GetPrefixes()[0]
+            number = self._of_prototype.get(top)
+            if number is not None:
+                return f"/{self._holder}/P{number}{text[len(str(top)) :]}"
+        return text
 
     def _subtree(self, top: Usd.Prim) -> None:
         above: list[int] = []
@@ -297,7 +296,7 @@ def _facts(root: Sdf.Layer) -> dict[str, Any]:
     """Metadata of a root layer: flags, numbers and texts, and expression variables of such."""
     found: dict[str, Any] = {}
     for name in sorted(root.pseudoRoot.ListInfoKeys()):
-        if name in _LEFT_OUT:
+        if name in OWN_FACTS:
             continue
         value = root.pseudoRoot.GetInfo(name)
         if isinstance(value, _PLAIN):
@@ -308,4 +307,3 @@ def _facts(root: Sdf.Layer) -> dict[str, Any]:
 
 
 _PLAIN = (bool, int, float, str)
-_LEFT_OUT = ("comment", "documentation", "owner", "subLayers", "subLayerOffsets")

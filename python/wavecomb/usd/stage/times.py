@@ -15,6 +15,11 @@ def time_code(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
     return Usd.TimeCode.EarliestTime()
 
 
+def code_of(frame: float | None) -> Usd.TimeCode:
+    """The time of a ``frame_number``; of None that of default values."""
+    return Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
+
+
 def frame_number(time: Usd.TimeCode) -> float | None:
     """The number of a frame; None for the earliest samples or default values, which have none."""
     if time.IsDefault() or time.IsEarliestTime():

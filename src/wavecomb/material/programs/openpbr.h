@@ -26,7 +26,8 @@ namespace wavecomb {
 /// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
 /// show no others.
 template <typename F, uint32_t kParts>
-class OpenPbrBsdf : public BsdfTraits {
+class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
+  using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;
   static constexpr bool kCoat = (kParts & kCoats) != 0, kFuzz = (kParts & kFuzzes) != 0,
                         kBack = (kParts & kBacks) != 0, kTurned = (kParts & kBrushes) != 0;
   using Base = OpenPbrBase<F, kParts>;
@@ -67,8 +68,9 @@ class OpenPbrBsdf : public BsdfTraits {
     }
     diffuse_ = lerp(p.base_color, under, sub);
     if constexpr (kTurned) {
-      turn_cos_ = sincos_2pi(p.rotation).cos;
-      turn_sin_ = sincos_2pi(p.rotation).sin;
+      const SinCos<F> turn = sincos_2pi(p.rotation);
+      turn_cos_ = turn.cos;
+      turn_sin_ = turn.sin;
     }
   }
 
@@ -140,14 +142,7 @@ class OpenPbrBsdf : public BsdfTraits {
     return v;
   }
 
-  F delta_probability(const Vec3<F>& wo) const { return delta_probability(view(wo)); }
-  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const { return eval(view(wo), wi); }
-  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    return diffuse_f_cos(view(wo), wi);
-  }
-  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
-    return sample(view(wo), u_lobe, u, v);
-  }
+  using Viewed::delta_probability, Viewed::eval, Viewed::diffuse_f_cos, Viewed::sample;
 
   F delta_probability(const View& v) const {
     F mirrors = select(base_.smooth, v.p_base, F(0.f));

@@ -29,7 +29,8 @@ namespace wavecomb {
 /// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
 /// show no others.
 template <typename F, uint32_t kParts>
-class PrincipledBsdf : public BsdfTraits {
+class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
+  using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;
   static constexpr bool kMetal = (kParts & kMetals) != 0, kCoat = (kParts & kCoats) != 0,
                         kStraight = (kParts & kPasses) != 0;
 
@@ -133,14 +134,7 @@ class PrincipledBsdf : public BsdfTraits {
     return v;
   }
 
-  F delta_probability(const Vec3<F>& wo) const { return delta_probability(view(wo)); }
-  BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const { return eval(view(wo), wi); }
-  Color<F> diffuse_f_cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    return diffuse_f_cos(view(wo), wi);
-  }
-  BsdfSample<F> sample(const Vec3<F>& wo, const F& u_lobe, const F& u, const F& v) const {
-    return sample(view(wo), u_lobe, u, v);
-  }
+  using Viewed::delta_probability, Viewed::eval, Viewed::diffuse_f_cos, Viewed::sample;
 
   F delta_probability(const View& v) const {
     F mirrors = select(smooth_, v.p_specular, F(0.f));
