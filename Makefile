@@ -87,20 +87,21 @@ test: ## Everything: lint, C++ tests, the same under sanitizers, pytest
 test-fast: ## Lint, C++ tests, pytest without the slow ones
 	@$(call stages,lint test-cpp test-py-fast)
 
-test-cpp: build build/.setup-test ## C++ tests
+# Those that optimising may show something of; the others are in test-asan (tests/cpp/CMakeLists.txt).
+test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole renders
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all: every check in packets and tests, too, which takes four times as long to compile.
-test-asan: build/.setup-test ## C++ tests under AddressSanitizer and UndefinedBehaviorSanitizer
+# CHECKS=all: all tests, and every check in packets and tests, too, which takes five times as long to compile.
+test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
-	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=ON
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS)
 	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
 test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
 	@test -e $(TSAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(TSAN) -G Ninja --log-level=NOTICE \
-	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=thread -DWAVECOMB_TESTS=ON
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=thread -DWAVECOMB_TESTS=all
 	@$(LOCK) $(VENV)/cmake --build $(TSAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	TSAN_OPTIONS="suppressions=$(CURDIR)/tests/cpp/tsan.supp $(TSAN_OPTIONS)" \
 	  $(TSAN)/tests/cpp/wavecomb_tests --gtest_brief=1 $(if $(FILTER),--gtest_filter='$(FILTER)')
@@ -114,8 +115,10 @@ test-py: build-naive build/.setup-test ## Python and statistical tests
 
 test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
 	@$(MAKE) --no-print-directory test-asan CHECKS=all
+	@$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=all
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
+	@$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
 
 test-wheel: wheel ## Install that wheel into a fresh environment and render with each of its libraries

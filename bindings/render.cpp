@@ -158,6 +158,22 @@ nb::dict aovs_dict(nb::handle owner) {
   return d;
 }
 
+/// The rows of WAVECOMB_AOVS.
+nb::list aov_table() {
+  static constexpr const char* kKinds[] = {"mean",     "mean_of_hits", "nearest",
+                                           "coverage", "groups",       "sum"};
+  nb::list rows;
+  for (const AovRow& aov : kAovs) {
+    nb::dict row;
+    row["name"] = aov.name;
+    row["channels"] = aov.channels;
+    row["kind"] = kKinds[static_cast<size_t>(aov.kind)];
+    row["title"] = aov.title;
+    rows.append(row);
+  }
+  return rows;
+}
+
 nb::dict manifests_dict(const Result& r) {
   nb::dict d;
   for (const CryptoManifest& manifest : r.picture.manifests) {
@@ -255,7 +271,7 @@ void bind_render(nb::module_& m) {
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
         "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none(),
         "watcher"_a = nb::none(), "state"_a = nb::none(), "interval"_a = 0.1);
-  m.attr("AOVS") = nb::cast(AovSet{(1u << kAovCount) - 1}.names());
+  m.def("aov_table", &aov_table);
   m.def("crypto_id", [](const std::string& name) { return crypto_id(name); });
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);

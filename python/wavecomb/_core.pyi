@@ -419,6 +419,9 @@ def light_kinds() -> list[tuple[str, tuple[str, ...]]]:
 def material_table() -> list[dict[str, Any]]:
     """The parameters of materials, as wavecomb.material_table.MaterialParameter has them."""
 
+def aov_table() -> list[dict[str, Any]]:
+    """What a render can keep beside the beauty, as wavecomb.run.aovs.Aov has it."""
+
 def light_table() -> list[dict[str, Any]]:
     """The parameters of lights, as wavecomb.light_table.LightParameter has them."""
 
@@ -503,7 +506,7 @@ class Settings:
     """Passes of 1, 1, 2, 4 ... samples: the whole picture is there soon. Default: False."""
     # ---- to here ----
     region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
-    aovs: list[str]  # names of AOVS; "light_NAME" for one light group
+    aovs: list[str]  # names of aov_table(); "light_NAME" for one light group
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:
         """Raises Error naming the setting and what it may be."""
@@ -694,7 +697,6 @@ class RayRecording:
         wall_s, and by kind of ray thread_s, rays and hits. Raises Error for a width that Embree
         does not have here."""
 
-AOVS: list[str]
 """Names for Settings.aovs."""
 
 GRAPH_CODES: tuple[str, ...]

@@ -105,7 +105,7 @@ TEST(Allocation, NoneForAovs) {
   for (const auto& scene : {mixed(), emissive_meshes()})
     for (const uint32_t lanes : lane_widths()) {
       WaveCase c;
-      c.settings.aovs.bits = (1u << kAovCount) - 1;
+      c.settings.aovs.bits = AovSet::kAll;
       c.lanes = lanes;
       expect_no_allocation(scene, c, "all AOVs");
     }

@@ -18,9 +18,9 @@ std::string numbered(std::string name, uint32_t i) {
 
 TEST(AovSet, NamesThereAndBack) {
   uint32_t bits = 0;
-  for (const std::string& name : AovSet{(1u << kAovCount) - 1}.names())
+  for (const std::string& name : AovSet{AovSet::kAll}.names())
     bits |= static_cast<uint32_t>(AovSet::parse(name));
-  EXPECT_EQ(bits, (1u << kAovCount) - 1);
+  EXPECT_EQ(bits, AovSet::kAll);
   EXPECT_EQ(AovSet{}.names(), (std::vector<std::string>{"albedo", "normal", "depth"}));
   EXPECT_THROW(AovSet::parse("albdo"), Error);
 }
@@ -92,35 +92,78 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
 
 // The figures of docs/aovs.md.
 TEST(AovFilm, MemoryOfEveryAov) {
-  const AovLayout all{AovSet{(1u << kAovCount) - 1}, 4};
+  const AovLayout all{AovSet{AovSet::kAll}, 4};
   const Film film(16, 9, all);
-  EXPECT_EQ(film.bytes(), 16u * 9 * (32 + 64 + 32 + 3 * 64 + 72 + 4 * 24 + 8 + 48));
+  EXPECT_EQ(film.bytes(),
+            16u * 9 * (32 + 2 * 24 + 12 + 4 + 28 + 3 * 64 + 3 * 24 + 4 * 24 + 8 + 2 * 24));
   const auto bytes = [](uint32_t bits) { return Film(8, 8, {AovSet{bits}}).bytes() / 64; };
   EXPECT_EQ(bytes(0), 32u);
-  EXPECT_EQ(bytes(AovSet::kFirst), 96u);
+  EXPECT_EQ(bytes(AovSet::kUsual), 92u);
+  EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kGuideNormal)), 56u);
+  EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kUv)), 44u);
   EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kCryptoAsset)), 96u);
 }
 
 TEST(AovFilm, NearestSampleWinsAndTheFirstOfEquals) {
-  Film film(1, 1, {AovSet{AovSet::kNearest}});
-  const float uv[2] = {0.25f, 0.5f};
-  AovHit hit;
-  hit.material = 4;
-  hit.position[0] = 7;
-  film.aovs().add_hit(0, AovHit{}, 0.5f, uv, nullptr);
-  film.aovs().add_hit(0, hit, 0.2f, uv, nullptr);
-  hit.material = 5;
-  film.aovs().add_hit(0, hit, 0.2f, uv, nullptr);
-  film.aovs().add_hit(0, hit, 0.3f, uv, nullptr);
-  const AovFilm::Nearest& nearest = film.aovs().nearest(0);
-  EXPECT_EQ(nearest.material, 4u);
-  EXPECT_EQ(nearest.instance, kNothingHit);
+  Film film(1, 1, {AovSet{aov_bits(AovKind::kNearest)}});
+  AovFilm& aovs = film.aovs();
+  const auto add = [&](float centre2, uint32_t material, float x) {
+    if (!aovs.is_nearest(0, centre2)) return;
+    const float position[3] = {x, 0, 0}, uv[2] = {0.25f, 0.5f};
+    const float id = id_value(material), none = id_value(kNothingHit);
+    aovs.put(Aov::kPosition, 0, position);
+    aovs.put(Aov::kUv, 0, uv);
+    aovs.put(Aov::kMaterialId, 0, &id);
+    aovs.put(Aov::kInstanceId, 0, &none);
+  };
+  add(0.5f, kNothingHit, 0);
+  add(0.2f, 4, 7);
+  add(0.2f, 5, 8);
+  add(0.3f, 6, 9);
   const std::vector<AovLayer> layers = std::move(film).finish({}).aovs;
   ASSERT_EQ(layers.size(), 4u);
   EXPECT_EQ(layers[0].values, (std::vector<float>{7, 0, 0}));
   EXPECT_EQ(layers[1].values, (std::vector<float>{0.25f, 0.5f}));
   EXPECT_EQ(layers[2].values, (std::vector<float>{5}));  // counted from 1
   EXPECT_EQ(layers[3].values, (std::vector<float>{0}));
+}
+
+// What a row says is what the film keeps, and the layers come in the order of the rows.
+TEST(AovFilm, EveryRowHasItsLayer) {
+  const AovLayout layout{AovSet{AovSet::kAll}, 2};
+  const std::vector<std::string> groups{"key", "sky"};
+  Film film(2, 1, layout);
+  film.pixel(1, 0).samples = 4;
+  for (const AovRow& row : kAovs)
+    if (row.kind == AovKind::kMean || row.kind == AovKind::kSum) {
+      const float twice[3] = {2, 4, 6};
+      film.aovs().add(row.aov, 1, twice);
+      film.aovs().add(row.aov, 1, twice);
+    }
+  const Film before = film;
+  const Film::Layers layers = std::move(film).finish(groups);
+  std::vector<std::string> names{"albedo", "normal", "depth"};
+  for (const AovLayer& layer : layers.aovs) names.push_back(layer.name);
+  std::vector<std::string> expected;
+  for (const AovRow& row : kAovs) {
+    if (row.kind == AovKind::kGroups)
+      for (const std::string& group : groups) expected.push_back("light_" + group);
+    else
+      expected.emplace_back(row.name);
+  }
+  EXPECT_EQ(names, expected);
+  for (const AovLayer& layer : layers.aovs) {
+    EXPECT_EQ(layer.values, before.aovs().layer(layer.name, layers.samples, groups).values)
+        << layer.name;
+    if (layer.name.starts_with("light_")) continue;
+    const AovRow& row = row_of(AovSet::parse(layer.name));
+    if (row.kind == AovKind::kMean) {
+      EXPECT_EQ(layer.values, (std::vector<float>{0, 0, 0, 1, 2, 3})) << row.name;
+    }
+    if (row.kind == AovKind::kSum) {
+      EXPECT_EQ(layer.values, (std::vector<float>{0, 4})) << row.name;
+    }
+  }
 }
 
 TEST(ObjectNames, SeenThroughInstances) {

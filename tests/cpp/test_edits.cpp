@@ -382,7 +382,7 @@ TEST(Costs, AWholeProfileSparesCalibration) {
 TEST(Snapshots, HaveEveryLayerOfThePicture) {
   WavefrontRenderer renderer(mixed());
   Settings s = small();
-  s.aovs = AovSet{(1u << kAovCount) - 1};
+  s.aovs = AovSet{AovSet::kAll};
   s.error = true;
   s.spp = 16;
   std::vector<AovLayer> seen;
@@ -421,7 +421,7 @@ TEST(Picks, AgreeWithWhatThePictureShows) {
   s.spp = 1;
   s.filter = FilterKind::kBox;
   s.filter_width = 0.01f;  // rays through the middle of pixels
-  s.aovs = AovSet{(1u << kAovCount) - 1};
+  s.aovs = AovSet{AovSet::kAll};
   const Picture p = renderer.render(s);
   const AovLayer &material = layer(p, "material_id"), &instance = layer(p, "instance_id");
   const AovLayer &position = layer(p, "position"), &uv = layer(p, "uv");

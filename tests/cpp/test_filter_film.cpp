@@ -118,13 +118,16 @@ TEST(Film, ManySamplesStayExact) {
 
 TEST(Film, AovsAreMeans) {
   Film film(3, 2, {});
-  EXPECT_TRUE(film.aovs().has_first());
   film.pixel(2, 1).samples = 4;
-  AovFilm::First& aov = film.aovs().first(film.index(2, 1));
-  aov.albedo[1] = 2;
-  aov.normal[2] = -1;
-  aov.depth = 9;
-  aov.depth_samples = 3;  // one of four missed
+  AovFilm& aovs = film.aovs();
+  const size_t pixel = film.index(2, 1);
+  ASSERT_NE(aovs.sums(Aov::kAlbedo, pixel), nullptr);
+  aovs.sums(Aov::kAlbedo, pixel)[1] = 2;
+  aovs.sums(Aov::kNormal, pixel)[2] = -1;
+  for (const float depth : {2.f, 3.f, 4.f}) {  // one of four missed
+    aovs.add(Aov::kDepth, pixel, &depth);
+    aovs.count_hit(pixel);
+  }
   EXPECT_EQ(film.albedo()[3 * 5 + 1], 0.5f);
   EXPECT_EQ(film.normal()[3 * 5 + 2], -0.25f);
   EXPECT_EQ(film.depth()[5], 3);
@@ -139,10 +142,11 @@ TEST(Film, FinishGivesTheSameMeans) {
     for (uint32_t x = 0; x < film.width(); ++x) {
       const uint32_t n = x + 5 * y;  // the first has no samples
       film.pixel(x, y) = {uniform(rng), uniform(rng), uniform(rng), n};
-      AovFilm::First& aov = film.aovs().first(film.index(x, y));
-      for (size_t c = 0; c < 3; ++c) aov.albedo[c] = uniform(rng), aov.normal[c] = uniform(rng);
-      aov.depth = uniform(rng);
-      aov.depth_samples = n / 2;
+      const size_t pixel = film.index(x, y);
+      for (const Aov aov : {Aov::kAlbedo, Aov::kNormal, Aov::kDepth})
+        for (uint32_t c = 0; c < row_of(aov).channels; ++c)
+          film.aovs().sums(aov, pixel)[c] = uniform(rng);
+      for (uint32_t i = 0; i < n / 2; ++i) film.aovs().count_hit(pixel);
     }
   const Film before = film;
   const Film::Layers layers = std::move(film).finish({});
@@ -156,7 +160,7 @@ TEST(Film, FinishGivesTheSameMeans) {
 
 TEST(Film, WithoutAovs) {
   const Film film(3, 2, {AovSet{0}});
-  EXPECT_FALSE(film.aovs().has_first());
+  EXPECT_EQ(Film(3, 2, {AovSet{0}}).aovs().sums(Aov::kAlbedo, 0), nullptr);
   EXPECT_EQ(film.aovs().bytes(), 0u);
   EXPECT_TRUE(Film(film).finish({}).aovs.empty());
   EXPECT_TRUE(film.albedo().empty());

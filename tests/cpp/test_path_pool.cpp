@@ -138,7 +138,7 @@ TEST(PathPool, ColdFieldsComeBackOneByOne) {
 
 TEST(PathAovs, OnlyWhatIsAskedForTakesRoom) {
   const PathAovs none(100, {AovSet{0}}, nullptr), usual(100, {AovSet{}}, nullptr);
-  const PathAovs all(100, {AovSet{(1u << kAovCount) - 1}, 3}, nullptr);
+  const PathAovs all(100, {AovSet{AovSet::kAll}, 3}, nullptr);
   EXPECT_EQ(none.bytes(), 0u);
   EXPECT_FALSE(none.wants_hits() || none.wants_vertex(0) || none.wants_groups() ||
                none.wants_cost());

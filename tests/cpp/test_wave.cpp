@@ -261,7 +261,7 @@ TEST(Wave, DepthZeroSeesEmittersOnly) {
 
 Settings with_all_aovs() {
   Settings s = small_settings();
-  s.aovs.bits = (1u << kAovCount) - 1;
+  s.aovs.bits = AovSet::kAll;
   return s;
 }
 

@@ -19,6 +19,7 @@ import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 from wavecomb.picture.image import read_layers
+from wavecomb.run.aovs import core_aovs
 from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
 
 _core = pytest.importorskip("wavecomb._core")
@@ -62,14 +63,14 @@ class StopAt:
     "ending", [{"spp": 700}, {"noise": 0.015, "spp": 4096}, {"adaptive": 0.02, "spp": 4096}]
 )
 def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
-    settings = _core.Settings(width=48, height=40, error=True, aovs=_core.AOVS, **ending)
+    settings = _core.Settings(width=48, height=40, error=True, aovs=list(core_aovs()), **ending)
     whole = _core.render(cornell.scene, settings)
     state: dict[str, Any] | None = None
     runs = 0
     for _ in range(200):
         watcher = StopAt(random.Random(runs).randrange(2))
         changed = _core.Settings(
-            width=48, height=40, error=True, aovs=_core.AOVS, **ending,
+            width=48, height=40, error=True, aovs=list(core_aovs()), **ending,
             threads=1 + runs % 2, wave_size=(64, 4096, 1000)[runs % 3],
         )  # fmt: skip
         result = _core.render(cornell.scene, changed, watcher=watcher, state=state)

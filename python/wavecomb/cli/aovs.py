@@ -23,7 +23,7 @@ def aov_options(command: F) -> F:
         "aovs",
         multiple=True,
         metavar="NAME",
-        help=f"Layer to keep, may be given again: {', '.join(aov_names.NAMES[1:])}, "
+        help=f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
         f"{aov_names.LIGHT}NAME, crypto, all; beauty is always there (docs/aovs.md).  "
         f"[default: {', '.join(aov_names.DEFAULT[1:])}]",
     )(file_options(command))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 from wavecomb.picture import cryptomatte
 from wavecomb.picture.image import read_layers, read_metadata
+from wavecomb.run.aovs import of_kind
 
 SAME_SETTINGS = (
     "width",
@@ -30,13 +31,15 @@ SAME_SETTINGS = (
     "cosine_sampling",
 )
 """Settings that decide what a picture tends to; the rest may differ."""
-SUMS = ("samples", "cost")
-NEAREST = ("position", "uv", "material_id", "instance_id")
-"""Layers of one sample: those of the first picture are kept."""
 SQUARED = ("variance",)
 """Variances of means: they add up with the squares of the weights."""
 SPREAD = ("error",)
 """Standard errors: the roots of such."""
+
+
+def _sums() -> tuple[str, ...]:
+    """Layers that add up."""
+    return ("samples", *of_kind("sum"))
 
 
 @dataclass(frozen=True)
@@ -214,7 +217,7 @@ def _add(
     for name, layer in layers.items():
         if cryptomatte.is_crypto(name):
             continue
-        if name in NEAREST:
+        if name in of_kind("nearest"):
             sums[name] = np.where(had, sums[name], layer) if name in sums else layer
             continue
         # A pixel without samples may hold anything.
@@ -223,11 +226,11 @@ def _add(
             values = values * samples**2
         elif name in SPREAD:
             values = (values * samples) ** 2
-        elif name == "depth":
+        elif name in of_kind("mean_of_hits"):
             hit = np.isfinite(values)
             values = np.where(hit, values, 0) * samples
             sums["_hits"] = sums.get("_hits", 0) + np.where(hit, samples, 0)
-        elif name not in SUMS:
+        elif name not in _sums():
             values = values * samples
         sums[name] = sums[name] + values if name in sums else values
 
@@ -245,10 +248,10 @@ def _means(
             values = values * weight**2
         elif name in SPREAD:
             values = np.sqrt(values) * weight
-        elif name == "depth":
+        elif name in of_kind("mean_of_hits"):
             hits = sums["_hits"]
             values = np.where(hits > 0, values / np.maximum(hits, 1.0), np.inf)
-        elif name not in SUMS and name not in NEAREST:
+        elif name not in _sums() and name not in of_kind("nearest"):
             values = values * weight
         out[name] = values.astype(np.float32)
     for level, weighted in pairs.items():

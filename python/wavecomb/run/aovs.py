@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
 
+from wavecomb.core_table import rows_by_name
 from wavecomb.errors import WavecombError
 
 DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
@@ -12,39 +15,67 @@ DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 
 GUIDES = ("guide_albedo", "guide_normal")
 """For denoisers: of what is seen, also in mirrors and through clear glass."""
-_CORE: dict[str, tuple[int, str]] = {
-    "albedo": (3, "Albedo"),
-    "normal": (3, "Normal"),
-    "depth": (1, "Depth"),
-    "position": (3, "Position"),
-    "uv": (2, "Texture coordinates"),
-    "material_id": (1, "Materials"),
-    "instance_id": (1, "Instances"),
-    "crypto_object": (0, "Objects (Cryptomatte)"),
-    "crypto_material": (0, "Materials (Cryptomatte)"),
-    "crypto_asset": (0, "Assets (Cryptomatte)"),
-    "emission": (3, "Emission"),
-    "direct": (3, "Direct light"),
-    "indirect": (3, "Indirect light"),
-    "light_groups": (0, ""),
-    "cost": (1, "Cost per pixel"),
-    "guide_albedo": (3, ""),
-    "guide_normal": (3, ""),
-}
-"""AOVs that the core keeps: channels, where they are a layer of their own; title in the window, ""
-where it does not offer them."""
-CRYPTO = ("crypto_object", "crypto_material", "crypto_asset")
 ERRORS = ("error", "variance")
-NAMES = ("beauty", *_CORE, "samples", *ERRORS)
-"""All AOVs; "light_NAME" is a single light group."""
-TITLES = {name: title for name, (_, title) in _CORE.items() if title}
-GROUPS = {"all": NAMES, "crypto": CRYPTO}
-"""Names that stand for several."""
 LIGHT = "light_"
 
 
-def expand(names: Iterable[str]) -> tuple[str, ...]:
-    """AOVs in the order of ``NAMES``, each once, single light groups at the end; beauty is in.
+@dataclass(frozen=True)
+class Aov:
+    """An AOV that the core keeps: a row of its table (core/aov.h).
+
+    Attributes:
+        name: Of ``--aov`` and of the layer.
+        channels: Of its layer; 0 where that is none of numbers, or there are several.
+        kind: How samples become a pixel: "mean", "mean_of_hits", "nearest", "coverage", "groups" or
+            "sum".
+        title: In the window; "" where it does not offer the layer.
+    """
+
+    name: str
+    channels: int
+    kind: str
+    title: str
+
+
+@cache
+def core_aovs() -> Mapping[str, Aov]:
+    """Every AOV of the core by name, in the table's order.
+
+    >>> core_aovs()["depth"].kind
+    'mean_of_hits'
+    """
+    from wavecomb import _core
+
+    return rows_by_name(Aov, _core.aov_table())
+
+
+@cache
+def of_kind(kind: str) -> tuple[str, ...]:
+    """Names of those whose samples become a pixel so.
+
+    >>> of_kind("coverage")
+    ('crypto_object', 'crypto_material', 'crypto_asset')
+    """
+    return tuple(name for name, row in core_aovs().items() if row.kind == kind)
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """All AOVs; "light_NAME" is a single light group beside them.
+
+    >>> names()[:3]
+    ('beauty', 'albedo', 'normal')
+    """
+    return ("beauty", *core_aovs(), "samples", *ERRORS)
+
+
+def groups() -> dict[str, tuple[str, ...]]:
+    """Names that stand for several."""
+    return {"all": names(), "crypto": of_kind("coverage")}
+
+
+def expand(asked: Iterable[str]) -> tuple[str, ...]:
+    """AOVs in the order of ``names``, each once, single light groups at the end; beauty is in.
 
     >>> expand(["depth", "crypto", "light_key"])
     ('beauty', 'depth', 'crypto_object', 'crypto_material', 'crypto_asset', 'light_key')
@@ -52,18 +83,19 @@ def expand(names: Iterable[str]) -> tuple[str, ...]:
     Raises:
         WavecombError: There is no AOV of that name.
     """
+    all_names, several = names(), groups()
     wanted: dict[str, None] = {"beauty": None}
-    for name in names:
-        if name not in NAMES and name not in GROUPS and not _is_light(name):
+    for name in asked:
+        if name not in all_names and name not in several and not _is_light(name):
             raise WavecombError(
-                f"AOV {name!r} is not known; there are {', '.join(NAMES)}, "
+                f"AOV {name!r} is not known; there are {', '.join(all_names)}, "
                 f"{LIGHT}NAME for the light group NAME, crypto and all"
             )
-        wanted.update(dict.fromkeys(GROUPS.get(name, (name,))))
-    known = tuple(name for name in NAMES if name in wanted)
+        wanted.update(dict.fromkeys(several.get(name, (name,))))
+    known = tuple(name for name in all_names if name in wanted)
     if "light_groups" in wanted:
         return known
-    return known + tuple(name for name in wanted if name not in NAMES)
+    return known + tuple(name for name in wanted if name not in all_names)
 
 
 def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]:
@@ -74,28 +106,28 @@ def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]
 
 def for_core(aovs: Iterable[str]) -> list[str]:
     """Those that the core has to make room for."""
-    return [name for name in aovs if name in _CORE or _is_light(name)]
+    return [name for name in aovs if name in core_aovs() or _is_light(name)]
+
+
+_SUM_BYTES = {"mean": 8, "mean_of_hits": 8, "nearest": 4, "coverage": 0, "groups": 0, "sum": 8}
+"""A channel in the film; what has none is counted apart."""
 
 
 def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
     """Memory of a pixel: sums in the film, and the layers that are handed out (docs/aovs.md)."""
-    names = set(aovs)
+    chosen = set(aovs)
+    kept = [row for row in core_aovs().values() if row.name in chosen]
     total = 32 + 12 + 4
-    if names & {"albedo", "normal", "depth"}:
-        total += 64
-    if names & {"position", "uv", "material_id", "instance_id"}:
-        total += 32
-    if names & {"emission", "direct", "indirect"}:
-        total += 72
-    if names & set(GUIDES):
-        total += 48
-    groups = light_groups if "light_groups" in names else sum(map(_is_light, names))
-    total += groups * (24 + 12)
-    total += len(names & set(CRYPTO)) * (64 + 48)
-    total += 4 * sum(_CORE[name][0] for name in names & _CORE.keys())
-    if names & set(ERRORS):
+    for row in kept:
+        total += (_SUM_BYTES[row.kind] + 4) * row.channels
+    for kind in ("mean_of_hits", "nearest"):
+        total += 4 * any(row.kind == kind for row in kept)
+    total += (64 + 48) * sum(row.kind == "coverage" for row in kept)
+    single = sum(map(_is_light, chosen))
+    total += (24 + 12) * (light_groups if "light_groups" in chosen else single)
+    if chosen & set(ERRORS):
         total += 48 + 4 + 12
-    return total + (8 if "cost" in names else 0)
+    return total
 
 
 def _is_light(name: str) -> bool:

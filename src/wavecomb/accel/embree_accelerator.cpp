@@ -3,6 +3,7 @@
 
 #include <embree4/rtcore.h>
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -48,6 +49,12 @@ RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView
   return args;
 }
 
+uint32_t widest_packet(RTCDevice device) {
+  if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
+  if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
+  return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED) ? 4 : 1;
+}
+
 }  // namespace
 
 /// What rays are traced with: the hierarchy, and what this scene's own materials say.
@@ -57,6 +64,7 @@ struct EmbreeAccelerator::Impl {
   SceneView view;
   RTCScene top;
   uint32_t first_world, first_light;  ///< EmbreeHierarchy's
+  uint32_t native;                    ///< rays of the widest native packet
 
   Impl(std::shared_ptr<const Scene> of, std::shared_ptr<const EmbreeHierarchy> built)
       : scene(std::move(of)),
@@ -64,7 +72,8 @@ struct EmbreeAccelerator::Impl {
         view(scene->view()),
         top(hierarchy->top()),
         first_world(hierarchy->first_world()),
-        first_light(hierarchy->first_light()) {}
+        first_light(hierarchy->first_light()),
+        native(widest_packet(hierarchy->device())) {}
 
   /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
@@ -176,9 +185,13 @@ struct EmbreeAccelerator::Impl {
     }
   }
 
-  /// Rays per packet. Embree inverts the transform of a moving instance by other operations for a
-  /// packet than for a ray alone, and so hits differ: there each ray is alone.
-  uint32_t packet(uint32_t width) const { return view.motion.instances ? 1 : width; }
+  /// Rays per packet. Packets that are not native Embree takes apart itself, and calls filters with
+  /// one ray, whose place in the packet they cannot know. It inverts the transform of a moving
+  /// instance by other operations for a packet than for a ray alone, and so hits differ: there each
+  /// ray is alone.
+  uint32_t packet(uint32_t width) const {
+    return view.motion.instances ? 1 : std::min(width, native);
+  }
 
   static RTCRay load_ray(const RaySpan& rays, size_t i) {
     RTCRay ray{};
@@ -265,13 +278,7 @@ size_t EmbreeAccelerator::bytes() const {
 }
 
 uint32_t EmbreeAccelerator::native_width() const {
-  if (rtcGetDeviceProperty(impl_->hierarchy->device(), RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED))
-    return 16;
-  if (rtcGetDeviceProperty(impl_->hierarchy->device(), RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED))
-    return 8;
-  if (rtcGetDeviceProperty(impl_->hierarchy->device(), RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED))
-    return 4;
-  return 1;
+  return impl_->native;
 }
 
 RTCSceneTy* EmbreeAccelerator::embree_scene() const {

@@ -67,11 +67,11 @@ class EmbreeAccelerator {
                     uint32_t threads);
   ~EmbreeAccelerator();
 
-  /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16. `coherent`: the rays of a packet go
-  /// much the same way, and are traversed together. Hits do not depend on width or order, nor on
-  /// coherence for rays from one point; from several, rays at edges may differ
-  /// (docs/decisions/canonical-hits.md). Where things move, none are taken for coherent; where
-  /// instances do, each ray is traced alone (docs/decisions/motion.md).
+  /// Closest hits. `width`: rays per packet, 1, 4, 8 or 16, of 16 or 8 the native width where that
+  /// is less. `coherent`: the rays of a packet go much the same way, and are traversed together.
+  /// Hits do not depend on width or order, nor on coherence for rays from one point; from several,
+  /// rays at edges may differ (docs/decisions/canonical-hits.md). Where things move, none are taken
+  /// for coherent; where instances do, each ray is traced alone (docs/decisions/motion.md).
   void intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width, bool coherent,
                  const PresenceKeys& keys) const;
   /// occluded[i] = 1 where something lies before tfar, else 0.

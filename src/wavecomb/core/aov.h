@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Names of what a render can keep beside the beauty.
+/// What a render can keep beside the beauty, as a table: arbitrary output variables (docs/aovs.md).
+///
+/// A new one is a row at the end of WAVECOMB_AOVS, and a line where paths find its value
+/// (integrate/path_aovs.h). Its place in the film, its layer, its block in checkpoints, its name in
+/// Python, on the command line and in the window follow from the row.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -9,38 +14,90 @@
 
 namespace wavecomb {
 
-/// Arbitrary output variables (docs/aovs.md), one bit each.
-enum class Aov : uint32_t {
-  // Of what camera rays meet first, means over the pixel's samples.
-  kAlbedo = 1u << 0,
-  kNormal = 1u << 1,
-  kDepth = 1u << 2,
-  // Of the sample nearest the pixel's centre: a mean of these means nothing.
-  kPosition = 1u << 3,
-  kUv = 1u << 4,
-  kMaterialId = 1u << 5,
-  kInstanceId = 1u << 6,
-  // Ids and how much of the pixel each covers.
-  kCryptoObject = 1u << 7,
-  kCryptoMaterial = 1u << 8,
-  kCryptoAsset = 1u << 9,
-  // Parts of the beauty: emission + direct + indirect, and the sum of all light groups.
-  kEmission = 1u << 10,
-  kDirect = 1u << 11,
-  kIndirect = 1u << 12,
-  kLightGroups = 1u << 13,
-  // Measured.
-  kCost = 1u << 14,
-  // For denoisers: means of what is seen, also in mirrors and through clear glass.
-  kGuideAlbedo = 1u << 15,
-  kGuideNormal = 1u << 16,
+/// How the samples of a pixel become its value.
+enum class AovKind : uint8_t {
+  kMean,        ///< the mean over its samples
+  kMeanOfHits,  ///< the mean over those that hit something, infinite where none did
+  kNearest,     ///< that of the sample nearest its centre: a mean of these means nothing
+  kCoverage,    ///< ids, and how much of the pixel each covers (Cryptomatte)
+  kGroups,      ///< a layer of means for each light group
+  kSum,         ///< the sum over its samples
 };
-inline constexpr uint32_t kAovCount = 17;
 
-/// Names in the order of the bits: "albedo", "normal" ... "guide_normal".
-extern const char* const kAovNames[kAovCount];
-/// The name of one.
-const char* aov_name(Aov aov);
+/// Who finds the value of a path.
+enum class AovSource : uint8_t {
+  kHit,     ///< what the camera's ray met, before it is shaded
+  kVertex,  ///< the first vertex, once it was shaded
+  kGuide,   ///< the last vertex that guides a denoiser
+  kLight,   ///< the light that reaches the path
+  kTime,    ///< the clock
+};
+
+/// X(enumerator, name, channels, kind, source, title): a bit each, in this order. Channels are 0
+/// where the layer is none of numbers, or there are several; the title is the window's, "" where it
+/// does not offer the layer.
+// clang-format off
+#define WAVECOMB_AOVS(X)                                                                      \
+  X(Albedo, "albedo", 3, kMean, kVertex, "Albedo")                                            \
+  X(Normal, "normal", 3, kMean, kVertex, "Normal")                                            \
+  X(Depth, "depth", 1, kMeanOfHits, kHit, "Depth")                                            \
+  X(Position, "position", 3, kNearest, kHit, "Position")                                      \
+  X(Uv, "uv", 2, kNearest, kVertex, "Texture coordinates")                                    \
+  X(MaterialId, "material_id", 1, kNearest, kHit, "Materials")                                \
+  X(InstanceId, "instance_id", 1, kNearest, kHit, "Instances")                                \
+  X(CryptoObject, "crypto_object", 0, kCoverage, kHit, "Objects (Cryptomatte)")               \
+  X(CryptoMaterial, "crypto_material", 0, kCoverage, kHit, "Materials (Cryptomatte)")         \
+  X(CryptoAsset, "crypto_asset", 0, kCoverage, kHit, "Assets (Cryptomatte)")                  \
+  X(Emission, "emission", 3, kMean, kLight, "Emission")                                       \
+  X(Direct, "direct", 3, kMean, kLight, "Direct light")                                       \
+  X(Indirect, "indirect", 3, kMean, kLight, "Indirect light")                                 \
+  X(LightGroups, "light_groups", 0, kGroups, kLight, "")                                      \
+  X(Cost, "cost", 1, kSum, kTime, "Cost per pixel")                                           \
+  X(GuideAlbedo, "guide_albedo", 3, kMean, kGuide, "")                                        \
+  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")
+// clang-format on
+
+namespace detail {
+#define WAVECOMB_AOV(id, name, channels, kind, source, title) k##id,
+enum class AovPlace : uint32_t { WAVECOMB_AOVS(WAVECOMB_AOV) kCount };
+#undef WAVECOMB_AOV
+}  // namespace detail
+
+inline constexpr auto kAovCount = static_cast<uint32_t>(detail::AovPlace::kCount);
+static_assert(kAovCount <= 32);
+
+/// One bit each.
+enum class Aov : uint32_t {
+#define WAVECOMB_AOV(id, name, channels, kind, source, title) \
+  k##id = 1u << static_cast<uint32_t>(detail::AovPlace::k##id),
+  WAVECOMB_AOVS(WAVECOMB_AOV)
+#undef WAVECOMB_AOV
+};
+
+struct AovRow {
+  Aov aov;
+  const char* name;
+  uint32_t channels;
+  AovKind kind;
+  AovSource source;
+  const char* title;
+};
+inline constexpr AovRow kAovs[] = {
+#define WAVECOMB_AOV(id, name, channels, kind, source, title) \
+  {Aov::k##id, name, channels, AovKind::kind, AovSource::source, title},
+    WAVECOMB_AOVS(WAVECOMB_AOV)
+#undef WAVECOMB_AOV
+};
+/// The place of its row.
+constexpr uint32_t place_of(Aov aov) {
+  return static_cast<uint32_t>(std::countr_zero(static_cast<uint32_t>(aov)));
+}
+constexpr const AovRow& row_of(Aov aov) {
+  return kAovs[place_of(aov)];
+}
+constexpr const char* aov_name(Aov aov) {
+  return row_of(aov).name;
+}
 
 constexpr uint32_t operator|(Aov a, Aov b) {
   return static_cast<uint32_t>(a) | static_cast<uint32_t>(b);
@@ -48,27 +105,35 @@ constexpr uint32_t operator|(Aov a, Aov b) {
 constexpr uint32_t operator|(uint32_t a, Aov b) {
   return a | static_cast<uint32_t>(b);
 }
+/// Bits of the rows for which `is_wanted`.
+template <typename IsWanted>
+constexpr uint32_t aov_bits(const IsWanted& is_wanted) {
+  uint32_t bits = 0;
+  for (const AovRow& row : kAovs)
+    if (is_wanted(row)) bits = bits | row.aov;
+  return bits;
+}
+constexpr uint32_t aov_bits(AovKind kind) {
+  return aov_bits([&](const AovRow& row) { return row.kind == kind; });
+}
+constexpr uint32_t aov_bits(AovSource source) {
+  return aov_bits([&](const AovRow& row) { return row.source == source; });
+}
 
 /// A set of AOVs.
 struct AovSet {
-  static constexpr uint32_t kFirst = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
-  static constexpr uint32_t kNearest =
-      Aov::kPosition | Aov::kUv | Aov::kMaterialId | Aov::kInstanceId;
-  static constexpr uint32_t kCrypto = Aov::kCryptoObject | Aov::kCryptoMaterial | Aov::kCryptoAsset;
-  static constexpr uint32_t kGuides = Aov::kGuideAlbedo | Aov::kGuideNormal;
+  /// Those that are kept where nothing is asked for. A picture has fields for them.
+  static constexpr uint32_t kUsual = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
+  /// Parts of the beauty: emission + direct + indirect.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
+  static constexpr uint32_t kAll = aov_bits([](const AovRow&) { return true; });
 
-  uint32_t bits = kFirst;
+  uint32_t bits = kUsual;
 
   bool has(Aov a) const { return any(static_cast<uint32_t>(a)); }
+  bool has(AovKind kind) const { return any(aov_bits(kind)); }
+  bool has(AovSource source) const { return any(aov_bits(source)); }
   bool any(uint32_t mask) const { return (bits & mask) != 0; }
-  /// Mean attributes of the first hit.
-  bool first() const { return any(kFirst); }
-  /// Attributes of the sample nearest the pixel's centre.
-  bool nearest() const { return any(kNearest); }
-  bool crypto() const { return any(kCrypto); }
-  bool parts() const { return any(kParts); }
-  bool guides() const { return any(kGuides); }
 
   std::vector<std::string> names() const;
   /// Throws Error that lists what there is.

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <initializer_list>
+#include <limits>
 
 namespace wavecomb {
 namespace {
@@ -14,22 +14,6 @@ double inverse(uint32_t n) {
 
 /// Before the names of light groups' layers.
 constexpr const char* kLightPrefix = "light_";
-
-/// The layers beyond albedo, normal, depth and light groups.
-constexpr Aov kFurther[] = {
-    Aov::kPosition,       Aov::kUv,          Aov::kMaterialId, Aov::kInstanceId, Aov::kCryptoObject,
-    Aov::kCryptoMaterial, Aov::kCryptoAsset, Aov::kEmission,   Aov::kDirect,     Aov::kIndirect,
-    Aov::kCost,           Aov::kGuideAlbedo, Aov::kGuideNormal};
-
-/// The mean of `n` samples out of their sums, rgb.
-void put_mean(const double* sums, uint32_t n, float* out) {
-  for (size_t c = 0; c < 3; ++c) out[c] = static_cast<float>(sums[c] * inverse(n));
-}
-
-/// Ids are counted from 1 in pictures; 0 is nothing.
-float id_value(uint32_t id) {
-  return id == kNothingHit ? 0.f : static_cast<float>(id) + 1.f;
-}
 
 /// A layer whose pixel i is written by `write(i, pointer)`.
 template <typename Write>
@@ -53,32 +37,35 @@ void keep_once(std::vector<uint32_t>& ids) {
 }  // namespace
 
 AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixels_(pixels) {
-  const AovSet& set = layout.set;
-  if (set.first()) first_.resize(pixels);
-  if (set.nearest()) nearest_.resize(pixels);
-  for (const Aov level : {Aov::kCryptoObject, Aov::kCryptoMaterial, Aov::kCryptoAsset})
-    if (set.has(level)) crypto_[level_index(level)].resize(pixels);
-  if (set.parts()) parts_.resize(pixels);
-  if (set.has(Aov::kLightGroups)) groups_.resize(pixels * 3 * layout.light_groups);
-  if (set.has(Aov::kCost)) cost_ns_.resize(pixels);
-  if (set.guides()) guides_.resize(pixels);
+  for (const AovRow& row : kAovs) {
+    if (!layout.set.has(row.aov)) continue;
+    switch (row.kind) {
+      case AovKind::kMean:
+      case AovKind::kMeanOfHits:
+      case AovKind::kGroups:
+      case AovKind::kSum:
+        sums_[place_of(row.aov)].resize(pixels * words_of(row));
+        break;
+      case AovKind::kNearest:
+        nearest_[place_of(row.aov)].resize(pixels * words_of(row));
+        break;
+      case AovKind::kCoverage:
+        crypto_[level_index(row.aov)].resize(pixels);
+        break;
+    }
+  }
+  if (layout.set.has(AovKind::kMeanOfHits)) hits_.resize(pixels);
+  if (layout.set.has(AovKind::kNearest))
+    centre2_.resize(pixels, std::numeric_limits<float>::infinity());
 }
 
 size_t AovFilm::bytes() const {
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
-  size_t n = of(first_) + of(nearest_) + of(parts_) + of(groups_) + of(cost_ns_) + of(guides_);
+  size_t n = of(hits_) + of(centre2_);
+  for (const auto& sums : sums_) n += of(sums);
+  for (const auto& values : nearest_) n += of(values);
   for (const auto& level : crypto_) n += of(level);
   return n;
-}
-
-std::vector<float> AovFilm::depth() const {
-  if (!layout_.set.has(Aov::kDepth)) return {};
-  std::vector<float> out(first_.size());
-  for (size_t i = 0; i < out.size(); ++i)
-    out[i] = first_[i].depth_samples == 0
-                 ? std::numeric_limits<float>::infinity()
-                 : static_cast<float>(first_[i].depth * inverse(first_[i].depth_samples));
-  return out;
 }
 
 AovLayer AovFilm::crypto_layer(Aov level, const std::vector<uint32_t>& samples) const {
@@ -100,46 +87,43 @@ AovLayer AovFilm::crypto_layer(Aov level, const std::vector<uint32_t>& samples) 
 }
 
 AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
-  const auto make = [&](uint32_t channels, const auto& write) {
-    return make_layer(aov_name(aov), channels, pixels_, write);
+  const AovRow& row = row_of(aov);
+  if (!layout_.set.has(aov)) return {};
+  const std::vector<double>& sums = sums_[place_of(aov)];
+  const auto scaled = [&](const auto& scale) {
+    return make_layer(row.name, row.channels, pixels_, [&](size_t i, float* out) {
+      for (uint32_t c = 0; c < row.channels; ++c)
+        out[c] = static_cast<float>(sums[i * row.channels + c] * scale(i));
+    });
   };
-  const auto means = [&](const auto& values, auto sums) {
-    return make(3, [&](size_t i, float* v) { put_mean(values[i].*sums, samples[i], v); });
-  };
-  switch (aov) {
-    case Aov::kPosition:
-      return make(3, [&](size_t i, float* v) { std::copy_n(nearest_[i].position, 3, v); });
-    case Aov::kUv:
-      return make(2, [&](size_t i, float* v) { std::copy_n(nearest_[i].uv, 2, v); });
-    case Aov::kMaterialId:
-      return make(1, [&](size_t i, float* v) { *v = id_value(nearest_[i].material); });
-    case Aov::kInstanceId:
-      return make(1, [&](size_t i, float* v) { *v = id_value(nearest_[i].instance); });
-    case Aov::kCryptoObject:
-    case Aov::kCryptoMaterial:
-    case Aov::kCryptoAsset:
+  switch (row.kind) {
+    case AovKind::kMean:
+      return scaled([&](size_t i) { return inverse(samples[i]); });
+    case AovKind::kMeanOfHits: {
+      AovLayer layer = scaled([&](size_t i) { return inverse(hits_[i]); });
+      for (size_t i = 0; i < layer.values.size(); ++i)
+        if (hits_[i / row.channels] == 0) layer.values[i] = std::numeric_limits<float>::infinity();
+      return layer;
+    }
+    case AovKind::kSum:
+      return scaled([](size_t /*i*/) { return 1.0; });
+    case AovKind::kNearest:
+      return {row.name, row.channels, nearest_[place_of(aov)]};
+    case AovKind::kCoverage:
       return crypto_layer(aov, samples);
-    case Aov::kEmission:
-      return means(parts_, &Parts::emission);
-    case Aov::kDirect:
-      return means(parts_, &Parts::direct);
-    case Aov::kIndirect:
-      return means(parts_, &Parts::indirect);
-    case Aov::kCost:
-      return make(1, [&](size_t i, float* v) { *v = static_cast<float>(cost_ns_[i]); });
-    case Aov::kGuideAlbedo:
-      return means(guides_, &Guides::albedo);
-    case Aov::kGuideNormal:
-      return means(guides_, &Guides::normal);
-    default:
-      return {};
+    case AovKind::kGroups:
+      break;
   }
+  return {};
 }
 
 AovLayer AovFilm::group_layer(uint32_t group, const std::string& name,
                               const std::vector<uint32_t>& samples) const {
+  const std::vector<double>& sums = sums_[place_of(Aov::kLightGroups)];
   return make_layer(kLightPrefix + name, 3, pixels_, [&](size_t i, float* v) {
-    put_mean(groups_.data() + 3 * (i * layout_.light_groups + group), samples[i], v);
+    for (size_t c = 0; c < 3; ++c)
+      v[c] = static_cast<float>(sums[3 * (i * layout_.light_groups + group) + c] *
+                                inverse(samples[i]));
   });
 }
 
@@ -148,35 +132,31 @@ AovLayer AovFilm::layer(const std::string& name, const std::vector<uint32_t>& sa
   if (layout_.set.has(Aov::kLightGroups))
     for (uint32_t g = 0; g < layout_.light_groups; ++g)
       if (name == kLightPrefix + group_names[g]) return group_layer(g, group_names[g], samples);
-  for (const Aov aov : kFurther)
-    if (name == aov_name(aov) && layout_.set.has(aov)) return layer(aov, samples);
+  for (const AovRow& row : kAovs)
+    if (name == row.name) return layer(row.aov, samples);
   return {};
+}
+
+AovLayer AovFilm::take(Aov aov, const std::vector<uint32_t>& samples) {
+  AovLayer taken = layer(aov, samples);
+  release(sums_[place_of(aov)]);
+  release(nearest_[place_of(aov)]);
+  if (row_of(aov).kind == AovKind::kCoverage) release(crypto_[level_index(aov)]);
+  layout_.set.bits &= ~static_cast<uint32_t>(aov);
+  return taken;
 }
 
 std::vector<AovLayer> AovFilm::finish(const std::vector<uint32_t>& samples,
                                       const std::vector<std::string>& group_names) && {
-  release(first_);
   std::vector<AovLayer> out;
-  const auto add = [&](std::initializer_list<Aov> aovs) {
-    for (const Aov aov : aovs)
-      if (layout_.set.has(aov)) out.push_back(layer(aov, samples));
-  };
-  add({Aov::kPosition, Aov::kUv, Aov::kMaterialId, Aov::kInstanceId});
-  release(nearest_);
-  for (const Aov level : {Aov::kCryptoObject, Aov::kCryptoMaterial, Aov::kCryptoAsset}) {
-    add({level});
-    release(crypto_[level_index(level)]);
+  for (const AovRow& row : kAovs) {
+    if (!layout_.set.has(row.aov)) continue;
+    if (row.kind == AovKind::kGroups)
+      for (uint32_t g = 0; g < layout_.light_groups; ++g)
+        out.push_back(group_layer(g, group_names[g], samples));
+    AovLayer layer = take(row.aov, samples);
+    if (!layer.values.empty()) out.push_back(std::move(layer));
   }
-  add({Aov::kEmission, Aov::kDirect, Aov::kIndirect});
-  release(parts_);
-  if (layout_.set.has(Aov::kLightGroups))
-    for (uint32_t g = 0; g < layout_.light_groups; ++g)
-      out.push_back(group_layer(g, group_names[g], samples));
-  release(groups_);
-  add({Aov::kCost});
-  release(cost_ns_);
-  add({Aov::kGuideAlbedo, Aov::kGuideNormal});
-  release(guides_);
   return out;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a film keeps beside the beauty: only what is asked for takes room.
+/// What a film keeps beside the beauty: only what is asked for takes room. How the samples of an
+/// AOV are put together is said by its row (core/aov.h); what they are, by who adds them.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,14 +16,10 @@ namespace wavecomb {
 /// Material, instance or object where nothing was hit.
 inline constexpr uint32_t kNothingHit = 0xffffffffu;
 
-/// What a camera ray met first.
-struct AovHit {
-  float position[3] = {0, 0, 0};
-  uint32_t object = kNothingHit;  ///< as ObjectNames numbers them
-  uint32_t material = kNothingHit;
-  uint32_t instance = kNothingHit;
-  uint32_t pad[2] = {0, 0};
-};
+/// Ids are counted from 1 in pictures; 0 is nothing.
+inline float id_value(uint32_t id) {
+  return id == kNothingHit ? 0.f : static_cast<float>(id) + 1.f;
+}
 
 /// A layer of a picture: `channels` values a pixel, row 0 at the top.
 struct AovLayer {
@@ -40,137 +36,96 @@ class AovFilm {
   AovFilm() = default;
   AovFilm(size_t pixels, const AovLayout& layout);
 
-  /// Sums over samples of what was hit first.
-  struct First {
-    double albedo[3] = {0, 0, 0};
-    double normal[3] = {0, 0, 0};
-    double depth = 0;  ///< over samples that hit something
-    uint32_t depth_samples = 0;
-  };
-  /// Of the sample nearest the pixel's centre, the first among equals.
-  struct Nearest {
-    float centre2 = std::numeric_limits<float>::infinity();  ///< squared distance, pixels
-    float position[3] = {0, 0, 0};
-    float uv[2] = {0, 0};
-    uint32_t material = kNothingHit, instance = kNothingHit;
-  };
-  /// Sums of radiance: seen by the camera itself, after one scattering, and after more.
-  struct Parts {
-    double emission[3] = {0, 0, 0}, direct[3] = {0, 0, 0}, indirect[3] = {0, 0, 0};
-  };
-  /// Sums over samples of what guides a denoiser: albedo and normal.
-  struct Guides {
-    double albedo[3] = {0, 0, 0}, normal[3] = {0, 0, 0};
-  };
   static constexpr uint32_t kCryptoLevels = 3;
   /// Ids given for each pixel, of those that CryptoPixel holds: three layers of a file.
   static constexpr uint32_t kCryptoRanks = 6;
 
   const AovLayout& layout() const { return layout_; }
-  bool has_first() const { return !first_.empty(); }
-  First& first(size_t pixel) { return first_[pixel]; }
-  const Nearest& nearest(size_t pixel) const { return nearest_[pixel]; }
-  /// Sums of rgb of light group 0, 1 ... of the layout, side by side.
-  double* groups(size_t pixel) { return groups_.data() + pixel * 3 * layout_.light_groups; }
 
-  /// One sample's first hit. `tables` is read for Cryptomatte only.
-  void add_hit(size_t pixel, const AovHit& hit, float centre2, const float* uv,
-               const CryptoTables* tables) {
-    if (!nearest_.empty() && centre2 < nearest_[pixel].centre2) {
-      nearest_[pixel] = {centre2,
-                         {hit.position[0], hit.position[1], hit.position[2]},
-                         {uv[0], uv[1]},
-                         hit.material,
-                         hit.instance};
-    }
-    if (hit.object != kNothingHit) {
-      if (!crypto_[0].empty()) crypto_[0][pixel].add(tables->object_id[hit.object]);
-      if (!crypto_[2].empty()) crypto_[2][pixel].add(tables->asset_id[hit.object]);
-    }
-    if (hit.material != kNothingHit && !crypto_[1].empty())
-      crypto_[1][pixel].add(tables->material_id[hit.material]);
-  }
-  /// One sample's radiance (rgb) before the first scattering, with what came after one, and whole.
-  void add_parts(size_t pixel, const float* emitted, const float* with_direct, const float* all) {
-    Parts& p = parts_[pixel];
-    for (size_t c = 0; c < 3; ++c) {
-      p.emission[c] += double{emitted[c]};
-      p.direct[c] += double{with_direct[c]} - double{emitted[c]};
-      p.indirect[c] += double{all[c]} - double{with_direct[c]};
-    }
-  }
-  /// One sample's albedo and normal, side by side.
-  void add_guides(size_t pixel, const float* guides) {
-    Guides& g = guides_[pixel];
-    for (size_t c = 0; c < 3; ++c) {
-      g.albedo[c] += double{guides[c]};
-      g.normal[c] += double{guides[3 + c]};
-    }
-  }
-  void add_cost(size_t pixel, double ns) { cost_ns_[pixel] += ns; }
+  // ---- one sample's values ----------------------------------------------------------------------
 
-  /// Means, where pixel i has count(i) samples; empty where not asked for.
-  template <typename Count>
-  std::vector<float> albedo(const Count& count) const {
-    return layout_.set.has(Aov::kAlbedo) ? means(&First::albedo, count) : std::vector<float>{};
+  /// Sums of an AOV that is a mean or a sum, by channel; null where it is not kept. Those of light
+  /// groups stand side by side.
+  double* sums(Aov aov, size_t pixel) {
+    std::vector<double>& all = sums_[place_of(aov)];
+    return all.empty() ? nullptr : all.data() + pixel * words_of(row_of(aov));
   }
-  template <typename Count>
-  std::vector<float> normal(const Count& count) const {
-    return layout_.set.has(Aov::kNormal) ? means(&First::normal, count) : std::vector<float>{};
+  /// Adds the channels of an AOV that is kept.
+  void add(Aov aov, size_t pixel, const float* values) {
+    double* to = sums(aov, pixel);
+    for (uint32_t c = 0; c < row_of(aov).channels; ++c) to[c] += double{values[c]};
   }
-  /// Means over the samples that hit something; infinite where none did.
-  std::vector<float> depth() const;
-  /// A layer that the set asks for, "light_NAME" among them; no name where it does not.
+  /// A sample has hit something: counts for means of hits.
+  void count_hit(size_t pixel) { ++hits_[pixel]; }
+  /// Whether a sample at this squared distance from the pixel's centre, in pixels, is the nearest
+  /// so far, the first among equals. It is to be put then.
+  bool is_nearest(size_t pixel, float centre2) {
+    if (!(centre2 < centre2_[pixel])) return false;
+    centre2_[pixel] = centre2;
+    return true;
+  }
+  /// The channels of an AOV of the nearest sample; nothing where it is not kept.
+  void put(Aov aov, size_t pixel, const float* values) {
+    std::vector<float>& all = nearest_[place_of(aov)];
+    for (uint32_t c = 0; c < row_of(aov).channels && !all.empty(); ++c)
+      all[pixel * row_of(aov).channels + c] = values[c];
+  }
+  /// What a sample has met, as ObjectNames numbers it, or kNothingHit.
+  void add_ids(size_t pixel, uint32_t object, uint32_t material, const CryptoTables& tables) {
+    if (object != kNothingHit) {
+      if (!crypto_[0].empty()) crypto_[0][pixel].add(tables.object_id[object]);
+      if (!crypto_[2].empty()) crypto_[2][pixel].add(tables.asset_id[object]);
+    }
+    if (material != kNothingHit && !crypto_[1].empty())
+      crypto_[1][pixel].add(tables.material_id[material]);
+  }
+
+  // ---- layers -----------------------------------------------------------------------------------
+
+  /// The layer of an AOV, but for light groups; no values where it is not kept. `samples` is by
+  /// pixel.
+  AovLayer layer(Aov aov, const std::vector<uint32_t>& samples) const;
+  /// The same by name, "light_NAME" among them; no name where it is not kept.
   AovLayer layer(const std::string& name, const std::vector<uint32_t>& samples,
                  const std::vector<std::string>& group_names) const;
-  /// The layers that the set asks for beyond albedo, normal and depth, and the end of the film:
-  /// sums are freed as soon as they were used. Light groups are called "light_" and their name.
-  /// `samples` is by pixel.
+  /// The layer of an AOV, whose sums are freed.
+  AovLayer take(Aov aov, const std::vector<uint32_t>& samples);
+  /// All that are kept and were not taken, and the end of the film: sums are freed as soon as they
+  /// were used. Light groups are called "light_" and their name.
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
                                const std::vector<std::string>& group_names) &&;
   size_t bytes() const;
   /// Runs block(name, values) for each vector of sums, for checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
-    block("aov_first", first_);
-    block("aov_nearest", nearest_);
-    block("aov_crypto_object", crypto_[0]);
-    block("aov_crypto_material", crypto_[1]);
-    block("aov_crypto_asset", crypto_[2]);
-    block("aov_parts", parts_);
-    block("aov_light_groups", groups_);
-    block("aov_cost", cost_ns_);
-    block("aov_guides", guides_);
+    for (const AovRow& row : kAovs) {
+      const std::string name = std::string("aov_") + row.name;
+      block(name, sums_[place_of(row.aov)]);
+      block(name, nearest_[place_of(row.aov)]);
+      if (row.kind == AovKind::kCoverage) block(name, crypto_[level_index(row.aov)]);
+    }
+    block("aov_hits", hits_);
+    block("aov_centre", centre2_);
   }
 
  private:
-  static uint32_t level_index(Aov level) {
-    return level == Aov::kCryptoObject ? 0 : level == Aov::kCryptoMaterial ? 1 : 2;
+  static uint32_t level_index(Aov level) { return place_of(level) - place_of(Aov::kCryptoObject); }
+  /// Sums of a pixel.
+  size_t words_of(const AovRow& row) const {
+    return row.kind == AovKind::kGroups ? 3 * layout_.light_groups : row.channels;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
-  /// One of the set beyond albedo, normal, depth and light groups.
-  AovLayer layer(Aov aov, const std::vector<uint32_t>& samples) const;
   AovLayer group_layer(uint32_t group, const std::string& name,
                        const std::vector<uint32_t>& samples) const;
-  template <typename Count>
-  std::vector<float> means(double (First::*sum)[3], const Count& count) const {
-    std::vector<float> out(3 * first_.size());
-    for (size_t i = 0; i < first_.size(); ++i)
-      for (size_t c = 0; c < 3; ++c)
-        out[3 * i + c] =
-            static_cast<float>((first_[i].*sum)[c] * (count(i) == 0 ? 0.0 : 1.0 / count(i)));
-    return out;
-  }
 
   AovLayout layout_;
   size_t pixels_ = 0;
-  std::vector<First> first_;
-  std::vector<Nearest> nearest_;
+  // By the place of an AOV's row; empty where it is not kept.
+  std::array<std::vector<double>, kAovCount> sums_;
+  std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
-  std::vector<Parts> parts_;
-  std::vector<double> groups_;
-  std::vector<double> cost_ns_;
-  std::vector<Guides> guides_;
+  std::vector<uint32_t> hits_;  ///< samples that have hit something
+  std::vector<float> centre2_;  ///< squared distance of the nearest sample, pixels
 };
 
 /// Sorted ids in a Cryptomatte's layer.

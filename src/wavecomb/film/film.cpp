@@ -42,15 +42,15 @@ std::vector<float> Film::beauty() const {
 }
 
 std::vector<float> Film::albedo() const {
-  return aovs_.albedo([&](size_t i) { return pixels_[i].samples; });
+  return aovs_.layer(Aov::kAlbedo, samples()).values;
 }
 
 std::vector<float> Film::normal() const {
-  return aovs_.normal([&](size_t i) { return pixels_[i].samples; });
+  return aovs_.layer(Aov::kNormal, samples()).values;
 }
 
 std::vector<float> Film::depth() const {
-  return aovs_.depth();
+  return aovs_.layer(Aov::kDepth, samples()).values;
 }
 
 std::vector<uint32_t> Film::samples() const {
@@ -72,7 +72,7 @@ std::vector<float> Film::variance() const {
 
 std::vector<Film::Block> Film::blocks() {
   std::vector<Block> out;
-  const auto add = [&](const char* name, auto& values) {
+  const auto add = [&](const std::string& name, auto& values) {
     if (!values.empty()) out.push_back({name, std::as_writable_bytes(std::span(values))});
   };
   add("pixels", pixels_);
@@ -90,10 +90,9 @@ Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
   release(errors_);
   release(pixels_);
   splats_ = {};
-  const auto count = [&](size_t i) { return layers.samples[i]; };
-  layers.albedo = aovs_.albedo(count);
-  layers.normal = aovs_.normal(count);
-  layers.depth = aovs_.depth();
+  layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
+  layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;
+  layers.depth = aovs_.take(Aov::kDepth, layers.samples).values;
   layers.aovs = std::move(aovs_).finish(layers.samples, light_groups);
   return layers;
 }

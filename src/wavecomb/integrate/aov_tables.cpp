@@ -14,7 +14,7 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
   layout.set = settings.aovs;
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials need none of it; positions of objects do.
-  if (layout.set.crypto()) crypto = CryptoTables(scene, layout.set);
+  if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);
   if (!layout.set.has(Aov::kLightGroups)) return;
   const std::vector<std::string>& there = scene.light_groups();
   if (settings.light_groups.empty()) {

@@ -4,10 +4,22 @@
 namespace wavecomb {
 namespace {
 
-void add_to(double (&sum)[3], const Vec3<float>& v) {
-  sum[0] += double{v.x};
-  sum[1] += double{v.y};
-  sum[2] += double{v.z};
+void add_to(double* sums, const Vec3<float>& v) {
+  sums[0] += double{v.x};
+  sums[1] += double{v.y};
+  sums[2] += double{v.z};
+}
+
+/// Adds what is in `all` and not in `before`, rgb; nothing where there are no sums.
+void add_difference(double* sums, const float* all, const float* before) {
+  for (size_t c = 0; c < 3 && sums; ++c) sums[c] += double{all[c]} - double{before[c]};
+}
+
+const float* values_of(const float& value) {
+  return &value;
+}
+const float* values_of(const Vec3<float>& value) {
+  return &value.x;
 }
 
 }  // namespace
@@ -17,62 +29,69 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
   const auto for_each_slot = [&](const auto& one) {
     for (auto slot = static_cast<uint32_t>(begin); slot < end; ++slot) one(slot);
   };
-  const auto first_vertex = [&](uint32_t slot) {
-    return load_row<FirstVertexRow, float>(first_.rows, slot, true);
+  const auto for_each_vertex_aov = [&](AovKind kind, uint32_t slot, const auto& one) {
+    const float* row = vertex_.rows + slot * vertex_.words;
+    for (const AovRow& aov : kAovs)
+      if (aov.kind == kind && vertex_at_[place_of(aov.aov)] != kNotKept)
+        one(aov.aov, row + vertex_at_[place_of(aov.aov)]);
   };
-  if (film.has_first()) {
-    AovFilm::First& first = film.first(pixel);
-    if (first_) {
-      for_each_slot([&](uint32_t slot) {
-        const FirstVertexRow<float> row = first_vertex(slot);
-        add_to(first.albedo, row.albedo);
-        add_to(first.normal, row.normal);
-      });
-    }
-    if (depth_) {
-      for_each_slot([&](uint32_t slot) {
-        if (!std::isfinite(depth_.rows[slot])) return;
-        first.depth += double{depth_.rows[slot]};
-        ++first.depth_samples;
-      });
-    }
-  }
+  if (vertex_)
+    for_each_slot([&](uint32_t slot) {
+      for_each_vertex_aov(AovKind::kMean, slot,
+                          [&](Aov aov, const float* values) { film.add(aov, pixel, values); });
+    });
+  if (depth_)
+    for_each_slot([&](uint32_t slot) {
+      if (!std::isfinite(depth_.rows[slot])) return;
+      film.add(Aov::kDepth, pixel, depth_.rows + slot);
+      film.count_hit(pixel);
+    });
   if (hits_) {
     for_each_slot([&](uint32_t slot) {
-      const auto row = load_row<FirstHitRow, float>(hits_.rows, slot, true);
-      const Vec2<float> uv =
-          layout_.set.has(Aov::kUv) ? first_vertex(slot).uv : Vec2<float>{0.f, 0.f};
-      film.add_hit(pixel,
-                   {{row.position.x, row.position.y, row.position.z},
-                    row.object,
-                    row.material,
-                    row.instance},
-                   centre_ ? centre_.rows[slot] : 0.f, &uv.x, tables_ ? &tables_->crypto : nullptr);
+      const auto hit = load_row<FirstHitRow, float>(hits_.rows, slot, true);
+      if (tables_) film.add_ids(pixel, hit.object, hit.material, tables_->crypto);
+      if (!centre_ || !film.is_nearest(pixel, centre_.rows[slot])) return;
+      for_each_hit_value(
+          hit, [&](Aov aov, const auto& value) { film.put(aov, pixel, values_of(value)); });
+      if (vertex_)
+        for_each_vertex_aov(AovKind::kNearest, slot,
+                            [&](Aov aov, const float* values) { film.put(aov, pixel, values); });
     });
   }
   if (parts_[0]) {
+    const float none[3] = {0, 0, 0};
+    double* emission = film.sums(Aov::kEmission, pixel);
+    double* direct = film.sums(Aov::kDirect, pixel);
+    double* indirect = film.sums(Aov::kIndirect, pixel);
     for_each_slot([&](uint32_t slot) {
       const size_t row = slot * kRadianceWords;
-      film.add_parts(pixel, parts_[0].rows + row, parts_[1].rows + row, radiance + row);
+      const float *emitted = parts_[0].rows + row, *with_direct = parts_[1].rows + row;
+      add_difference(emission, emitted, none);
+      add_difference(direct, with_direct, emitted);
+      add_difference(indirect, radiance + row, with_direct);
     });
   }
   if (groups_) {
-    double* sums = film.groups(pixel);
+    double* sums = film.sums(Aov::kLightGroups, pixel);
     for_each_slot([&](uint32_t slot) {
       for (uint32_t g = 0; g < layout_.light_groups; ++g) {
         const auto c =
             load_row<RadianceRow, float>(groups_.rows, slot * layout_.light_groups + g, true).sum;
-        sums[3 * g] += double{c.x};
-        sums[3 * g + 1] += double{c.y};
-        sums[3 * g + 2] += double{c.z};
+        add_to(sums + 3 * g, c);
       }
     });
   }
-  if (guides_)
-    for_each_slot(
-        [&](uint32_t slot) { film.add_guides(pixel, guides_.rows + slot * kRowWords<GuideRow>); });
+  if (guides_) {
+    double* albedo = film.sums(Aov::kGuideAlbedo, pixel);
+    double* normal = film.sums(Aov::kGuideNormal, pixel);
+    for_each_slot([&](uint32_t slot) {
+      const auto row = load_row<GuideRow, float>(guides_.rows, slot, true);
+      if (albedo) add_to(albedo, row.albedo);
+      if (normal) add_to(normal, row.normal);
+    });
+  }
   if (cost_ns_)
-    for_each_slot([&](uint32_t slot) { film.add_cost(pixel, double{cost_ns_.rows[slot]}); });
+    for_each_slot([&](uint32_t slot) { film.add(Aov::kCost, pixel, cost_ns_.rows + slot); });
 }
 
 }  // namespace wavecomb

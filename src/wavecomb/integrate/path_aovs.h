@@ -30,14 +30,15 @@
 
 namespace wavecomb {
 
-/// What the AOVs have of the first vertex, once it was shaded.
-template <typename F>
-struct FirstVertexRow {
-  Color<F> albedo;
-  Vec3<F> normal;
-  Vec2<F> uv;
-  WAVECOMB_FIELDS(albedo, normal, uv)
-};
+/// Values that AOVs have of the first vertex, once it was shaded and where `path` has reached it: a
+/// line for each row whose source is kVertex. Runs put(aov, value), value of its channels.
+template <typename F, typename Put>
+inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*path*/,
+                                  const Put& put) {
+  put(Aov::kAlbedo, v.albedo);
+  put(Aov::kNormal, v.normal);
+  put(Aov::kUv, v.uv);
+}
 
 /// What the camera's ray met, before it is shaded; kNothingHit where it did not.
 template <typename F>
@@ -46,6 +47,15 @@ struct FirstHitRow {
   UInt<F> object, material, instance;
   WAVECOMB_FIELDS(position, object, material, instance)
 };
+
+/// Values that AOVs of the nearest sample have of it: a line for each such row whose source is
+/// kHit.
+template <typename Put>
+inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
+  put(Aov::kPosition, hit.position);
+  put(Aov::kMaterialId, id_value(hit.material));
+  put(Aov::kInstanceId, id_value(hit.instance));
+}
 
 /// Albedo and normal of the last vertex that guides a denoiser.
 template <typename F>
@@ -67,14 +77,20 @@ class PathAovs {
     const auto rows = [&](Block& block, bool wanted, size_t words) {
       if (wanted) block = Block(capacity, words);
     };
-    rows(first_, set.first() || set.has(Aov::kUv), kRowWords<FirstVertexRow>);
+    uint32_t words = 0;
+    for (const AovRow& row : kAovs) {
+      if (row.source != AovSource::kVertex || !set.has(row.aov)) continue;
+      vertex_at_[place_of(row.aov)] = words;
+      words += row.channels;
+    }
+    rows(vertex_, words > 0, words);
     rows(depth_, set.has(Aov::kDepth), 1);
-    rows(hits_, set.nearest() || set.crypto(), kRowWords<FirstHitRow>);
-    rows(centre_, set.nearest(), 1);
-    for (Block& part : parts_) rows(part, set.parts(), kRadianceWords);
+    rows(hits_, set.has(AovKind::kNearest) || set.has(AovKind::kCoverage), kRowWords<FirstHitRow>);
+    rows(centre_, set.has(AovKind::kNearest), 1);
+    for (Block& part : parts_) rows(part, set.any(AovSet::kParts), kRadianceWords);
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
     rows(cost_ns_, set.has(Aov::kCost), 1);
-    rows(guides_, set.guides(), kRowWords<GuideRow>);
+    rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
   }
 
   size_t bytes() const {
@@ -87,7 +103,7 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block : {&first_, &guides_, &cost_ns_, &groups_}) block->zero(slots);
+    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_}) block->zero(slots);
     if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
     const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit, kNothingHit};
     for (uint32_t i = 0; hits_ && i < slots; ++i)
@@ -140,14 +156,19 @@ class PathAovs {
     return v;
   }
   /// Whether that is anything at all.
-  bool wants_vertex(uint32_t depth) const { return (depth == 0 && first_) || guides_ || groups_; }
+  bool wants_vertex(uint32_t depth) const { return (depth == 0 && vertex_) || guides_ || groups_; }
 
   /// A vertex was shaded, which `path` had reached.
   template <typename F>
   void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
               const Mask<F>& active) const {
-    if (depth == 0 && first_)
-      store_row<FirstVertexRow, F>(first_.rows, slot, {v.albedo, v.normal, v.uv}, active);
+    if (depth == 0 && vertex_) {
+      const UInt<F> row = slot * static_cast<uint32_t>(vertex_.words);
+      for_each_vertex_value<F>(v, path, [&](Aov aov, const auto& value) {
+        const uint32_t at = vertex_at_[place_of(aov)];
+        if (at != kNotKept) scatter_words<F>(vertex_.rows, value, row + at, active);
+      });
+    }
     if (guides_) store_guides<F>(slot, v, path, active);
   }
 
@@ -217,8 +238,7 @@ class PathAovs {
   /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
 
-  // For tests: rows of what is kept, or null.
-  const float* first_rows() const { return first_.rows; }
+  // For tests: rows of light groups, or null.
   const float* group_rows() const { return groups_.rows; }
 
  private:
@@ -239,8 +259,35 @@ class PathAovs {
   };
 
   std::array<const Block*, 9> blocks() const {
-    return {&first_,    &depth_,  &hits_,    &centre_, &parts_[0],
+    return {&vertex_,   &depth_,  &hits_,    &centre_, &parts_[0],
             &parts_[1], &groups_, &cost_ns_, &guides_};
+  }
+
+  /// In place of where an AOV's value is kept.
+  static constexpr uint32_t kNotKept = 0xffffffffu;
+  static constexpr std::array<uint32_t, kAovCount> nothing_kept() {
+    std::array<uint32_t, kAovCount> at{};
+    at.fill(kNotKept);
+    return at;
+  }
+
+  /// The words of a value, one after another from word `at` on.
+  template <typename F>
+  static void scatter_words(float* rows, const F& value, const UInt<F>& at, const Mask<F>& active) {
+    scatter<F>(rows, value, at, active);
+  }
+  template <typename F>
+  static void scatter_words(float* rows, const Vec2<F>& value, const UInt<F>& at,
+                            const Mask<F>& active) {
+    scatter<F>(rows, value.x, at, active);
+    scatter<F>(rows, value.y, at + 1u, active);
+  }
+  template <typename F>
+  static void scatter_words(float* rows, const Vec3<F>& value, const UInt<F>& at,
+                            const Mask<F>& active) {
+    scatter<F>(rows, value.x, at, active);
+    scatter<F>(rows, value.y, at + 1u, active);
+    scatter<F>(rows, value.z, at + 2u, active);
   }
 
   /// Distance along the camera's axis.
@@ -264,7 +311,9 @@ class PathAovs {
 
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
-  Block first_, depth_, hits_;
+  Block vertex_, depth_, hits_;
+  /// By an AOV's place: its words in a row of vertex_, or kNotKept.
+  std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
   Block centre_;                ///< squared distance of the sample from the pixel's centre, pixels
   std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
   Block groups_;                ///< radiance by light group, a slot's groups side by side

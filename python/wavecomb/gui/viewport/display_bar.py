@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from PySide6.QtCore import QSettings, Qt
@@ -28,15 +29,15 @@ from wavecomb.run import aovs as aov_names
 
 EXPOSURE = 10.0
 """Stops, to both sides."""
-_TITLES = {
-    "beauty": "Beauty",
-    "denoised": "Denoised",
-    **aov_names.TITLES,
-    "samples": "Samples",
-    "error": "Error",
-    "variance": "Variance",
-}
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
+
+
+@cache
+def _titles() -> dict[str, str]:
+    """Layers that the bar offers, in its order."""
+    own = {name: row.title for name, row in aov_names.core_aovs().items() if row.title}
+    last = {"samples": "Samples", "error": "Error", "variance": "Variance"}
+    return {"beauty": "Beauty", "denoised": "Denoised", **own, **last}
 
 
 class DisplayBar(QToolBar):
@@ -138,14 +139,14 @@ class DisplayBar(QToolBar):
     # ---- layers ----------------------------------------------------------------------------------
 
     def _fill_layers(self, further: tuple[str, ...]) -> None:
-        names = ["beauty", "denoised", *(n for n in _TITLES if n not in ("beauty", "denoised"))]
+        names = ["beauty", "denoised", *(n for n in _titles() if n not in ("beauty", "denoised"))]
         names += [name for name in further if name not in names]
         if [self.layer.itemData(i) for i in range(self.layer.count())] == names:
             return
         current = self._viewport.look.layer
         self.layer.clear()
         for name in names:
-            title = _TITLES.get(name, name.removeprefix("light_") + " (light group)")
+            title = _titles().get(name, name.removeprefix("light_") + " (light group)")
             self.layer.addItem(title, name)
         self.layer.setCurrentIndex(max(self.layer.findData(current), 0))
 

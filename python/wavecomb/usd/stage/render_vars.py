@@ -50,7 +50,7 @@ def aov_of(prim: UsdRender.Var) -> str | None:
         return _of_expression(name.rpartition("lpe:")[2])
     if kind == "primvar" or name.startswith("primvars:"):
         return "uv" if name.removeprefix("primvars:") in ("st", "uv") else None
-    if name in aov_names.NAMES or name == "crypto" or name.startswith(aov_names.LIGHT):
+    if name in aov_names.names() or name == "crypto" or name.startswith(aov_names.LIGHT):
         return name
     return _AOV_OF.get(name)
 
