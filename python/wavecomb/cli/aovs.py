@@ -16,6 +16,19 @@ F = TypeVar("F", bound=Callable[..., Any])
 _COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 
 
+class _AovOption(click.Option):
+    """Its help names what the core keeps, which is loaded when it is read."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """The option, and its help."""
+        self.help = (
+            f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
+            f"{aov_names.LIGHT}NAME, crypto, all; beauty is always there (docs/aovs.md).  "
+            f"[default: {', '.join(aov_names.DEFAULT[1:])}]"
+        )
+        return super().get_help_record(ctx)
+
+
 def aov_options(command: F) -> F:
     """--aov, and ``file_options``."""
     command = click.option(
@@ -23,9 +36,7 @@ def aov_options(command: F) -> F:
         "aovs",
         multiple=True,
         metavar="NAME",
-        help=f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
-        f"{aov_names.LIGHT}NAME, crypto, all; beauty is always there (docs/aovs.md).  "
-        f"[default: {', '.join(aov_names.DEFAULT[1:])}]",
+        cls=_AovOption,
     )(file_options(command))
     return command
 
