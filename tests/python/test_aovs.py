@@ -113,6 +113,20 @@ def test_names_are_expanded() -> None:
         aovs.expand(["albdo"])
 
 
+def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> None:
+    """A row whose value no path finds would be a layer of nothing."""
+    layers = {**picture.layers(), **picture.aovs}
+    for name, row in aovs.core_aovs().items():
+        kept = [n for n in layers if n.startswith("light_")] if row.kind == "groups" else [name]
+        for one in kept:
+            layer = layers[one]
+            if row.channels:
+                assert layer.shape[2:] == ((row.channels,) if row.channels > 1 else ()), one
+            # Ids of a Cryptomatte are bits.
+            values = layer.view(np.uint32) if row.kind == "coverage" else layer
+            assert values.max() > values.min(), one
+
+
 def test_nothing_else_than_the_beauty(loaded: Any, picture: wavecomb.Picture) -> None:
     plain = wavecomb.render(loaded, size=(64, 48), spp=16, aovs=[])
     assert plain.albedo is plain.normal is plain.depth is None
