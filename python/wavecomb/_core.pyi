@@ -419,6 +419,9 @@ def light_kinds() -> list[tuple[str, tuple[str, ...]]]:
 def material_table() -> list[dict[str, Any]]:
     """The parameters of materials, as wavecomb.material_table.MaterialParameter has them."""
 
+def program_table() -> list[dict[str, Any]]:
+    """What programs read, as wavecomb.material_table.Program has it."""
+
 def light_table() -> list[dict[str, Any]]:
     """The parameters of lights, as wavecomb.light_table.LightParameter has them."""
 
