@@ -173,8 +173,9 @@ void expect_own_by_material(const MaterialView& view) {
       float value[W];
       wavecomb::store(value, own[k]);
       for (size_t i = 0; i < W; ++i)
-        if (lane_bits<F>(active) >> i & 1)
+        if (lane_bits<F>(active) >> i & 1) {
           ASSERT_EQ(value[i], k < 3 ? view.own[material[i]].value[k] : 0.f) << W << " " << k;
+        }
     }
   }
 }
