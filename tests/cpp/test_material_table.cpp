@@ -16,8 +16,8 @@ namespace {
 
 TEST(ProgramList, ModelCostsAreThoseOfBeforeThereWasAList) {
   const float ns[] = {60, 75, 70, 85, 20, 110, 300};
-  const char* names[] = {"diffuse", "metal", "dielectric", "plastic", "emissive", "principled",
-                         "openpbr"};
+  const char* names[] = {"diffuse",  "metal",      "dielectric", "plastic",
+                         "emissive", "principled", "openpbr"};
   ASSERT_GE(kProgramCount, std::size(names));
   for (size_t i = 0; i < std::size(names); ++i) {
     EXPECT_STREQ(kPrograms[i].name, names[i]);
