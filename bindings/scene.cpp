@@ -58,6 +58,7 @@ std::pair<Color3, Color3> corners(const Bounds& b) {
 void bind_scene(nb::module_& m) {
   using namespace nb::literals;
   m.def("material_table", &material_rows);
+  m.def("program_table", &program_rows);
   m.attr("INHERIT_MATERIAL") = kInheritMaterial;
 
   nb::class_<TileStore>(m, "TextureStore")

@@ -16,6 +16,7 @@
 #include "lights.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/graph/parameters.h"
+#include "wavecomb/integrate/program_reads.h"
 #include "wavecomb/scene/material_table.h"
 
 namespace nb = nanobind;
@@ -117,7 +118,7 @@ void for_each_kind(const Visit& visit) {
 void take_material(Reader& reader, Material& to) {
   for_each_kind([&]<typename Value>() {
     for_each_parameter<Value>(
-        [&](const char* name, auto member) { reader.take(name, to.*member); });
+        to, [&](const MaterialParameter& p, Value& value) { reader.take(p.name, value); });
   });
 }
 
@@ -235,14 +236,39 @@ nb::list material_rows() {
   for (const MaterialParameter& p : material_table()) {
     nb::dict d;
     d["name"] = p.name;
-    d["kind"] = std::visit(
-        []<typename Value>(Value Material::*) {
-          return std::is_same_v<Value, float>  ? "number"
-                 : std::is_same_v<Value, bool> ? "flag"
-                                               : "colour";
-        },
-        p.member);
-    d["default"] = std::visit([&](auto member) { return to_python(standard.*member); }, p.member);
+    if (const OwnParameter* own = p.own()) {
+      const ProgramParameter& info = own->info();
+      d["kind"] = "number";
+      d["default"] = info.standard;
+      d["program"] = info_of(own->program).name;
+      d["least"] = info.least;
+      d["most"] = info.most;
+    }
+    for_each_kind([&]<typename Value>() {
+      if (const auto* member = std::get_if<Value Material::*>(&p.place)) {
+        d["kind"] = std::is_same_v<Value, float>  ? "number"
+                    : std::is_same_v<Value, bool> ? "flag"
+                                                  : "colour";
+        d["default"] = to_python(standard.**member);
+      }
+    });
+    rows.append(d);
+  }
+  return rows;
+}
+
+nb::list program_rows() {
+  nb::list rows;
+  for (uint32_t id = 0; id < kProgramCount; ++id) {
+    const ProgramReads reads = reads_of(static_cast<ProgramId>(id));
+    nb::list inputs;
+    for (uint32_t i = 0; i < kInputCount; ++i)
+      if ((reads.inputs >> i & 1) != 0) inputs.append(kInputNames[i]);
+    nb::dict d;
+    d["name"] = kPrograms[id].name;
+    d["inputs"] = nb::tuple(inputs);
+    d["reads_ior"] = reads.ior;
+    d["has_more"] = reads.has_more;
     rows.append(d);
   }
   return rows;
@@ -256,7 +282,7 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
   d["program"] = kProgramNames[static_cast<size_t>(m.program)];
   for_each_kind([&]<typename Value>() {
     for_each_parameter<Value>(
-        [&](const char* name, auto member) { d[name] = to_python(m.*member); });
+        m, [&](const MaterialParameter& p, const Value& value) { d[p.name] = to_python(value); });
   });
   for (uint32_t s = 0; s < kInputCount; ++s)
     if (m.has_texture(static_cast<Input>(s)))

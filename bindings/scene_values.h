@@ -46,6 +46,8 @@ wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 void take_parameters(wavecomb::Material& material, const nanobind::kwargs& values);
 /// material_table() as Python reads it.
 nanobind::list material_rows();
+/// What programs read, as Python reads it.
+nanobind::list program_rows();
 
 /// As add_material takes it. Throws Error for ids that are not there.
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);

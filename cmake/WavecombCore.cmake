@@ -3,11 +3,38 @@
 # set of WAVECOMB_ISAS.
 
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.cpp")
-file(GLOB programs CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
-# Rows of WAVECOMB_VARIANTS: "X(name, program, parts)".
-file(READ "${PROJECT_SOURCE_DIR}/src/wavecomb/scene/material_parts.h" variants)
-string(REGEX MATCHALL "X\\([a-z_]+, [a-z]+, [k0]" variants "${variants}")
-set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/scene/material_parts.h")
+# wavecomb_read_rows(VAR FILE PATTERN): what matches in a header of src/wavecomb.
+function(wavecomb_read_rows var file pattern)
+  set(file "${PROJECT_SOURCE_DIR}/src/wavecomb/${file}")
+  file(READ "${file}" text)
+  string(REGEX MATCHALL "${pattern}" rows "${text}")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
+  set(${var} ${rows} PARENT_SCOPE)
+endfunction()
+
+# Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)", "P(name, Class, ...)". Each has a header of its name.
+wavecomb_read_rows(programs scene/programs.h "\n  [XP]\\([a-z_0-9]+, ")
+list(TRANSFORM programs REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
+file(GLOB program_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
+list(TRANSFORM program_headers REPLACE "^.*/([^/]+)\\.h$" "\\1")
+foreach(program IN LISTS programs)
+  if(NOT program IN_LIST program_headers)
+    message(FATAL_ERROR "WAVECOMB_PROGRAMS (src/wavecomb/scene/programs.h) has a program \"${program}\", and "
+      "there is no src/wavecomb/material/programs/${program}.h")
+  endif()
+endforeach()
+foreach(program IN LISTS program_headers)
+  if(NOT program IN_LIST programs)
+    message(FATAL_ERROR "src/wavecomb/material/programs/${program}.h is there, and WAVECOMB_PROGRAMS "
+      "(src/wavecomb/scene/programs.h) has no row for it")
+  endif()
+endforeach()
+# Variants, as "name:program": programs as they are, then rows of WAVECOMB_VARIANTS, "X(name, program, parts)".
+wavecomb_read_rows(reduced scene/material_parts.h "\n  X\\([a-z_0-9]+, [a-z_0-9]+, ")
+list(TRANSFORM reduced REPLACE "^.*\\(([a-z_0-9]+), ([a-z_0-9]+), $" "\\1:\\2")
+set(variants ${programs})
+list(TRANSFORM variants REPLACE "^(.+)$" "\\1:\\1")
+list(APPEND variants ${reduced})
 set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$")
@@ -25,15 +52,14 @@ set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <li
 function(wavecomb_lane_units var width plain)
   set(folder "${PROJECT_BINARY_DIR}/lanes")
   set(units "")
-  foreach(header IN LISTS programs)
-    get_filename_component(program "${header}" NAME_WE)
+  foreach(program IN LISTS programs)
     configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/program.lanes.cpp.in"
       "${folder}/${program}_${width}.cpp" @ONLY)
     list(APPEND units "${folder}/${program}_${width}.cpp")
   endforeach()
   set(index 0)
   foreach(row IN LISTS variants)
-    string(REGEX MATCH "X\\(([a-z_]+), ([a-z]+)," row "${row}")
+    string(REGEX MATCH "^(.*):(.*)$" row "${row}")
     set(variant "${CMAKE_MATCH_1}")
     set(program "${CMAKE_MATCH_2}")
     if(plain)

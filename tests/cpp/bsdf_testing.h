@@ -90,4 +90,19 @@ inline OpenPbrParams<float> plain_params() {
   return p;
 }
 
+/// `p` as program `Bsdf` takes it. What it has to itself is `own` of the way from least to most.
+template <typename Bsdf, typename F>
+ParamsOf<Bsdf, F> params_for(const OpenPbrParams<F>& p, float own = 0.5f) {
+  constexpr const ProgramInfo& kInfo = info_of(Bsdf::kProgram);
+  if constexpr (kInfo.own_count() == 0) {
+    return p;
+  } else {
+    OwnShadingParams<F> more;
+    static_cast<ShadingParams<F>&>(more) = p;
+    for (size_t i = 0; i < kInfo.own.size(); ++i)
+      more.own[i] = F(kInfo.own[i].least + own * (kInfo.own[i].most - kInfo.own[i].least));
+    return more;
+  }
+}
+
 }  // namespace wavecomb::bsdf_testing

@@ -163,7 +163,9 @@ inline std::vector<Case> usual_cases() {
 /// Calls f(bsdf) with the scalar class of the case's program.
 template <typename Function>
 void with_bsdf(const Case& c, Function f) {
-  visit_program<float>(c.program, [&]<typename Bsdf>() { f(Bsdf(c.params, c.schlick)); });
+  visit_program<float>(c.program, [&]<typename Bsdf>() {
+    f(Bsdf(bsdf_testing::params_for<Bsdf>(c.params), c.schlick));
+  });
 }
 
 /// Directions from which a case is seen, at these cosines; from both sides where they differ.

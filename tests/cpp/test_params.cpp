@@ -158,6 +158,38 @@ TEST_F(ParamsTest, UniformAndMixedLanesEqualScalar) {
   expect_lanes_equal_scalar<16>(view_);
 }
 
+template <size_t W>
+void expect_own_by_material(const MaterialView& view) {
+  using F = FloatP<W>;
+  std::mt19937 rng(W);
+  for (int round = 0; round < 100; ++round) {
+    uint32_t material[W];
+    const uint32_t one = rng() % 3;
+    for (uint32_t& m : material) m = round % 2 ? one : rng() % 3;
+    const uint32_t off = rng();  // some lanes idle
+    const Mask<F> active = Mask<F>((lane_index<F>() & UInt<F>(off)) == UInt<F>(0u));
+    const auto own = detail::own_values<3, F>(view, wavecomb::load<UInt<F>>(material), active);
+    for (size_t k = 0; k < own.size(); ++k) {
+      float value[W];
+      wavecomb::store(value, own[k]);
+      for (size_t i = 0; i < W; ++i)
+        if (lane_bits<F>(active) >> i & 1) {
+          ASSERT_EQ(value[i], k < 3 ? view.own[material[i]].value[k] : 0.f) << W << " " << k;
+        }
+    }
+  }
+}
+
+TEST_F(ParamsTest, WhatAProgramHasToItselfIsItsMaterials) {
+  const ProgramParameterRecord own[3] = {{{1, 2, 3, 4}}, {{5, 6, 7, 8}}, {{9, 10, 11, 12}}};
+  view_.own = own;
+  expect_own_by_material<4>(view_);
+  expect_own_by_material<8>(view_);
+  expect_own_by_material<16>(view_);
+  const auto scalar = detail::own_values<4, float>(view_, 1u, true);
+  EXPECT_EQ(scalar[3], 8.f);
+}
+
 TEST_F(ParamsTest, ConstantsComeThrough) {
   const auto p = fetch_params<kAllInputs, float>(view_, 0u, {0.3f, 0.4f}, 0.f, true);
   EXPECT_EQ(p.base_color.y, records_[0].base_color[1]);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "program_cases.h"
+#include "wavecomb/integrate/program_reads.h"
 
 namespace wavecomb {
 namespace {
@@ -15,6 +16,7 @@ namespace {
 using bsdf_testing::direction;
 using bsdf_testing::furnace;
 using bsdf_testing::kronecker;
+using bsdf_testing::params_for;
 using bsdf_testing::plain_params;
 using namespace program_cases;
 using Vec = Vec3<float>;
@@ -24,6 +26,10 @@ TEST(Programs, TableFindsEachProgram) {
     int visits = 0;
     visit_program<float>(static_cast<ProgramId>(i), [&]<typename Bsdf>() {
       EXPECT_EQ(static_cast<uint32_t>(Bsdf::kProgram), i);
+      EXPECT_EQ(Bsdf::kEmits, can_emit(Bsdf::kProgram)) << kProgramNames[i];
+      const ProgramReads reads = reads_of(Bsdf::kProgram);
+      EXPECT_EQ(reads.inputs & ~input_bit(Input::kEmission), Bsdf::kInputs) << kProgramNames[i];
+      EXPECT_EQ(reads.ior, Bsdf::kReadsIor) << kProgramNames[i];
       ++visits;
     });
     EXPECT_EQ(visits, 1);
@@ -343,16 +349,16 @@ void expect_packet_equals_scalar(ProgramId id) {
         float_bits<F>(packet([](const Inputs& i) { return std::bit_cast<float>(i.params.flags); }));
     float wide[kRecorded * W], narrow[kRecorded];
     visit_program<F>(id, [&]<typename Bsdf>() {
-      record_bits<Bsdf, F>(Bsdf(p, schlick), vec([](const Inputs& i) { return i.wo; }),
-                           vec([](const Inputs& i) { return i.wi; }),
-                           packet([](const Inputs& i) { return i.l; }),
-                           packet([](const Inputs& i) { return i.u; }),
-                           packet([](const Inputs& i) { return i.v; }), wide);
+      record_bits<Bsdf, F>(
+          Bsdf(params_for<Bsdf>(p), schlick), vec([](const Inputs& i) { return i.wo; }),
+          vec([](const Inputs& i) { return i.wi; }), packet([](const Inputs& i) { return i.l; }),
+          packet([](const Inputs& i) { return i.u; }), packet([](const Inputs& i) { return i.v; }),
+          wide);
     });
     for (size_t i = 0; i < W; ++i) {
       visit_program<float>(id, [&]<typename Bsdf>() {
-        record_bits<Bsdf, float>(Bsdf(in[i].params, schlick), in[i].wo, in[i].wi, in[i].l, in[i].u,
-                                 in[i].v, narrow);
+        record_bits<Bsdf, float>(Bsdf(params_for<Bsdf>(in[i].params), schlick), in[i].wo, in[i].wi,
+                                 in[i].l, in[i].u, in[i].v, narrow);
       });
       for (size_t k = 0; k < kRecorded; ++k)
         ASSERT_EQ(std::bit_cast<uint32_t>(narrow[k]), std::bit_cast<uint32_t>(wide[k * W + i]))
@@ -422,7 +428,8 @@ TEST(Programs, NoInputGivesNonsense) {
     for (int round = 0; round < 60000; ++round) {
       const Inputs in = random_inputs(rng);
       visit_program<float>(static_cast<ProgramId>(id), [&]<typename Bsdf>() {
-        const Bsdf bsdf(in.params, round % 3 == 0);
+        const float own = static_cast<float>(round % 5) / 4;
+        const Bsdf bsdf(params_for<Bsdf>(in.params, own), round % 3 == 0);
         const auto e = bsdf.eval(in.wo, in.wi);
         const auto s = bsdf.sample(in.wo, in.l, in.u, in.v);
         for (float x :

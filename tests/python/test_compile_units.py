@@ -17,6 +17,7 @@ from wavecomb import _core
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "editable"
 HEADERS = ROOT / "src" / "wavecomb" / "material" / "programs"
+PROGRAMS = ROOT / "src" / "wavecomb" / "scene" / "programs.h"
 VARIANTS = ROOT / "src" / "wavecomb" / "scene" / "material_parts.h"
 
 
@@ -43,6 +44,9 @@ def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], prog
     widths = {1, *_core.lane_widths()}
     full = {f"{program}_{width}.cpp.o" for width in widths}
     rows = re.findall(r"^ *X\((\w+), (\w+),", VARIANTS.read_text("utf-8"), re.MULTILINE)
+    listed = re.findall(r"^ *[XP]\((\w+), ", PROGRAMS.read_text("utf-8"), re.MULTILINE)
+    assert set(listed) == {path.stem for path in HEADERS.glob("*.h")}
+    rows += [(name, name) for name in listed]
     plain = {f"plain_{name}_{max(widths)}.cpp.o" for name, of in rows if of == program}
     assert plain
     assert units_of[program] == full | plain

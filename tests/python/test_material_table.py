@@ -10,9 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 from added_rows import add_rows, made_again
+from pxr import Usd, UsdShade
 
 from wavecomb import _core as core
-from wavecomb.material_table import MaterialParameter, material_parameters
+from wavecomb.material_table import (
+    MaterialParameter,
+    material_parameters,
+    preview_programs,
+    programs,
+)
+from wavecomb.usd.looks.parameters import material_parameters as traced_parameters
+from wavecomb.usd.looks.preview import INPUTS, PreviewReader
+from wavecomb.usd.stage.report import LoadReport
 
 ROOT = Path(__file__).parents[2]
 
@@ -20,6 +29,7 @@ ADDED = (
     MaterialParameter("graininess", "number", 0.5),
     MaterialParameter("sheen_tint", "colour", (1.0, 0.5, 0.0)),
     MaterialParameter("one_sided", "flag", False),
+    MaterialParameter("dustiness", "number", 0.25, "diffuse", 0.0, 0.75),
 )
 
 
@@ -29,10 +39,10 @@ def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     add_rows(monkeypatch, material_parameters, ADDED, ("wavecomb.run.boxed.calls",))
 
 
-def build(**values: Any) -> Any:
+def build(program: str = "principled", **values: Any) -> Any:
     """A scene with one triangle, whose material is told this."""
     builder = core.SceneBuilder(1)
-    builder.add_material("principled", name="/M", **values)
+    builder.add_material(program, name="/M", **values)
     triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     faces = np.array([[0, 1, 2]], np.uint32)
     builder.add_to_group(0, builder.add_mesh(triangle, faces, material=0, name="/T"))
@@ -42,17 +52,53 @@ def build(**values: Any) -> Any:
 
 def another(row: MaterialParameter) -> Any:
     """A value that a row takes and that is not its default."""
+    if row.least is not None and row.most is not None:
+        return row.most if row.default != row.most else row.least
     return {"number": 0.25, "colour": (0.25, 0.5, 0.75), "flag": not row.default}[row.kind]
 
 
 def test_rows_are_the_cores() -> None:
-    usual = build()
     for name, row in material_parameters().items():
-        changed = build(**{name: another(row)})
+        program = row.program or "principled"
+        usual = build(program)
+        changed = build(program, **{name: another(row)})
         assert changed.fingerprint() != usual.fingerprint(), name
         assert usual.material(0)[name] == pytest.approx(row.default), name
         assert changed.material(0)[name] == pytest.approx(another(row)), name
-        assert build(**{name: row.default}).fingerprint() == usual.fingerprint(), name
+        same = build(program, **{name: row.default})
+        assert same.fingerprint() == usual.fingerprint(), name
+
+
+def test_what_a_program_has_to_itself_is_no_others() -> None:
+    for name, row in material_parameters().items():
+        for program in programs():
+            is_told = row.program in ("", program)
+            assert (name in build(program).material(0)) == is_told, (name, program)
+            if not is_told:
+                with pytest.raises(core.Error, match=f"has no parameter '{name}'"):
+                    build(program, **{name: row.default})
+        if row.most is not None:
+            with pytest.raises(core.Error, match=f"{name} is .*; it must be from"):
+                build(row.program, **{name: row.most + 1.0})
+
+
+def test_what_programs_read_is_what_the_loaders_own_table_said() -> None:
+    every = {
+        "base_color", "specular_color", "emission", "roughness", "metallic", "clearcoat",
+        "clearcoat_roughness", "opacity", "normal", "ior", "opacity_threshold",
+    }  # fmt: skip
+    said = {
+        "diffuse": {"base_color", "normal"},
+        "metal": {"base_color", "specular_color", "roughness", "normal"},
+        "dielectric": {"base_color", "roughness", "ior", "normal"},
+        "plastic": {"base_color", "roughness", "ior", "normal"},
+        "emissive": {"emission"},
+        "principled": every,
+    }
+    assert {name: programs()[name].reads for name in said} == said
+    assert preview_programs()[: len(said)] == tuple(said)
+    assert "openpbr" in programs() and "openpbr" not in preview_programs()
+    assert every == {parameter for parameter, _ in INPUTS.values()}
 
 
 def test_the_fingerprint_is_that_of_before_there_was_a_table() -> None:
@@ -90,6 +136,7 @@ def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:
     assert more["sheen_tint"]([1, 2, 3], []) == (1.0, 2.0, 3.0)
     with pytest.raises(Exception, match="switch"):
         more["one_sided"](3, [])
+    assert more["dustiness"](0.5, []) == 0.5
 
 
 def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
@@ -99,3 +146,44 @@ def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
     assert "        graininess: float = 0.5,\n" in keywords
     assert "        sheen_tint: tuple[float, float, float] = (1, 0.5, 0),\n" in keywords
     assert "        one_sided: bool = False,\n" in keywords
+    assert "        dustiness: float = 0.25,\n" in keywords
+
+
+STAGE = """#usda 1.0
+def Material "M" {
+    custom token wavecomb:program = "%s"
+    %s
+    token outputs:surface.connect = </M/S.outputs:surface>
+    def Shader "S" {
+        uniform token info:id = "UsdPreviewSurface"
+        token outputs:surface
+    }
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("authored", "value"), [("", None), ("0.5", 0.5), ("-2", 0.0), ("7", 0.75), ("nan", 0.25)]
+)
+def test_an_added_row_of_a_program_is_read_from_its_attribute(
+    with_rows: None, authored: str, value: float | None
+) -> None:
+    attribute = f"float wavecomb:dustiness = {authored}" if authored else ""
+    for program in ("diffuse", "plastic"):
+        stage = Usd.Stage.CreateInMemory()
+        stage.GetRootLayer().ImportFromString(STAGE % (program, attribute))
+        prim, time = stage.GetPrimAtPath("/M"), Usd.TimeCode.Default()
+        textures: Any = None  # there are none to read
+        reader = PreviewReader(prim, time, textures, LoadReport())
+        read = reader.read(UsdShade.Shader(stage.GetPrimAtPath("/M/S"))).parameters
+        traced = traced_parameters(prim, time)
+        if program != "diffuse":
+            assert "dustiness" not in read and "dustiness" not in traced
+            continue
+        assert read.get("dustiness") == value
+        assert traced["dustiness"].value == (0.25 if value is None else value)
+        assert str(traced["dustiness"].attribute) == "/M.wavecomb:dustiness"
+        bounds = pytest.importorskip("wavecomb.gui.scene.materials_model").range_of(
+            traced["dustiness"]
+        )
+        assert (bounds.low, bounds.high) == (0.0, 0.75)

@@ -66,13 +66,12 @@ std::vector<MaterialTraits> material_traits(const Scene& scene) {
 }
 
 CostSnapshot model_costs(const Scene& scene) {
-  constexpr float kProgramNs[kProgramCount] = {60, 75, 70, 85, 20, 110, 300};
   constexpr float kTextureNs = 25;
   CostSnapshot costs;
   costs.texture_ns.assign(scene.textures().size(), kTextureNs);
   float sum = 0;
   for (const Material& material : scene.materials()) {
-    float ns = kProgramNs[static_cast<size_t>(material.program)];
+    float ns = info_of(material.program).model_ns;
     for (const TextureUse& use : material.textures)
       if (use.texture != kNoTexture) ns += kTextureNs;
     costs.material_ns.push_back(ns);

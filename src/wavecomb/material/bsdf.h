@@ -7,8 +7,8 @@
 ///   static constexpr ProgramId kProgram;
 ///   static constexpr uint32_t kInputs;      what it reads
 ///   BsdfTraits, or what differs from them
-///   using Params;                          where it takes more than ShadingParams (params.h)
-///   Bsdf(const Params&, bool schlick);
+///   using Params;                          where it takes what no row can say (params.h)
+///   Bsdf(const Params&, bool schlick);     ShadingParams, or else ParamsOf
 ///   Color<F> albedo() const;               for the AOV: diffuse and specular colour
 ///   Mask<F> has_non_delta() const;         lanes where light sampling makes sense
 ///   View view(wo) const;                   what depends on wo alone; wo itself in the simple ones
@@ -24,6 +24,8 @@
 ///   static auto interact(const Vertex<F>&);    what it meets: integrate/steps/interact.h says how
 #pragma once
 
+#include <array>
+
 #include "wavecomb/core/vec.h"
 #include "wavecomb/scene/material_data.h"
 
@@ -37,6 +39,7 @@ struct BsdfTraits {
   static constexpr bool kTransmits = false;     ///< those may lead to the other side
   static constexpr bool kHasTerminator = true;  ///< rays start beyond the terminator of its normals
   static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
+  static constexpr bool kReadsIor = false;      ///< the index of refraction says something
   static constexpr bool kOnSurface = true;      ///< shades hits; or else it has an `interact`
 
   /// What depends on wo alone, as the functions below take it: wo, unless a program says more.
@@ -113,6 +116,12 @@ struct ShadingParams {
   F ior;
   Color<F> conductor_eta, conductor_k;
   UInt<F> flags;
+};
+
+/// What a program takes that has parameters to itself (scene/programs.h), in the order of its row.
+template <typename F>
+struct OwnShadingParams : ShadingParams<F> {
+  std::array<F, kMaxProgramParameters> own;
 };
 
 }  // namespace wavecomb

@@ -95,9 +95,22 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
 }
 
 namespace detail {
+/// The first `kOwn` parameters that programs have to themselves; 0 for the others.
+template <size_t kOwn, typename F>
+WAVECOMB_INLINE std::array<F, kMaxProgramParameters> own_values(const MaterialView& view,
+                                                                const UInt<F>& material,
+                                                                const Mask<F>& active) {
+  using R = ProgramParameterRecord;
+  const auto r = make_reader<R, F>(view.own, material, active);
+  std::array<F, kMaxProgramParameters> own;
+  for (size_t i = 0; i < own.size(); ++i) own[i] = i < kOwn ? r.at(&R::value, i) : F(0.f);
+  return own;
+}
+
 template <typename Bsdf, typename F>
 struct ParamsOf {
-  using Type = ShadingParams<F>;
+  using Type = std::conditional_t<(info_of(Bsdf::kProgram).own_count() > 0), OwnShadingParams<F>,
+                                  ShadingParams<F>>;
 };
 template <typename Bsdf, typename F>
   requires requires { typename Bsdf::Params; }
@@ -115,12 +128,21 @@ template <typename Bsdf, uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
                                             const Vec2<F>& uv, const F& uv_width,
                                             const MakePoint& make_point, const Mask<F>& active) {
-  if constexpr (requires { typename Bsdf::Params; })
+  constexpr size_t kOwn = info_of(Bsdf::kProgram).own_count();
+  if constexpr (requires { typename Bsdf::Params; }) {
+    static_assert(kOwn == 0, "What a program has to itself beside Params is read by Params::fetch");
     return Bsdf::Params::template fetch<kInputs, Bsdf::kTextured>(materials, material, uv, uv_width,
                                                                   make_point, active);
-  else
+  } else if constexpr (kOwn == 0) {
     return fetch_params<kInputs, F, Bsdf::kTextured>(materials, material, uv, uv_width, make_point,
                                                      active);
+  } else {
+    OwnShadingParams<F> p;
+    static_cast<ShadingParams<F>&>(p) = fetch_params<kInputs, F, Bsdf::kTextured>(
+        materials, material, uv, uv_width, make_point, active);
+    p.own = detail::own_values<kOwn, F>(materials, material, active);
+    return p;
+  }
 }
 
 }  // namespace wavecomb

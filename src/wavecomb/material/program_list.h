@@ -12,29 +12,34 @@
 
 namespace wavecomb {
 
-template <typename F>
-class DiffuseBsdf;
-template <typename F>
-class MetalBsdf;
-template <typename F>
-class DielectricBsdf;
-template <typename F>
-class PlasticBsdf;
-template <typename F>
-class EmissiveBsdf;
-template <typename F, uint32_t kParts = kAllParts>
-class PrincipledBsdf;
-template <typename F, uint32_t kParts = kAllParts>
-class OpenPbrBsdf;
+#define WAVECOMB_WHOLE(name, Class, ...) \
+  template <typename F>                  \
+  class Class##Bsdf;
+#define WAVECOMB_IN_PARTS(name, Class, ...)          \
+  template <typename F, uint32_t kParts = kAllParts> \
+  class Class##Bsdf;
+WAVECOMB_PROGRAMS(WAVECOMB_WHOLE, WAVECOMB_IN_PARTS)
+#undef WAVECOMB_WHOLE
+#undef WAVECOMB_IN_PARTS
 
 template <typename... Bsdf>
 struct ProgramList {
   static constexpr size_t kSize = sizeof...(Bsdf);
 };
 
+namespace detail {
+/// The list behind its first entry, which is there for the sake of commas.
+template <typename First, typename... Bsdf>
+ProgramList<Bsdf...> list_behind(ProgramList<First, Bsdf...>);
+}  // namespace detail
+
 template <typename F>
-using Programs = ProgramList<DiffuseBsdf<F>, MetalBsdf<F>, DielectricBsdf<F>, PlasticBsdf<F>,
-                             EmissiveBsdf<F>, PrincipledBsdf<F>, OpenPbrBsdf<F>>;
+using Programs = decltype(detail::list_behind(
+    ProgramList<void
+#define WAVECOMB_PROGRAM(name, Class, ...) , Class##Bsdf<F>
+                    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+                >()));
 static_assert(Programs<float>::kSize == kProgramCount);
 
 namespace detail {
@@ -65,14 +70,17 @@ using Program = decltype(detail::program_at<static_cast<size_t>(kId)>(Programs<F
 namespace detail {
 template <uint32_t kVariant, typename F>
 auto variant_class() {
-  constexpr ProgramId kId = program_of(kVariant);
-  constexpr uint32_t kParts = kVariants[kVariant].parts;
-  if constexpr (kParts == kAllParts)
-    return std::type_identity<Program<kId, F>>();
-  else if constexpr (kId == ProgramId::kPrincipled)
-    return std::type_identity<PrincipledBsdf<F, kParts>>();
+  [[maybe_unused]] constexpr ProgramId kId = program_of(kVariant);
+  [[maybe_unused]] constexpr uint32_t kParts = kVariants[kVariant].parts;
+#define WAVECOMB_WHOLE(name, Class, ...)
+#define WAVECOMB_IN_PARTS(name, Class, ...)                        \
+  if constexpr (kParts != kAllParts && kId == ProgramId::k##Class) \
+    return std::type_identity<Class##Bsdf<F, kParts>>();           \
   else
-    return std::type_identity<OpenPbrBsdf<F, kParts>>();
+  WAVECOMB_PROGRAMS(WAVECOMB_WHOLE, WAVECOMB_IN_PARTS)
+  return std::type_identity<Program<kId, F>>();
+#undef WAVECOMB_WHOLE
+#undef WAVECOMB_IN_PARTS
 }
 }  // namespace detail
 

@@ -96,12 +96,24 @@ uint64_t hash_geometry(const Scene& scene) {
   return h.value();
 }
 
+void add_named(Hash& h, const char* name, float value) {
+  h.add_bytes(name, std::strlen(name));
+  h.add(value);
+}
+
 uint64_t hash_materials(const Scene& scene) {
   Hash h;
   for (const Material& m : scene.materials()) {
     h.add(m.program);
     for (const MaterialParameter& p : material_table())
-      std::visit([&](const auto& member) { h.add(m.*member); }, p.member);
+      std::visit(
+          [&](const auto& place) {
+            if constexpr (!std::is_same_v<decltype(place), const OwnParameter&>)
+              h.add(m.*place);
+            else if (place.is_of(m) && m.own_value(place.index) != place.info().standard)
+              add_named(h, p.name, m.own_value(place.index));
+          },
+          p.place);
     if (m.program == ProgramId::kOpenPbr) {
       const OpenPbr& o = m.openpbr;
 #define WAVECOMB_ADD(kind, name, standard, least, most) h.add(o.name);

@@ -4,33 +4,17 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "wavecomb/core/affine.h"
 #include "wavecomb/graph/graph.h"
 #include "wavecomb/scene/openpbr_data.h"
+#include "wavecomb/scene/programs.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
-
-/// A program is shading code; each material runs one.
-enum class ProgramId : uint8_t {
-  kDiffuse,
-  kMetal,
-  kDielectric,
-  kPlastic,
-  kEmissive,
-  kPrincipled,
-  kOpenPbr,
-};
-inline constexpr uint32_t kProgramCount = 7;
-inline constexpr const char* kProgramNames[kProgramCount] = {
-    "diffuse", "metal", "dielectric", "plastic", "emissive", "principled", "openpbr"};
-/// Whether a program reads the emission input.
-inline constexpr bool can_emit(ProgramId p) {
-  return p == ProgramId::kEmissive || p == ProgramId::kPrincipled || p == ProgramId::kOpenPbr;
-}
 
 /// Parameters that a texture can drive. Each has a constant, used where no texture is connected.
 enum class Input : uint8_t {
@@ -82,11 +66,15 @@ struct Material {
   bool presence = false;  ///< principled: opacity is presence (cut-out) rather than transparency
   std::array<TextureUse, kInputCount> textures;
   OpenPbr openpbr;  ///< read by the program of that name alone
+  /// Parameters that its program alone has (ProgramInfo::own), where they are given.
+  std::array<std::optional<float>, kMaxProgramParameters> own;
   /// What computes parameters at hits, in place of constants and textures: ids of
   /// SceneBuilder::add_graph or kNoGraph. The parts that drive opacity and emission alone stand
   /// beside the whole, for rays and lights that ask for nothing else.
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
+  /// Number `i` of the parameters that its program alone has.
+  float own_value(size_t i) const { return own[i].value_or(info_of(program).own[i].standard); }
   bool has_texture(Input s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
   /// Whether it can shine: its program reads the emission input and finds something there.
   bool emits() const {
@@ -135,12 +123,20 @@ struct alignas(64) TextureUseRecord {
 };
 static_assert(sizeof(TextureUseRecord) == 64);
 
+/// What programs have to themselves, as lanes read it.
+struct alignas(16) ProgramParameterRecord {
+  float value[kMaxProgramParameters];
+};
+static_assert(sizeof(ProgramParameterRecord) == 16);
+
 /// What kernels need of all materials. Uses are at `material * kInputCount + input`.
 struct MaterialView {
   const MaterialRecord* materials = nullptr;
   const TextureUseRecord* uses = nullptr;
   const TextureView* textures = nullptr;
   const OpenPbrRecord* openpbr = nullptr;
+  /// By material; null where no material runs a program that has parameters to itself.
+  const ProgramParameterRecord* own = nullptr;
   const float* energy = nullptr;  ///< EnergyTables; set where a material needs them
   GraphView graphs{};
   /// A render setting: Schlick's approximation in place of exact Fresnel.

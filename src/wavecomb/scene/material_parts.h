@@ -23,17 +23,10 @@ enum Part : uint32_t {
 };
 inline constexpr uint32_t kAllParts = 511;
 
-/// The variants, each the cheapest that has its parts: X(name, program, parts). Each program with
-/// all of its parts comes first, in the order of ProgramId; the others in the order of what they
-/// cost. CMake reads this list, too: there is a compile unit for each.
+/// The variants that are not the whole of a program, each the cheapest that has its parts:
+/// X(name, program, parts), in the order of what they cost. CMake reads this list, too: there is a
+/// compile unit for each.
 #define WAVECOMB_VARIANTS(X)                       \
-  X(diffuse, diffuse, kAllParts)                   \
-  X(metal, metal, kAllParts)                       \
-  X(dielectric, dielectric, kAllParts)             \
-  X(plastic, plastic, kAllParts)                   \
-  X(emissive, emissive, kAllParts)                 \
-  X(principled, principled, kAllParts)             \
-  X(openpbr, openpbr, kAllParts)                   \
   X(gloss, principled, 0)                          \
   X(textured_gloss, principled, kVaries)           \
   X(textured_metal, principled, kVaries | kMetals) \
@@ -45,9 +38,13 @@ struct Variant {
   const char* program;
   uint32_t parts;
 };
+/// Each program with all of its parts comes first, in the order of ProgramId.
 inline constexpr Variant kVariants[] = {
+#define WAVECOMB_PROGRAM(name, ...) {#name, #name, kAllParts},
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
 #define WAVECOMB_VARIANT(name, program, parts) {#name, #program, parts},
-    WAVECOMB_VARIANTS(WAVECOMB_VARIANT)
+        WAVECOMB_VARIANTS(WAVECOMB_VARIANT)
 #undef WAVECOMB_VARIANT
 };
 inline constexpr uint32_t kVariantCount = sizeof(kVariants) / sizeof(Variant);

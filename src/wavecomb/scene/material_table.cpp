@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/scene/material_table.h"
 
-namespace wavecomb {
+#include <vector>
 
-std::span<const MaterialParameter> material_table() {
+namespace wavecomb {
+namespace {
+
+std::vector<MaterialParameter> make_table() {
   using M = Material;
-  static const MaterialParameter table[] = {
+  std::vector<MaterialParameter> table = {
       {"base_color", &M::base_color},
       {"specular_color", &M::specular_color},
       {"emission", &M::emission},
@@ -21,6 +24,16 @@ std::span<const MaterialParameter> material_table() {
       {"specular_workflow", &M::specular_workflow},
       {"presence", &M::presence},
   };
+  for (uint32_t id = 0; id < kProgramCount; ++id)
+    for (size_t i = 0; i < kPrograms[id].own_count(); ++i)
+      table.push_back({kPrograms[id].own[i].name, OwnParameter{static_cast<ProgramId>(id), i}});
+  return table;
+}
+
+}  // namespace
+
+std::span<const MaterialParameter> material_table() {
+  static const std::vector<MaterialParameter> table = make_table();
   return table;
 }
 

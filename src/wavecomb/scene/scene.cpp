@@ -72,6 +72,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.uses = materials_->uses.data();
   v.materials.textures = geometry_->texture_views.data();
   v.materials.openpbr = materials_->openpbr.data();
+  v.materials.own = materials_->own.data();
   v.materials.graphs = materials_->graphs->view();
   v.materials.graphs.attributes = geometry_->attributes();
   v.lights = lights_->set.view(v.materials);

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/number_text.h"
 #include "wavecomb/scene/material_table.h"
 #include "wavecomb/scene/motion.h"
 
@@ -12,6 +13,18 @@ namespace wavecomb {
 std::string quoted(const std::string& kind, const std::string& name) {
   return kind + (name.empty() ? "" : " '" + name + "'");
 }
+
+namespace {
+
+/// Throws Error where a number of a program's own is out of its range; one that is not finite is
+/// said elsewhere.
+void check_own(const std::string& of, const ProgramParameter& p, float value) {
+  if (value < p.least || value > p.most)
+    throw Error(of + ": " + p.name + " is " + text(double{value}) + "; it must be from " +
+                text(double{p.least}) + " to " + text(double{p.most}));
+}
+
+}  // namespace
 
 void check_material(const Material& material, size_t texture_count, size_t graph_count) {
   const auto name = quoted("material", material.name);
@@ -46,8 +59,12 @@ void check_material(const Material& material, size_t texture_count, size_t graph
     else
       check_color(value);
   };
-  for_each_parameter<float>([&](const char*, auto member) { check(material.*member); });
-  for_each_parameter<Vec3<float>>([&](const char*, auto member) { check(material.*member); });
+  for_each_parameter<float>(material, [&](const MaterialParameter& p, float value) {
+    check(value);
+    if (p.own()) check_own(name, p.own()->info(), value);
+  });
+  for_each_parameter<Vec3<float>>(
+      material, [&](const MaterialParameter&, const Vec3<float>& value) { check(value); });
   check(o.transmission_color);
   std::apply([&](const auto&... input) { (check(input), ...); },
              static_cast<const OpenPbrInputs<float>&>(o).fields());

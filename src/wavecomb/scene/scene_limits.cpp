@@ -20,8 +20,9 @@ constexpr uint64_t words_of = sizeof(Record) / 4;
 static_assert((kMaxInstances + 1) * words_of<InstanceRecord> == kGatherWords);
 
 /// The most words that a material takes in any table.
-constexpr uint64_t kMaterialWords = std::max(
-    {words_of<MaterialRecord>, kInputCount * words_of<TextureUseRecord>, words_of<OpenPbrRecord>});
+constexpr uint64_t kMaterialWords =
+    std::max({words_of<MaterialRecord>, kInputCount * words_of<TextureUseRecord>,
+              words_of<OpenPbrRecord>, words_of<ProgramParameterRecord>});
 
 }  // namespace
 

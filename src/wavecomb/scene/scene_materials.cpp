@@ -50,6 +50,12 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   return r;
 }
 
+ProgramParameterRecord make_own_record(const Material& m) {
+  ProgramParameterRecord r{};
+  for (size_t i = 0; i < kMaxProgramParameters; ++i) r.value[i] = m.own_value(i);
+  return r;
+}
+
 OpenPbrRecord make_openpbr_record(const OpenPbr& m) {
   OpenPbrRecord r{};
   auto& inputs = static_cast<OpenPbrInputs<float>&>(r);
@@ -92,8 +98,11 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 
 SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_)
     : materials(std::move(all)), graphs(std::move(programs_)) {
+  const bool has_own = std::ranges::any_of(
+      materials, [](const Material& m) { return info_of(m.program).own_count() > 0; });
   for (const Material& m : materials) {
     records.push_back(make_material_record(m, *graphs));
+    if (has_own) own.push_back(make_own_record(m));
     if (m.program == ProgramId::kOpenPbr) {
       records.back().openpbr = static_cast<uint32_t>(openpbr.size());
       openpbr.push_back(make_openpbr_record(m.openpbr));

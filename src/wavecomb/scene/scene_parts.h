@@ -122,6 +122,8 @@ struct SceneMaterials {
   std::vector<uint32_t> programs;      ///< by material
   std::vector<uint32_t> variants;      ///< by material: of its program, the least one
   std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
+  /// By material; empty where no program has parameters to itself.
+  std::vector<ProgramParameterRecord> own;
   bool has_presence = false, has_emission = false;
 };
 

@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Qt
 from wavecomb.gui.headed_model import ColourRole, HeadedModel
 from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER, SWITCH, FieldRow, FormModel
 from wavecomb.gui.scene.ranges import UNIT, Colour, Range
+from wavecomb.material_table import material_parameters as known_parameters
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene
@@ -224,6 +225,9 @@ def range_of(parameter: Parameter) -> Range:
     """What a parameter can be."""
     one = parameter.definition
     if one is None:
+        row = known_parameters().get(parameter.name)
+        if row is not None and row.least is not None and row.most is not None:
+            return Range(row.least, row.most, row.least, row.most)
         return RANGES.get(parameter.name, UNIT)
     decimals = 1 if one.soft_high >= 100.0 else 3
     return Range(one.low, one.high, one.soft_low, one.soft_high, decimals)

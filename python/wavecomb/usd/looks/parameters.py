@@ -16,6 +16,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from wavecomb.light_table import EDITABLE, of_kind
+from wavecomb.material_table import own_parameters, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
@@ -23,7 +24,7 @@ from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical, linear_colour, space_of
 from wavecomb.usd.looks.material import PREVIEW, surface_source
 from wavecomb.usd.looks.network import Source, colour, number, shader_id, source_of, value_of
-from wavecomb.usd.looks.preview import INPUTS, USES, constant, program_of
+from wavecomb.usd.looks.preview import INPUTS, constant, program_of
 from wavecomb.usd.looks.surface import COLOUR_PARAMETERS
 from wavecomb.usd.looks.surface_inputs import COLOUR, SWITCH, InputDefinition
 from wavecomb.usd.stage.identity import LightGroups
@@ -88,10 +89,10 @@ class _Tracer:
 
     def preview(self, program: str) -> dict[str, Parameter]:
         """Parameters of a UsdPreviewSurface."""
-        wanted = USES.get(program)
+        wanted = programs()[program].reads
         out: dict[str, Parameter] = {}
         for name, (parameter, default) in INPUTS.items():
-            if parameter == "normal" or (wanted is not None and parameter not in wanted):
+            if parameter == "normal" or parameter not in wanted:
                 continue
             if parameter == "base_color" and program == "dielectric":
                 default = (1.0, 1.0, 1.0)
@@ -103,6 +104,13 @@ class _Tracer:
                 value = colour(attribute.Get(self._time), black)
                 path, usual = attribute.GetPath(), Sdf.ValueTypeNames.Color3f
                 out[parameter] = self._constant(parameter, value, path, attribute, usual)
+        for row in own_parameters(program):
+            attribute = self._prim.GetAttribute(row.attribute) or None
+            given = None if attribute is None else attribute.Get(self._time)
+            now = row.in_range(number(given, row.default))
+            path = self._prim.GetPath().AppendProperty(row.attribute)
+            usual = Sdf.ValueTypeNames.Float
+            out[row.name] = self._constant(row.name, now, path, attribute, usual)
         return out
 
     def materialx(self, model_name: str) -> dict[str, Parameter]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Usd, UsdShade
 
+from wavecomb.material_table import own_parameters, preview_programs, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.graphs.node import PARAMETERS
 from wavecomb.usd.graphs.surface import Drivers
@@ -55,17 +56,6 @@ _UNIT = (
     "opacity",
     "opacity_threshold",
 )
-USES: dict[str, tuple[str, ...]] = {
-    "diffuse": ("base_color", "normal"),
-    "metal": ("base_color", "specular_color", "roughness", "normal"),
-    "dielectric": ("base_color", "roughness", "ior", "normal"),
-    "plastic": ("base_color", "roughness", "ior", "normal"),
-    "emissive": ("emission",),
-}
-"""Parameters that a program reads; principled reads all."""
-
-PROGRAMS = (*USES, "principled")
-"""What ``wavecomb:program`` may say."""
 
 _WRAP_INPUTS = ("wrapS", "wrapT")
 _ONES = (1.0, 1.0, 1.0, 1.0)
@@ -79,8 +69,8 @@ def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> st
     name = attribute.Get(time) if attribute else None
     if name is None:
         return "principled"
-    if word(name) not in PROGRAMS:
-        known = ", ".join(PROGRAMS)
+    if word(name) not in preview_programs():
+        known = ", ".join(preview_programs())
         report.warn(f"wavecomb:program {name!r} is none of {known}: principled", material.GetPath())
         return "principled"
     return str(name)
@@ -112,10 +102,10 @@ class PreviewReader:
     def read(self, shader: UsdShade.Shader) -> Surface:
         """The surface of a UsdPreviewSurface shader."""
         program = program_of(self.material, self.time, self.report)
-        wanted = USES.get(program)
+        wanted = programs()[program].reads
         parameters: dict[str, Any] = {}
         for name, (parameter, default) in INPUTS.items():
-            if wanted is not None and parameter not in wanted:
+            if parameter not in wanted:
                 continue
             source = source_of(shader, name, self.time)
             if source is not None:
@@ -138,6 +128,10 @@ class PreviewReader:
             attribute = self.material.GetAttribute(key)
             if program == "metal" and attribute and attribute.HasAuthoredValue():
                 parameters[parameter] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
+        for row in own_parameters(program):
+            attribute = self.material.GetAttribute(row.attribute)
+            if attribute and attribute.HasAuthoredValue():
+                parameters[row.name] = row.in_range(number(attribute.Get(self.time), row.default))
         displacement = self._displacement(shader)
         return Surface(
             str(self.material.GetPath()),

@@ -12,6 +12,7 @@ template <typename F>
 class DielectricBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kDielectric;
+  static constexpr bool kReadsIor = true;
   static constexpr bool kTransmits = true;
   static constexpr bool kHasTerminator = false;
   static constexpr uint32_t kInputs =

@@ -34,6 +34,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
 
  public:
   static constexpr ProgramId kProgram = ProgramId::kOpenPbr;
+  static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kGlows) != 0;
   static constexpr bool kAbsorbs = (kParts & kPasses) != 0;
   // Not by parts: which lights the tree chooses goes by it.

@@ -17,6 +17,7 @@ template <typename F>
 class PlasticBsdf : public BsdfTraits {
  public:
   static constexpr ProgramId kProgram = ProgramId::kPlastic;
+  static constexpr bool kReadsIor = true;
   static constexpr uint32_t kInputs =
       input_bit(Input::kBaseColor) | input_bit(Input::kRoughness) | input_bit(Input::kNormal);
 

@@ -36,6 +36,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
 
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
+  static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kGlows) != 0;
   static constexpr bool kTextured = (kParts & kVaries) != 0;
   /// All, or none: a frame lies along the texture where any of them has one.

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The programs: shading code, of which each material runs one. Ids, names, kernels, what a
+/// material of a program can be told, and the compile units follow from this list.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace wavecomb {
+
+/// Most parameters that one program can have to itself.
+inline constexpr size_t kMaxProgramParameters = 4;
+
+/// A number that materials of one program alone can be told. Its name is unlike those of all
+/// others.
+struct ProgramParameter {
+  const char* name = nullptr;
+  float standard = 0;
+  float least = 0, most = 0;
+};
+
+/// A row for each program:
+///
+///   name, class of its BSDF without "Bsdf", whether its materials may emit, model cost of a record
+///   in ns (for reproducible renders), then its own parameters, as {"name", default, least, most}
+///
+/// Its code is in material/programs/NAME.h, which material/program_table.h includes for tests. Rows
+/// are X, and P where the class may be had with some of its parts alone (scene/material_parts.h).
+/// CMake reads this list, too: two spaces and a row on each line. A new one comes last, since
+/// fingerprints have the ids.
+#define WAVECOMB_PROGRAMS(X, P)        \
+  X(diffuse, Diffuse, false, 60)       \
+  X(metal, Metal, false, 75)           \
+  X(dielectric, Dielectric, false, 70) \
+  X(plastic, Plastic, false, 85)       \
+  X(emissive, Emissive, true, 20)      \
+  P(principled, Principled, true, 110) \
+  P(openpbr, OpenPbr, true, 300)
+
+enum class ProgramId : uint8_t {
+#define WAVECOMB_PROGRAM(name, Class, ...) k##Class,
+  WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+};
+
+struct ProgramInfo {
+  const char* name;
+  bool can_emit;   ///< it reads the emission input
+  float model_ns;  ///< for each record
+  std::array<ProgramParameter, kMaxProgramParameters> own;
+
+  constexpr size_t own_count() const {
+    size_t count = 0;
+    while (count < own.size() && own[count].name) ++count;
+    return count;
+  }
+};
+/// By ProgramId.
+inline constexpr ProgramInfo kPrograms[] = {
+#define WAVECOMB_PROGRAM(name, Class, emits, ns, ...) {#name, emits, ns, {{__VA_ARGS__}}},
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+};
+inline constexpr const char* kProgramNames[] = {
+#define WAVECOMB_PROGRAM(name, ...) #name,
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+};
+inline constexpr uint32_t kProgramCount = sizeof(kPrograms) / sizeof(ProgramInfo);
+
+constexpr const ProgramInfo& info_of(ProgramId program) {
+  return kPrograms[static_cast<size_t>(program)];
+}
+/// Whether a program reads the emission input.
+constexpr bool can_emit(ProgramId program) {
+  return info_of(program).can_emit;
+}
+
+}  // namespace wavecomb
