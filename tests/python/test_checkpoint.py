@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -284,7 +285,7 @@ def command(stage: Path, *arguments: Any) -> list[str]:
 
 
 def run(*words: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*words), capture_output=True, text=True, timeout=300)
+    return forks.run(command(*words)[1:], timeout=300)
 
 
 def invoke(*words: Any, code: int = 0) -> Result:
