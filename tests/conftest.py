@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import compileall
 import os
+import subprocess
 import sys
 from collections.abc import Generator
 from typing import Any
 
+import forks
 import parts
 import pytest
 
@@ -36,6 +38,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     from xdist.scheduler import WorkStealingScheduling
 
     return WorkStealingScheduling(config, log)
+
+
+@pytest.fixture
+def forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that the package starts, such as readers of stages, are forked, too."""
+    monkeypatch.setattr(subprocess, "Popen", forks.Popen)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

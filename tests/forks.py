@@ -27,11 +27,15 @@ from typing import Any
 
 HARMLESS = frozenset((
     "WAVECOMB_ISOLATE", "WAVECOMB_DEBUG", "HOME", "TMPDIR", "PYTEST_CURRENT_TEST", "COLUMNS",
+    "OPENBLAS_NUM_THREADS",
 ))  # fmt: skip
-"""Variables that are read when a command runs; any other may be read at import."""
+"""Variables that are read when a command runs, or that a command sets itself before it imports
+what reads them; any other may be read at import."""
 
 _MOST = 100_000
+_Popen = subprocess.Popen  # tests may put the one below in its place
 _server: Server | None = None
+_lock = threading.Lock()
 
 
 def wavecomb(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -78,7 +82,7 @@ class Server:
         self._variables = _read_at_import(os.environ)
         self._channel, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with its:
-            self._process = subprocess.Popen(
+            self._process = _Popen(
                 [sys.executable, __file__, str(its.fileno())],
                 pass_fds=[its.fileno()],
                 stdin=subprocess.DEVNULL,
@@ -107,7 +111,7 @@ def _read_at_import(variables: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in variables.items() if name not in HARMLESS}
 
 
-class Popen(subprocess.Popen):
+class Popen(_Popen):
     """`subprocess.Popen`, forked by the server where that makes no difference."""
 
     _told: socket.socket | None = None
@@ -170,10 +174,11 @@ def _is_python(words: Sequence[str]) -> bool:
 
 def _started() -> Server | None:
     global _server
-    if _server is None and sys.platform == "linux" and hasattr(socket, "send_fds"):
-        _server = Server()
-        atexit.register(close)
-    return _server
+    with _lock:
+        if _server is None and sys.platform == "linux" and hasattr(socket, "send_fds"):
+            _server = Server()
+            atexit.register(close)
+        return _server
 
 
 # ---- the process that forks ----------------------------------------------------------------------

@@ -128,6 +128,8 @@ def test_time_limit(cornell: Any) -> None:
     assert picture.samples.min() >= 1
     assert picture.samples.max() <= picture.samples.min() + 16
     assert np.isfinite(picture.beauty).all()
+    picture = render(cornell, size=64, spp=1 << 20, time_limit=1.5, noise=0.001, threads=1)
+    assert picture.stats["seconds"]["render"] == pytest.approx(1.5, rel=0.05, abs=0.1)
 
 
 def test_time_limit_with_little_time(cornell: Any) -> None:
@@ -143,9 +145,10 @@ def test_time_limit_is_no_reason_to_go_on(cornell: Any) -> None:
     expect_equal(adaptive, render(cornell, noise=0.3), "with time enough")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("limit", [5.0, 12.0])
 def test_time_limit_is_kept_within_five_percent(cornell: Any, limit: float) -> None:
+    """Of limits that are long; ``test_time_limit`` has a short one."""
     for settings in ({}, {"noise": 0.001}):
         picture = render(cornell, size=256, spp=1 << 20, time_limit=limit, **settings)
         assert picture.stats["seconds"]["render"] == pytest.approx(limit, rel=0.05)

@@ -313,6 +313,7 @@ def test_dry_run_does_nothing_and_estimates(results: Path, tmp_path: Path) -> No
     assert "matches none" in bench("run", suite, "-o", other, "--only", "x", "--dry-run").stderr
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
@@ -347,6 +348,7 @@ def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     assert len(json.loads((out / "machine.json").read_text())["sittings"]) == 2
 
 
+@pytest.mark.usefixtures("forked")
 def test_a_run_that_fails_is_a_row_and_is_tried_again(tmp_path: Path) -> None:
     (tmp_path / "bad.usda").write_text("#usda 1.0\nnonsense")
     text = TINY.replace('scene = "cornell"', 'file = "bad.usda"').replace("golden = true", "")
@@ -363,6 +365,7 @@ def test_a_run_that_fails_is_a_row_and_is_tried_again(tmp_path: Path) -> None:
     assert row["status"] == "ok"
 
 
+@pytest.mark.usefixtures("forked")
 def test_events_for_programs_and_only_some_stages(tmp_path: Path) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     suite = written(tmp_path, text + '[stage.other]\nfile = "missing.usda"\n')
@@ -381,6 +384,7 @@ def test_events_for_programs_and_only_some_stages(tmp_path: Path) -> None:
     assert unknown.exit_code == 2 and "--stage boxx: no such stage" in unknown.stderr
 
 
+@pytest.mark.usefixtures("forked")
 def test_time_limit(tmp_path: Path) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     arguments = ("run", written(tmp_path, text), "-o", tmp_path / "out", "--time-limit", 0.0001)

@@ -25,9 +25,9 @@ HTML = "{http://www.w3.org/1999/xhtml}"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with its report."""
+    """A folder with its report, and beside it docs/made-up.md."""
     path = write_folder(tmp_path_factory.mktemp("bench") / "made up", everything(), pictures=True)
-    assert build(path) == path / "report.html"
+    assert build(path, path.parent / "docs" / "made-up.md") == path / "report.html"
     return path
 
 
@@ -135,17 +135,16 @@ def test_figures_open_and_are_not_blank(folder: Path) -> None:
         assert len(shapes) > 20
 
 
-def test_markdown_page(folder: Path, tmp_path: Path) -> None:
-    target = tmp_path / "docs" / "made-up.md"
-    build(folder, target)
+def test_markdown_page(folder: Path) -> None:
+    target = folder.parent / "docs" / "made-up.md"
     text = target.read_text(encoding="utf-8")
     assert text.startswith("# Wavecomb benchmark: made-up\n")
     assert "## What the figures say" in text and "equal runs vary by 12% (made up)" in text
     shown = re.findall(r"!\[[^]]+\]\(made-up/([^)]+)\)", text)
     assert len(shown) > 10 and any("difference-mixed" in name for name in shown)
-    files = {path.name for path in (tmp_path / "docs" / "made-up").iterdir()}
+    files = {path.name for path in target.with_suffix("").iterdir()}
     assert set(shown) == files
-    for path in (tmp_path / "docs" / "made-up").iterdir():
+    for path in target.with_suffix("").iterdir():
         limit = LARGEST_SVG if path.suffix == ".svg" else LARGEST_PNG
         assert 0 < path.stat().st_size <= limit, path.name
     # Tables are whole: every row has as many cells as its head, and a head of several rows is told.

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from parts import needs, only_where
@@ -117,6 +118,7 @@ def assert_same_picture(here: Any, there: Any) -> None:
         assert np.array_equal(layer, two.layers()[name], equal_nan=True), name
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_every_scene_is_the_same_bit_for_bit(name: str, tmp_path: Path) -> None:
     path = tmp_path / f"{name}.usdc"
@@ -126,6 +128,7 @@ def test_every_scene_is_the_same_bit_for_bit(name: str, tmp_path: Path) -> None:
     assert_same_picture(here, there)
 
 
+@pytest.mark.usefixtures("forked")
 def test_textures_move_points_there(tmp_path: Path) -> None:
     import OpenImageIO as oiio
 
@@ -141,6 +144,7 @@ def test_textures_move_points_there(tmp_path: Path) -> None:
     assert_alike(here, there)
 
 
+@pytest.mark.usefixtures("forked")
 def test_options_arrive(good: Path) -> None:
     from wavecomb.run.boxed.reader import Reader
 
@@ -154,6 +158,7 @@ def test_options_arrive(good: Path) -> None:
             assert_alike(wavecomb.load(good, isolate=False, **options), reader.load(options))
 
 
+@pytest.mark.usefixtures("forked")
 @needs("userfaultfd")
 def test_textures_within_a_limit(tmp_path: Path) -> None:
     path = tmp_path / "mixed.usdc"
@@ -166,6 +171,7 @@ def test_textures_within_a_limit(tmp_path: Path) -> None:
     assert_same_picture(whole, there)
 
 
+@pytest.mark.usefixtures("forked")
 def test_frames_are_the_same_and_share(good: Path) -> None:
     def frames(isolate: bool) -> list[Any]:
         return list(
@@ -183,6 +189,7 @@ def test_frames_are_the_same_and_share(good: Path) -> None:
         ).beauty)  # fmt: skip
 
 
+@pytest.mark.usefixtures("forked")
 def test_views_of_one_scene_are_looked_at_there(tmp_path: Path) -> None:
     from wavecomb.run.sequence import Frames
 
@@ -202,6 +209,7 @@ def test_views_of_one_scene_are_looked_at_there(tmp_path: Path) -> None:
     assert not np.array_equal(pictures[True, 1.0], pictures[True, 3.0])
 
 
+@pytest.mark.usefixtures("forked")
 def test_the_window_reads_there_and_shares_textures(tmp_path: Path) -> None:
     loader = pytest.importorskip("wavecomb.gui.loader")
     path = tmp_path / "mixed.usdc"
@@ -226,6 +234,7 @@ def test_the_window_reads_there_and_shares_textures(tmp_path: Path) -> None:
     assert again.textures.ids == there.textures.ids
 
 
+@pytest.mark.usefixtures("forked")
 def test_progress_is_told(good: Path) -> None:
     told: list[tuple[int, int]] = []
     wavecomb.load(good, isolate=True, progress=lambda done, found: told.append((done, found)))
@@ -340,6 +349,7 @@ def does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     """Makes the process in the sandbox do something else; nothing may be left of it."""
     from wavecomb.run.boxed import process
 
+    forks.close()  # or it would be a child that is left
     folder = tmp_path / "tmp"
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))

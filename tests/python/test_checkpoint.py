@@ -60,7 +60,15 @@ class StopAt:
 
 
 @pytest.mark.parametrize(
-    "ending", [{"spp": 700}, {"noise": 0.015, "spp": 4096}, {"adaptive": 0.02, "spp": 4096}]
+    "ending",
+    [
+        {"spp": 200},
+        {"noise": 0.03, "spp": 1024},
+        {"adaptive": 0.04, "spp": 1024},
+        pytest.param({"spp": 700}, marks=pytest.mark.long),
+        pytest.param({"noise": 0.015, "spp": 4096}, marks=pytest.mark.long),
+        pytest.param({"adaptive": 0.02, "spp": 4096}, marks=pytest.mark.long),
+    ],
 )
 def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
     settings = _core.Settings(width=48, height=40, error=True, aovs=_core.AOVS, **ending)
@@ -89,7 +97,8 @@ def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
     assert result.stats["resumed_samples"] > 0
 
 
-def test_snapshots_change_nothing(cornell: Any) -> None:
+@pytest.mark.parametrize("spp", [200, pytest.param(800, marks=pytest.mark.long)])
+def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
     class Often:
         taken = 0
 
@@ -101,7 +110,7 @@ def test_snapshots_change_nothing(cornell: Any) -> None:
             assert np.isfinite(snapshot.beauty()).all()
             self.taken += 1
 
-    settings = _core.Settings(width=64, height=64, spp=800)
+    settings = _core.Settings(width=64, height=64, spp=spp)
     watcher = Often()
     watched = _core.render(cornell.scene, settings, watcher=watcher)
     assert watcher.taken > 2

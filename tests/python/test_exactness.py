@@ -342,14 +342,23 @@ def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("size", "waves"),
+    [
+        pytest.param((16, 12), [256, 1024, 65536], id="small"),
+        pytest.param((32, 24), OPTIONS["wave_size"], id="large", marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("roulette", ROULETTES)
 @pytest.mark.parametrize("scene", SCENES)
-def test_every_choice(scene: str, roulette: str, scene_of: Any) -> None:
-    """The whole product, small: a wave of 64 K holds all that a thread gets here."""
-    size, spp = (32, 24), 8
+def test_every_choice(
+    scene: str, roulette: str, size: tuple[int, int], waves: list[int], scene_of: Any
+) -> None:
+    """The whole product: of many waves, of two, and one that holds all that a thread gets here."""
+    spp = 8
     expected = plain(scene_of, scene, roulette, size, spp)
     names = ("policy", "materialize", "wave_size", "threads", "ray_order")
-    for choice in itertools.product(*(OPTIONS[name] for name in names)):
+    for choice in itertools.product(*({**OPTIONS, "wave_size": waves}[name] for name in names)):
         settings = dict(zip(names, choice, strict=True))
         settings |= {"roulette": roulette, "costs": "model", "shadow_order": settings["ray_order"]}
         expect_equal(render(scene_of(scene), size, spp, **settings), expected, settings)

@@ -37,7 +37,7 @@ def mixed(generated: Any) -> Any:
 )
 @pytest.mark.parametrize("scene", ["cornell", "mixed"])
 def test_same_mean(
-    scene: str, name: str, settings: dict[str, Any], beauty: Any, request: Any
+    scene: str, name: str, settings: dict[str, Any], beauty: Any, request: Any, fewer: int
 ) -> None:
     """The Mixed stage has smooth metal and glass, textures and every program."""
     stage = request.getfixturevalue(scene)
@@ -46,8 +46,9 @@ def test_same_mean(
         # By cosine, what a narrow lobe shows of another object comes from one sample in thousands,
         # more than a test has time for: lamps and the sky, by light samples as well, are enough.
         plain["max_depth"] = 1 if name == "cosine" else 4
-    a = batches(lambda seed: beauty(stage, 64, 64, seed=seed, **plain, **settings), 12)
-    b = batches(lambda seed: beauty(stage, 64, 64, seed=seed, **plain), 12, first_seed=500)
+    spp = 64 // fewer
+    a = batches(lambda seed: beauty(stage, 64, spp, seed=seed, **plain, **settings), 12)
+    b = batches(lambda seed: beauty(stage, 64, spp, seed=seed, **plain), 12, first_seed=500)
     assert_agree(f"{scene} {name}", a, b)
 
 
@@ -71,13 +72,13 @@ def rel_mse(picture: Any, reference: Any) -> float:
 
 
 @pytest.mark.slow
-def test_owen_sobol_converges_faster(cornell: Any, beauty: Any) -> None:
+def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> None:
     """Independent noise has at least 1.3 times the error at 16 samples, and 1.9 times at 256.
 
     Measured at 8 bounces: 1.6 and 2.4 (4.4 and 7.0 with direct light only). As many times more
     samples would bring independent noise to the same error.
     """
-    reference = beauty(cornell, 32, 8192, seed=900, sampler="sobol")
+    reference = beauty(cornell, 32, 8192 // fewer, seed=900, sampler="sobol")
     gain = {}
     for spp, count in ((16, 16), (256, 4)):
         errors = {
