@@ -341,16 +341,21 @@ def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
         expect_equal(render(scene_of(scene), (48, 32), 8, **settings), expected, row)
 
 
+SMALL = (16, 12), [256, 1024, 65536]
+LARGE = (32, 24), OPTIONS["wave_size"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("size", "waves"),
+    ("scene", "roulette", "size", "waves"),
     [
-        pytest.param((16, 12), [256, 1024, 65536], id="small"),
-        pytest.param((32, 24), OPTIONS["wave_size"], id="large", marks=pytest.mark.long),
+        *((scene, roulette, *SMALL) for scene, roulette in zip(SCENES, ROULETTES, strict=True)),
+        *(
+            pytest.param(scene, roulette, *LARGE, marks=pytest.mark.long)
+            for scene, roulette in itertools.product(SCENES, ROULETTES)
+        ),
     ],
 )
-@pytest.mark.parametrize("roulette", ROULETTES)
-@pytest.mark.parametrize("scene", SCENES)
 def test_every_choice(
     scene: str, roulette: str, size: tuple[int, int], waves: list[int], scene_of: Any
 ) -> None:

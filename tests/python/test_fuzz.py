@@ -38,15 +38,23 @@ def test_broken_stages_end_in_a_line() -> None:
     assert all(v.said for v in verdicts if v.outcome != "rendered")
 
 
-@pytest.mark.parametrize(
-    "case",
-    ["checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
-     "usda words/148", "usda words/150"],
+MENDED = (
+    "checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
+    "usda words/148", "usda words/150",
 )  # fmt: skip
-def test_what_was_found_and_mended(case: str) -> None:
-    kind, _, number = case.partition("/")
-    (verdict,) = run([(kind, int(number))], seed=1)
-    assert verdict.outcome in GOOD, verdict.said
+
+
+@pytest.fixture(scope="module")
+def mended() -> dict[str, Verdict]:
+    """What became of each: one process after another takes them, as of all cases."""
+    cases = [case.split("/") for case in MENDED]
+    verdicts = run([(kind, int(number)) for kind, number in cases], seed=1)
+    return {verdict.name: verdict for verdict in verdicts}
+
+
+@pytest.mark.parametrize("case", MENDED)
+def test_what_was_found_and_mended(case: str, mended: dict[str, Verdict]) -> None:
+    assert mended[case].outcome in GOOD, mended[case].said
 
 
 def test_table() -> None:
