@@ -311,6 +311,7 @@ def test_python_script_gets_exceptions(tmp_path: Path) -> None:
         module.render(tmp_path / "no.usda")
 
 
+@pytest.mark.slow
 def test_interrupt_keeps_what_is_done(tmp_path: Path, out: Path) -> None:
     stage = write_stage(tmp_path / "s.usda", mesh() + GROUND + CAMERA + LIGHT)
     arguments = ["render", stage, "-o", out, "--size", 64, 64, "--spp", 1 << 20, "--threads", 1]

@@ -46,6 +46,7 @@ def texts(tree: ElementTree.Element, tag: str) -> list[str]:
     return ["".join(element.itertext()) for element in tree.iter(HTML + tag)]
 
 
+@pytest.mark.slow
 def test_page_is_sound_and_can_be_read_by_all(tree: ElementTree.Element) -> None:
     ids = [element.get("id") for element in tree.iter() if element.get("id")]
     assert len(ids) == len(set(ids))
@@ -110,6 +111,7 @@ def test_viewers(tree: ElementTree.Element) -> None:
     assert "none, program, material" in named
 
 
+@pytest.mark.slow
 def test_figures_open_and_are_not_blank(folder: Path) -> None:
     names = {path.stem for path in (folder / "figures").iterdir()}
     for part in (
@@ -176,6 +178,7 @@ def test_parts_are_kept_beside_the_page(folder: Path, tree: ElementTree.Element)
             assert not isinstance(part, Markup) or part.html in text
 
 
+@pytest.mark.slow
 def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:
     """Each renderer has a golden picture, a viewer and a map of its own."""
     vary = {"renderer": ["wavecomb", "cycles"]}
@@ -186,6 +189,7 @@ def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:
     assert names == {"difference-mixed-wavecomb", "difference-mixed-cycles"}
 
 
+@pytest.mark.slow
 def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=2)
     rows[3]["picture_sha256"] = "1" * 64
@@ -194,6 +198,7 @@ def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
     assert "mixed, roulette throughput, 16 spp, seed 1: 2 different pictures" in text
 
 
+@pytest.mark.slow
 def test_one_run_makes_a_report(tmp_path: Path) -> None:
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
     rows.append({**rows[0], "run_id": "x", "status": "failed", "error": "no <memory> left"})

@@ -118,6 +118,7 @@ def assert_same_picture(here: Any, there: Any) -> None:
         assert np.array_equal(layer, two.layers()[name], equal_nan=True), name
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_every_scene_is_the_same_bit_for_bit(name: str, tmp_path: Path) -> None:
@@ -158,6 +159,7 @@ def test_options_arrive(good: Path) -> None:
             assert_alike(wavecomb.load(good, isolate=False, **options), reader.load(options))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("forked")
 @needs("userfaultfd")
 def test_textures_within_a_limit(tmp_path: Path) -> None:
@@ -209,6 +211,7 @@ def test_views_of_one_scene_are_looked_at_there(tmp_path: Path) -> None:
     assert not np.array_equal(pictures[True, 1.0], pictures[True, 3.0])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("forked")
 def test_the_window_reads_there_and_shares_textures(tmp_path: Path) -> None:
     loader = pytest.importorskip("wavecomb.gui.loader")
@@ -275,6 +278,7 @@ def script(code: str, *arguments: Any, **environment: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "deed",
     [
@@ -293,6 +297,7 @@ def test_it_is_so_by_default_and_usd_stays_out(good: Path, deed: str, tmp_path: 
     assert not os.listdir(tmp_path / "tmp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variable", ["WAVECOMB_ISOLATE", "WAVECOMB_DEBUG"])
 def test_it_can_be_left(good: Path, variable: str) -> None:
     code = COUNTS + "wavecomb.load(sys.argv[1])\nprint(len(started), 'pxr' in sys.modules)"
@@ -300,6 +305,7 @@ def test_it_can_be_left(good: Path, variable: str) -> None:
     assert script(code, good, **{variable: value}) == "0 True\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["on", "off"])
 def test_commands_start_no_other(good: Path, tmp_path: Path, how: str) -> None:
     """They are in a child, or were asked not to be."""
@@ -370,6 +376,7 @@ def does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 IN_THE_MIDST = "loader._add_lights = lambda *_: {}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
@@ -462,6 +469,7 @@ def test_errors_of_names_that_are_not_known_run_nothing(good: Path) -> None:
             reader.load({})
 
 
+@pytest.mark.slow
 def test_errors_are_of_the_same_types(good: Path, tmp_path: Path) -> None:
     from wavecomb.run.boxed.reader import Reader
 
@@ -519,6 +527,7 @@ loader._build = spy
     assert str(caught.value) == "PermissionError done" + 3 * " PermissionError" + " done"
 
 
+@pytest.mark.slow
 def test_memory_is_limited_on_both_sides(good: Path, does: Any) -> None:
     does("loader.survey = lambda *_: np.ones(10**9)")
     with pytest.raises(WavecombError, match=r"good\.usda: out of memory.*limit is 600 MB"):
@@ -555,6 +564,7 @@ wavecomb.load(sys.argv[1], isolate=True)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "is_deaf"), [(signal.SIGINT, False), (signal.SIGKILL, False), (signal.SIGKILL, True)]
 )
@@ -588,6 +598,7 @@ def test_no_process_outlives_who_asked(good: Path, does: Any, number: int, is_de
             left.rmdir()
 
 
+@pytest.mark.slow
 def test_what_libraries_print_there_is_passed_on(good: Path, does: Any) -> None:
     deed = "os.write(2, b'libpng error: CRC\\nsomething else\\n')"
     code = does(deed)

@@ -59,6 +59,7 @@ class StopAt:
         }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "ending",
     [
@@ -97,6 +98,7 @@ def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
     assert result.stats["resumed_samples"] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spp", [200, pytest.param(800, marks=pytest.mark.long)])
 def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
     class Often:
@@ -117,6 +119,7 @@ def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
     assert watched.beauty.tobytes() == _core.render(cornell.scene, settings).beauty.tobytes()
 
 
+@pytest.mark.slow
 def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
     """What was begun without a limit is a pass of 2^14 samples: it is cut, or taken in steps."""
     settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15}
@@ -304,6 +307,7 @@ def invoke(*words: Any, code: int = 0) -> Result:
     return result
 
 
+@pytest.mark.slow
 def test_signals_save(stage: Path, tmp_path: Path) -> None:
     out, file = tmp_path / "a.exr", tmp_path / "a.ckpt"
     for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
@@ -371,6 +375,7 @@ def test_a_timed_render_is_not_resumed_without_end(stage: Path, tmp_path: Path) 
     invoke(stage, "-o", out, "--resume", file, "--time-limit", 0.1)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_does_not_end_a_render(cornell: Any, tmp_path: Path) -> None:
     from wavecomb.run.watcher import CheckpointSink, Watcher
 

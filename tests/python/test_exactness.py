@@ -300,6 +300,7 @@ def test_covering_design_covers() -> None:
     assert len(COVERING) < 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
     stats = plain(scene_of, scene, "off", (48, 32), 8).stats
@@ -313,6 +314,7 @@ def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
         assert stats["lane_utilisation"] < 0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
     """Waves of eight and of nine depths look alike, whichever queues are measured."""
@@ -331,6 +333,7 @@ def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
     assert lengths[0] == pytest.approx(lengths[1], rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
     for row in COVERING:

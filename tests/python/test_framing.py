@@ -138,6 +138,7 @@ def test_points_touch_a_margin_on_both_sides(projection, conform, size):
         )
 
 
+@pytest.mark.slow
 def test_an_outline_is_what_matters():
     rng = np.random.default_rng(5)
     ball = rng.normal(size=(50000, 3))
@@ -185,6 +186,7 @@ def test_a_group_of_many_things_keeps_few_points():
         assert (found @ direction).max() == pytest.approx((whole @ direction).max(), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "block", "most"),
     [(10_000, 1 << 12, 20e6), pytest.param(100_000, 1 << 15, 150e6, marks=pytest.mark.long)],

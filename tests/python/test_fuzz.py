@@ -12,6 +12,7 @@ from fuzz_stages import GOOD, Verdict, run, table
 pytest.importorskip("wavecomb._core")
 
 
+@pytest.mark.slow
 def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
     for kind in KINDS:
         folders = [tmp_path / f"{kind}-{turn}" for turn in range(3)]
@@ -27,6 +28,7 @@ def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
         assert texts[0] != texts[2] or kind == "deep", kind
 
 
+@pytest.mark.slow
 def test_broken_stages_end_in_a_line() -> None:
     verdicts = run(plan(len(KINDS)), seed=1)
     faults = [f"{v.name}: {v.outcome} {v.said}" for v in verdicts if v.outcome not in GOOD]

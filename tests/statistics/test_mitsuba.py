@@ -53,13 +53,14 @@ def check(mitsuba: ModuleType, beauty: Any, fewer: int) -> Check:
         spp: int = 64,
         count: int = 8,
         max_depth: int = 4,
-        size: int = 64,
+        size: int | None = None,
         tolerance: float = 0.0,
         **settings: Any,
     ) -> Agreement:
         from mitsuba_bridge import MitsubaScene, PeerSettings
 
         spp //= fewer
+        size = size or (64 if fewer == 1 else 48)
         peer = MitsubaScene(mitsuba, recorded, PeerSettings(size, size, max_depth))
         a = batches(
             lambda seed: beauty(
@@ -82,6 +83,7 @@ def test_cornell_box(check: Check, generated: Any, fewer: int, max_depth: int) -
         f"cornell {max_depth}",
         record(generated("cornell")),
         max_depth=max_depth,
+        size=64,
         spp=64 if few else 128,
         count=8 if few else 10,
     )

@@ -60,6 +60,7 @@ def error(picture: Any, truth: Any) -> float:
     return float(np.mean((picture - truth) ** 2))
 
 
+@pytest.mark.slow
 def test_portals_change_no_mean_and_lower_the_noise(shot: Any, tmp_path: Path) -> None:
     sky = write_sky(tmp_path)
     with_it = INSIDE, portal(), dome("Portal", image=sky)
@@ -70,6 +71,7 @@ def test_portals_change_no_mean_and_lower_the_noise(shot: Any, tmp_path: Path) -
     assert error(shot(*with_it), truth) < noise / 3
 
 
+@pytest.mark.slow
 def test_light_from_beside_portals_counts(shot: Any, fewer: int) -> None:
     """Of a portal over half of the window, or none of it, or turned away: the same mean."""
     expected = shot(INSIDE, portal(), dome("Portal"), spp=2048).mean()
@@ -79,6 +81,7 @@ def test_light_from_beside_portals_counts(shot: Any, fewer: int) -> None:
         assert found == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_two_portals_that_overlap(shot: Any) -> None:
     expected = shot(INSIDE, portal(), dome("Portal"), spp=2048).mean()
     two = portal(1.5 * WINDOW, "A", moved(-0.1, 0.1, HALF)), portal(1.2, "B")

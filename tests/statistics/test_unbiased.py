@@ -49,12 +49,12 @@ def test_same_mean(
         # By cosine, what a narrow lobe shows of another object comes from one sample in thousands,
         # more than a test has time for: lamps and the sky, by light samples as well, are enough.
         plain["max_depth"] = 1 if name == "cosine" else 4
-    spp = 64 // fewer
-    a = batches(lambda seed: beauty(stage, 64, spp, seed=seed, **plain, **settings), 12)
+    size, spp = 64 if fewer == 1 else 48, 64 // fewer
+    a = batches(lambda seed: beauty(stage, size, spp, seed=seed, **plain, **settings), 12)
     key = scene, plain["max_depth"], spp
     if key not in _plain:
         _plain[key] = batches(
-            lambda seed: beauty(stage, 64, spp, seed=seed, **plain), 12, first_seed=500
+            lambda seed: beauty(stage, size, spp, seed=seed, **plain), 12, first_seed=500
         )
     assert_agree(f"{scene} {name}", a, _plain[key])
 
@@ -142,6 +142,7 @@ def test_clamping_only_takes_away(cornell: Any, beauty: Any) -> None:
     assert clamped.mean() < 0.97 * more.mean()
 
 
+@pytest.mark.slow
 def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
     """Sample k is the same whatever the count: the first 4 of 8 samples are those of 4.
 
@@ -158,6 +159,7 @@ def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
     assert abs(np.corrcoef(four[keep], other[keep])[0, 1]) < 0.12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 3])
 def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int, fewer: int) -> None:
     """A delta lobe beside a diffuse one is chosen by a probability that cosine sampling knows."""

@@ -213,6 +213,7 @@ def test_exposure_is_that_of_both_and_of_flip(qtbot, pair):
     assert after["RMSE"] == before["RMSE"] and after["PSNR"] != before["PSNR"]
 
 
+@pytest.mark.slow
 def test_exchange(qtbot, pair):
     QTest.mouseClick(pair.findChild(QToolButton, "swap"), LEFT)
     settled(qtbot, pair)
@@ -226,6 +227,7 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
         assert "open" in failed.args[0] and "first" in failed.args[0]
 
 
+@pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
     """Another policy: bit for bit the same. Another seed: other noise. The viewport goes on."""
     window = CompareWindow(session)
@@ -261,6 +263,7 @@ def test_kept_picture_against_live_settings(qtbot, session):
         window.shutdown()
 
 
+@pytest.mark.slow
 def test_keys_of_the_main_window_keep_the_picture(qtbot, cornell, tmp_path):
     from wavecomb.gui.main_window import MainWindow
     from wavecomb.gui.setup import Setup

@@ -133,6 +133,7 @@ def without_folders(structure: str) -> str:
     return structure.replace(NOWHERE, "").replace("[", "/").replace("]", "")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_outlines_of_scenes_are_the_scenes(name: str, tmp_path: Path) -> None:
@@ -141,6 +142,7 @@ def test_outlines_of_scenes_are_the_scenes(name: str, tmp_path: Path) -> None:
     assert_alike(path, opened(path), open_editable(path))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", SOME)
 def test_outlines_of_assets_are_the_assets(name: str) -> None:
@@ -184,6 +186,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not landlock.version(), reason="this kernel has no Landlock")
 @pytest.mark.parametrize("name", ["scene", "mtlx", "referring", "rig"])
 def test_the_window_opens_no_file_of_a_stage(name: str, tmp_path: Path) -> None:
