@@ -10,7 +10,6 @@ import sys
 from collections.abc import Generator
 from typing import Any
 
-import forks
 import parts
 import pytest
 
@@ -43,6 +42,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 @pytest.fixture
 def forked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Processes that the package starts, such as readers of stages, are forked, too."""
+    import forks
+
     monkeypatch.setattr(subprocess, "Popen", forks.Popen)
 
 

@@ -267,6 +267,7 @@ def test_a_suite_from_end_to_end(results: Path) -> None:
     assert len(pictures) == 2 == len({digest for _, digest in pictures})
 
 
+@pytest.mark.slow
 def test_everything_is_kept(results: Path) -> None:
     assert (results / "suite.toml").read_text() == TINY
     entries = [json.loads(line) for line in (results / "runs.jsonl").read_text().splitlines()]
@@ -292,6 +293,7 @@ def test_everything_is_kept(results: Path) -> None:
     assert machine["noise"]["runs"] == 4 and len(machine["sittings"]) == 1
 
 
+@pytest.mark.slow
 def test_results_are_not_overwritten(results: Path, tmp_path: Path) -> None:
     before = (results / "runs.csv").read_bytes()
     again = bench("run", written(tmp_path, TINY), "-o", results)

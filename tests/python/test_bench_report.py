@@ -69,6 +69,7 @@ def test_page_is_sound_and_can_be_read_by_all(tree: ElementTree.Element) -> None
         assert any(control in list(label) for label in tree.iter(HTML + "label"))
 
 
+@pytest.mark.slow
 def test_page_needs_nothing_else(page: str) -> None:
     without_names = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
     assert not re.search(r"""(src|href|xlink:href)=["'](?!#|data:)""", without_names)
@@ -77,6 +78,7 @@ def test_page_needs_nothing_else(page: str) -> None:
     assert "currentColor" in page
 
 
+@pytest.mark.slow
 def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
     headings = texts(tree, "h2")
     for wanted in (
@@ -99,6 +101,7 @@ def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
     assert "adaptive takes" in findings
 
 
+@pytest.mark.slow
 def test_viewers(tree: ElementTree.Element) -> None:
     viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]
     assert len(viewers) == 2
@@ -137,6 +140,7 @@ def test_figures_open_and_are_not_blank(folder: Path) -> None:
         assert len(shapes) > 20
 
 
+@pytest.mark.slow
 def test_markdown_page(folder: Path) -> None:
     target = folder.parent / "docs" / "made-up.md"
     text = target.read_text(encoding="utf-8")
@@ -158,6 +162,7 @@ def test_markdown_page(folder: Path) -> None:
     assert not re.search(r"</?(p|td|th|tr|table|details|span|svg)\b", text)
 
 
+@pytest.mark.slow
 def test_parts_are_kept_beside_the_page(folder: Path, tree: ElementTree.Element) -> None:
     """What the window shows is what the page says, section by section and figure by figure."""
     report = read_report(folder)
