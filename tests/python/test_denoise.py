@@ -46,6 +46,7 @@ def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
     assert noisy.denoised is None
 
 
+@pytest.mark.slow
 def test_guides_keep_detail(pictures: Any) -> None:
     """A pattern that only the albedo shows comes through."""
     from wavecomb.picture.denoise import denoise

@@ -372,6 +372,7 @@ def test_every_choice(
         expect_equal(render(scene_of(scene), size, spp, **settings), expected, settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
     """Hierarchy and shares of lights: of one thread or many, of other settings before, or new."""

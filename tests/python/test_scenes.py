@@ -98,6 +98,7 @@ def test_every_stage_is_complete(stage: Usd.Stage) -> None:
             assert indices.min() >= 0 and indices.max() < len(points)
 
 
+@pytest.mark.slow
 def test_textures_are_beside_the_stage(stage: Usd.Stage) -> None:
     folder = Path(stage.GetRootLayer().realPath).parent
     for prim in stage.Traverse():
@@ -121,6 +122,7 @@ def test_object_counts(
     assert len(experiment[name].GetPrototypes()) == (2 if teapots else 1)
 
 
+@pytest.mark.slow
 def test_mixed_has_many_materials_over_all_programs(experiment: dict[str, Usd.Stage]) -> None:
     stage = experiment["mixed"]
     bound = {

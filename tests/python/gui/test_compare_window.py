@@ -185,6 +185,7 @@ def test_values_under_the_mouse(qtbot, pair):
     )
 
 
+@pytest.mark.slow
 def test_maps(qtbot, pair):
     combo = pair.findChild(QComboBox, "compare-map")
     QTest.mouseClick(pair.findChild(QToolButton, "mode-difference"), LEFT)
