@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import compileall
 import os
+import subprocess
+import sys
 from collections.abc import Generator
+from typing import Any
 
 import parts
 import pytest
@@ -12,6 +16,35 @@ import pytest
 # Tests look into the loader, which has to be in their process for that; and each of the hundreds of
 # stages that they load would wait for a Python. What is read in a sandbox says so (isolate=True).
 os.environ.setdefault("WAVECOMB_ISOLATE", "0")
+
+# Hundreds of processes: none of them has to compile the package. What is in a sandbox could not
+# keep what it compiled.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+    sys.dont_write_bytecode = False
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compiles the package, once and before there are workers."""
+    if not hasattr(config, "workerinput"):
+        compileall.compile_dir(parts.PACKAGE, quiet=2)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """A file stays with one worker, and so do its fixtures, until another has nothing to do."""
+    if config.getvalue("dist") != "load":
+        return None
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log)
+
+
+@pytest.fixture
+def forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that the package starts, such as readers of stages, are forked, too."""
+    import forks
+
+    monkeypatch.setattr(subprocess, "Popen", forks.Popen)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -25,6 +25,7 @@ from typing import NoReturn
 
 import pytest
 
+PACKAGE = Path(__file__).resolve().parents[1] / "python" / "wavecomb"
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 """Stages, pictures and meshes of others; not on a user's machine."""
 

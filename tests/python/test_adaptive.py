@@ -36,9 +36,11 @@ def expect_equal(a: wavecomb.Picture, b: wavecomb.Picture, what: Any) -> None:
         assert getattr(a, layer).tobytes() == getattr(b, layer).tobytes(), f"{layer}: {what}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [{"adaptive": 0.05}, {"noise": 0.06}])
 def test_one_picture_whatever_the_schedule(cornell: Any, ending: dict[str, float]) -> None:
-    plain = render(cornell, policy="none", threads=1, wave_size=64, lanes=1, **ending)
+    size = 24
+    plain = render(cornell, size, policy="none", threads=1, wave_size=64, lanes=1, **ending)
     counts = np.unique(plain.samples)
     assert len(counts) > 2, "or it would show nothing"
     assert counts[0] >= 16
@@ -49,11 +51,12 @@ def test_one_picture_whatever_the_schedule(cornell: Any, ending: dict[str, float
         settings = {
             "policy": next(names), "wave_size": wave_size, "threads": threads, "lanes": lanes
         }  # fmt: skip
-        expect_equal(render(cornell, **settings, **ending), plain, settings)
-    reference = render(cornell, integrator="reference", **ending)
+        expect_equal(render(cornell, size, **settings, **ending), plain, settings)
+    reference = render(cornell, size, integrator="reference", **ending)
     expect_equal(reference, plain, "reference")
 
 
+@pytest.mark.slow
 def test_samples_of_a_pixel_are_those_of_a_plain_render(cornell: Any) -> None:
     """A pixel with n samples is the pixel of a render with n for all: nothing is left out."""
     picture = render(cornell, noise=0.06)
@@ -64,6 +67,7 @@ def test_samples_of_a_pixel_are_those_of_a_plain_render(cornell: Any) -> None:
         np.testing.assert_array_equal(picture.variance[here], plain.variance[here])
 
 
+@pytest.mark.slow
 def test_errors_end_below_the_threshold(cornell: Any) -> None:
     picture = render(cornell, spp=4096, adaptive=0.04)
     assert (picture.error <= 0.04).all()
@@ -74,6 +78,7 @@ def test_errors_end_below_the_threshold(cornell: Any) -> None:
     assert (most.samples == 48).all()
 
 
+@pytest.mark.slow
 def test_noise_target_is_met(cornell: Any) -> None:
     reference = render(cornell, spp=2048).beauty.astype(float)
     for target in (0.1, 0.03):
@@ -89,6 +94,7 @@ def test_fewest_samples_are_kept(cornell: Any) -> None:
     assert (picture.samples == 48).all()
 
 
+@pytest.mark.slow
 def test_error_and_variance_of_a_plain_render(cornell: Any) -> None:
     plain = render(cornell, spp=64)
     assert plain.error is None
@@ -118,6 +124,7 @@ def test_refuses_what_cannot_be(cornell: Any, settings: dict[str, Any]) -> None:
         render(cornell, **settings)
 
 
+@pytest.mark.slow
 def test_time_limit(cornell: Any) -> None:
     start = time.perf_counter()
     picture = render(cornell, size=64, spp=1 << 20, time_limit=1.5)
@@ -128,6 +135,8 @@ def test_time_limit(cornell: Any) -> None:
     assert picture.samples.min() >= 1
     assert picture.samples.max() <= picture.samples.min() + 16
     assert np.isfinite(picture.beauty).all()
+    picture = render(cornell, size=64, spp=1 << 20, time_limit=1.5, noise=0.001, threads=1)
+    assert picture.stats["seconds"]["render"] == pytest.approx(1.5, rel=0.05, abs=0.1)
 
 
 def test_time_limit_with_little_time(cornell: Any) -> None:
@@ -143,9 +152,10 @@ def test_time_limit_is_no_reason_to_go_on(cornell: Any) -> None:
     expect_equal(adaptive, render(cornell, noise=0.3), "with time enough")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("limit", [5.0, 12.0])
 def test_time_limit_is_kept_within_five_percent(cornell: Any, limit: float) -> None:
+    """Of limits that are long; ``test_time_limit`` has a short one."""
     for settings in ({}, {"noise": 0.001}):
         picture = render(cornell, size=256, spp=1 << 20, time_limit=limit, **settings)
         assert picture.stats["seconds"]["render"] == pytest.approx(limit, rel=0.05)

@@ -325,6 +325,7 @@ def everything():
     )
 
 
+@pytest.mark.slow
 def test_same_bits_whatever_the_order(tmp_path):
     path = write(tmp_path, "#usda 1.0\n" + everything() + CAMERA)
     scene = load_stage(path).scene

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import forks
 import numpy as np
 import pytest
 
@@ -64,12 +65,7 @@ def write_stage(path: Path, body: str) -> Path:
 
 
 def wavecomb(*arguments: object, timeout: float = 60) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "wavecomb", *(str(argument) for argument in arguments)],
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-    )
+    done = forks.wavecomb(*arguments, timeout=timeout)
     assert "Traceback" not in done.stderr
     assert done.returncode in (0, 1, 2), done.stderr
     return done
@@ -315,17 +311,20 @@ def test_python_script_gets_exceptions(tmp_path: Path) -> None:
         module.render(tmp_path / "no.usda")
 
 
+@pytest.mark.slow
 def test_interrupt_keeps_what_is_done(tmp_path: Path, out: Path) -> None:
     stage = write_stage(tmp_path / "s.usda", mesh() + GROUND + CAMERA + LIGHT)
     arguments = ["render", stage, "-o", out, "--size", 64, 64, "--spp", 1 << 20, "--threads", 1]
+    arguments += ["--progress", "json"]
     process = subprocess.Popen(
         [sys.executable, "-m", "wavecomb", *(str(argument) for argument in arguments)],
         stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
-    time.sleep(3.0)
+    assert process.stdout is not None
+    assert "progress" in process.stdout.readline()
     os.kill(process.pid, signal.SIGINT)
     _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130, stderr

@@ -245,6 +245,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_a_suite_from_end_to_end(results: Path) -> None:
     rows = columns.read_rows(results / "runs.csv")
     assert sorted(row["run_id"] for row in rows) == [
@@ -266,6 +267,7 @@ def test_a_suite_from_end_to_end(results: Path) -> None:
     assert len(pictures) == 2 == len({digest for _, digest in pictures})
 
 
+@pytest.mark.slow
 def test_everything_is_kept(results: Path) -> None:
     assert (results / "suite.toml").read_text() == TINY
     entries = [json.loads(line) for line in (results / "runs.jsonl").read_text().splitlines()]
@@ -291,6 +293,7 @@ def test_everything_is_kept(results: Path) -> None:
     assert machine["noise"]["runs"] == 4 and len(machine["sittings"]) == 1
 
 
+@pytest.mark.slow
 def test_results_are_not_overwritten(results: Path, tmp_path: Path) -> None:
     before = (results / "runs.csv").read_bytes()
     again = bench("run", written(tmp_path, TINY), "-o", results)
@@ -301,6 +304,7 @@ def test_results_are_not_overwritten(results: Path, tmp_path: Path) -> None:
     assert (results / "runs.csv").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_dry_run_does_nothing_and_estimates(results: Path, tmp_path: Path) -> None:
     suite = written(tmp_path, TINY)
     result = bench("run", suite, "-o", results, "--dry-run", "--repetitions", 3, "--resume")
@@ -313,6 +317,8 @@ def test_dry_run_does_nothing_and_estimates(results: Path, tmp_path: Path) -> No
     assert "matches none" in bench("run", suite, "-o", other, "--only", "x", "--dry-run").stderr
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
@@ -347,6 +353,8 @@ def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     assert len(json.loads((out / "machine.json").read_text())["sittings"]) == 2
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_a_run_that_fails_is_a_row_and_is_tried_again(tmp_path: Path) -> None:
     (tmp_path / "bad.usda").write_text("#usda 1.0\nnonsense")
     text = TINY.replace('scene = "cornell"', 'file = "bad.usda"').replace("golden = true", "")
@@ -363,6 +371,8 @@ def test_a_run_that_fails_is_a_row_and_is_tried_again(tmp_path: Path) -> None:
     assert row["status"] == "ok"
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_events_for_programs_and_only_some_stages(tmp_path: Path) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     suite = written(tmp_path, text + '[stage.other]\nfile = "missing.usda"\n')
@@ -381,6 +391,8 @@ def test_events_for_programs_and_only_some_stages(tmp_path: Path) -> None:
     assert unknown.exit_code == 2 and "--stage boxx: no such stage" in unknown.stderr
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_time_limit(tmp_path: Path) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     arguments = ("run", written(tmp_path, text), "-o", tmp_path / "out", "--time-limit", 0.0001)

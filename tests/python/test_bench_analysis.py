@@ -39,6 +39,7 @@ def results(tmp_path: Path, rows: list) -> Results:
 # ---- intervals -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [3, 7, 8, 16])
 def test_intervals_cover_as_often_as_they_say(n: int) -> None:
     """Ratio of means of skewed times that a round shakes together: 0.9 in truth."""

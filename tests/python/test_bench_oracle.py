@@ -76,6 +76,8 @@ def test_many_materials_go_by_the_greedy_way() -> None:
     assert steps.count(1) >= len(names) - 3
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_ranks_are_what_material_shades_by(tmp_path: Path) -> None:
     """A suite with both oracles: the same picture, ranks in the trace, every material once."""
     suite = tmp_path / "orders.toml"

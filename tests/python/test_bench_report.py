@@ -25,9 +25,9 @@ HTML = "{http://www.w3.org/1999/xhtml}"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with its report."""
+    """A folder with its report, and beside it docs/made-up.md."""
     path = write_folder(tmp_path_factory.mktemp("bench") / "made up", everything(), pictures=True)
-    assert build(path) == path / "report.html"
+    assert build(path, path.parent / "docs" / "made-up.md") == path / "report.html"
     return path
 
 
@@ -46,6 +46,7 @@ def texts(tree: ElementTree.Element, tag: str) -> list[str]:
     return ["".join(element.itertext()) for element in tree.iter(HTML + tag)]
 
 
+@pytest.mark.slow
 def test_page_is_sound_and_can_be_read_by_all(tree: ElementTree.Element) -> None:
     ids = [element.get("id") for element in tree.iter() if element.get("id")]
     assert len(ids) == len(set(ids))
@@ -68,6 +69,7 @@ def test_page_is_sound_and_can_be_read_by_all(tree: ElementTree.Element) -> None
         assert any(control in list(label) for label in tree.iter(HTML + "label"))
 
 
+@pytest.mark.slow
 def test_page_needs_nothing_else(page: str) -> None:
     without_names = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
     assert not re.search(r"""(src|href|xlink:href)=["'](?!#|data:)""", without_names)
@@ -76,6 +78,7 @@ def test_page_needs_nothing_else(page: str) -> None:
     assert "currentColor" in page
 
 
+@pytest.mark.slow
 def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
     headings = texts(tree, "h2")
     for wanted in (
@@ -98,6 +101,7 @@ def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
     assert "adaptive takes" in findings
 
 
+@pytest.mark.slow
 def test_viewers(tree: ElementTree.Element) -> None:
     viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]
     assert len(viewers) == 2
@@ -110,6 +114,7 @@ def test_viewers(tree: ElementTree.Element) -> None:
     assert "none, program, material" in named
 
 
+@pytest.mark.slow
 def test_figures_open_and_are_not_blank(folder: Path) -> None:
     names = {path.stem for path in (folder / "figures").iterdir()}
     for part in (
@@ -135,17 +140,17 @@ def test_figures_open_and_are_not_blank(folder: Path) -> None:
         assert len(shapes) > 20
 
 
-def test_markdown_page(folder: Path, tmp_path: Path) -> None:
-    target = tmp_path / "docs" / "made-up.md"
-    build(folder, target)
+@pytest.mark.slow
+def test_markdown_page(folder: Path) -> None:
+    target = folder.parent / "docs" / "made-up.md"
     text = target.read_text(encoding="utf-8")
     assert text.startswith("# Wavecomb benchmark: made-up\n")
     assert "## What the figures say" in text and "equal runs vary by 12% (made up)" in text
     shown = re.findall(r"!\[[^]]+\]\(made-up/([^)]+)\)", text)
     assert len(shown) > 10 and any("difference-mixed" in name for name in shown)
-    files = {path.name for path in (tmp_path / "docs" / "made-up").iterdir()}
+    files = {path.name for path in target.with_suffix("").iterdir()}
     assert set(shown) == files
-    for path in (tmp_path / "docs" / "made-up").iterdir():
+    for path in target.with_suffix("").iterdir():
         limit = LARGEST_SVG if path.suffix == ".svg" else LARGEST_PNG
         assert 0 < path.stat().st_size <= limit, path.name
     # Tables are whole: every row has as many cells as its head, and a head of several rows is told.
@@ -157,6 +162,7 @@ def test_markdown_page(folder: Path, tmp_path: Path) -> None:
     assert not re.search(r"</?(p|td|th|tr|table|details|span|svg)\b", text)
 
 
+@pytest.mark.slow
 def test_parts_are_kept_beside_the_page(folder: Path, tree: ElementTree.Element) -> None:
     """What the window shows is what the page says, section by section and figure by figure."""
     report = read_report(folder)
@@ -177,6 +183,7 @@ def test_parts_are_kept_beside_the_page(folder: Path, tree: ElementTree.Element)
             assert not isinstance(part, Markup) or part.html in text
 
 
+@pytest.mark.slow
 def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:
     """Each renderer has a golden picture, a viewer and a map of its own."""
     vary = {"renderer": ["wavecomb", "cycles"]}
@@ -187,6 +194,7 @@ def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:
     assert names == {"difference-mixed-wavecomb", "difference-mixed-cycles"}
 
 
+@pytest.mark.slow
 def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=2)
     rows[3]["picture_sha256"] = "1" * 64
@@ -195,6 +203,7 @@ def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
     assert "mixed, roulette throughput, 16 spp, seed 1: 2 different pictures" in text
 
 
+@pytest.mark.slow
 def test_one_run_makes_a_report(tmp_path: Path) -> None:
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
     rows.append({**rows[0], "run_id": "x", "status": "failed", "error": "no <memory> left"})

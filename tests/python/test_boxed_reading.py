@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from parts import needs, only_where
@@ -117,6 +118,8 @@ def assert_same_picture(here: Any, there: Any) -> None:
         assert np.array_equal(layer, two.layers()[name], equal_nan=True), name
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_every_scene_is_the_same_bit_for_bit(name: str, tmp_path: Path) -> None:
     path = tmp_path / f"{name}.usdc"
@@ -126,6 +129,7 @@ def test_every_scene_is_the_same_bit_for_bit(name: str, tmp_path: Path) -> None:
     assert_same_picture(here, there)
 
 
+@pytest.mark.usefixtures("forked")
 def test_textures_move_points_there(tmp_path: Path) -> None:
     import OpenImageIO as oiio
 
@@ -141,6 +145,7 @@ def test_textures_move_points_there(tmp_path: Path) -> None:
     assert_alike(here, there)
 
 
+@pytest.mark.usefixtures("forked")
 def test_options_arrive(good: Path) -> None:
     from wavecomb.run.boxed.reader import Reader
 
@@ -154,6 +159,8 @@ def test_options_arrive(good: Path) -> None:
             assert_alike(wavecomb.load(good, isolate=False, **options), reader.load(options))
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 @needs("userfaultfd")
 def test_textures_within_a_limit(tmp_path: Path) -> None:
     path = tmp_path / "mixed.usdc"
@@ -166,6 +173,7 @@ def test_textures_within_a_limit(tmp_path: Path) -> None:
     assert_same_picture(whole, there)
 
 
+@pytest.mark.usefixtures("forked")
 def test_frames_are_the_same_and_share(good: Path) -> None:
     def frames(isolate: bool) -> list[Any]:
         return list(
@@ -183,6 +191,7 @@ def test_frames_are_the_same_and_share(good: Path) -> None:
         ).beauty)  # fmt: skip
 
 
+@pytest.mark.usefixtures("forked")
 def test_views_of_one_scene_are_looked_at_there(tmp_path: Path) -> None:
     from wavecomb.run.sequence import Frames
 
@@ -202,6 +211,8 @@ def test_views_of_one_scene_are_looked_at_there(tmp_path: Path) -> None:
     assert not np.array_equal(pictures[True, 1.0], pictures[True, 3.0])
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_the_window_reads_there_and_shares_textures(tmp_path: Path) -> None:
     loader = pytest.importorskip("wavecomb.gui.loader")
     path = tmp_path / "mixed.usdc"
@@ -226,6 +237,7 @@ def test_the_window_reads_there_and_shares_textures(tmp_path: Path) -> None:
     assert again.textures.ids == there.textures.ids
 
 
+@pytest.mark.usefixtures("forked")
 def test_progress_is_told(good: Path) -> None:
     told: list[tuple[int, int]] = []
     wavecomb.load(good, isolate=True, progress=lambda done, found: told.append((done, found)))
@@ -266,6 +278,7 @@ def script(code: str, *arguments: Any, **environment: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "deed",
     [
@@ -284,6 +297,7 @@ def test_it_is_so_by_default_and_usd_stays_out(good: Path, deed: str, tmp_path: 
     assert not os.listdir(tmp_path / "tmp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variable", ["WAVECOMB_ISOLATE", "WAVECOMB_DEBUG"])
 def test_it_can_be_left(good: Path, variable: str) -> None:
     code = COUNTS + "wavecomb.load(sys.argv[1])\nprint(len(started), 'pxr' in sys.modules)"
@@ -291,6 +305,7 @@ def test_it_can_be_left(good: Path, variable: str) -> None:
     assert script(code, good, **{variable: value}) == "0 True\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["on", "off"])
 def test_commands_start_no_other(good: Path, tmp_path: Path, how: str) -> None:
     """They are in a child, or were asked not to be."""
@@ -340,6 +355,7 @@ def does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     """Makes the process in the sandbox do something else; nothing may be left of it."""
     from wavecomb.run.boxed import process
 
+    forks.close()  # or it would be a child that is left
     folder = tmp_path / "tmp"
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))
@@ -360,6 +376,7 @@ def does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 IN_THE_MIDST = "loader._add_lights = lambda *_: {}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
@@ -452,6 +469,7 @@ def test_errors_of_names_that_are_not_known_run_nothing(good: Path) -> None:
             reader.load({})
 
 
+@pytest.mark.slow
 def test_errors_are_of_the_same_types(good: Path, tmp_path: Path) -> None:
     from wavecomb.run.boxed.reader import Reader
 
@@ -509,6 +527,7 @@ loader._build = spy
     assert str(caught.value) == "PermissionError done" + 3 * " PermissionError" + " done"
 
 
+@pytest.mark.slow
 def test_memory_is_limited_on_both_sides(good: Path, does: Any) -> None:
     does("loader.survey = lambda *_: np.ones(10**9)")
     with pytest.raises(WavecombError, match=r"good\.usda: out of memory.*limit is 600 MB"):
@@ -545,6 +564,7 @@ wavecomb.load(sys.argv[1], isolate=True)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "is_deaf"), [(signal.SIGINT, False), (signal.SIGKILL, False), (signal.SIGKILL, True)]
 )
@@ -578,6 +598,7 @@ def test_no_process_outlives_who_asked(good: Path, does: Any, number: int, is_de
             left.rmdir()
 
 
+@pytest.mark.slow
 def test_what_libraries_print_there_is_passed_on(good: Path, does: Any) -> None:
     deed = "os.write(2, b'libpng error: CRC\\nsomething else\\n')"
     code = does(deed)

@@ -359,6 +359,7 @@ def build(stream: bytes) -> Any:
     return builder.build()
 
 
+@pytest.mark.slow
 def test_flipped_bits_make_a_scene_or_an_error_and_nothing_else(tmp_path: Path) -> None:
     import wavecomb
 

@@ -24,6 +24,7 @@ def tree(root: pathlib.Path, files: dict[str, str]) -> pathlib.Path:
     return root
 
 
+@pytest.mark.slow
 def test_this_tree_is_clean():
     result = run(ROOT)
     assert result.returncode == 0, result.stderr

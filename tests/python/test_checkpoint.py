@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -59,8 +60,17 @@ class StopAt:
         }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "ending", [{"spp": 700}, {"noise": 0.015, "spp": 4096}, {"adaptive": 0.02, "spp": 4096}]
+    "ending",
+    [
+        {"spp": 200},
+        {"noise": 0.03, "spp": 1024},
+        {"adaptive": 0.04, "spp": 1024},
+        pytest.param({"spp": 700}, marks=pytest.mark.long),
+        pytest.param({"noise": 0.015, "spp": 4096}, marks=pytest.mark.long),
+        pytest.param({"adaptive": 0.02, "spp": 4096}, marks=pytest.mark.long),
+    ],
 )
 def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
     settings = _core.Settings(width=48, height=40, error=True, aovs=list(core_aovs()), **ending)
@@ -89,7 +99,9 @@ def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
     assert result.stats["resumed_samples"] > 0
 
 
-def test_snapshots_change_nothing(cornell: Any) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("spp", [200, pytest.param(800, marks=pytest.mark.long)])
+def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
     class Often:
         taken = 0
 
@@ -101,13 +113,14 @@ def test_snapshots_change_nothing(cornell: Any) -> None:
             assert np.isfinite(snapshot.beauty()).all()
             self.taken += 1
 
-    settings = _core.Settings(width=64, height=64, spp=800)
+    settings = _core.Settings(width=64, height=64, spp=spp)
     watcher = Often()
     watched = _core.render(cornell.scene, settings, watcher=watcher)
     assert watcher.taken > 2
     assert watched.beauty.tobytes() == _core.render(cornell.scene, settings).beauty.tobytes()
 
 
+@pytest.mark.slow
 def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
     """What was begun without a limit is a pass of 2^14 samples: it is cut, or taken in steps."""
     settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15}
@@ -285,7 +298,7 @@ def command(stage: Path, *arguments: Any) -> list[str]:
 
 
 def run(*words: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*words), capture_output=True, text=True, timeout=300)
+    return forks.run(command(*words)[1:], timeout=300)
 
 
 def invoke(*words: Any, code: int = 0) -> Result:
@@ -295,6 +308,7 @@ def invoke(*words: Any, code: int = 0) -> Result:
     return result
 
 
+@pytest.mark.slow
 def test_signals_save(stage: Path, tmp_path: Path) -> None:
     out, file = tmp_path / "a.exr", tmp_path / "a.ckpt"
     for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
@@ -362,6 +376,7 @@ def test_a_timed_render_is_not_resumed_without_end(stage: Path, tmp_path: Path) 
     invoke(stage, "-o", out, "--resume", file, "--time-limit", 0.1)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_does_not_end_a_render(cornell: Any, tmp_path: Path) -> None:
     from wavecomb.run.watcher import CheckpointSink, Watcher
 

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -459,12 +460,7 @@ def test_python_m() -> None:
 
 
 def wavecomb(*arguments: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "wavecomb", *(str(argument) for argument in arguments)],
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
+    return forks.wavecomb(*arguments)
 
 
 def test_from_scene_to_comparison(tmp_path: Path) -> None:

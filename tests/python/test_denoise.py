@@ -34,6 +34,7 @@ def rmse(a: Any, b: Any) -> float:
     return float(np.sqrt(((np.minimum(a, 1) - np.minimum(b, 1)) ** 2).mean()))
 
 
+@pytest.mark.slow
 def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
     noisy, clean = pictures
     picture = noisy.with_denoised(threads=1)
@@ -45,6 +46,7 @@ def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
     assert noisy.denoised is None
 
 
+@pytest.mark.slow
 def test_guides_keep_detail(pictures: Any) -> None:
     """A pattern that only the albedo shows comes through."""
     from wavecomb.picture.denoise import denoise

@@ -300,6 +300,7 @@ def test_covering_design_covers() -> None:
     assert len(COVERING) < 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
     stats = plain(scene_of, scene, "off", (48, 32), 8).stats
@@ -313,6 +314,7 @@ def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
         assert stats["lane_utilisation"] < 0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
     """Waves of eight and of nine depths look alike, whichever queues are measured."""
@@ -331,6 +333,7 @@ def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
     assert lengths[0] == pytest.approx(lengths[1], rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
     for row in COVERING:
@@ -341,20 +344,35 @@ def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
         expect_equal(render(scene_of(scene), (48, 32), 8, **settings), expected, row)
 
 
+SMALL = (16, 12), [256, 1024, 65536]
+LARGE = (32, 24), OPTIONS["wave_size"]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("roulette", ROULETTES)
-@pytest.mark.parametrize("scene", SCENES)
-def test_every_choice(scene: str, roulette: str, scene_of: Any) -> None:
-    """The whole product, small: a wave of 64 K holds all that a thread gets here."""
-    size, spp = (32, 24), 8
+@pytest.mark.parametrize(
+    ("scene", "roulette", "size", "waves"),
+    [
+        *((scene, roulette, *SMALL) for scene, roulette in zip(SCENES, ROULETTES, strict=True)),
+        *(
+            pytest.param(scene, roulette, *LARGE, marks=pytest.mark.long)
+            for scene, roulette in itertools.product(SCENES, ROULETTES)
+        ),
+    ],
+)
+def test_every_choice(
+    scene: str, roulette: str, size: tuple[int, int], waves: list[int], scene_of: Any
+) -> None:
+    """The whole product: of many waves, of two, and one that holds all that a thread gets here."""
+    spp = 8
     expected = plain(scene_of, scene, roulette, size, spp)
     names = ("policy", "materialize", "wave_size", "threads", "ray_order")
-    for choice in itertools.product(*(OPTIONS[name] for name in names)):
+    for choice in itertools.product(*({**OPTIONS, "wave_size": waves}[name] for name in names)):
         settings = dict(zip(names, choice, strict=True))
         settings |= {"roulette": roulette, "costs": "model", "shadow_order": settings["ray_order"]}
         expect_equal(render(scene_of(scene), size, spp, **settings), expected, settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
     """Hierarchy and shares of lights: of one thread or many, of other settings before, or new."""

@@ -12,6 +12,7 @@ from fuzz_stages import GOOD, Verdict, run, table
 pytest.importorskip("wavecomb._core")
 
 
+@pytest.mark.slow
 def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
     for kind in KINDS:
         folders = [tmp_path / f"{kind}-{turn}" for turn in range(3)]
@@ -27,6 +28,7 @@ def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
         assert texts[0] != texts[2] or kind == "deep", kind
 
 
+@pytest.mark.slow
 def test_broken_stages_end_in_a_line() -> None:
     verdicts = run(plan(len(KINDS)), seed=1)
     faults = [f"{v.name}: {v.outcome} {v.said}" for v in verdicts if v.outcome not in GOOD]
@@ -38,15 +40,23 @@ def test_broken_stages_end_in_a_line() -> None:
     assert all(v.said for v in verdicts if v.outcome != "rendered")
 
 
-@pytest.mark.parametrize(
-    "case",
-    ["checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
-     "usda words/148", "usda words/150"],
+MENDED = (
+    "checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
+    "usda words/148", "usda words/150",
 )  # fmt: skip
-def test_what_was_found_and_mended(case: str) -> None:
-    kind, _, number = case.partition("/")
-    (verdict,) = run([(kind, int(number))], seed=1)
-    assert verdict.outcome in GOOD, verdict.said
+
+
+@pytest.fixture(scope="module")
+def mended() -> dict[str, Verdict]:
+    """What became of each: one process after another takes them, as of all cases."""
+    cases = [case.split("/") for case in MENDED]
+    verdicts = run([(kind, int(number)) for kind, number in cases], seed=1)
+    return {verdict.name: verdict for verdict in verdicts}
+
+
+@pytest.mark.parametrize("case", MENDED)
+def test_what_was_found_and_mended(case: str, mended: dict[str, Verdict]) -> None:
+    assert mended[case].outcome in GOOD, mended[case].said
 
 
 def test_table() -> None:

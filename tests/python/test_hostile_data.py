@@ -113,6 +113,7 @@ def test_archives_that_are_no_checkpoints(stage: Path, tmp_path: Path, kind: str
     assert os.listdir(tmp_path) == ["a.ckpt"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parts", "method", "words"),
     [

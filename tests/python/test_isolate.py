@@ -175,6 +175,7 @@ def test_an_image_library_that_crashes_is_named_with_its_file(tmp_path: Path) ->
     assert "while reading /A, decoding sky.exr" in err
 
 
+@pytest.mark.slow
 def test_composition_without_end(tmp_path: Path) -> None:
     stage = doubling(tmp_path / "many.usda")
     done = subprocess.run(
@@ -192,6 +193,7 @@ def test_limit_follows_the_layers() -> None:
     assert patience.allowed_s(10 * patience.BYTES_PER_S) == patience.BASE_S + 10
 
 
+@pytest.mark.slow
 def test_load_in_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("wavecomb._core")
     import wavecomb

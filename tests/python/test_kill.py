@@ -201,6 +201,7 @@ def start(request: pytest.FixtureRequest, tmp_path: Path) -> Start:
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_kill_a_few_times(kind: str, start: Start) -> None:
     killer = start(kind, 1)

@@ -65,6 +65,7 @@ def render(scene: Any, selection: str, seed: int = 0, spp: int = 16, **more: Any
     return wavecomb.render(scene, size=SIZE, spp=spp, seed=seed, light_selection=selection, **more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("glass", [False, True])
 def test_the_mean_is_that_of_power(glass: bool) -> None:
     scene = builder_scene(glass).build()
@@ -89,6 +90,7 @@ def test_the_mean_is_that_of_power(glass: bool) -> None:
     assert error < 0.01 * totals["power"].mean()
 
 
+@pytest.mark.slow
 def test_the_tree_has_less_noise(street: Any) -> None:
     # Lights that are seen are as noisy either way.
     def lit(selection: str, seed: int, spp: int) -> Any:

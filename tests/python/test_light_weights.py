@@ -72,6 +72,7 @@ def shares(picture: Any) -> dict[str, float]:
     return {part["name"]: part["share"] for part in picture.stats["light_calibration"]["shares"]}
 
 
+@pytest.mark.slow
 def test_a_dim_dome_costs_no_noise(studio: Any) -> None:
     def picture(weights: str, seed: int, spp: int) -> Any:
         return render(
@@ -97,6 +98,7 @@ def test_a_dim_dome_costs_no_noise(studio: Any) -> None:
     assert found["/World/Lights/Key"]["share"] > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("selection", ["power", "tree"])
 def test_the_mean_is_that_of_power(selection: str) -> None:
     scene = room()
@@ -163,6 +165,7 @@ class _StopAtOnce:
         }
 
 
+@pytest.mark.slow
 def test_a_resumed_picture_has_the_same_shares(studio: Any) -> None:
     settings = _core.Settings(width=48, height=32, spp=600)
     whole = _core.render(studio, settings)

@@ -186,6 +186,7 @@ def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
     assert got["shares"]["2"] < 0.75
 
 
+@pytest.mark.slow
 def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
     """OpenImageIO without an image to read, and Rich without a terminal, before the picture."""
     path = tmp_path / "stage.usda"

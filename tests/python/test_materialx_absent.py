@@ -99,6 +99,7 @@ def test_the_door_knows_the_models():
     assert set(mtlx.MODELS) == MODELS.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [PREVIEW, STANDARD])
 def test_stages_without_its_graphs_read_no_library(tmp_path, text):
     code = (

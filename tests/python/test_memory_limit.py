@@ -95,6 +95,7 @@ def large_merge(folder: Path) -> list[object]:
     return ["merge", folder / "a.exr", folder / "b.exr", "-o", folder / "o.exr"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bomb", [packed_indices, packed_texture, large_picture, large_merge])
 def test_bombs_are_one_line(tmp_path: Path, bomb: Callable[[Path], list[object]]) -> None:
     command = bomb(tmp_path)
@@ -108,12 +109,14 @@ def test_bombs_are_one_line(tmp_path: Path, bomb: Callable[[Path], list[object]]
     assert int(done.stdout.split()[-1]) < 1.4e6
 
 
+@pytest.mark.slow
 def test_from_python(tmp_path: Path) -> None:
     packed_indices(tmp_path)
     with pytest.raises(WavecombError, match=f"out of memory .* the limit is {LIMIT_MB} MB"):
         wavecomb.load(tmp_path / "bomb.usdc", isolate=True, memory_limit=LIMIT_MB)
 
 
+@pytest.mark.slow
 def test_a_sound_stage_fits(tmp_path: Path) -> None:
     (tmp_path / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
     done = run("info", tmp_path / "s.usda")

@@ -292,6 +292,7 @@ def Xform "Carrier" {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", ["", STRANDS], ids=["mesh", "curves and points"])
 def test_blur_is_the_mean_of_still_frames(tmp_path, more):
     path = write(tmp_path, stage(SCENE % QUAD + more))

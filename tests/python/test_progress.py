@@ -157,6 +157,7 @@ def test_bad_options(
     assert not fake.loaded
 
 
+@pytest.mark.slow
 def test_preview_grows(tmp_path: Path) -> None:
     pytest.importorskip("wavecomb._core")
     from wavecomb.scenes import write_scene

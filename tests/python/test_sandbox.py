@@ -236,6 +236,7 @@ def test_what_a_killed_pair_left_goes_with_the_next(place: Path) -> None:
     assert sorted(os.listdir(place / "out")) == ["a.exr", "other.exr"]
 
 
+@pytest.mark.slow
 @with_landlock
 @with_seccomp
 def test_a_render_as_people_make_it(place: Path) -> None:
@@ -331,6 +332,7 @@ sys.addaudithook(hook)
 """
 
 
+@pytest.mark.slow
 @with_landlock
 @with_seccomp
 @pytest.mark.parametrize("how", ["load", "render", "default", "frames", "window"])

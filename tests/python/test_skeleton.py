@@ -233,6 +233,7 @@ def test_instances_with_animations_of_their_own():
     assert len(heights) == 2 and heights[1] - heights[0] > 5
 
 
+@pytest.mark.slow
 @needs_asset(f"{SKELETONS}/arm.usda", f"{SKELETONS}/arm_baked.usda")
 def test_the_arm_of_openusd_is_as_it_baked_it():
     folder = ASSETS / SKELETONS

@@ -82,6 +82,7 @@ def whole(stage):
     return result.beauty
 
 
+@pytest.mark.slow
 @needs_store
 @pytest.mark.parametrize("policy", ["none", "program", "texture-locality", "random-runs"])
 def test_the_picture_is_the_same_within_the_limit(stage, whole, policy):
@@ -126,6 +127,7 @@ def resident_of_stores():
     return sum_kb * 1024
 
 
+@pytest.mark.slow
 @needs_store
 def test_the_kernel_sees_no_more_than_the_limit(stage):
     loaded = load_stage(stage, texture_limit=LIMIT_MB)
@@ -204,6 +206,7 @@ def no_memory_for_tiles():
     assert prctl(set_seccomp, mode_filter, ctypes.byref(head)) == 0
 
 
+@pytest.mark.slow
 @needs_store
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="numbers of system calls of x86_64")
 @pytest.mark.parametrize("limit", ["1", "2"], ids=["on the store's thread", "on the loader's"])
@@ -233,6 +236,7 @@ def run(stage, *options, file_bytes=None, **environment):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @needs_store
 @pytest.mark.parametrize(
     ("options", "trouble", "words"),

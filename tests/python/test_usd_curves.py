@@ -286,6 +286,7 @@ def test_what_is_not_supported_is_named(tmp_path, kind):
     assert f"not supported: {kind}: /N" in said(loaded)
 
 
+@pytest.mark.slow
 def test_many_curves_load_in_a_second(tmp_path):
     from pxr import Usd, UsdGeom, Vt
 

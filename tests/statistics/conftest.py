@@ -69,6 +69,20 @@ def beauty() -> Render:
     return render
 
 
+@pytest.fixture(
+    params=[
+        pytest.param(4, id="quarter"),
+        pytest.param(1, id="whole", marks=pytest.mark.long),
+    ]
+)
+def fewer(request: pytest.FixtureRequest) -> int:
+    """What samples are divided by: in `make test`, and in `make test-long`, which sees half of it.
+
+    Welch's t makes its level of the noise that there is, so fewer samples fail no more often.
+    """
+    return int(request.param)
+
+
 @pytest.fixture
 def recorded(tmp_path: Path) -> Callable[..., RecordingBuilder]:
     """Writes prims to a stage, loads it, keeps the record of it."""

@@ -122,6 +122,7 @@ PROGRAMS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_no_program_makes_energy(shot: Any, program: str, roughness: float) -> None:
@@ -313,6 +314,7 @@ def test_mirror_shows_the_dome(shot: Any, tmp_path: Path) -> None:
     assert np.abs(picture.mean(axis=(0, 1)) / expected - 1.0).max() < 5e-3
 
 
+@pytest.mark.slow
 def test_fresnel_of_a_pane(shot: Any) -> None:
     """Straight through a pane: two interfaces, with all reflections between them."""
     glass = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.0, ior=1.5)

@@ -229,6 +229,7 @@ def test_a_light_without_a_material_has_no_opacity(shot: Shot) -> None:
     agree(shot(constant(0.5), lamp), TINT * UNDER_SQUARE)
 
 
+@pytest.mark.slow
 def test_bounces_and_light_samples_alone(shot: Shot, tmp_path: Path) -> None:
     """What moves is found by bounces alone; both together bring the same."""
     write_mask(tmp_path, np.random.default_rng(5).random((4, 4)).astype(np.float32))

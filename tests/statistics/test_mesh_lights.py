@@ -164,6 +164,7 @@ def test_normalize_divides_by_the_area(shot: Any, scale: float, scheme: str) -> 
     close(shot(seen, FLOOR, mesh, spp=4), 5 / (2 * scale * scale), 1e-5)
 
 
+@pytest.mark.slow
 def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
     """Normalized, from afar: radiance 1 / (4 pi r^2) over the disk of pi r^2 that is seen."""
     ball = sphere("Lamp", "M", (0, 30, 0), rings=48)
@@ -256,6 +257,7 @@ def test_shaping(shot: Any) -> None:
     close(shot(where, FLOOR, focused), 0.5 * shot(where, FLOOR, plain), 4e-3)
 
 
+@pytest.mark.slow
 def test_moving_mesh_lights_shine(shot: Any) -> None:
     """Found by bounces alone, with their colour."""
     time = "double3 xformOp:translate.timeSamples = { -1: (-1e-3, 1, 0), 1: (1e-3, 1, 0) }"

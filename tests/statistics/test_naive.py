@@ -103,6 +103,7 @@ def lit(module: Any, folder: Path, *prims: str, **changes: Any) -> float:
 DOWN = turned(x=-90)
 
 
+@pytest.mark.slow
 def test_the_naive_integrator_is_right(module: Any, tmp_path: Path) -> None:
     """Irradiance of a dome, a disk overhead, a sphere, a point and a sun."""
     shots = {
@@ -138,6 +139,7 @@ def test_glow_that_is_cut_out(module: Any, tmp_path: Path, opacity: float) -> No
     )
 
 
+@pytest.mark.slow
 def test_comparison_reads_well(module: Any, tmp_path: Path) -> None:
     found = compare(make_scene(0, tmp_path))
     assert isinstance(found, Comparison)

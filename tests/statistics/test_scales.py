@@ -81,6 +81,7 @@ def test_same_noise(tmp_path: Path, beauty: Any, scale: float) -> None:
     assert close.mean() > 0.98, f"{(~close).sum()} pixels differ"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3, 1e5])
 def test_a_closed_box_is_dark(tmp_path: Path, beauty: Any, scale: float) -> None:
     """No light leaks through edges and corners from a bright sky outside."""

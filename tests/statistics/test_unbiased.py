@@ -13,6 +13,9 @@ from stages import camera, ground, light, look_at, material, quad, sphere, write
 
 import wavecomb
 
+_plain: dict[Any, Any] = {}
+"""What several settings are compared with."""
+
 
 @pytest.fixture(scope="module")
 def cornell(generated: Any) -> Any:
@@ -37,7 +40,7 @@ def mixed(generated: Any) -> Any:
 )
 @pytest.mark.parametrize("scene", ["cornell", "mixed"])
 def test_same_mean(
-    scene: str, name: str, settings: dict[str, Any], beauty: Any, request: Any
+    scene: str, name: str, settings: dict[str, Any], beauty: Any, request: Any, fewer: int
 ) -> None:
     """The Mixed stage has smooth metal and glass, textures and every program."""
     stage = request.getfixturevalue(scene)
@@ -46,9 +49,14 @@ def test_same_mean(
         # By cosine, what a narrow lobe shows of another object comes from one sample in thousands,
         # more than a test has time for: lamps and the sky, by light samples as well, are enough.
         plain["max_depth"] = 1 if name == "cosine" else 4
-    a = batches(lambda seed: beauty(stage, 64, 64, seed=seed, **plain, **settings), 12)
-    b = batches(lambda seed: beauty(stage, 64, 64, seed=seed, **plain), 12, first_seed=500)
-    assert_agree(f"{scene} {name}", a, b)
+    size, spp = 64 if fewer == 1 else 48, 64 // fewer
+    a = batches(lambda seed: beauty(stage, size, spp, seed=seed, **plain, **settings), 12)
+    key = scene, plain["max_depth"], spp
+    if key not in _plain:
+        _plain[key] = batches(
+            lambda seed: beauty(stage, size, spp, seed=seed, **plain), 12, first_seed=500
+        )
+    assert_agree(f"{scene} {name}", a, _plain[key])
 
 
 @pytest.mark.slow
@@ -71,13 +79,13 @@ def rel_mse(picture: Any, reference: Any) -> float:
 
 
 @pytest.mark.slow
-def test_owen_sobol_converges_faster(cornell: Any, beauty: Any) -> None:
+def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> None:
     """Independent noise has at least 1.3 times the error at 16 samples, and 1.9 times at 256.
 
     Measured at 8 bounces: 1.6 and 2.4 (4.4 and 7.0 with direct light only). As many times more
     samples would bring independent noise to the same error.
     """
-    reference = beauty(cornell, 32, 8192, seed=900, sampler="sobol")
+    reference = beauty(cornell, 32, 8192 // fewer, seed=900, sampler="sobol")
     gain = {}
     for spp, count in ((16, 16), (256, 4)):
         errors = {
@@ -134,6 +142,7 @@ def test_clamping_only_takes_away(cornell: Any, beauty: Any) -> None:
     assert clamped.mean() < 0.97 * more.mean()
 
 
+@pytest.mark.slow
 def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
     """Sample k is the same whatever the count: the first 4 of 8 samples are those of 4.
 
@@ -150,8 +159,9 @@ def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
     assert abs(np.corrcoef(four[keep], other[keep])[0, 1]) < 0.12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 3])
-def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int) -> None:
+def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int, fewer: int) -> None:
     """A delta lobe beside a diffuse one is chosen by a probability that cosine sampling knows."""
     coat = {"clearcoat": 1.0, "clearcoatRoughness": 0.0}
     prims = [
@@ -173,9 +183,9 @@ def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int) -
         sphere("B", "S", (0.8, 0.7, 0), 0.7),
     ]
     loaded = wavecomb.load(write_stage(tmp_path / "s.usda", *prims))
-    plain = {"max_depth": bounces}
-    a = batches(lambda s: beauty(loaded, 48, 64, seed=s, cosine_sampling=True, **plain), 12)
-    b = batches(lambda s: beauty(loaded, 48, 64, seed=s, **plain), 12, first_seed=500)
+    plain, spp = {"max_depth": bounces}, 64 // fewer
+    a = batches(lambda s: beauty(loaded, 48, spp, seed=s, cosine_sampling=True, **plain), 12)
+    b = batches(lambda s: beauty(loaded, 48, spp, seed=s, **plain), 12, first_seed=500)
     assert_agree(f"cosine beside smooth lobes {bounces}", a, b)
 
 

@@ -31,6 +31,7 @@ def files(pictures: tuple[str, ...]) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 @needs("wavecomb._core")
 @needs_asset(*files(FEW))
 def test_a_few_pictures(tmp_path: Path) -> None:

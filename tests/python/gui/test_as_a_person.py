@@ -182,6 +182,7 @@ def use(person, tmp_path, name):
     assert state["message"] == "", state["message"]
 
 
+@pytest.mark.slow
 def test_small_stages(person, tmp_path):
     """MaterialX, .mtlx files, instances, no light, no camera, a layer that is missing, a fault."""
     looks, referring = write_stage(tmp_path), write_referring(tmp_path)

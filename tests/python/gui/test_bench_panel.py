@@ -151,6 +151,7 @@ def test_what_is_no_folder_is_said(qtbot, opened, tmp_path):
     assert opened.browser.folder is not None  # what was there stays
 
 
+@pytest.mark.slow
 def test_two_folders(qtbot, opened, folder, tmp_path):
     two = opened.browser.two
     two.set_before(write_folder(tmp_path / "before", policy_rows(repetitions=3, seed=4)))
@@ -175,6 +176,7 @@ def choose(qtbot, panel, tmp_path):
     return tmp_path / "out"
 
 
+@pytest.mark.slow
 def test_a_suite_is_stopped_gone_on_with_and_shown(qtbot, panel, tmp_path, cornell):
     """The viewport renders before and after, and stands still between; the window never waits."""
     session, runner = panel.runner._session, panel.runner
@@ -201,6 +203,7 @@ def test_a_suite_is_stopped_gone_on_with_and_shown(qtbot, panel, tmp_path, corne
     assert "order.box" in runner.log.toPlainText()
 
 
+@pytest.mark.slow
 def test_errors_of_a_run_are_messages(qtbot, panel, tmp_path):
     out = choose(qtbot, panel, tmp_path)
     out.mkdir()

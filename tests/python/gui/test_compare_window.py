@@ -185,6 +185,7 @@ def test_values_under_the_mouse(qtbot, pair):
     )
 
 
+@pytest.mark.slow
 def test_maps(qtbot, pair):
     combo = pair.findChild(QComboBox, "compare-map")
     QTest.mouseClick(pair.findChild(QToolButton, "mode-difference"), LEFT)
@@ -213,6 +214,7 @@ def test_exposure_is_that_of_both_and_of_flip(qtbot, pair):
     assert after["RMSE"] == before["RMSE"] and after["PSNR"] != before["PSNR"]
 
 
+@pytest.mark.slow
 def test_exchange(qtbot, pair):
     QTest.mouseClick(pair.findChild(QToolButton, "swap"), LEFT)
     settled(qtbot, pair)
@@ -226,6 +228,7 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
         assert "open" in failed.args[0] and "first" in failed.args[0]
 
 
+@pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
     """Another policy: bit for bit the same. Another seed: other noise. The viewport goes on."""
     window = CompareWindow(session)
@@ -261,6 +264,7 @@ def test_kept_picture_against_live_settings(qtbot, session):
         window.shutdown()
 
 
+@pytest.mark.slow
 def test_keys_of_the_main_window_keep_the_picture(qtbot, cornell, tmp_path):
     from wavecomb.gui.main_window import MainWindow
     from wavecomb.gui.setup import Setup

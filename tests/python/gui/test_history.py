@@ -152,6 +152,7 @@ def test_the_menu_says_what_it_would_undo(scene_window):
     assert edits.lines() == [f"{KEY}.inputs:intensity = 2"]
 
 
+@pytest.mark.slow
 def test_the_title_marks_what_is_not_saved(scene_window, qtbot, tmp_path):
     window, edits = scene_window, scene_window.scene.edits
     assert "[*]" in window.windowTitle() and not window.isWindowModified()
@@ -172,6 +173,7 @@ def test_the_title_marks_what_is_not_saved(scene_window, qtbot, tmp_path):
     assert not window.isWindowModified() and not edits.history.stack.canUndo()
 
 
+@pytest.mark.slow
 def test_solo_is_undone_as_a_whole(scene_window):
     edits, lights = scene_window.scene.edits, scene_window.scene.lights.model.paths
     first, second = lights[:2]
@@ -195,6 +197,7 @@ def test_solo_is_undone_as_a_whole(scene_window):
     assert edits.solo == first and seen() == [True, False, False]
 
 
+@pytest.mark.slow
 def test_the_camera_goes_back_and_forth(scene_window, qtbot):
     window, session = scene_window, scene_window.session
     clock = [0.0]

@@ -75,6 +75,7 @@ def unfold(materials):
         group.head.setChecked(True)
 
 
+@pytest.mark.slow
 def test_an_openpbr_material_shows_its_own_inputs(panel):
     materials = panel.materials
     materials.choose(f"{LOOKS}/Car")
@@ -132,6 +133,7 @@ EDITS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Car", "Wood", "Standard", "Gltf"])
 def test_an_edit_is_what_is_saved(panel, same_as_saved, final, name, qtbot):
     """One after the other, then all back; some are part of a graph or of a texture's use."""
@@ -170,6 +172,7 @@ def test_switches_and_colours(panel, same_as_saved, final):
     assert (same_as_saved(panel) != before).any()
 
 
+@pytest.mark.slow
 def test_in_an_instance_edits_are_live_only(panel, final, qtbot):
     materials = panel.materials
     before = final(panel.session).beauty
@@ -198,6 +201,7 @@ def make_window(qtbot, tmp_path, stage):
     return window
 
 
+@pytest.mark.slow
 def test_all_is_seen_at_the_usual_width(qtbot, tmp_path, looks):
     window = make_window(qtbot, tmp_path, looks)
     materials = window.scene.materials
@@ -219,6 +223,7 @@ def test_all_is_seen_at_the_usual_width(qtbot, tmp_path, looks):
     window.close()
 
 
+@pytest.mark.slow
 def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
     """A value that was typed is one step, however slowly; the field has no history of its own."""
     window = make_window(qtbot, tmp_path, looks)

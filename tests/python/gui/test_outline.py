@@ -133,6 +133,8 @@ def without_folders(structure: str) -> str:
     return structure.replace(NOWHERE, "").replace("[", "/").replace("]", "")
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_outlines_of_scenes_are_the_scenes(name: str, tmp_path: Path) -> None:
     path = tmp_path / f"{name}.usda"
@@ -140,6 +142,8 @@ def test_outlines_of_scenes_are_the_scenes(name: str, tmp_path: Path) -> None:
     assert_alike(path, opened(path), open_editable(path))
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", SOME)
 def test_outlines_of_assets_are_the_assets(name: str) -> None:
     path = asset(name)
@@ -182,6 +186,7 @@ os._exit(0)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not landlock.version(), reason="this kernel has no Landlock")
 @pytest.mark.parametrize("name", ["scene", "mtlx", "referring", "rig"])
 def test_the_window_opens_no_file_of_a_stage(name: str, tmp_path: Path) -> None:
@@ -309,6 +314,7 @@ class Xform "Arm"
 """
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("name", ["scene", "mtlx", "referring", "rig"])
 def test_outlines_of_small_stages(name: str, tmp_path: Path) -> None:
     path, _ = stage(name, tmp_path)
@@ -320,6 +326,7 @@ def choices(usd: Usd.Stage) -> dict[str, str]:
     return {one.name: one.choice for one in StageEdits(usd, TIME).variant_sets(WORLD)}
 
 
+@pytest.mark.usefixtures("forked")
 def test_variants_that_are_asked_for_are_selected_in_the_window(tmp_path: Path) -> None:
     path, _ = stage("rig", tmp_path)
     variants = {"/World{rig}": "one"}
@@ -332,6 +339,7 @@ def test_variants_that_are_asked_for_are_selected_in_the_window(tmp_path: Path) 
     assert choices(got.usd) == {"rig": "two", "look": ""}
 
 
+@pytest.mark.usefixtures("forked")
 def test_edits_lie_above_the_outline(tmp_path: Path) -> None:
     """Values that are edited are not in it; variants bring another onto the same stage."""
     path, _ = stage("rig", tmp_path)
@@ -357,6 +365,7 @@ def test_edits_lie_above_the_outline(tmp_path: Path) -> None:
     assert_alike(path, other, open_editable(path, {"/World{rig}": "one"}))
 
 
+@pytest.mark.usefixtures("forked")
 def test_what_changed_on_disk_comes_onto_the_same_stage(tmp_path: Path) -> None:
     path, _ = stage("rig", tmp_path)
     usd = opened(path).usd
@@ -368,6 +377,7 @@ def test_what_changed_on_disk_comes_onto_the_same_stage(tmp_path: Path) -> None:
     assert_alike(path, again, open_editable(path))
 
 
+@pytest.mark.usefixtures("forked")
 def test_saved_edits_lie_over_the_stage_itself(tmp_path: Path) -> None:
     path, _ = stage("rig", tmp_path)
     usd = opened(path).usd
@@ -383,6 +393,7 @@ def test_saved_edits_lie_over_the_stage_itself(tmp_path: Path) -> None:
     assert list(saved.GetRootLayer().subLayerPaths) == ["./stage/rig.usda"]
 
 
+@pytest.mark.usefixtures("forked")
 @pytest.mark.parametrize("how", ["0", "1"])
 def test_bounds_are_of_what_is_drawn(
     how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

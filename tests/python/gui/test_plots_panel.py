@@ -73,6 +73,7 @@ def select_row(panel: PlotsPanel, row: int) -> None:
     QTest.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=place)
 
 
+@pytest.mark.slow
 def test_restarts_with_other_settings_are_series(
     panel: PlotsPanel, session: Any, qtbot: Any
 ) -> None:
@@ -97,6 +98,7 @@ def test_restarts_with_other_settings_are_series(
     assert "samples/s" in panel._line.text()
 
 
+@pytest.mark.slow
 def test_phases_per_sample_and_over_time(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     render(panel, session, qtbot, spp=64)
     look = panel.log.current.run.last
@@ -110,6 +112,7 @@ def test_phases_per_sample_and_over_time(panel: PlotsPanel, session: Any, qtbot:
     assert max(bar.end for bar in panel.phases.plot.bars) == pytest.approx(100.0)
 
 
+@pytest.mark.slow
 def test_figures_come_while_it_renders(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     session.change(width=256, height=256, spp=4096)
     qtbot.waitUntil(
@@ -135,6 +138,7 @@ def test_figures_come_while_it_renders(panel: PlotsPanel, session: Any, qtbot: A
     session.stop()
 
 
+@pytest.mark.slow
 def test_coherence(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     render(panel, session, qtbot, policy="material")
     show_tab(panel, COHERENCE)
@@ -148,6 +152,7 @@ def test_coherence(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
         assert items[-1].getData()[1][-1] == pytest.approx(value), name
 
 
+@pytest.mark.slow
 def test_materials(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     render(panel, session, qtbot, policy="material")
     show_tab(panel, MATERIALS)
@@ -190,6 +195,7 @@ def test_short_names_and_orders() -> None:
     assert material_costs({}) == []
 
 
+@pytest.mark.slow
 def test_runs_are_pinned_copied_saved_and_cleared(
     panel: PlotsPanel, session: Any, qtbot: Any, tmp_path: Path
 ) -> None:
@@ -219,6 +225,7 @@ def test_runs_are_pinned_copied_saved_and_cleared(
     assert len(panel.log.series) == 1 and panel.log.pinned is None
 
 
+@pytest.mark.slow
 def test_both_are_repeated_in_turn(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     render(panel, session, qtbot)
     render(panel, session, qtbot, policy="none", ray_order="slot")
@@ -235,6 +242,7 @@ def test_both_are_repeated_in_turn(panel: PlotsPanel, session: Any, qtbot: Any) 
     assert verdict is not None and verdict.repeats == 4
 
 
+@pytest.mark.slow
 def test_a_moved_camera_is_another_picture(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     from dataclasses import replace
 
@@ -251,6 +259,7 @@ def test_a_moved_camera_is_another_picture(panel: PlotsPanel, session: Any, qtbo
     assert [len(one.runs) for one in panel.log.series] == [2, 1], "back at the first"
 
 
+@pytest.mark.slow
 def test_draws_only_what_is_seen_and_follows_the_theme(
     panel: PlotsPanel, session: Any, qtbot: Any
 ) -> None:

@@ -6,6 +6,7 @@ import random
 import sys
 import threading
 
+import pytest
 from conftest import wait_final
 from PySide6.QtCore import QtMsgType, qInstallMessageHandler
 from PySide6.QtGui import QAction
@@ -114,6 +115,7 @@ def play(monkey, count):
         monkey.step()
 
 
+@pytest.mark.slow
 def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
     window = cornell_window
     broken = tmp_path / "broken.usda"

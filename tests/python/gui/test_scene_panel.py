@@ -290,6 +290,7 @@ def box(view):
     return where
 
 
+@pytest.mark.slow
 def test_lights_off_and_alone(panel, same_as_saved, qtbot, stage_path):
     lights = panel.lights
     panel.tabs.setCurrentWidget(lights)
@@ -390,6 +391,7 @@ def test_reload_drops_edits(panel, qtbot, stage_path, final):
     assert panel.tree.model.rowCount() == 2 - 1
 
 
+@pytest.mark.slow
 def test_many_prims(open_panel, tmp_path, qtbot):
     layer = Sdf.Layer.CreateNew(str(tmp_path / "many.usdc"))
     with Sdf.ChangeBlock():

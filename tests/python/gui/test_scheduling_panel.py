@@ -120,6 +120,7 @@ def test_each_control_changes_the_setup_and_restarts(
     assert session.state == "finished" and not messages
 
 
+@pytest.mark.slow
 def test_every_policy_in_turn_gives_the_same_bits(
     panel: SchedulingPanel, session: Any, qtbot: Any
 ) -> None:
@@ -206,6 +207,7 @@ def test_shows_what_was_set_elsewhere(panel: SchedulingPanel, session: Any) -> N
     assert panel.findChild(QAbstractSpinBox, "threads").value() == 2
 
 
+@pytest.mark.slow
 def test_adaptive_sampling(panel: SchedulingPanel, session: Any, qtbot: Any) -> None:
     messages: list[str] = []
     session.failed.connect(messages.append)

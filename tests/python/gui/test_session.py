@@ -41,6 +41,7 @@ def test_opens_and_renders(session, cornell):
     assert session.state == "finished" and session.pose.path == "/World/Camera"
 
 
+@pytest.mark.slow
 def test_ends_with_the_picture_of_the_command_line(session, final, cornell, tmp_path):
     out = tmp_path / "picture.exr"
     command = [sys.executable, "-m", "wavecomb", "render", str(cornell), "-o", str(out)]
@@ -55,6 +56,7 @@ def test_ends_with_the_picture_of_the_command_line(session, final, cornell, tmp_
         assert np.array_equal(frame.layers[name], layers[name])
 
 
+@pytest.mark.slow
 def test_saves_the_files_of_the_command_line(session, final, qtbot, cornell, tmp_path):
     session.change(width=48, height=40)
     final(session)
@@ -215,6 +217,7 @@ def test_a_pause_that_comes_while_a_frame_is_made_is_told(new_session, qtbot, co
     qtbot.waitUntil(lambda: len(taken) > 4, timeout=20000)
 
 
+@pytest.mark.slow
 def test_moving_shows_reduced_pictures_then_the_whole_one(new_session, qtbot, cornell, final):
     session = new_session(width=640, height=640, spp=1)
     session.open(cornell)
@@ -291,6 +294,7 @@ def test_cameras_of_the_stage(session, final, qtbot):
     assert "/World/None" in watched.failures[0]
 
 
+@pytest.mark.slow
 def test_denoise(session, final, qtbot):
     pytest.importorskip("pyoidn", reason="needs the extra denoise")
     session.change(denoise=True)

@@ -80,6 +80,7 @@ def alone(test):
     return run
 
 
+@pytest.mark.slow
 @alone
 def test_garbage_that_holds_qt_is_found(qapp):
     """What the next test relies on."""
@@ -94,6 +95,7 @@ def test_garbage_that_holds_qt_is_found(qapp):
         assert len(saved.look()) == 1
 
 
+@pytest.mark.slow
 @alone
 def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
     """Opened, used and closed: whichever thread collects, it has nothing of Qt's to destroy."""
@@ -109,6 +111,7 @@ def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
         assert saved.look() == []
 
 
+@pytest.mark.slow
 @alone
 def test_a_session_alone_leaves_no_garbage(qapp, stage_path):
     """Without a parent: it is gone with the last who has it."""
@@ -130,6 +133,7 @@ def test_a_session_alone_leaves_no_garbage(qapp, stage_path):
         assert saved.look() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [1, pytest.param(10, marks=pytest.mark.long)])
 def test_another_thread_may_collect(stage_path, tmp_path, times):
     """It does so all the time while a window is used and closed; nothing stands still."""

@@ -28,10 +28,12 @@ def told(done):
     return lines[0]
 
 
+@pytest.mark.slow
 def test_without_a_display():
     assert "no display to open a window on: set DISPLAY" in told(run([]))
 
 
+@pytest.mark.slow
 def test_with_a_display_that_does_not_answer():
     assert "no window can be opened" in told(run([], DISPLAY=":987"))
 
@@ -43,6 +45,7 @@ def test_without_the_extra(tmp_path):
     assert "pip install 'wavecomb[gui]'" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -55,6 +58,7 @@ def test_bad_options(arguments, words):
     assert words in told(run(arguments, QT_QPA_PLATFORM="offscreen"))
 
 
+@pytest.mark.slow
 def test_a_signal_closes_it(cornell, tmp_path):
     env = os.environ | {"QT_QPA_PLATFORM": "offscreen", "XDG_CONFIG_HOME": str(tmp_path)}
     window = subprocess.Popen(
@@ -137,6 +141,7 @@ print("seen")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1, 2])
 @needs("bin:Xvfb")
 def test_under_xvfb(cornell, tmp_path, scale):

@@ -58,6 +58,7 @@ def middle(viewport):
     return viewport.width() / 2, viewport.height() / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("button", "modifiers"), [(Middle, No), (Left, Alt)], ids=["blender", "usdview"]
 )
@@ -74,6 +75,7 @@ def test_orbit(viewport, button, modifiers):
     assert session.pose.path is None
 
 
+@pytest.mark.slow
 def test_pictures_follow_while_it_is_dragged(viewport, qtbot):
     session, shown = viewport.session, []
     viewport.shown.connect(lambda frame, look: shown.append(frame.version))
@@ -89,6 +91,7 @@ def test_pictures_follow_while_it_is_dragged(viewport, qtbot):
     qtbot.waitUntil(lambda: viewport.frame_shown is session.last_frame)
 
 
+@pytest.mark.slow
 def test_pan_takes_what_is_under_the_cursor_along(viewport):
     session, (x, y) = viewport.session, middle(viewport)
     at = viewport.to_picture(QPointF(x, y))
@@ -110,6 +113,7 @@ def wait_settled(viewport):
     raise AssertionError("the render did not end")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["wheel", "Ctrl+Middle", "Alt+Right"])
 def test_dolly(viewport, way):
     session, (x, y) = viewport.session, middle(viewport)
@@ -139,6 +143,7 @@ def test_keys_move_the_camera(viewport):
     assert session.pose.path == "/World/Camera"
 
 
+@pytest.mark.slow
 def test_front_right_and_top_are_along_the_axes(viewport):
     for key, axis in ((Qt.Key.Key_1, 2), (Qt.Key.Key_3, 0), (Qt.Key.Key_7, 1)):
         QTest.keyClick(viewport, key)
@@ -189,6 +194,7 @@ def test_zoom_about_the_cursor_and_back(viewport):
     assert viewport.is_fitted()
 
 
+@pytest.mark.slow
 def test_at_100_percent_the_screen_has_the_pixels_of_the_picture(viewport, qtbot):
     from wavecomb.picture import image
 
@@ -202,6 +208,7 @@ def test_at_100_percent_the_screen_has_the_pixels_of_the_picture(viewport, qtbot
         assert shown.getRgb()[:3] == tuple(int(c) for c in codes[y, x])
 
 
+@pytest.mark.slow
 def test_region_by_dragging(viewport, qtbot):
     session, window = viewport.session, viewport.window()
     QTest.keyClick(window, Qt.Key.Key_B, Control)
@@ -216,6 +223,7 @@ def test_region_by_dragging(viewport, qtbot):
     assert session.setup.region is None
 
 
+@pytest.mark.slow
 def test_escape_leaves_the_region_mode(viewport):
     QTest.keyClick(viewport.window(), Qt.Key.Key_B, Control)
     assert viewport.cursor().shape() == Qt.CursorShape.CrossCursor
@@ -224,6 +232,7 @@ def test_escape_leaves_the_region_mode(viewport):
     assert viewport.session.setup.region is None
 
 
+@pytest.mark.slow
 def test_inspector_shows_the_pixel_under_the_cursor(viewport, qtbot):
     window, frame = viewport.window(), viewport.session.last_frame
     move(viewport, viewport.from_picture(QPointF(30.5, 80.5)))
@@ -236,6 +245,7 @@ def test_inspector_shows_the_pixel_under_the_cursor(viewport, qtbot):
     assert float(rows["depth"]) == pytest.approx(float(frame.layers["depth"][80, 30]), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_grid_of_large_pixels(viewport):
     viewport.set_zoom(32.0)
     plain = viewport.grab().toImage()

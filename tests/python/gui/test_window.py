@@ -34,6 +34,7 @@ def test_an_empty_window_says_how_to_begin(window):
         window.actions_by_name[name].trigger()
 
 
+@pytest.mark.slow
 def test_drop_opens_a_stage(window, qtbot, cornell):
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(cornell))])
@@ -59,6 +60,7 @@ def test_drop_opens_a_stage(window, qtbot, cornell):
     assert not entered.isAccepted()
 
 
+@pytest.mark.slow
 def test_an_error_is_shown_until_it_is_closed(cornell_window, qtbot, tmp_path):
     window = cornell_window
     window.open(tmp_path / "none.usda")
@@ -71,6 +73,7 @@ def test_an_error_is_shown_until_it_is_closed(cornell_window, qtbot, tmp_path):
     assert window.message.text() == ""
 
 
+@pytest.mark.slow
 def test_controls_of_the_render(cornell_window, qtbot):
     window, bar = cornell_window, cornell_window.render_bar
     for box, field, value in (
@@ -109,6 +112,7 @@ def test_exposure_and_view_change_what_is_shown(cornell_window, qtbot):
     assert shown.pixelColor(40, 50).getRgb()[:3] == tuple(int(c) for c in codes[50, 40])
 
 
+@pytest.mark.slow
 def test_layers_and_their_legend(cornell_window, qtbot):
     window, display = cornell_window, cornell_window.display
 
@@ -133,6 +137,7 @@ def test_layers_and_their_legend(cornell_window, qtbot):
     qtbot.waitUntil(lambda: window.viewport.legend() is None, timeout=5000)
 
 
+@pytest.mark.slow
 def test_png_of_a_heat_map_is_what_is_shown(cornell_window, qtbot, tmp_path):
     from wavecomb.picture.image import read_image, srgb_from_linear
 
@@ -216,6 +221,7 @@ def test_text_is_readable_in_both_colours(window, colours):
     assert window.settings.value("theme") == colours
 
 
+@pytest.mark.slow
 def test_the_state_is_kept(window, qtbot):
     from wavecomb.gui.main_window import MainWindow
 
@@ -259,6 +265,7 @@ def test_closing_ends_all_threads(window, qtbot, cornell):
     assert not [name for name in names if name.startswith("wavecomb-")]
 
 
+@pytest.mark.slow
 def test_colours_reach_every_widget(window, qapp):
     for dock in window.docks.values():
         dock.show()

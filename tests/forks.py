@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Processes that need not import OpenUSD and NumPy anew.
+
+A fresh `wavecomb` takes most of a second before it does anything. `wavecomb(...)`, `code(...)` and
+`Popen` ask a server that has imported everything, and done nothing else: it has one thread, and
+forks for each request. What is forked gets the folder, variables and descriptors that it was to be
+started with, and goes on as `python -m` or `python -c` do, to the end: supervisor, sandbox, signals
+and exit codes are those of a command. What cannot be so is started as ever: other programs, limits
+set by `preexec_fn`, variables that are read at import and are not what they were (`HARMLESS` are
+not). Tests of what is imported and when start real processes.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import select
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+HARMLESS = frozenset((
+    "WAVECOMB_ISOLATE", "WAVECOMB_DEBUG", "HOME", "TMPDIR", "PYTEST_CURRENT_TEST", "COLUMNS",
+    "OPENBLAS_NUM_THREADS",
+))  # fmt: skip
+"""Variables that are read when a command runs, or that a command sets itself before it imports
+what reads them; any other may be read at import."""
+
+_MOST = 100_000
+_Popen = subprocess.Popen  # tests may put the one below in its place
+_server: Server | None = None
+_lock = threading.Lock()
+
+
+def wavecomb(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    """What `wavecomb ARGUMENTS` says, and how it ends. Options: of `run`."""
+    return run(["-m", "wavecomb", *map(str, arguments)], **options)
+
+
+def code(text: str, *arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    """What `python -c TEXT ARGUMENTS` says; what `wavecomb` needs is imported already."""
+    return run(["-c", text, *map(str, arguments)], **options)
+
+
+def run(
+    words: Sequence[str],
+    *,
+    env: Mapping[str, str] | None = None,
+    cwd: str | Path | None = None,
+    timeout: float = 100,
+) -> subprocess.CompletedProcess[str]:
+    """As `subprocess.run`, of Python with these words, captured, as text."""
+    pipe, command = subprocess.PIPE, [sys.executable, *words]
+    process = Popen(command, stdout=pipe, stderr=pipe, text=True, env=env, cwd=cwd)
+    with process:
+        try:
+            out, err = process.communicate(timeout=timeout)
+        except BaseException:
+            process.kill()
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
+
+
+def close() -> None:
+    """Ends the server, if there is one."""
+    global _server
+    if _server is not None:
+        _server.close()
+    _server = None
+
+
+class Server:
+    """The process that forks, seen from the tests."""
+
+    def __init__(self) -> None:
+        self._variables = _read_at_import(os.environ)
+        self._channel, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with its:
+            self._process = _Popen(
+                [sys.executable, __file__, str(its.fileno())],
+                pass_fds=[its.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+            )
+
+    def serves(self, variables: Mapping[str, str]) -> bool:
+        """Whether variables that are read at import are what they were."""
+        return _read_at_import(variables) == self._variables
+
+    def fork(self, request: Mapping[str, Any], descriptors: Sequence[int]) -> socket.socket:
+        """Has a process forked; gives the socket that tells its pid, and how it ended."""
+        mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with its:
+            data = json.dumps(request).encode()
+            socket.send_fds(self._channel, [data], [its.fileno(), *descriptors])
+        return mine
+
+    def close(self) -> None:
+        """Ends the server."""
+        self._channel.close()
+        self._process.wait(10)
+
+
+def _read_at_import(variables: Mapping[str, str]) -> dict[str, str]:
+    return {name: value for name, value in variables.items() if name not in HARMLESS}
+
+
+class Popen(_Popen):
+    """`subprocess.Popen`, forked by the server where that makes no difference."""
+
+    _told: socket.socket | None = None
+
+    def _execute_child(
+        self, args: Any, executable: Any, preexec_fn: Any, close_fds: Any, pass_fds: Any,
+        cwd: Any, env: Any, startupinfo: Any, creationflags: Any, shell: Any,
+        p2cread: int, p2cwrite: int, c2pread: int, c2pwrite: int, errread: int, errwrite: int,
+        *more: Any,
+    ) -> None:  # fmt: skip
+        *_, session = more[:6]  # restore_signals, gid, gids, uid, umask, start_new_session
+        variables = {str(k): str(v) for k, v in (os.environ if env is None else env).items()}
+        words = [] if isinstance(args, (str, bytes)) else [str(word) for word in args]
+        request = {"words": words[1:], "env": variables, "cwd": os.fspath(cwd or os.getcwd()),
+                   "numbers": [0, 1, 2, *pass_fds], "session": bool(session)}  # fmt: skip
+        plain = not (preexec_fn or shell or executable or any(more[1:4]) or more[6:] > (-1,))
+        server = _started() if plain and _is_python(words) else None
+        if server is None or not server.serves(variables) or len(json.dumps(request)) > _MOST:
+            super()._execute_child(
+                args, executable, preexec_fn, close_fds, pass_fds, cwd, env, startupinfo,
+                creationflags, shell, p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite,
+                *more,
+            )  # fmt: skip
+            return
+        given = (p2cread, c2pwrite, errwrite)
+        streams = [number if end == -1 else end for number, end in enumerate(given)]
+        self._told = server.fork(request, [*streams, *pass_fds])
+        self._child_created = True
+        self.pid = int(self._told.recv(64))
+        own = (p2cwrite, c2pread, errread)
+        shut = {end for end, mine in zip(given, own, strict=True) if end != -1 and mine != -1}
+        nothing = getattr(self, "_devnull", None)
+        for end in shut | ({nothing} - {None}):
+            os.close(end)
+
+    def _try_wait(self, wait_flags: int) -> tuple[int, int]:
+        if self._told is None:
+            return super()._try_wait(wait_flags)
+        if wait_flags & os.WNOHANG and not select.select([self._told], [], [], 0)[0]:
+            return 0, 0
+        status = self._told.recv(64)
+        self._told.close()
+        return self.pid, int(status or 9)
+
+    def _internal_poll(self, *arguments: Any, **options: Any) -> int | None:
+        if self._told is None:
+            return super()._internal_poll(*arguments, **options)
+        if self.returncode is None and self._waitpid_lock.acquire(False):
+            with contextlib.ExitStack() as held:
+                held.callback(self._waitpid_lock.release)
+                pid, status = (0, 0) if self.returncode is not None else self._try_wait(os.WNOHANG)
+                if pid:
+                    self._handle_exitstatus(status)
+        return self.returncode
+
+
+def _is_python(words: Sequence[str]) -> bool:
+    return len(words) > 2 and words[0] == sys.executable and words[1] in ("-m", "-c")
+
+
+def _started() -> Server | None:
+    global _server
+    with _lock:
+        if _server is None and sys.platform == "linux" and hasattr(socket, "send_fds"):
+            _server = Server()
+            atexit.register(close)
+        return _server
+
+
+# ---- the process that forks ----------------------------------------------------------------------
+
+
+def _import_everything() -> None:
+    """All modules of the package but the window's, and what they import when they need it."""
+    import importlib
+    import pkgutil
+
+    import wavecomb
+
+    names = [module.name for module in pkgutil.walk_packages(wavecomb.__path__, "wavecomb.", str)]
+    names += ["difflib", "runpy"]
+    for name in names:
+        if not name.startswith("wavecomb.gui") and not name.endswith("__main__"):
+            # Without an extra that is not installed; who needs it says so.
+            with contextlib.suppress(ImportError):
+                importlib.import_module(name)
+
+
+def _serve(channel: socket.socket) -> dict[str, Any] | None:
+    """Forks for each request; gives it, in the fork. None: nobody asks any more."""
+    while True:
+        data, descriptors, _, _ = socket.recv_fds(channel, 2 * _MOST, 16)
+        with contextlib.suppress(ChildProcessError):
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
+        if not data:
+            return None
+        if os.fork() == 0:
+            channel.close()
+            request: dict[str, Any] = json.loads(data)
+            _fork(request, descriptors)
+            return request
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+
+def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
+    """Goes on in a child, with its descriptors; this process waits for it, and tells its end."""
+    import fcntl
+
+    told, *given = (fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, 500) for one in descriptors)
+    for one in descriptors:
+        os.close(one)
+    channel = socket.socket(fileno=told)
+    child = os.fork()
+    if child:
+        for one in (0, 1, 2, *given):
+            os.close(one)
+        channel.send(str(child).encode())
+        _, status = os.waitpid(child, 0)
+        with contextlib.suppress(OSError):
+            channel.send(str(status).encode())
+        os._exit(0)
+    channel.close()
+    for number, one in zip(request["numbers"], given, strict=True):
+        os.dup2(one, number)
+        os.close(one)
+    if request["session"]:
+        os.setsid()
+
+
+def _end(code: object) -> None:
+    """Ends this process as Python does, but takes down no module: that is half of what is left."""
+    if code is not None and not isinstance(code, int):
+        print(code, file=sys.stderr)
+        code = 1
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit((code or 0) & 0xFF)
+
+
+def _main(descriptor: int) -> None:
+    # NumPy's matrix products would start threads; commands say so, too.
+    mine = "OPENBLAS_NUM_THREADS" not in os.environ
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    here = os.path.dirname(os.path.abspath(__file__))
+    sys.path[:] = [place for place in sys.path if os.path.abspath(place) != here]
+    _import_everything()
+    if mine:
+        del os.environ["OPENBLAS_NUM_THREADS"]
+    import gc
+    import runpy
+
+    gc.collect()
+    gc.freeze()
+    assert len(os.listdir("/proc/self/task")) == 1, "a fork would lack the other threads"
+    request = _serve(socket.socket(fileno=descriptor))
+    if request is None:
+        return
+    os.chdir(request["cwd"])
+    os.environ.clear()
+    os.environ.update(request["env"])
+    way, what, *rest = request["words"]
+    sys.argv[:] = [way, *rest]
+    sys.path.insert(0, "" if way == "-c" else request["cwd"])
+    code: object = 0
+    try:
+        if way == "-m":
+            runpy.run_module(what, run_name="__main__", alter_sys=True)
+        else:
+            module = type(sys)("__main__")
+            sys.modules["__main__"] = module
+            exec(compile(what, "<string>", "exec"), module.__dict__)
+    except SystemExit as end:
+        code = end.code
+    except BaseException:
+        sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
+        code = 1
+    _end(code)
+
+
+if __name__ == "__main__":
+    _main(int(sys.argv[1]))
