@@ -421,6 +421,7 @@ def material_table() -> list[dict[str, Any]]:
 
 def aov_table() -> list[dict[str, Any]]:
     """What a render can keep beside the beauty, as wavecomb.run.aovs.Aov has it."""
+
 def program_table() -> list[dict[str, Any]]:
     """What programs read, as wavecomb.material_table.Program has it."""
 
