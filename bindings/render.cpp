@@ -162,6 +162,7 @@ nb::dict aovs_dict(nb::handle owner) {
 nb::list aov_table() {
   static constexpr const char* kKinds[] = {"mean",     "mean_of_hits", "nearest",
                                            "coverage", "groups",       "sum"};
+  static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kSum) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
     nb::dict row;

@@ -35,6 +35,8 @@ SQUARED = ("variance",)
 """Variances of means: they add up with the squares of the weights."""
 SPREAD = ("error",)
 """Standard errors: the roots of such."""
+_HITS = "_hits "
+"""Before the name of a layer: how many samples have hit something, of a mean over those."""
 
 
 def _sums() -> tuple[str, ...]:
@@ -229,7 +231,8 @@ def _add(
         elif name in of_kind("mean_of_hits"):
             hit = np.isfinite(values)
             values = np.where(hit, values, 0) * samples
-            sums["_hits"] = sums.get("_hits", 0) + np.where(hit, samples, 0)
+            hits = _HITS + name
+            sums[hits] = sums.get(hits, 0) + np.where(hit, samples, 0)
         elif name not in _sums():
             values = values * samples
         sums[name] = sums[name] + values if name in sums else values
@@ -242,14 +245,14 @@ def _means(
     weight = 1.0 / np.maximum(samples, 1.0)
     out: dict[str, NDArray[Any]] = {}
     for name, values in sums.items():
-        if name == "_hits":
+        if name.startswith(_HITS):
             continue
         if name in SQUARED:
             values = values * weight**2
         elif name in SPREAD:
             values = np.sqrt(values) * weight
         elif name in of_kind("mean_of_hits"):
-            hits = sums["_hits"]
+            hits = sums[_HITS + name]
             values = np.where(hits > 0, values / np.maximum(hits, 1.0), np.inf)
         elif name not in _sums() and name not in of_kind("nearest"):
             values = values * weight

@@ -29,17 +29,14 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
   const auto for_each_slot = [&](const auto& one) {
     for (auto slot = static_cast<uint32_t>(begin); slot < end; ++slot) one(slot);
   };
-  const auto for_each_vertex_aov = [&](AovKind kind, uint32_t slot, const auto& one) {
-    const float* row = vertex_.rows + slot * vertex_.words;
-    for (const AovRow& aov : kAovs)
-      if (aov.kind == kind && vertex_at_[place_of(aov.aov)] != kNotKept)
-        one(aov.aov, row + vertex_at_[place_of(aov.aov)]);
+  const auto for_each_vertex_aov = [&](AovKind kind, const auto& one) {
+    for (const AovRow& row : kAovs)
+      if (row.kind == kind && vertex_at_[place_of(row.aov)] != kNotKept)
+        one(row.aov, vertex_.rows + vertex_at_[place_of(row.aov)]);
   };
-  if (vertex_)
-    for_each_slot([&](uint32_t slot) {
-      for_each_vertex_aov(AovKind::kMean, slot,
-                          [&](Aov aov, const float* values) { film.add(aov, pixel, values); });
-    });
+  for_each_vertex_aov(AovKind::kMean, [&](Aov aov, const float* rows) {
+    for_each_slot([&](uint32_t slot) { film.add(aov, pixel, rows + slot * vertex_.words); });
+  });
   if (depth_)
     for_each_slot([&](uint32_t slot) {
       if (!std::isfinite(depth_.rows[slot])) return;
@@ -53,9 +50,9 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       if (!centre_ || !film.is_nearest(pixel, centre_.rows[slot])) return;
       for_each_hit_value(
           hit, [&](Aov aov, const auto& value) { film.put(aov, pixel, values_of(value)); });
-      if (vertex_)
-        for_each_vertex_aov(AovKind::kNearest, slot,
-                            [&](Aov aov, const float* values) { film.put(aov, pixel, values); });
+      for_each_vertex_aov(AovKind::kNearest, [&](Aov aov, const float* rows) {
+        film.put(aov, pixel, rows + slot * vertex_.words);
+      });
     });
   }
   if (parts_[0]) {
