@@ -3,12 +3,12 @@
 #pragma once
 
 #include "wavecomb/material/energy_tables.h"
-#include "wavecomb/material/lobes/coat.h"
 #include "wavecomb/material/lobes/eon.h"
 #include "wavecomb/material/lobes/fuzz.h"
 #include "wavecomb/material/lobes/lambert.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
 #include "wavecomb/material/lobes/openpbr_base.h"
+#include "wavecomb/material/lobes/openpbr_coat.h"
 #include "wavecomb/material/openpbr_params.h"
 #include "wavecomb/material/program_list.h"
 
@@ -57,7 +57,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       fuzz_roughness_ = p.fuzz_roughness;
       fuzz_color_ = p.fuzz_color;
     }
-    if constexpr (kCoat) set_coat(p);
+    if constexpr (kCoat) coat_ = OpenPbrCoat<F>(p);
     // Thin walls let a part of the diffuse light through.
     const F sub = p.subsurface_weight;
     Color<F> under = p.subsurface_color;
@@ -84,7 +84,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   Mask<F> has_non_delta() const {
     Mask<F> any_lobe = ((base_.opaque > 0.f) & not_(is_black(Color<F>(diffuse_ + back_)))) |
                        (not_(base_.smooth) & base_.present);
-    if constexpr (kCoat) any_lobe = any_lobe | (not_(coat_smooth_) & (coat_ > 0.f));
+    if constexpr (kCoat) any_lobe = any_lobe | (not_(coat_.smooth) & (coat_.weight > 0.f));
     if constexpr (kFuzz) any_lobe = any_lobe | (fuzz_ > 0.f);
     return any_lobe;
   }
@@ -115,7 +115,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     // A solid that transmits has its layers on the outside.
     const F outside = select(v.base.inside, F(0.f), F(1.f));
     if constexpr (kFuzz) v.fuzz_on = fuzz_ * outside;
-    if constexpr (kCoat) v.coat_on = coat_ * outside;
+    if constexpr (kCoat) v.coat_on = coat_.weight * outside;
     v.under_fuzz = F(1.f);
     v.fuzz.albedo = F(0.f);
     v.fuzz.inv_a = F(1.f);
@@ -129,15 +129,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     v.coat_compensation = F(1.f);
     F coat_albedo(0.f);
     if (has_coat()) {
-      const EnergyLookup<F> look(energy_, z, coat_roughness_);
-      const F white = max(look.white(), F(1e-3f));
-      v.coat_compensation =
-          select(coat_smooth_, F(1.f), fma(coat_f0_, F(F(1.f - white) / white), F(1.f)));
-      const F rough = look.reflected(coat_ior_) * v.coat_compensation;
-      const F smooth = fresnel_dielectric(z, coat_ior_).reflectance;
-      coat_albedo = v.coat_on * min(select(coat_smooth_, smooth, rough), F(1.f));
-      v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_)));
-      v.coated = darkened(v, z) * coat_tint(z) * F(v.under_fuzz * F(coat_ - coat_albedo));
+      const auto layer = coat_.layer(energy_, z);
+      v.coat_compensation = layer.compensation;
+      coat_albedo = v.coat_on * layer.albedo;
+      v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_.weight)));
+      v.coated =
+          darkened(v, z) * coat_.tint(z) * F(v.under_fuzz * F(coat_.weight - coat_albedo));
     }
     choose_shares(v, F(v.under_fuzz * coat_albedo));
     return v;
@@ -147,7 +144,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
 
   F delta_probability(const View& v) const {
     F mirrors = select(base_.smooth, v.p_base, F(0.f));
-    if constexpr (kCoat) mirrors = mirrors + select(coat_smooth_, v.p_coat, F(0.f));
+    if constexpr (kCoat) mirrors = mirrors + select(coat_.smooth, v.p_coat, F(0.f));
     return select(v.o.z > 0.f, mirrors, F(0.f));
   }
 
@@ -190,9 +187,9 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     if (kCoat && any(is_coat)) {
       // A facet of the coat may reflect to below, where only what the base transmits has a density:
       // no sample.
-      const Vec3<F> c = sample_microfacet(coat_ggx_, o, u, v);
+      const Vec3<F> c = sample_microfacet(coat_.ggx, o, u, v);
       const Vec3<F> rough = select<F>(c.z > 0.f, c, Vec3<F>(F(1.f), F(0.f), F(0.f)));
-      wi = select<F>(is_coat, select<F>(coat_smooth_, mirror, rough), wi);
+      wi = select<F>(is_coat, select<F>(coat_.smooth, mirror, rough), wi);
     }
     Mask<F> refracted(false);
     if (any(is_base)) {
@@ -205,7 +202,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     const Mask<F> above = o.z > 0.f;
     const Mask<F> delta_base = is_base & base_.smooth & above;
     Mask<F> delta_coat(false);
-    if constexpr (kCoat) delta_coat = is_coat & coat_smooth_ & above;
+    if constexpr (kCoat) delta_coat = is_coat & coat_.smooth & above;
     // What is smooth is eval'd as nothing; a mirrored direction may still meet other lobes.
     const Mask<F> delta = delta_base | delta_coat;
     const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
@@ -241,34 +238,19 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       s.eta = select(bends, view.base.eta, F(1.f));
     }
     F lobe = select(is_base, base_.roughness, F(1.f));
-    if constexpr (kCoat) lobe = select(is_coat, coat_roughness_, lobe);
+    if constexpr (kCoat) lobe = select(is_coat, coat_.roughness, lobe);
     s.roughness = select(s.is_delta, F(0.f), lobe);
     return s;
   }
 
  private:
   bool has_coat() const {
-    if constexpr (kCoat) return any(Mask<F>(coat_ > 0.f));
+    if constexpr (kCoat) return any(Mask<F>(coat_.weight > 0.f));
     return false;
   }
   static bool has_fuzz(const View& v) {
     if constexpr (kFuzz) return any(Mask<F>(v.fuzz_on > 0.f));
     return false;
-  }
-
-  void set_coat(const Params& p) {
-    coat_ = p.clearcoat;
-    coat_roughness_ = p.clearcoat_roughness;
-    coat_ior_ = coat_ior(p.coat_ior);
-    coat_f0_ = f0_from_ior(coat_ior_);
-    const F coat_alpha = alpha_from_roughness(coat_roughness_);
-    coat_smooth_ = coat_alpha < kDeltaAlpha;
-    coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
-    // Half of the logarithm: light crosses the coat twice.
-    const auto half_log = [](const F& c) { return F(0.5f * log(max(c, F(1e-6f)))); };
-    coat_color_ = p.coat_color;
-    coat_log_ = {half_log(p.coat_color.x), half_log(p.coat_color.y), half_log(p.coat_color.z)};
-    darkening_ = p.coat_darkening;
   }
 
   Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
@@ -289,46 +271,29 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return mirror_z(turned_back(w), v.side);
   }
 
-  /// coat_color^(1 / 2 mu), mu the cosine in the coat.
-  Color<F> coat_tint(const F& z) const {
-    const F inv = 1.f / max(refracted_cos(abs(z), coat_ior_), F(0.05f));
-    return {exp(F(coat_log_.x * inv)), exp(F(coat_log_.y * inv)), exp(F(coat_log_.z * inv))};
-  }
   F coat_reflectance(const View& v, const F& cos_h) const {
-    return v.coat_on *
-           min(F(fresnel_dielectric(cos_h, coat_ior_).reflectance * v.coat_compensation), F(1.f));
+    return coat_.reflectance(v.coat_on, v.coat_compensation, cos_h);
   }
   /// Share of the base that is seen through what is above it.
   Color<F> below(const View& v, const Vec3<F>& wi) const {
     if (!has_coat()) return v.bare;
-    return fma_color(v.coated, coat_tint(wi.z), v.bare);
+    return fma_color(v.coated, coat_.tint(wi.z), v.bare);
   }
   static Color<F> fma_color(const Color<F>& a, const Color<F>& b, const Color<F>& c) {
     return {fma(a.x, b.x, c.x), fma(a.y, b.y, c.y), fma(a.z, b.z, c.z)};
   }
 
-  /// The coat sends light back down to the base, which absorbs again: (1 - K) / (1 - K E_base)
-  /// (OpenPBR 1.1, "Coat darkening").
+  /// What the coat's own reflections make of the colour below it.
   Color<F> darkened(const View& v, const F& z) const {
-    const F smooth = fresnel_dielectric(z, coat_ior_).reflectance;
-    const F rough = 1.f - F(1.f - average_fresnel_dielectric(coat_ior_)) / sqr(coat_ior_);
-    // How diffuse the base is.
+    const Color<F> albedo =
+        base_.metal_f0() * base_.metal + (diffuse_ + back_) * base_.opaque + Color<F>(base_.glass);
     const F spread = fma(F(1.f - base_.opaque), base_.roughness, base_.opaque);
-    const F k = fma(spread, F(rough - smooth), smooth);
-    const Color<F> e = min(
-        base_.metal_f0() * base_.metal + (diffuse_ + back_) * base_.opaque + Color<F>(base_.glass),
-        Color<F>(F(1.f)));
-    const auto one = [&](const F& albedo) {
-      const F dark = F(1.f - k) / max(fnma(k, albedo, F(1.f)), F(1e-4f));
-      const F on = select(v.base.inside, F(0.f), darkening_);
-      return fma(on, F(dark - 1.f), F(1.f));
-    };
-    return {one(e.x), one(e.y), one(e.z)};
+    return coat_.darkened(z, albedo, spread, v.base.inside);
   }
 
   void choose_shares(View& v, const F& coat) const {
     Color<F> through = v.bare;
-    if constexpr (kCoat) through = fma_color(v.coated, coat_color_, v.bare);
+    if constexpr (kCoat) through = fma_color(v.coated, coat_.color, v.bare);
     const F floor(0.04f);
     const auto share = [&floor](const Mask<F>& on, const F& estimate) {
       return select(on, max(estimate, floor), F(0.f));
@@ -377,9 +342,9 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     }
     f = f * below(v, wi);
     Mask<F> rough_coat(false);
-    if constexpr (kCoat) rough_coat = not_(coat_smooth_) & (v.coat_on > 0.f);
+    if constexpr (kCoat) rough_coat = not_(coat_.smooth) & (v.coat_on > 0.f);
     if (kCoat && any(rough_coat)) {
-      const MicrofacetEval<F> m = eval_microfacet(coat_ggx_, o, wi);
+      const MicrofacetEval<F> m = eval_microfacet(coat_.ggx, o, wi);
       const F on = select(rough_coat, F(1.f), F(0.f));
       const F glossy = m.f_cos * on * coat_reflectance(v, m.cos_h) * v.under_fuzz;
       f += Color<F>(glossy);
@@ -396,11 +361,9 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   Base base_;
   EonDiffuse<F> eon_;
   const float* energy_;
-  F fuzz_, fuzz_roughness_, coat_, coat_roughness_, coat_ior_, coat_f0_, darkening_;
-  F turn_cos_, turn_sin_;
-  Color<F> fuzz_color_, coat_color_, coat_log_, diffuse_, back_;
-  Ggx<F> coat_ggx_;
-  Mask<F> coat_smooth_;
+  OpenPbrCoat<F> coat_;
+  F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
+  Color<F> fuzz_color_, diffuse_, back_;
 };
 
 }  // namespace wavecomb
