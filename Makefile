@@ -95,7 +95,8 @@ test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole render
 # CHECKS=all: all tests, and every check in packets and tests, too, which takes five times as long to compile.
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
-	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS)
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS) \
+	  -DWAVECOMB_BATCH=ON
 	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 

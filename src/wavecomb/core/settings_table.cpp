@@ -222,7 +222,7 @@ std::vector<SettingInfo> order_settings() {
   return settings;
 }
 
-std::vector<SettingInfo> make_table() {
+std::vector<SettingInfo> make_settings() {
   std::vector<SettingInfo> table;
   const auto add = [&](SettingGroup group, std::vector<SettingInfo> settings) {
     for (SettingInfo& setting : settings) {
@@ -307,7 +307,7 @@ void SettingInfo::check(const Settings& settings) const {
 }
 
 std::span<const SettingInfo> setting_table() {
-  static const std::vector<SettingInfo> table = make_table();
+  static const std::vector<SettingInfo> table = make_settings();
   return table;
 }
 

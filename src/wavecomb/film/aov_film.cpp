@@ -5,12 +5,10 @@
 #include <bit>
 #include <limits>
 
+#include "wavecomb/film/storage.h"
+
 namespace wavecomb {
 namespace {
-
-double inverse(uint32_t n) {
-  return n == 0 ? 0.0 : 1.0 / n;
-}
 
 /// Before the names of light groups' layers.
 constexpr const char* kLightPrefix = "light_";
@@ -21,12 +19,6 @@ AovLayer make_layer(std::string name, uint32_t channels, size_t pixels, const Wr
   AovLayer layer{std::move(name), channels, std::vector<float>(pixels * channels)};
   for (size_t i = 0; i < pixels; ++i) write(i, layer.values.data() + i * channels);
   return layer;
-}
-
-/// Frees what a vector holds.
-template <typename T>
-void release(std::vector<T>& values) {
-  std::vector<T>().swap(values);
 }
 
 void keep_once(std::vector<uint32_t>& ids) {
@@ -81,7 +73,7 @@ AovLayer AovFilm::crypto_layer(Aov level, const std::vector<uint32_t>& samples) 
       const uint32_t k = order[rank];
       if (p.count[k] == 0) break;
       out[2 * rank] = std::bit_cast<float>(p.id[k]);
-      out[2 * rank + 1] = static_cast<float>(p.count[k] * inverse(samples[i]));
+      out[2 * rank + 1] = static_cast<float>(p.count[k] * inverse_count(samples[i]));
     }
   });
 }
@@ -98,9 +90,9 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
   };
   switch (row.kind) {
     case AovKind::kMean:
-      return scaled([&](size_t i) { return inverse(samples[i]); });
+      return scaled([&](size_t i) { return inverse_count(samples[i]); });
     case AovKind::kMeanOfHits: {
-      AovLayer layer = scaled([&](size_t i) { return inverse(hits_[i]); });
+      AovLayer layer = scaled([&](size_t i) { return inverse_count(hits_[i]); });
       for (size_t i = 0; i < layer.values.size(); ++i)
         if (hits_[i / row.channels] == 0) layer.values[i] = std::numeric_limits<float>::infinity();
       return layer;
@@ -123,7 +115,7 @@ AovLayer AovFilm::group_layer(uint32_t group, const std::string& name,
   return make_layer(kLightPrefix + name, 3, pixels_, [&](size_t i, float* v) {
     for (size_t c = 0; c < 3; ++c)
       v[c] = static_cast<float>(sums[3 * (i * layout_.light_groups + group) + c] *
-                                inverse(samples[i]));
+                                inverse_count(samples[i]));
   });
 }
 

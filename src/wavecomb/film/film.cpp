@@ -3,20 +3,9 @@
 
 #include <limits>
 
+#include "wavecomb/film/storage.h"
+
 namespace wavecomb {
-namespace {
-
-double inverse(uint32_t n) {
-  return n == 0 ? 0.0 : 1.0 / n;
-}
-
-/// Frees what a vector holds.
-template <typename T>
-void release(std::vector<T>& values) {
-  std::vector<T>().swap(values);
-}
-
-}  // namespace
 
 Film::Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error)
     : width_(width),
@@ -30,7 +19,7 @@ std::vector<float> Film::beauty() const {
   std::vector<float> out(3 * pixels_.size());
   for (size_t i = 0; i < pixels_.size(); ++i) {
     const Pixel& p = pixels_[i];
-    const double s = inverse(p.samples);
+    const double s = inverse_count(p.samples);
     std::array<double, 3> mean{p.r * s, p.g * s, p.b * s};
     if (!splats_.empty()) {
       const std::array<double, 3> splat = splats_.mean(i);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/integrate/reference.h"
@@ -213,7 +214,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   out.parts = std::move(parts);
   out.paths = static_cast<uint32_t>(pixels.size());
   out.tilted_nodes = static_cast<uint32_t>(tilts.size());
-  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  out.seconds = seconds_since(start);
   return out;
 }
 

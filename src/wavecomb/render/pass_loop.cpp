@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/render/adaptive.h"
 #include "wavecomb/render/pixel_order.h"
 
@@ -85,7 +86,7 @@ bool PassLoop::is_late() const {
 }
 
 double PassLoop::seconds() const {
-  return std::chrono::duration<double>(Clock::now() - start_).count();
+  return seconds_since(start_);
 }
 
 RenderStatus PassLoop::status() const {

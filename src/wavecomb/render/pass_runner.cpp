@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/core/task_order.h"
 #include "wavecomb/integrate/statistics.h"
@@ -60,9 +61,7 @@ void PassRunner::run_wave(const WaveTask& task) {
   const uint64_t before = rays();
   integrator_.run(worker, task);
   rays_ += rays() - before;
-  if (samples_.fetch_add(task.path_count()) == 0)
-    first_samples_s_ =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  if (samples_.fetch_add(task.path_count()) == 0) first_samples_s_ = seconds_since(start_);
 }
 
 }  // namespace wavecomb

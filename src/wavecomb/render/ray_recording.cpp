@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/task_order.h"
@@ -18,12 +19,6 @@
 
 namespace wavecomb {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void count(std::vector<uint64_t>& at, uint32_t depth, uint64_t n) {
   if (at.size() <= depth) at.resize(depth + 1);

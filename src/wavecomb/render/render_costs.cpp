@@ -5,6 +5,7 @@
 #include <chrono>
 #include <unordered_map>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/core/denormals.h"
 
 namespace wavecomb {
@@ -54,8 +55,7 @@ void RenderCosts::start(const WaveContext& context, const LaneKernels& kernels,
     const DenormalsOff denormals_off;
     const auto begin = std::chrono::steady_clock::now();
     order = calibrate(scene_, context, kernels, halted);
-    calibration_s_ =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    calibration_s_ = seconds_since(begin);
     if (profile) apply(*profile);
   }
   calibrated_ = order;

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <utility>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/task_order.h"
 #include "wavecomb/film/error_map.h"
@@ -21,12 +22,6 @@
 
 namespace wavecomb {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Paths a wave holds unless told otherwise (docs/decisions/wave-size.md), and samples of a pixel
 /// that a pass adds.

@@ -83,7 +83,7 @@ CameraParameter counted(CameraParameter p) {
   return p;
 }
 
-std::vector<CameraParameter> make_table() {
+std::vector<CameraParameter> make_camera_parameters() {
   using C = Camera;
   return {
       counted(number_from<&C::lens_radius>("lens_radius", 0,
@@ -147,7 +147,7 @@ void CameraParameter::check(const Camera& camera) const {
 }
 
 std::span<const CameraParameter> camera_table() {
-  static const std::vector<CameraParameter> table = make_table();
+  static const std::vector<CameraParameter> table = make_camera_parameters();
   return table;
 }
 

@@ -2,6 +2,7 @@
 /// The densities that lights with pictures are sampled by.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 #include "wavecomb/scene/light_builder.h"
@@ -11,7 +12,6 @@ namespace wavecomb {
 
 namespace {
 
-constexpr double kPiD = 3.14159265358979323846;
 constexpr uint32_t kMaxWidth = 1024, kMaxDomeHeight = 512, kMaxRectHeight = 1024;
 /// Rows of texels that are read at once.
 constexpr uint32_t kRows = 256;
@@ -203,7 +203,8 @@ Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<fl
   const Cells cells = cell_means(texture, color, kMaxDomeHeight, Wrap::kClamp);  // of the poles
   // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
   return make_distribution(cells, [&](uint32_t y) {
-    return std::cos(kPiD * y / cells.height) - std::cos(kPiD * (y + 1) / cells.height);
+    return std::cos(std::numbers::pi * y / cells.height) -
+           std::cos(std::numbers::pi * (y + 1) / cells.height);
   });
 }
 
@@ -217,10 +218,11 @@ Distribution2D build_rect_distribution(const TextureView& texture, const Vec3<fl
 
 double image_solid_angle(const Distribution2D& d) {
   const double sum = squares(d, [&](uint32_t y) {
-    return 2 * kPiD / d.width *
-           (std::cos(kPiD * y / d.height) - std::cos(kPiD * (y + 1) / d.height));
+    return 2 * std::numbers::pi / d.width *
+           (std::cos(std::numbers::pi * y / d.height) -
+            std::cos(std::numbers::pi * (y + 1) / d.height));
   });
-  return sum > 0 ? 1 / sum : 4 * kPiD;
+  return sum > 0 ? 1 / sum : 4 * std::numbers::pi;
 }
 
 }  // namespace wavecomb

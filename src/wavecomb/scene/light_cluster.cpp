@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "wavecomb/scene/light_kind.h"
 
 namespace wavecomb {
 namespace {
-
-constexpr double kPiD = 3.14159265358979323846;
 
 double dot(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -29,7 +28,7 @@ uint32_t steps(double x) {
 
 /// sin(angle / 2) in steps, upwards.
 uint32_t half_sine(double angle, uint32_t most) {
-  const double s = std::sin(std::clamp(angle, 0.0, kPiD) / 2) * most;
+  const double s = std::sin(std::clamp(angle, 0.0, std::numbers::pi) / 2) * most;
   return std::min(most, static_cast<uint32_t>(std::ceil(s)));
 }
 
@@ -56,12 +55,12 @@ LightCluster bound_corners(const float (&p)[3], const float (&u)[3], const float
 
 void bound_normals(LightCluster& c, const float (&n)[3]) {
   for (size_t k = 0; k < 3; ++k) c.normals.axis[k] = double{n[k]};
-  c.emission = kPiD / 2;
+  c.emission = std::numbers::pi / 2;
 }
 
 void bound_round(LightCluster& c) {
-  c.normals.angle = kPiD;
-  c.emission = kPiD / 2;
+  c.normals.angle = std::numbers::pi;
+  c.emission = std::numbers::pi / 2;
 }
 
 void widen(LightCluster& c, const float (&half)[3]) {
@@ -79,17 +78,18 @@ DirectionCone unite(const DirectionCone& a, const DirectionCone& b) {
   const double sign = wide.two_sided && cosine < 0 ? -1 : 1;
   cosine = std::clamp(cosine * sign, -1.0, 1.0);
   const double between = std::acos(cosine);
-  if (std::min(between + other.angle, kPiD) <= wide.angle) return wide;
+  if (std::min(between + other.angle, std::numbers::pi) <= wide.angle) return wide;
   const double angle = (wide.angle + between + other.angle) / 2;
   double across[3], length2 = 0;
   for (size_t k = 0; k < 3; ++k) {
     across[k] = other.axis[k] * sign - wide.axis[k] * cosine;
     length2 += across[k] * across[k];
   }
-  const double all = wide.two_sided ? kPiD / 2 : kPiD;
+  const double all = wide.two_sided ? std::numbers::pi / 2 : std::numbers::pi;
   if (!(angle < all) || !(length2 > 1e-10)) {
     // Of opposite axes there is no way that is shorter. Equal ones leave the wider as it is.
-    wide.angle = cosine < 0 || angle >= all ? kPiD : std::max(wide.angle, other.angle + between);
+    wide.angle =
+        cosine < 0 || angle >= all ? std::numbers::pi : std::max(wide.angle, other.angle + between);
     return wide;
   }
   const double turn = angle - wide.angle, scale = std::sin(turn) / std::sqrt(length2);
@@ -112,7 +112,7 @@ LightCluster unite(const LightCluster& a, const LightCluster& b) {
 
 LightCluster bound_light(const LightRecord& light, double power) {
   LightCluster c = empty_at(light.p);
-  c.intensity = power / kPiD;
+  c.intensity = power / std::numbers::pi;
   const LightKindInfo& kind = info_of(static_cast<LightKind>(light.kind));
   if (kind.bound) kind.bound(c, light, power);
   return c;
@@ -120,15 +120,15 @@ LightCluster bound_light(const LightRecord& light, double power) {
 
 LightCluster bound_light(const TriangleLight& light, double power) {
   LightCluster c = bound_corners(light.p, light.u, light.v, false);
-  c.intensity = power / (2 * kPiD);  // to either side
-  c.emission = kPiD / 2;
+  c.intensity = power / (2 * std::numbers::pi);  // to either side
+  c.emission = std::numbers::pi / 2;
   c.normals.two_sided = true;
   const double m[3] = {double{light.m[0]}, double{light.m[1]}, double{light.m[2]}};
   const double area = std::sqrt(dot(m, m));
   if (area > 0)
     for (size_t k = 0; k < 3; ++k) c.normals.axis[k] = m[k] / area;
   else
-    c.normals.angle = kPiD;
+    c.normals.angle = std::numbers::pi;
   return c;
 }
 

@@ -200,7 +200,7 @@ std::vector<LightParameter> common_rows() {
   };
 }
 
-std::vector<LightParameter> make_table() {
+std::vector<LightParameter> make_light_parameters() {
   std::vector<LightParameter> table = common_rows();
   const std::span<const LightKindInfo> kinds = light_kinds();
   for (const LightKindInfo& kind : kinds)
@@ -257,7 +257,7 @@ void check(const Light& light, const LightReferences& there) {
 }  // namespace
 
 std::span<const LightParameter> light_table() {
-  static const std::vector<LightParameter> table = make_table();
+  static const std::vector<LightParameter> table = make_light_parameters();
   return table;
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/light_builder.h"
@@ -15,7 +16,6 @@
 namespace wavecomb {
 namespace {
 
-constexpr double kPiD = 3.14159265358979323846;
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
 /// Effective lights from which on the tree pays (docs/light-selection.md).
@@ -63,9 +63,9 @@ struct Bin {
 /// Solid angle, weighed by cosine, that lights with normals in a cone of that angle shine into,
 /// which are pi / 2 off their normals at most (Conty Estevez and Kulla 2018, eq. 1).
 double emission_measure(double angle) {
-  const double reach = std::min(angle + kPiD / 2, kPiD);
-  return 2 * kPiD * (1 - std::cos(angle)) +
-         kPiD / 2 *
+  const double reach = std::min(angle + std::numbers::pi / 2, std::numbers::pi);
+  return 2 * std::numbers::pi * (1 - std::cos(angle)) +
+         std::numbers::pi / 2 *
              (2 * reach * std::sin(angle) - std::cos(angle - 2 * reach) -
               2 * angle * std::sin(angle) + std::cos(angle));
 }

@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-std::vector<MaterialParameter> make_table() {
+std::vector<MaterialParameter> make_material_parameters() {
   using M = Material;
   std::vector<MaterialParameter> table = {
       {"base_color", &M::base_color},
@@ -33,7 +33,7 @@ std::vector<MaterialParameter> make_table() {
 }  // namespace
 
 std::span<const MaterialParameter> material_table() {
-  static const std::vector<MaterialParameter> table = make_table();
+  static const std::vector<MaterialParameter> table = make_material_parameters();
   return table;
 }
 
