@@ -76,7 +76,9 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        writer = StageWriter(path, info.metres_per_unit, settings.texture_size, settings.seed)
+        writer = StageWriter(
+            path, info.metres_per_unit, settings.texture_size, settings.seed, settings.plain
+        )
         info.build(writer, settings)
         writer.save(f"Wavecomb scene {name}: {info.summary}")
     except OSError as error:

@@ -29,6 +29,9 @@ class SceneOptions:
         shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
             which is none, geometrically.
         lights: How many ``lights`` has.
+        plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
+            the metallic workflow, no program named. ``heavy`` has no such form, ``spread`` none of
+            a ``shader_cost`` above 1.
     """
 
     dragon: Path | str | None = None
@@ -43,6 +46,7 @@ class SceneOptions:
     texture_mb: float = 16.0
     shader_cost: float = 1.0
     lights: int = 1000
+    plain: bool = False
 
     def __post_init__(self) -> None:
         """Refuses what no scene can use."""
