@@ -18,9 +18,10 @@ from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.patterns import Image
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
-from wavecomb.scenes.textures import Image, TextureInfo
+from wavecomb.scenes.textures import TextureInfo
 
 MAX_MATERIALS = 1024
 MAX_TEXTURE_MB = 8192.0

@@ -20,9 +20,10 @@ from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.materials import Colour, MaterialInfo
 from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.patterns import Image
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
-from wavecomb.scenes.textures import Image, TextureInfo
+from wavecomb.scenes.textures import TextureInfo
 
 MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
