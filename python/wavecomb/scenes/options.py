@@ -18,7 +18,8 @@ class SceneOptions:
     Attributes:
         dragon: OBJ, PLY or USD file to stand in for our dragon, or None.
         triangles: Triangles of our dragon; of all stones of ``spread`` and ``heavy`` together.
-        teapot_level: Cells along each edge of the teapot's 32 patches.
+        teapot_level: Cells along each edge of the teapot's 32 patches; whatever is turned in
+            ``room`` has four times as many around.
         seed: Of the layout and of the texture patterns.
         texture_size: Edge of the largest textures, texels; the others shrink in proportion.
         aspect: Width / height of the picture that the camera frames.
