@@ -368,6 +368,9 @@ def test_scene(tmp_path: Path) -> None:
     out = tmp_path / "box.usda"
     assert run("scene", "cornell", "-o", out).exit_code == 0
     assert out.read_text().startswith("#usda")
+    assert "wavecomb:program" in out.read_text()
+    assert run("scene", "cornell", "-o", out, "--plain").exit_code == 0
+    assert "wavecomb:program" not in out.read_text()
 
 
 @pytest.mark.parametrize(
@@ -380,6 +383,7 @@ def test_scene(tmp_path: Path) -> None:
         (["cornell", "-o", "/nowhere/a.usda"], "/nowhere does not exist"),
         (["cornell", "-o", "a.usda", "--triangles", "0"], "--triangles"),
         (["cornell-dragon", "-o", "a.usda", "--dragon", "no.obj"], "no.obj"),
+        (["heavy", "-o", "a.usda", "--plain"], "heavy has no plain form"),
     ],
 )
 def test_bad_scene(

@@ -21,6 +21,7 @@ from wavecomb.cli.row_options import Real
         "wavecomb scene spread -o spread.usdc --materials 256 --texture-mb 64 --shader-cost 10",
         "wavecomb scene heavy -o heavy.usdc --materials 64 --texture-mb 2000",
         "wavecomb scene lights -o street.usdc --lights 10000",
+        "wavecomb scene mixed -o plain.usdc --plain",
     ),
 )
 @click.argument("name", required=False)
@@ -50,6 +51,11 @@ from wavecomb.cli.row_options import Real
     type=Real(1),
     metavar="X",
     help="spread: octaves of noise on the dearest material; 1: none.",
+)
+@click.option(
+    "--plain",
+    is_flag=True,
+    help="UsdPreviewSurface as others export it: no program, metallic workflow. Not of heavy.",
 )
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
     """Write one of our own test stages, and its textures beside it."""

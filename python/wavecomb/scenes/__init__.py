@@ -18,6 +18,7 @@ from wavecomb.scenes.heavy import build_heavy
 from wavecomb.scenes.lights import build_lights
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.room import build_room
 from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.studio import build_studio
@@ -48,6 +49,7 @@ SCENES: dict[str, SceneInfo] = {
     "spread": SceneInfo("a field of stones, for scaling: see --materials", 0.1, build_spread),
     "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
     "studio": SceneInfo("90 objects, a key, a fill and a dim dome", 0.1, build_studio),
+    "room": SceneInfo("a dining room, lit through a door ajar", 1.0, build_room),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""
@@ -76,7 +78,9 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        writer = StageWriter(path, info.metres_per_unit, settings.texture_size, settings.seed)
+        writer = StageWriter(
+            path, info.metres_per_unit, settings.texture_size, settings.seed, settings.plain
+        )
         info.build(writer, settings)
         writer.save(f"Wavecomb scene {name}: {info.summary}")
     except OSError as error:

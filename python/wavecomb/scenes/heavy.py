@@ -15,11 +15,13 @@ import numpy as np
 from pxr import UsdShade
 
 from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.patterns import Image
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
-from wavecomb.scenes.textures import Image, TextureInfo
+from wavecomb.scenes.textures import TextureInfo
 
 MAX_MATERIALS = 1024
 MAX_TEXTURE_MB = 8192.0
@@ -34,6 +36,10 @@ Inputs = dict[str, Any]
 
 def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
     """Fills the stage; ``SceneOptions`` says with how many materials and how large textures."""
+    if options.plain:
+        raise SceneError(
+            "heavy has no plain form: UsdPreviewSurface cannot say what its MaterialX networks do"
+        )
     check_field("heavy", options, materials=(1, MAX_MATERIALS), texture_mb=(0.1, MAX_TEXTURE_MB))
     rng = np.random.default_rng([options.seed, 2000])
     edge = texture_edge(options, _BYTES_PER_TEXEL, 2 * TILE)

@@ -11,11 +11,15 @@ give its parameters, set so that other renderers show something alike:
 - plastic: ``diffuseColor`` under a coat of ``ior`` and ``roughness``.
 - emissive: ``emissiveColor``, radiance.
 - principled: everything.
+
+``plain`` gives the form that other people's exporters write: no program, and the metallic workflow.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 Colour = tuple[float, float, float]
 """Linear Rec. 709 red, green, blue."""
@@ -28,13 +32,13 @@ class MaterialInfo:
     """One material.
 
     Attributes:
-        program: One of ``PROGRAMS``.
+        program: One of ``PROGRAMS``, or None for a UsdPreviewSurface that names no program.
         inputs: Values of UsdPreviewSurface inputs by name.
         textures: Names in ``textures.TEXTURES`` by input.
         repeat: Texture repeats for each unit of uv.
     """
 
-    program: str
+    program: str | None
     inputs: dict[str, float | int | Colour] = field(default_factory=dict)
     textures: dict[str, str] = field(default_factory=dict)
     repeat: float = 1.0
@@ -111,6 +115,36 @@ def principled(
 ) -> MaterialInfo:
     """All of UsdPreviewSurface."""
     return MaterialInfo("principled", inputs, textures or {}, repeat)
+
+
+def preview(
+    inputs: dict[str, float | int | Colour],
+    textures: dict[str, str] | None = None,
+    repeat: float = 1.0,
+) -> MaterialInfo:
+    """A UsdPreviewSurface as anybody writes it: no program is named."""
+    return MaterialInfo(None, inputs, textures or {}, repeat)
+
+
+_SPECULAR_WORKFLOW = ("useSpecularWorkflow", "specularColor")
+_TINT_OPACITY = 0.4
+"""Opacity of plain glass whose colour is pure."""
+
+
+def plain(info: MaterialInfo) -> MaterialInfo:
+    """The same material without a program, in the metallic workflow.
+
+    Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics, metals
+    lose the tint of their edges. Glass is all specular reflection and lets light pass straight on:
+    UsdPreviewSurface knows no refraction, and no tint but by opacity, so that coloured glass is
+    covered a little by its colour.
+    """
+    inputs = {key: value for key, value in info.inputs.items() if key not in _SPECULAR_WORKFLOW}
+    if info.program == "dielectric":
+        colour = np.asarray(inputs["diffuseColor"], float)
+        purity = 1.0 - colour.min() / max(colour.max(), 1e-6)
+        inputs["opacity"] = float(_TINT_OPACITY * purity)
+    return replace(info, program=None, inputs=inputs)
 
 
 GOLD = metal((1.00, 0.71, 0.29), 0.16, (1.0, 0.94, 0.78))

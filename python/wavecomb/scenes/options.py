@@ -18,7 +18,8 @@ class SceneOptions:
     Attributes:
         dragon: OBJ, PLY or USD file to stand in for our dragon, or None.
         triangles: Triangles of our dragon; of all stones of ``spread`` and ``heavy`` together.
-        teapot_level: Cells along each edge of the teapot's 32 patches.
+        teapot_level: Cells along each edge of the teapot's 32 patches; whatever is turned in
+            ``room`` has four times as many around.
         seed: Of the layout and of the texture patterns.
         texture_size: Edge of the largest textures, texels; the others shrink in proportion.
         aspect: Width / height of the picture that the camera frames.
@@ -29,6 +30,9 @@ class SceneOptions:
         shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
             which is none, geometrically.
         lights: How many ``lights`` has.
+        plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
+            the metallic workflow, no program named. ``heavy`` has no such form, ``spread`` none of
+            a ``shader_cost`` above 1.
     """
 
     dragon: Path | str | None = None
@@ -43,6 +47,7 @@ class SceneOptions:
     texture_mb: float = 16.0
     shader_cost: float = 1.0
     lights: int = 1000
+    plain: bool = False
 
     def __post_init__(self) -> None:
         """Refuses what no scene can use."""

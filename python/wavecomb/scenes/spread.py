@@ -16,12 +16,14 @@ import numpy as np
 from pxr import UsdShade
 
 from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.materials import Colour, MaterialInfo
 from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.patterns import Image
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
-from wavecomb.scenes.textures import Image, TextureInfo
+from wavecomb.scenes.textures import TextureInfo
 
 MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
@@ -42,6 +44,10 @@ def build_spread(writer: StageWriter, options: SceneOptions) -> None:
         texture_mb=(0, MAX_TEXTURE_MB),
         shader_cost=(1, MAX_COST),
     )
+    if options.plain and options.shader_cost > 1.0:
+        raise SceneError(
+            "spread has no plain form of a shader_cost above 1: that is a MaterialX network's noise"
+        )
     rng = np.random.default_rng([options.seed, 1000])
     names = [_material(writer, options, k, rng) for k in range(options.materials)]
     build_field(writer, names, options.triangles, _edge(options), options.aspect or 1.0, rng)

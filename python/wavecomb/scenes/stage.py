@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.materials import MaterialInfo
+from wavecomb.scenes.materials import MaterialInfo, plain
 from wavecomb.scenes.mesh import FloatArray, Mesh
 from wavecomb.scenes.textures import TEXTURES, TextureInfo, sky, write_image
 
@@ -39,7 +39,12 @@ class StageWriter:
     """
 
     def __init__(
-        self, path: Path, metres_per_unit: float, texture_size: int = 2048, seed: int = 0
+        self,
+        path: Path,
+        metres_per_unit: float,
+        texture_size: int = 2048,
+        seed: int = 0,
+        is_plain: bool = False,
     ) -> None:
         """Starts an empty stage.
 
@@ -48,6 +53,7 @@ class StageWriter:
             metres_per_unit: Length of a scene unit.
             texture_size: Edge of the largest textures; the others shrink in proportion.
             seed: Of the random patterns in textures.
+            is_plain: Whether materials are written in their plain form, ``materials.plain``.
         """
         if path.suffix.lower() not in SUFFIXES:
             raise SceneError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
@@ -56,6 +62,7 @@ class StageWriter:
         self._path = path
         self._texture_size = texture_size
         self._seed = seed
+        self._is_plain = is_plain
         self._materials: dict[str, UsdShade.Material] = {}
         self._written: set[str] = set()
         self._own: dict[str, TextureInfo] = {}
@@ -160,10 +167,13 @@ class StageWriter:
         """Adds a material, once for each name, with the textures it needs; returns the name."""
         if name in self._materials:
             return name
+        if self._is_plain:
+            info = plain(info)
         material = UsdShade.Material.Define(self.stage, f"/World/Looks/{name}")
-        material.GetPrim().CreateAttribute(
-            "wavecomb:program", Sdf.ValueTypeNames.String, custom=True
-        ).Set(info.program)
+        if info.program is not None:
+            material.GetPrim().CreateAttribute(
+                "wavecomb:program", Sdf.ValueTypeNames.String, custom=True
+            ).Set(info.program)
         surface = UsdShade.Shader.Define(self.stage, f"/World/Looks/{name}/Surface")
         surface.CreateIdAttr("UsdPreviewSurface")
         for key, value in info.inputs.items():

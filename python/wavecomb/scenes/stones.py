@@ -14,8 +14,9 @@ from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import Mesh, grid_faces, smooth_normals, without_flat_faces
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.patterns import Image
 from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.textures import Image, marble, weave, wood
+from wavecomb.scenes.textures import marble, weave, wood
 
 STONES = 144
 """At least so many stones lie in a field."""

@@ -16,10 +16,19 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
-from numpy.typing import NDArray
 
-Image = NDArray[np.float32]
-"""float32 (height, width, channels)."""
+from wavecomb.scenes.patterns import (
+    Image,
+    flat,
+    fractal,
+    grid,
+    mix,
+    normal_map,
+    ramp,
+    shifted,
+    step,
+    value_noise,
+)
 
 
 @dataclass(frozen=True)
@@ -41,108 +50,25 @@ class TextureInfo:
     normal: bool = False
 
 
-def _grid(size: int) -> tuple[Image, Image]:
-    """Texel centres x (1, size) and y (size, 1) in 0 to 1; y grows downwards."""
-    t = ((np.arange(size) + 0.5) / size).astype(np.float32)
-    return t[None, :], t[:, None]
-
-
-def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Image]:
-    """Lattice neighbours of places 0 to 1, wrapped, and the eased weight of the second."""
-    place = t * cells
-    low = np.floor(place)
-    f = (place - low).astype(np.float32)
-    first = low.astype(np.int64) % cells
-    return first, (first + 1) % cells, f * f * (3 - 2 * f)
-
-
-def _value_noise(x: Image, y: Image, cells: int, rng: np.random.Generator) -> Image:
-    """Tileable value noise, 0 to 1, with ``cells`` lattice cells to the unit.
-
-    Args:
-        x: Places across, any shape; (1, w) together with y (h, 1) is a grid and much faster.
-        y: Places down.
-        cells: Lattice cells to the unit.
-        rng: Source of the lattice values.
-    """
-    lattice = rng.random((cells, cells)).astype(np.float32)
-    x0, x1, fx = _cells(x, cells)
-    y0, y1, fy = _cells(y, cells)
-    if x.shape[0] == 1 and y.shape[1] == 1:
-        rows = lattice[y0[:, 0]] * (1 - fy) + lattice[y1[:, 0]] * fy
-        return np.asarray(rows[:, x0[0]] * (1 - fx) + rows[:, x1[0]] * fx, np.float32)
-    top = lattice[y0, x0] * (1 - fx) + lattice[y0, x1] * fx
-    bottom = lattice[y1, x0] * (1 - fx) + lattice[y1, x1] * fx
-    return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
-
-
-def _fractal(
-    x: Image, y: Image, cells: int, octaves: int, rng: np.random.Generator, gain: float = 0.5
-) -> Image:
-    """Sum of octaves of tileable value noise, 0 to 1."""
-    total = np.zeros(np.broadcast(x, y).shape, np.float32)
-    weight = 1.0
-    weights = 0.0
-    for octave in range(octaves):
-        total += np.float32(weight) * _value_noise(x, y, cells << octave, rng)
-        weights += weight
-        weight *= gain
-    return total / np.float32(weights)
-
-
-def _shifted(image: Image, dx: Image, dy: Image) -> Image:
-    """Bilinear lookup of a tileable (n, n) image, each texel moved by dx, dy (in image widths)."""
-    size = image.shape[0]
-    columns = np.arange(size, dtype=np.float32)[None, :] + dx * size
-    rows = np.arange(size, dtype=np.float32)[:, None] + dy * size
-    left, top = np.floor(columns), np.floor(rows)
-    fx, fy = columns - left, rows - top
-    i0, j0 = top.astype(np.int32) % size, left.astype(np.int32) % size
-    i1, j1 = (i0 + 1) % size, (j0 + 1) % size
-    upper = image[i0, j0] * (1 - fx) + image[i0, j1] * fx
-    return upper * (1 - fy) + (image[i1, j0] * (1 - fx) + image[i1, j1] * fx) * fy
-
-
-def _ramp(t: Image, stops: list[tuple[float, tuple[float, float, float]]]) -> Image:
-    """Colours (h, w, 3) of values (h, w) by linear interpolation between stops."""
-    places = [place for place, _ in stops]
-    return np.stack(
-        [np.interp(t, places, [colour[k] for _, colour in stops]) for k in range(3)], axis=2
-    ).astype(np.float32)
-
-
-def _mix(a: Image, b: Image, weight: Image) -> Image:
-    return a + (b - a) * weight[..., None]
-
-
-def _flat(colour: tuple[float, float, float]) -> Image:
-    return np.array(colour, np.float32).reshape(1, 1, 3)
-
-
-def _step(x: Image, low: float, high: float) -> Image:
-    s = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return (s * s * (3.0 - 2.0 * s)).astype(np.float32)
-
-
 def checker(size: int, rng: np.random.Generator) -> Image:
     """Ivory and deep blue checks, 8 x 8, a little worn."""
-    x, y = _grid(size)
+    x, y = grid(size)
     odd = ((np.floor(x * 8) + np.floor(y * 8)) % 2).astype(np.float32)
-    wear = 0.90 + 0.14 * _fractal(x, y, 8, 5, rng)
+    wear = 0.90 + 0.14 * fractal(x, y, 8, 5, rng)
     return np.clip(
-        _mix(_flat((0.92, 0.87, 0.76)), _flat((0.10, 0.19, 0.36)), odd) * wear[..., None], 0, 1
+        mix(flat((0.92, 0.87, 0.76)), flat((0.10, 0.19, 0.36)), odd) * wear[..., None], 0, 1
     )
 
 
 def wood(size: int, rng: np.random.Generator) -> Image:
     """Walnut: growth rings drawn out along v, pores and fibres."""
-    x, y = _grid(size)
-    warp = _fractal(x, y, 3, 4, rng)
+    x, y = grid(size)
+    warp = fractal(x, y, 3, 4, rng)
     ring = (x * 5.0 + 1.6 * warp + 0.25 * np.sin(2 * np.pi * y)) % 1.0
-    late = _step(ring, 0.0, 0.75) * (1.0 - _step(ring, 0.88, 1.0))
-    fibre = _value_noise(x, (y * 0.03125) % 1.0, 256, rng)
-    pores = _step(_fractal(x, (y * 0.0625) % 1.0, 128, 2, rng), 0.62, 0.75)
-    base = _ramp(
+    late = step(ring, 0.0, 0.75) * (1.0 - step(ring, 0.88, 1.0))
+    fibre = value_noise(x, (y * 0.03125) % 1.0, 256, rng)
+    pores = step(fractal(x, (y * 0.0625) % 1.0, 128, 2, rng), 0.62, 0.75)
+    base = ramp(
         late, [(0.0, (0.66, 0.43, 0.24)), (0.5, (0.53, 0.32, 0.17)), (1.0, (0.33, 0.18, 0.09))]
     )
     return np.clip(base * (0.86 + 0.24 * fibre - 0.30 * pores)[..., None], 0, 1)
@@ -150,22 +76,20 @@ def wood(size: int, rng: np.random.Generator) -> Image:
 
 def marble(size: int, rng: np.random.Generator) -> Image:
     """White marble with grey and gold veins."""
-    x, y = _grid(size)
-    wx, wy = _fractal(x, y, 3, 6, rng), _fractal(x, y, 3, 6, rng)
+    x, y = grid(size)
+    wx, wy = fractal(x, y, 3, 6, rng), fractal(x, y, 3, 6, rng)
     wx, wy = 0.35 * wx, 0.35 * wy
-    broad = np.abs(2.0 * _shifted(_fractal(x, y, 4, 6, rng, 0.55), wx, wy) - 1.0)
-    thin = np.abs(2.0 * _shifted(_fractal(x, y, 6, 6, rng, 0.6), wy, wx) - 1.0)
-    cloud = _fractal(x, y, 4, 6, rng)
-    base = _mix(_flat((0.95, 0.94, 0.92)), _flat((0.80, 0.81, 0.83)), _step(cloud, 0.35, 0.75))
-    base = _mix(base, _flat((0.36, 0.38, 0.42)), 0.85 * (1.0 - _step(broad, 0.0, 0.10)))
-    return np.clip(
-        _mix(base, _flat((0.72, 0.55, 0.28)), 0.8 * (1.0 - _step(thin, 0.0, 0.035))), 0, 1
-    )
+    broad = np.abs(2.0 * shifted(fractal(x, y, 4, 6, rng, 0.55), wx, wy) - 1.0)
+    thin = np.abs(2.0 * shifted(fractal(x, y, 6, 6, rng, 0.6), wy, wx) - 1.0)
+    cloud = fractal(x, y, 4, 6, rng)
+    base = mix(flat((0.95, 0.94, 0.92)), flat((0.80, 0.81, 0.83)), step(cloud, 0.35, 0.75))
+    base = mix(base, flat((0.36, 0.38, 0.42)), 0.85 * (1.0 - step(broad, 0.0, 0.10)))
+    return np.clip(mix(base, flat((0.72, 0.55, 0.28)), 0.8 * (1.0 - step(thin, 0.0, 0.035))), 0, 1)
 
 
 def weave(size: int, rng: np.random.Generator) -> Image:
     """Twill cloth: crimson warp, ochre weft."""
-    x, y = _grid(size)
+    x, y = grid(size)
     threads = 48
     px, py = x * threads, y * threads
     ix, iy = np.floor(px), np.floor(py)
@@ -174,8 +98,8 @@ def weave(size: int, rng: np.random.Generator) -> Image:
     along = np.where(warp_up > 0, py - iy, px - ix) - 0.5
     shade = (1.0 - 2.4 * across**2) * (1.0 - 0.7 * along**2)
     twist = 0.90 + 0.10 * np.sin(2 * np.pi * (3 * along + 2.5 * across))
-    worn = 0.85 + 0.3 * _fractal(x, y, 16, 4, rng)
-    colour = _mix(_flat((0.80, 0.55, 0.22)), _flat((0.60, 0.10, 0.13)), warp_up)
+    worn = 0.85 + 0.3 * fractal(x, y, 16, 4, rng)
+    colour = mix(flat((0.80, 0.55, 0.22)), flat((0.60, 0.10, 0.13)), warp_up)
     return np.clip(colour * (shade * twist * worn)[..., None], 0, 1).astype(np.float32)
 
 
@@ -189,43 +113,43 @@ def _tile_layout(size: int) -> tuple[Image, Image, Image, Image]:
     The two tile images share it, so it has its own seed.
     """
     rng = np.random.default_rng(_TILE_SEED)
-    x, y = _grid(size)
+    x, y = grid(size)
     count = 4
     px, py = x * count, y * count
     ix, iy = np.floor(px).astype(np.int64), np.floor(py).astype(np.int64)
-    chip = 0.012 * (_fractal(x, y, 32, 3, rng) - 0.5)
+    chip = 0.012 * (fractal(x, y, 32, 3, rng) - 0.5)
     inset = np.minimum(np.minimum(px - ix, ix + 1 - px), np.minimum(py - iy, iy + 1 - py))
-    joint = 1.0 - _step(inset + chip, 0.010, 0.020)
+    joint = 1.0 - step(inset + chip, 0.010, 0.020)
     tone = rng.random((count, count)).astype(np.float32)[iy, ix]
-    return joint, tone, _fractal(x, y, 32, 6, rng, 0.6), _fractal(x, y, 4, 5, rng)
+    return joint, tone, fractal(x, y, 32, 6, rng, 0.6), fractal(x, y, 4, 5, rng)
 
 
 def tiles(size: int, rng: np.random.Generator) -> Image:
     """Slate floor tiles, 4 x 4, with pale joints."""
     del rng
     joint, tone, grain, stain = _tile_layout(size)
-    slate = _ramp(
+    slate = ramp(
         0.42 * tone + 0.28 * grain + 0.30 * stain,
         [(0.15, (0.23, 0.245, 0.27)), (0.5, (0.33, 0.335, 0.34)), (0.85, (0.45, 0.42, 0.385))],
     )
-    return np.clip(_mix(slate, _flat((0.17, 0.165, 0.16)), joint), 0, 1)
+    return np.clip(mix(slate, flat((0.17, 0.165, 0.16)), joint), 0, 1)
 
 
 def tiles_roughness(size: int, rng: np.random.Generator) -> Image:
     """Roughness of the floor tiles: honed stone, worn smooth in places, matt joints."""
     del rng
     joint, tone, grain, stain = _tile_layout(size)
-    rough = 0.22 + 0.12 * tone + 0.20 * grain + 0.28 * _step(stain, 0.35, 0.7)
+    rough = 0.22 + 0.12 * tone + 0.20 * grain + 0.28 * step(stain, 0.35, 0.7)
     rough = rough + (0.9 - rough) * joint
     return np.repeat(np.clip(rough, 0.05, 1.0)[..., None], 3, axis=2).astype(np.float32)
 
 
 def brushed(size: int, rng: np.random.Generator) -> Image:
     """Roughness of brushed metal: long scratches along u, with a few deep ones."""
-    x, y = _grid(size)
-    fine = _value_noise((x * 0.03125) % 1.0, y, 256, rng)
-    mid = _value_noise((x * 0.0625) % 1.0, y, 96, rng)
-    deep = _step(_value_noise((x * 0.125) % 1.0, y, 192, rng), 0.86, 0.95)
+    x, y = grid(size)
+    fine = value_noise((x * 0.03125) % 1.0, y, 256, rng)
+    mid = value_noise((x * 0.0625) % 1.0, y, 96, rng)
+    deep = step(value_noise((x * 0.125) % 1.0, y, 192, rng), 0.86, 0.95)
     rough = 0.16 + 0.20 * fine + 0.14 * mid + 0.25 * deep
     return np.repeat(np.clip(rough, 0.05, 1.0)[..., None], 3, axis=2).astype(np.float32)
 
@@ -247,30 +171,26 @@ def hammered(size: int, rng: np.random.Generator) -> Image:
         window = np.ix_(rows % size, columns % size)
         height[window] = np.maximum(height[window], dent)
     height = -0.020 * height
-    slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (0.5 * size)
-    slope_y = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (0.5 * size)
-    normal = np.stack([-slope_x, -slope_y, np.ones_like(height)], axis=2)
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    return (0.5 + 0.5 * normal).astype(np.float32)
+    return normal_map(height, 1.0)
 
 
 def glaze(size: int, rng: np.random.Generator) -> Image:
     """Porcelain with a cobalt pattern of waves and dots."""
-    x, y = _grid(size)
-    wobble = 0.02 * (_fractal(x, y, 6, 4, rng) - 0.5)
+    x, y = grid(size)
+    wobble = 0.02 * (fractal(x, y, 6, 4, rng) - 0.5)
     cx, cy = (x * 4) % 1.0 - 0.5, (y * 8 + 0.5 * (np.floor(x * 4) % 2)) % 1.0
     arcs = np.abs((np.hypot(cx, cy * 0.6) * 3.0 + wobble * 10) % 1.0 - 0.5)
-    line = 1.0 - _step(arcs, 0.10, 0.16)
-    band = _step(np.sin(2 * np.pi * 2 * y + wobble * 20), 0.25, 0.35)
-    dots = 1.0 - _step(np.hypot((x * 10) % 1.0 - 0.5, (y * 10) % 1.0 - 0.5), 0.14, 0.20)
+    line = 1.0 - step(arcs, 0.10, 0.16)
+    band = step(np.sin(2 * np.pi * 2 * y + wobble * 20), 0.25, 0.35)
+    dots = 1.0 - step(np.hypot((x * 10) % 1.0 - 0.5, (y * 10) % 1.0 - 0.5), 0.14, 0.20)
     ink = np.clip(
-        line * band + dots * (1 - band) * _step(np.sin(2 * np.pi * 2 * y), -1.0, -0.6), 0, 1
+        line * band + dots * (1 - band) * step(np.sin(2 * np.pi * 2 * y), -1.0, -0.6), 0, 1
     )
-    pool = 0.75 + 0.25 * _fractal(x, y, 24, 3, rng)
+    pool = 0.75 + 0.25 * fractal(x, y, 24, 3, rng)
     return np.clip(
-        _mix(
-            _flat((0.93, 0.93, 0.90)) * np.ones((size, size, 1), np.float32),
-            _flat((0.07, 0.17, 0.52)),
+        mix(
+            flat((0.93, 0.93, 0.90)) * np.ones((size, size, 1), np.float32),
+            flat((0.07, 0.17, 0.52)),
             (ink * pool).astype(np.float32),
         ),
         0,
@@ -327,18 +247,16 @@ def sky(width: int, height: int, seed: int) -> Image:
     reach = 1.0 / np.maximum(up, 0.03)
     px = (0.11 * reach * np.sin(theta) * np.cos(phi) + 0.5) % 1.0
     py = (0.11 * reach * np.sin(theta) * np.sin(phi) + 0.5) % 1.0
-    cover = _step(
-        _fractal(px.astype(np.float32), py.astype(np.float32), 5, 6, rng, 0.55), 0.48, 0.72
-    )
-    cover = (cover * _step(up.astype(np.float32), 0.03, 0.22))[..., None]
+    cover = step(fractal(px.astype(np.float32), py.astype(np.float32), 5, 6, rng, 0.55), 0.48, 0.72)
+    cover = (cover * step(up.astype(np.float32), 0.03, 0.22))[..., None]
     lit = np.array([1.10, 0.95, 0.84]) * (0.55 + 1.3 * facing**6)
     image = image * (1.0 - 0.75 * cover) + 0.75 * cover * lit
-    disc = _step(
+    disc = step(
         to_sun.astype(np.float32), float(np.cos(np.radians(4.4))), float(np.cos(np.radians(3.6)))
     )[..., None]
     image = image + disc * np.array([300.0, 220.0, 135.0])
     ground = np.array([0.12, 0.115, 0.11]) * (0.6 + 0.4 * facing)
-    blend = _step((-up).astype(np.float32), -0.004, 0.015)[..., None]
+    blend = step((-up).astype(np.float32), -0.004, 0.015)[..., None]
     return (image * (1.0 - blend) + ground * blend).astype(np.float32)
 
 
