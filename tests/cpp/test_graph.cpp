@@ -108,7 +108,7 @@ std::vector<F> parameters(const MaterialView& view, const UInt<F>& material, con
   const auto point = [&](const Mask<F>&) {
     GraphPoint<F> at;
     at.uv = uv;
-    at.uv_width = width;
+    at.footprint = width;
     return at;
   };
   auto p = OpenPbrParams<F>::template fetch<kAllInputs>(view, material, uv, width, point, active);

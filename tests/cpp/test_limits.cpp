@@ -99,7 +99,7 @@ TEST(Limits, texels_are_numbered_to_the_last) {
     ASSERT_EQ(layout_refusal(image(49136, 65536, 1, format), view), "");
     const TextureLevel& level = view.levels[view.level_count - 1];
     ASSERT_GT(level.offset, 4000000000u);
-    EXPECT_LT(level.offset + 64u * level.tiles_x, uint64_t{1} << 32);
+    EXPECT_LT(level.offset + uint64_t{64} * level.tiles_x, uint64_t{1} << 32);
     for (uint32_t n = 0; n < view.level_count; ++n) {
       const TextureLevel& l = view.levels[n];
       const auto lanes = detail::broadcast_level<float>(l);

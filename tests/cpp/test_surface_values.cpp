@@ -127,7 +127,7 @@ template <typename F>
 std::array<F, 15> values_of(const GraphPoint<F>& at) {
   return {at.uv.x,
           at.uv.y,
-          at.uv_width,
+          at.footprint.width,
           at.position.x,
           at.position.y,
           at.position.z,

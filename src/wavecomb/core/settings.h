@@ -35,6 +35,9 @@ enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto
 enum class CostSource : uint8_t { kAuto, kMeasured, kModel };
 /// How rays are given to the accelerator: in packets, or each alone.
 enum class Traversal : uint8_t { kPackets, kSingle };
+/// How textures are filtered. kAuto: whole where the camera sees them, by one texel after bounces
+/// (docs/decisions/one-texel.md).
+enum class TextureFilter : uint8_t { kAuto, kWhole };
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
 /// Largest picture.
@@ -65,6 +68,7 @@ struct Settings {
   CostSource costs = CostSource::kAuto;
   float clamp_indirect = 0;  ///< largest luminance of one indirect contribution; 0: off
   bool schlick_fresnel = false;
+  TextureFilter texture_filter = TextureFilter::kAuto;
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
   /// Sample every non-delta bounce by cosine (the dissertation's way).

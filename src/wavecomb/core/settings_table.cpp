@@ -134,6 +134,12 @@ std::vector<SettingInfo> picture_settings() {
           "fresnel", "Fresnel",
           {{"exact", "Fresnel's equations."}, {"schlick", "Schlick's approximation."}},
           "Reflectance of dielectrics."),
+      choice<&S::texture_filter>(
+          "texture_filter", "Texture filter",
+          {{"auto",
+            "Whole where the camera looks, by one texel, chosen by its weight, after a bounce."},
+           {"whole", "Whole everywhere."}},
+          "How textures are filtered."),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
                                "Samples every bounce that is not a mirror's by cosine."),
       row<&S::error>("error", "Errors", "Keeps errors and variances where nothing else asks."),

@@ -12,11 +12,12 @@ namespace wavecomb {
 template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> graph_point(const SceneView& scene,
                                                        const MeshHit<F>& hit, const Surface<F>& s,
-                                                       const Vec3<F>& dir, const F& uv_width,
+                                                       const Vec3<F>& dir,
+                                                       const Footprint<F>& footprint,
                                                        const Mask<F>& active) {
   GraphPoint<F> at;
   at.uv = s.uv;
-  at.uv_width = uv_width;
+  at.footprint = footprint;
   at.position = s.p;
   at.normal = s.ns;
   at.view = -dir;

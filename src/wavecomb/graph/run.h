@@ -14,7 +14,7 @@ namespace wavecomb {
 template <typename F>
 struct GraphPoint {
   Vec2<F> uv{F(0.f), F(0.f)};
-  F uv_width = F(0.f);  ///< the ray's footprint in uv units
+  Footprint<F> footprint = F(0.f);  ///< the ray's in uv
   Vec3<F> position = Vec3<F>(F(0.f)), local_position = Vec3<F>(F(0.f));
   Vec3<F> normal{F(0.f), F(0.f), F(1.f)}, local_normal{F(0.f), F(0.f), F(1.f)};
   Vec3<F> tangent{F(1.f), F(0.f), F(0.f)};
@@ -181,7 +181,7 @@ template <typename F>
       case GraphCode::kImage: {
         const GraphImage& image = view.images[program.first_image + op.number];
         const Texel<F> texel = lookup<F>(textures[image.texture], in(0, 0), in(0, 1),
-                                         F(at.uv_width * image.stretch), active);
+                                         at.footprint.scaled(F(image.stretch)), active);
         const F c[4] = {texel.r, texel.g, texel.b, texel.a};
         for (uint32_t i = 0; i < width; ++i) to[i] = c[i];
         break;

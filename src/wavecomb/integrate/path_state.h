@@ -24,6 +24,7 @@ struct ShadeSettings {
   float clamp_indirect;  ///< 0: off
   bool schlick_fresnel;
   bool cosine_sampling;
+  bool filters_textures_whole;
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -33,7 +34,8 @@ struct ShadeSettings {
         roulette_depth(s.roulette_depth),
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),
-        cosine_sampling(s.cosine_sampling) {}
+        cosine_sampling(s.cosine_sampling),
+        filters_textures_whole(s.texture_filter == TextureFilter::kWhole) {}
 };
 
 /// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the

@@ -29,15 +29,15 @@
   KEYWORD template void run_graph<F>(const GraphView&, const GraphProgram&, const TextureView*,    \
                                      const GraphPoint<F>&, const Mask<F>&, F*);                    \
   KEYWORD template GraphPoint<F> graph_point<F>(const SceneView&, const MeshHit<F>&,               \
-                                                const Surface<F>&, const Vec3<F>&, const F&,       \
-                                                const Mask<F>&);                                   \
+                                                const Surface<F>&, const Vec3<F>&,                 \
+                                                const Footprint<F>&, const Mask<F>&);              \
   KEYWORD template void detail::setup_curved<F>(const SceneView&, const MeshHit<F>&, bool,         \
                                                 const Mask<F>&, Surface<F>&);                      \
   KEYWORD template Vec3<F> detail::read_texture<F>(const MaterialView&,                            \
                                                    const detail::RecordReader<F>&, const Vec2<F>&, \
-                                                   const F&, const Mask<F>&);                      \
+                                                   const Footprint<F>&, const Mask<F>&);           \
   KEYWORD template Texel<F> detail::lookup_tiles<F>(const TextureView&, const F&, const F&,        \
-                                                    const F&, const Mask<F>&);                     \
+                                                    const Footprint<F>&, const Mask<F>&);          \
   KEYWORD template MovedTriangle<F> moved_triangle<F>(                                             \
       const SceneView&, const UInt<F>&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&,   \
       const detail::InstanceMaps<F>&, const Mask<F>&);                                             \

@@ -20,7 +20,8 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   /// fetch_params for this program.
   template <uint32_t kInputs, bool kGraphs = true, typename MakePoint>
   static OpenPbrParams fetch(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                             const F& uv_width, const MakePoint& make_point, const Mask<F>& active);
+                             const Footprint<F>& footprint, const MakePoint& make_point,
+                             const Mask<F>& active);
 
   /// What a path's light keeps over a length `t` inside of the material; 1 for rays from outside.
   /// `cos_seen` is the cosine between the normal and the way back: negative inside.
@@ -48,13 +49,13 @@ inline std::array<F*, kGraphOutputCount> parameter_places(OpenPbrParams<F>& p) {
 template <typename F>
 template <uint32_t kInputs, bool kGraphs, typename MakePoint>
 inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const UInt<F>& material,
-                                                const Vec2<F>& uv, const F& uv_width,
+                                                const Vec2<F>& uv, const Footprint<F>& footprint,
                                                 const MakePoint& make_point,
                                                 const Mask<F>& active) {
   using R = OpenPbrRecord;
   OpenPbrParams p;
   static_cast<ShadingParams<F>&>(p) =
-      detail::evaluate_params<kInputs, F>(view, material, uv, uv_width, active);
+      detail::evaluate_params<kInputs, F>(view, material, uv, footprint, active);
   const bool uniform = any(active) && is_uniform<F>(material, active);
   const UInt<F> record = detail::make_reader<MaterialRecord, F>(view.materials, material, uniform,
                                                                 active)[&MaterialRecord::openpbr];

@@ -17,10 +17,10 @@ namespace detail {
 
 template <uint32_t kInputs, typename F>
 WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const UInt<F>& material,
-                                                 const Vec2<F>& uv, const F& uv_width,
+                                                 const Vec2<F>& uv, const Footprint<F>& footprint,
                                                  const Mask<F>& active) {
   using R = MaterialRecord;
-  const InputReader<F> inputs(view, material, uv, uv_width, active);
+  const InputReader<F> inputs(view, material, uv, footprint, active);
   const auto& r = inputs.record;
   const auto color = [&](Input s, float (R::*member)[3]) {
     const Vec3<F> constant = r[member];
@@ -73,24 +73,24 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
 }
 
 /// The parameters of material `material` at `uv`, in sane ranges. Only inputs in `kInputs` read
-/// textures; the others give their constants. `uv_width` is the ray's footprint in uv units.
+/// textures; the others give their constants. `footprint` is the ray's in uv.
 /// Materials without graphs may say so by kGraphs. `opacity` is 1 where it is presence, which
 /// fetch_opacity gives. Inactive lanes hold anything finite. Graphs are given what `make_point`
 /// says.
 template <uint32_t kInputs, typename F, bool kGraphs = true, typename MakePoint>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
-                                              const Vec2<F>& uv, const F& uv_width,
+                                              const Vec2<F>& uv, const Footprint<F>& footprint,
                                               const MakePoint& make_point, const Mask<F>& active) {
-  auto p = detail::evaluate_params<kInputs, F>(view, material, uv, uv_width, active);
+  auto p = detail::evaluate_params<kInputs, F>(view, material, uv, footprint, active);
   if constexpr (kGraphs) complete_params<F>(view, material, make_point, active, p);
   return p;
 }
 /// The same where graphs have nothing but uv.
 template <uint32_t kInputs, typename F>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
-                                              const Vec2<F>& uv, const F& uv_width,
+                                              const Vec2<F>& uv, const Footprint<F>& footprint,
                                               const Mask<F>& active) {
-  return fetch_params<kInputs, F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width},
+  return fetch_params<kInputs, F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint},
                                   active);
 }
 
@@ -126,20 +126,20 @@ using ParamsOf = typename detail::ParamsOf<Bsdf, F>::Type;
 /// fetch_params for program `Bsdf`.
 template <typename Bsdf, uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
-                                            const Vec2<F>& uv, const F& uv_width,
+                                            const Vec2<F>& uv, const Footprint<F>& footprint,
                                             const MakePoint& make_point, const Mask<F>& active) {
   constexpr size_t kOwn = info_of(Bsdf::kProgram).own_count();
   if constexpr (requires { typename Bsdf::Params; }) {
     static_assert(kOwn == 0, "What a program has to itself beside Params is read by Params::fetch");
-    return Bsdf::Params::template fetch<kInputs, Bsdf::kTextured>(materials, material, uv, uv_width,
-                                                                  make_point, active);
+    return Bsdf::Params::template fetch<kInputs, Bsdf::kTextured>(materials, material, uv,
+                                                                  footprint, make_point, active);
   } else if constexpr (kOwn == 0) {
-    return fetch_params<kInputs, F, Bsdf::kTextured>(materials, material, uv, uv_width, make_point,
+    return fetch_params<kInputs, F, Bsdf::kTextured>(materials, material, uv, footprint, make_point,
                                                      active);
   } else {
     OwnShadingParams<F> p;
     static_cast<ShadingParams<F>&>(p) = fetch_params<kInputs, F, Bsdf::kTextured>(
-        materials, material, uv, uv_width, make_point, active);
+        materials, material, uv, footprint, make_point, active);
     p.own = detail::own_values<kOwn, F>(materials, material, active);
     return p;
   }

@@ -136,7 +136,7 @@ bool alike(const Settings& a, const Settings& b) {
   return a.width == b.width && a.height == b.height && a.max_depth == b.max_depth &&
          a.filter == b.filter && a.used_filter_width() == b.used_filter_width() &&
          a.light_selection == b.light_selection && a.schlick_fresnel == b.schlick_fresnel &&
-         a.cosine_sampling == b.cosine_sampling;
+         a.cosine_sampling == b.cosine_sampling && a.texture_filter == b.texture_filter;
 }
 
 /// The paths through the scene of `view`, whose lights have the shares to calibrate with.
@@ -149,6 +149,7 @@ LightProbes trace_probes(const Scene& scene, const EmbreeAccelerator& accel, con
   probing.max_depth = std::min(settings.max_depth, kVertices);
   probing.schlick_fresnel = settings.schlick_fresnel;
   probing.cosine_sampling = settings.cosine_sampling;
+  probing.texture_filter = settings.texture_filter;
   probing.sampler = SamplerKind::kIndependent;
   probing.seed = 0x9e3779b9u;
   const FilterTable filter(settings.filter, settings.used_filter_width());

@@ -50,7 +50,7 @@ Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& mate
     };
     GraphPoint<float> at;
     at.uv = {mixed(t.uv0[0], t.uv1[0], t.uv2[0]), mixed(t.uv0[1], t.uv1[1], t.uv2[1])};
-    at.uv_width = width;
+    at.footprint = width;
     at.place = {t.mesh, t.prim, u, v};
     at.position = {mixed(t.p0[0], t.p1[0], t.p2[0]), mixed(t.p0[1], t.p1[1], t.p2[1]),
                    mixed(t.p0[2], t.p1[2], t.p2[2])};

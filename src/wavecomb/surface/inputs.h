@@ -18,7 +18,7 @@ namespace detail {
 /// What an input's texture gives: texel * scale + bias of the chosen channels.
 template <typename F>
 Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const Vec2<F>& uv,
-                     const F& uv_width, const Mask<F>& active) {
+                     const Footprint<F>& footprint, const Mask<F>& active) {
   using R = TextureUseRecord;
   F m[6];
   for (size_t i = 0; i < 6; ++i) m[i] = use.at(&R::uv, i);
@@ -26,11 +26,11 @@ Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const
   const F t = fma(m[3], uv.x, fma(m[4], uv.y, m[5]));
   // The footprint grows as the longer image of the two axes.
   const F stretch = sqrt(max(fma(m[0], m[0], F(m[3] * m[3])), fma(m[1], m[1], F(m[4] * m[4]))));
-  const F width = uv_width * stretch;
+  const Footprint<F> seen = footprint.scaled(stretch);
   const UInt<F> id = use[&R::texture];
   const Texel<F> texel =
-      use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t, width, active)
-                 : lookup<F>(view.textures, id, s, t, width, active);
+      use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t, seen, active)
+                 : lookup<F>(view.textures, id, s, t, seen, active);
   const auto channel = [&](const F& value, size_t i) {
     return fma(value, use.at(&R::scale, i), use.at(&R::bias, i));
   };
@@ -49,18 +49,18 @@ struct InputReader {
   const MaterialView& view;
   const UInt<F>& material;
   const Vec2<F>& uv;
-  const F& uv_width;
+  const Footprint<F>& footprint;  ///< in uv
   Mask<F> active;
   bool uniform;
   RecordReader<F> record;
   UInt<F> textured_inputs;
 
   InputReader(const MaterialView& view_, const UInt<F>& material_, const Vec2<F>& uv_,
-              const F& uv_width_, const Mask<F>& active_)
+              const Footprint<F>& footprint_, const Mask<F>& active_)
       : view(view_),
         material(material_),
         uv(uv_),
-        uv_width(uv_width_),
+        footprint(footprint_),
         active(active_),
         uniform(any(active_) && is_uniform<F>(material_, active_)),
         record(make_reader<MaterialRecord, F>(view_.materials, material_, uniform, active_)),
@@ -73,7 +73,9 @@ struct InputReader {
     if (none(textured)) return constant;
     const UInt<F> index = material * kInputCount + static_cast<uint32_t>(s);
     const auto use = make_reader<TextureUseRecord, F>(view.uses, index, uniform, textured);
-    return select<F>(textured, read_texture<F>(view, use, uv, uv_width, textured), constant);
+    // Light is filtered whole: emitters are few and bright, and light samples know no texels.
+    const Footprint<F> seen = s == Input::kEmission ? Footprint<F>(footprint.width) : footprint;
+    return select<F>(textured, read_texture<F>(view, use, uv, seen, textured), constant);
   }
   F value(Input s, const F& constant) const { return value(s, Vec3<F>(constant)).x; }
 };

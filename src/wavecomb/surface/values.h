@@ -17,25 +17,25 @@ namespace detail {
 template <typename F>
 struct UvOnly {
   const Vec2<F>& uv;
-  const F& uv_width;
+  const Footprint<F>& footprint;
   GraphPoint<F> operator()(const Mask<F>& /*active*/) const {
     GraphPoint<F> at;
     at.uv = uv;
-    at.uv_width = uv_width;
+    at.footprint = footprint;
     return at;
   }
 };
 
 }  // namespace detail
 
-/// Radiance that the surface emits at `uv`, whether it is there or not. `uv_width` is the footprint
-/// in uv units. Graphs are given what `make_point(active)` says, which is called only where there
+/// Radiance that the surface emits at `uv`, whether it is there or not. `footprint` is the
+/// ray's in uv. Graphs are given what `make_point(active)` says, which is called only where there
 /// is one.
 template <typename F, typename MakePoint>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                               const F& uv_width, const MakePoint& make_point,
+                               const Footprint<F>& footprint, const MakePoint& make_point,
                                const Mask<F>& active) {
-  const detail::InputReader<F> inputs(view, material, uv, uv_width, active);
+  const detail::InputReader<F> inputs(view, material, uv, footprint, active);
   const Vec3<F> constant = inputs.record[&MaterialRecord::emission];
   const Color<F> plain = detail::sane_emission(inputs.value(Input::kEmission, constant));
   const UInt<F> graph = inputs.record[&MaterialRecord::emission_graph];
@@ -46,8 +46,8 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
 /// The same where graphs have nothing but uv.
 template <typename F>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                               const F& uv_width, const Mask<F>& active) {
-  return fetch_emission<F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width}, active);
+                               const Footprint<F>& footprint, const Mask<F>& active) {
+  return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
 /// How much of the surface is there at `uv`: the probability that a ray meets it. It is 0 or 1 with
@@ -55,9 +55,10 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
 /// then). Graphs as in fetch_emission.
 template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                       const F& uv_width, const MakePoint& make_point, const Mask<F>& active) {
+                       const Footprint<F>& footprint, const MakePoint& make_point,
+                       const Mask<F>& active) {
   using R = MaterialRecord;
-  const detail::InputReader<F> inputs(view, material, uv, uv_width, active);
+  const detail::InputReader<F> inputs(view, material, uv, footprint, active);
   F opacity = detail::saturate(inputs.value(Input::kOpacity, inputs.record[&R::opacity]));
   const UInt<F> graph = inputs.record[&R::opacity_graph];
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
@@ -72,8 +73,8 @@ inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const 
 /// The same where graphs have nothing but uv.
 template <typename F>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
-                       const F& uv_width, const Mask<F>& active) {
-  return fetch_opacity<F>(view, material, uv, uv_width, detail::UvOnly<F>{uv, uv_width}, active);
+                       const Footprint<F>& footprint, const Mask<F>& active) {
+  return fetch_opacity<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
 }  // namespace wavecomb

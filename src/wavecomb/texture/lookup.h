@@ -12,6 +12,36 @@
 
 namespace wavecomb {
 
+/// How much of a texture a lookup sees, and by how many of its texels.
+///
+/// A filter is a mean of up to eight texels, four of each of two levels. One texel taken with the
+/// weight that the filter gives it as its probability has the same mean, for an eighth of the reads
+/// (M. Pharr, B. Wronski, M. Salvi, M. Fajardo, "Filtering After Shading With Stochastic Texture
+/// Filtering", Proc. ACM CGIT 7(1), 2024).
+template <typename F>
+struct Footprint {
+  F width;                 ///< in uv units
+  bool one_texel = false;  ///< or all that the filter sees
+  UInt<F> bits{0u};        ///< random, for one_texel
+
+  /// Of all texels.
+  Footprint(const F& w) : width(w) {}  // NOLINT(google-explicit-constructor)
+  /// Of one, chosen by `random`.
+  Footprint(const F& w, const UInt<F>& random) : width(w), one_texel(true), bits(random) {}
+
+  /// For coordinates that are `factor` times as large.
+  Footprint scaled(const F& factor) const {
+    Footprint f = *this;
+    f.width = width * factor;
+    return f;
+  }
+  /// Bits first to first + n - 1 as a number in (0, 1): the middle of its 2^n-th.
+  F number(int first, int n) const {
+    const UInt<F> part = (bits >> first) & ((1u << n) - 1u);
+    return F(F(Int<F>(part)) + 0.5f) * (1.f / static_cast<float>(1u << n));
+  }
+};
+
 /// Linear r, g, b and alpha.
 template <typename F>
 struct Texel {
@@ -41,22 +71,17 @@ struct LevelLanes {
 template <typename F>
 inline LevelLanes<F> broadcast_level(const TextureLevel& level) {
   using U = UInt<F>;
-  return {U(level.width), U(level.height), U(level.tiles_x),
-          U(static_cast<uint32_t>(level.offset))};
+  return {U(level.width), U(level.height), U(level.tiles_x), U(level.offset)};
 }
 /// Level `index` (< level_count) in each lane.
 template <typename F>
 inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& index,
                                   const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TextureLevel) / 4;
-  const UInt<F> word = index * kWords;
-  const auto read = [&](uint32_t at) {
-    return float_bits<F>(gather<F>(texture.levels, word + at, active));
-  };
-  // Offsets fit in 32 bits: lay_out refuses more texels. The low half of a 64-bit number comes
-  // first on the machines that we build for.
-  return {read(word_of(&TextureLevel::width)), read(word_of(&TextureLevel::height)),
-          read(word_of(&TextureLevel::tiles_x)), read(word_of(&TextureLevel::offset))};
+  const auto words = load_rows<kWords, F>(texture.levels, index * kWords, active);
+  const auto word = [&](uint32_t at) { return float_bits<F>(words[at]); };
+  return {word(word_of(&TextureLevel::width)), word(word_of(&TextureLevel::height)),
+          word(word_of(&TextureLevel::tiles_x)), word(word_of(&TextureLevel::offset))};
 }
 
 /// Two neighbouring texels along one axis and how far the point is from the first to the second.
@@ -199,23 +224,48 @@ inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level,
   return lerp_texel<F>(top, low, y.weight);
 }
 
+/// One texel of one level, each with the probability that is its weight in `bilinear`.
+template <typename F>
+inline Texel<F> one_texel(const TextureView& texture, const LevelLanes<F>& level, const F& s,
+                          const F& t, const Footprint<F>& footprint, const Mask<F>& active) {
+  const F width(Int<F>(level.width)), height(Int<F>(level.height));
+  const F left = footprint.number(0, 11) - 0.5f, up = footprint.number(11, 11) - 0.5f;
+  const Taps<F> x = make_taps<F>(texture.wrap_s, fma(s, width, left), level.width);
+  const Taps<F> y = make_taps<F>(texture.wrap_t, fnma(t, height, F(height + up)), level.height);
+  Texel<F> texel = fetch<F>(texture, texel_place<F>(level, x.i0, y.i0), active);
+  if (texture.wrap_s == Wrap::kBlack || texture.wrap_t == Wrap::kBlack) {
+    const F zero(0.f);
+    texel = select_texel<F>(x.in0 & y.in0, texel,
+                            {zero, zero, zero, texture.has_alpha ? zero : F(1.f)});
+  }
+  return texel;
+}
+
 /// `lookup` in a texture that is not made of tiles.
 template <typename F>
-inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t, const F& width,
-                             const Mask<F>& active) {
+inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
+                             const Footprint<F>& footprint, const Mask<F>& active) {
   const F s_in = wrap_coordinate<F>(texture.wrap_s, s);
   const F t_in = wrap_coordinate<F>(texture.wrap_t, t);
   const TextureLevel& finest = texture.levels[0];
   const float size =
       static_cast<float>(finest.width > finest.height ? finest.width : finest.height);
-  const F texels_wide = width * size;
+  const F texels_wide = footprint.width * size;
   const Mask<F> coarse = (texels_wide > 1.f) & active;
   if (none(coarse)) {
-    return bilinear<F>(texture, broadcast_level<F>(finest), s_in, t_in, active);
+    const LevelLanes<F> level = broadcast_level<F>(finest);
+    return footprint.one_texel ? one_texel<F>(texture, level, s_in, t_in, footprint, active)
+                               : bilinear<F>(texture, level, s_in, t_in, active);
   }
   const uint32_t last = texture.level_count - 1;
   // Lanes that are not coarse have lod 0: level 0 with weight 0 of the next, the same as above.
   const F lod = min(log2(clamp(texels_wide, F(1.f), F(1e9f))), F(static_cast<float>(last)));
+  if (footprint.one_texel) {
+    const F nearest = max(floor(F(lod + footprint.number(22, 10))), F(0.f));
+    const UInt<F> level = select(Mask<UInt<F>>(coarse), UInt<F>(to_int<F>(nearest)), UInt<F>(0u));
+    return one_texel<F>(texture, gather_level<F>(texture, level, active), s_in, t_in, footprint,
+                        active);
+  }
   const F base = max(floor(lod), F(0.f));
   const F weight = select(coarse, F(lod - base), F(0.f));
   const UInt<F> level = select(coarse, UInt<F>(to_int<F>(base)), UInt<F>(0u));
@@ -242,7 +292,7 @@ inline uint32_t first_of(const UInt<F>& value, const Mask<F>& active) {
 /// point on the border of two tiles belongs to the upper or right one; filters do not cross it.
 template <typename F>
 [[gnu::noinline]] Texel<F> lookup_tiles(const TextureView& texture, const F& s, const F& t,
-                                        const F& width, const Mask<F>& active) {
+                                        const Footprint<F>& footprint, const Mask<F>& active) {
   using U = UInt<F>;
   const F zero(0.f), columns(static_cast<float>(TileSet::kColumns));
   // NaN counts as 0; what is far off stays off and fits an integer.
@@ -251,13 +301,13 @@ template <typename F>
   const Mask<F> inside =
       (column >= zero) & (row >= zero) & (column < columns) & (row < columns) & active;
   const U tile = select(Mask<U>(inside), U(to_int<F>(fma(row, columns, column))), U(0u));
-  Texel<F> result = lookup_plain<F>(texture, zero, zero, zero, active);
+  Texel<F> result = lookup_plain<F>(texture, zero, zero, F(0.f), active);
   Mask<F> pending = inside;
   while (any(pending)) {
     const uint32_t one = first_of<F>(tile, pending);
     const Mask<F> same = pending & Mask<F>(tile == U(one));
     if (const TextureView* view = texture.tiles->views[one]) {
-      const Texel<F> texel = lookup_plain<F>(*view, F(s - column), F(t - row), width, same);
+      const Texel<F> texel = lookup_plain<F>(*view, F(s - column), F(t - row), footprint, same);
       result = select_texel<F>(same, texel, result);
     }
     pending = pending & not_(same);
@@ -269,34 +319,35 @@ template <typename F>
 
 /// Trilinear lookup in one texture (the same in all lanes). `s`, `t`: texture coordinates, t up
 /// (USD's convention: (0, 0) is the lower left corner of the image, texel centres are at half
-/// texels). `width`: footprint in uv units (lod = log2(width * max(texture width, height)),
-/// clamped); width <= 0 or NaN reads the finest level. Any s and t are safe; NaN counts as 0. Off a
+/// texels). The footprint's width says the level (lod = log2(width * max(texture width, height)),
+/// clamped); width <= 0 or NaN reads the finest. Any s and t are safe; NaN counts as 0. Off a
 /// texture that is black outside, each tap is black, and transparent if the texture has alpha.
 /// Inactive lanes are unspecified. A UDIM texture gives the tile's texel, and that of missing tiles
 /// where there is none.
 template <typename F>
-inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const F& width,
-                       const Mask<F>& active) {
+inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t,
+                       const Footprint<F>& footprint, const Mask<F>& active) {
   if (texture.tiles) [[unlikely]] {
     // Copies, so that what all other textures use may stay in registers.
-    const F u = s, v = t, w = width;
+    const F u = s, v = t;
+    const Footprint<F> f = footprint;
     const Mask<F> on = active;
-    return detail::lookup_tiles<F>(texture, u, v, w, on);
+    return detail::lookup_tiles<F>(texture, u, v, f, on);
   }
-  return detail::lookup_plain<F>(texture, s, t, width, active);
+  return detail::lookup_plain<F>(texture, s, t, footprint, active);
 }
 
 /// Lookup where each lane has its own texture id (index into `textures`); runs `lookup` once per
 /// distinct id among the active lanes. Lanes with id kNoTexture give (0, 0, 0, 1).
 template <typename F>
 inline Texel<F> lookup(const TextureView* textures, const UInt<F>& id, const F& s, const F& t,
-                       const F& width, const Mask<F>& active) {
+                       const Footprint<F>& footprint, const Mask<F>& active) {
   Texel<F> result{F(0.f), F(0.f), F(0.f), F(1.f)};
   Mask<F> pending = active & Mask<F>(id != UInt<F>(kNoTexture));
   while (any(pending)) {
     const uint32_t one = detail::first_of<F>(id, pending);
     const Mask<F> same = pending & Mask<F>(id == UInt<F>(one));
-    result = detail::select_texel<F>(same, lookup<F>(textures[one], s, t, width, same), result);
+    result = detail::select_texel<F>(same, lookup<F>(textures[one], s, t, footprint, same), result);
     pending = pending & not_(same);
   }
   return result;

@@ -129,7 +129,7 @@ class Pyramid {
       if (level.width % kTile == 0 && level.height % kTile == 0) continue;
       const size_t tiles = size_t{level.tiles_x} * ((level.height + kTile - 1) / kTile);
       const size_t bytes = size_t{channels_} * value_bytes(view_.format);
-      std::memset(storage_ + level.offset * bytes, 0, tiles * kTile * kTile * bytes);
+      std::memset(storage_ + size_t{level.offset} * bytes, 0, tiles * kTile * kTile * bytes);
     }
   }
 
@@ -314,7 +314,7 @@ float decode_value(const std::byte* p, TexelFormat format, bool srgb) {
 
 size_t texel_index(const TextureLevel& level, uint32_t x, uint32_t y) {
   const size_t tile = size_t{y / kTile} * level.tiles_x + x / kTile;
-  return level.offset + tile * (kTile * kTile) + (y % kTile) * kTile + x % kTile;
+  return size_t{level.offset} + tile * (kTile * kTile) + (y % kTile) * kTile + x % kTile;
 }
 
 PyramidTotals build_pyramid(const TextureDesc& desc, const TextureView& view, std::byte* storage,

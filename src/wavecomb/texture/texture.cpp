@@ -43,7 +43,8 @@ uint64_t lay_out(const TextureDesc& desc, TextureView& view) {
   uint32_t width = desc.width, height = desc.height;
   for (uint32_t& n = view.level_count; n < TextureView::kMaxLevels;) {
     const uint32_t tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;
-    view.levels[n++] = {width, height, tiles_x, 0, texels};
+    // Of images that are refused below, it may not fit.
+    view.levels[n++] = {width, height, tiles_x, static_cast<uint32_t>(texels)};
     texels += uint64_t{tiles_x} * tiles_y * kTile * kTile;
     if (width == 1 && height == 1) break;
     width = std::max(1u, width / 2);

@@ -37,10 +37,8 @@ struct TextureDesc {
 struct TextureLevel {
   uint32_t width, height;  ///< in texels
   uint32_t tiles_x;        ///< tiles in a row of tiles
-  uint32_t pad;
-  uint64_t offset;  ///< of the level's first tile, in texels from the start of the storage
+  uint32_t offset;         ///< of the level's first tile, in texels from the start of the storage
 };
-static_assert(sizeof(TextureLevel) == 24);
 
 struct TileSet;
 class TileStore;

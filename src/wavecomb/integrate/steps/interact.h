@@ -48,6 +48,17 @@ struct SurfaceInteraction {
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
 };
 
+/// How textures are seen whose footprint is `width` wide: whole by the camera, where a texel alone
+/// would be noise in the picture, and by one texel after a bounce, where the path is noisier than
+/// the texture.
+template <typename F, uint32_t kFeatures>
+WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
+  using U = UInt<F>;
+  if (v.depth == 0 || v.settings.filters_textures_whole) return width;
+  const U path = hash_u32<U>(v.key.pixel_hash, v.key.sample);
+  return {width, hash_u32<U>(path, U(0x7e3a15c1u + v.depth))};
+}
+
 /// The surface with the values of its material. Texture coordinates are worked out only where a
 /// texture or an AOV asks for them.
 template <typename Bsdf, typename F, uint32_t kFeatures>
@@ -69,7 +80,8 @@ WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F, kFe
   const Surface<F> s = setup_surface<F, v.has(kCurves), v.has(kMotion)>(
       scene, v.hit, path.dir, wants_uv, Bsdf::kHasTerminator, v.active);
   const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
-  const F uv_width = path.cone_width * s.uv_per_length / sqrt(cos_seen);
+  const Footprint<F> footprint =
+      footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(cos_seen)));
 
   MaterialView materials = scene.materials;
   const bool schlick = v.has(kExperiments) && v.settings.schlick_fresnel;
@@ -79,11 +91,11 @@ WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F, kFe
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;
-    const F width = uv_width;
-    return graph_point<F>(scene, at, surface, dir, width, lanes);
+    const Footprint<F> seen = footprint;
+    return graph_point<F>(scene, at, surface, dir, seen, lanes);
   };
-  const auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(materials, v.material, s.uv, uv_width,
-                                                              make_point, v.active);
+  const auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(materials, v.material, s.uv,
+                                                              footprint, make_point, v.active);
   Color<F> throughput = path.throughput;
   if constexpr (Bsdf::kAbsorbs) throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
   return {textured_inputs, reads_texture, textured, s, params, Bsdf(params, schlick), throughput};
