@@ -17,7 +17,7 @@ enum Feature : uint32_t {
   kNotes = 16,        ///< AOVs of vertices, histories of paths
   kExperiments = 32,  ///< cosine sampling, Schlick's approximation
 };
-inline constexpr uint32_t kPlain = 0, kEverything = 63;
+inline constexpr uint32_t kPlain = kNotes, kEverything = 63;
 
 /// Whether there are plain kernels and least variants for packets of F: for the widest ones.
 /// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.

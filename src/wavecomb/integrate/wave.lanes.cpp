@@ -46,7 +46,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     store_row<RadianceRow, float>(wave.pool.radiance, i, {}, true);
     if (wave.pool.cold) store_row<PathColdRow, float>(wave.pool.cold, i, {u, 0u}, true);
   }
-  const auto& kernels = kernels_for<F, NoMedia>(wave, context, settings, 1);
+  const auto& kernels = kernels_for<F, NoMedia>(context, settings);
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {
     // Packets that are to be filled in part only are batches of their own.

@@ -52,21 +52,19 @@ inline void spread_batch(Wave& wave, size_t begin, size_t end,
   wave.aovs.spread_cost(end - begin, start, slot);
 }
 
-/// Whether vertices of this depth ask for nothing that plain kernels know nothing of.
-inline bool is_plain(const Wave& wave, const WaveContext& context, const ShadeSettings& settings,
-                     uint32_t depth) {
+/// Whether scene and settings ask for nothing that plain kernels know nothing of.
+inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) {
   const SceneView& scene = context.scene;
   return !scene.has_motion && !scene.has_curves && !context.links() && !scene.mesh_lights &&
-         !scene.lights.has_sampled_only && !wave.aovs.wants_vertex(depth) && !wave.history &&
-         !settings.cosine_sampling && !settings.schlick_fresnel;
+         !scene.lights.has_sampled_only && !settings.cosine_sampling && !settings.schlick_fresnel;
 }
 
-/// The kernels, by variant, for vertices of this depth.
+/// The kernels, by variant.
 template <typename F, typename Media>
-const detail::BatchKernels<F>& kernels_for(const Wave& wave, const WaveContext& context,
-                                           const ShadeSettings& settings, uint32_t depth) {
+const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
+                                           const ShadeSettings& settings) {
   if constexpr (kHasPlain<F> && !Media::kAny)
-    if (is_plain(wave, context, settings, depth)) return kShadePlain<F>;
+    if (is_plain(context, settings)) return kShadePlain<F>;
   return kShadeBatch<F, typename Media::template Programs<F>>;
 }
 
@@ -74,7 +72,7 @@ const detail::BatchKernels<F>& kernels_for(const Wave& wave, const WaveContext& 
 template <typename F, typename Media>
 void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
   const ShadingQueue& queue = wave.shading;
-  const auto& kernels = kernels_for<F, Media>(wave, context, settings, depth);
+  const auto& kernels = kernels_for<F, Media>(context, settings);
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
     const size_t end = batch_end<F>(queue, begin);
