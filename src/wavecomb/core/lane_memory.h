@@ -161,6 +161,30 @@ inline U lookup16(const uint32_t* table, const U& index) {
   }
 }
 
+/// table[index] of 256 floats in each lane; index < 256. Out of registers where they are wide
+/// enough: a third of what a gather takes (Zen 4).
+template <typename F>
+inline F lookup256(const float* table, const UInt<F>& index) {
+#if defined(__AVX512F__)
+  if constexpr (!kIsScalar<F> && kWidth<F> == 16) {
+    // Each permutation looks in 32 entries by the low five bits; the others say which one counts.
+    const __m512i part = _mm512_srli_epi32(index.m, 5);
+    __m512 value =
+        _mm512_permutex2var_ps(_mm512_loadu_ps(table), index.m, _mm512_loadu_ps(table + 16));
+    for (int k = 1; k < 8; ++k) {
+      const float* at = table + 32 * k;
+      const __m512 here =
+          _mm512_permutex2var_ps(_mm512_loadu_ps(at), index.m, _mm512_loadu_ps(at + 16));
+      value = _mm512_mask_mov_ps(value, _mm512_cmpeq_epi32_mask(part, _mm512_set1_epi32(k)), here);
+    }
+    return F(value);
+  } else
+#endif
+  {
+    return gather<F>(table, index, Mask<F>(true));
+  }
+}
+
 /// Bits in reverse order, lane by lane.
 template <typename U>
 inline U reverse_bits(U x) {

@@ -153,10 +153,10 @@ inline UInt<F> fetch_word(const TextureView& texture, const UInt<F>& word, const
   return float_bits<F>(gather<F>(texture.texels, word, active));
 }
 
-/// Linear value of the low byte.
+/// Linear value of a byte.
 template <typename F>
-inline F decode_u8(bool srgb, const UInt<F>& byte, const Mask<F>& active) {
-  if (srgb) return gather<F>(kSrgbToLinear.data(), byte, active);
+inline F decode_u8(bool srgb, const UInt<F>& byte) {
+  if (srgb) return lookup256<F>(kSrgbToLinear.data(), byte);
   return F(Int<F>(byte)) * (1.f / 255.f);
 }
 
@@ -168,7 +168,7 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
     F value(0.f);
     if (texture.format == TexelFormat::kU8) {
       const UInt<F> word = fetch_word<F>(texture, i >> 2, active);
-      value = decode_u8<F>(texture.srgb, (word >> ((i & 3u) << 3)) & 0xffu, active);
+      value = decode_u8<F>(texture.srgb, (word >> ((i & 3u) << 3)) & 0xffu);
     } else if (texture.format == TexelFormat::kF16) {
       const UInt<F> word = fetch_word<F>(texture, i >> 1, active);
       value = half_to_float<F>((word >> ((i & 1u) << 4)) & 0xffffu);
@@ -180,10 +180,10 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
   Texel<F> t;
   if (texture.format == TexelFormat::kU8) {
     const UInt<F> word = fetch_word<F>(texture, i, active);
-    t.r = decode_u8<F>(texture.srgb, word & 0xffu, active);
-    t.g = decode_u8<F>(texture.srgb, (word >> 8) & 0xffu, active);
-    t.b = decode_u8<F>(texture.srgb, (word >> 16) & 0xffu, active);
-    t.a = texture.has_alpha ? decode_u8<F>(false, word >> 24, active) : one;
+    t.r = decode_u8<F>(texture.srgb, word & 0xffu);
+    t.g = decode_u8<F>(texture.srgb, (word >> 8) & 0xffu);
+    t.b = decode_u8<F>(texture.srgb, (word >> 16) & 0xffu);
+    t.a = texture.has_alpha ? decode_u8<F>(false, word >> 24) : one;
   } else if (texture.format == TexelFormat::kF16) {
     const auto words = load_rows<2, F>(texture.texels, i << 1, active);
     const UInt<F> rg = float_bits<F>(words[0]), ba = float_bits<F>(words[1]);
