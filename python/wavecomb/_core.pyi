@@ -461,6 +461,8 @@ class Settings:
     """Limit of a sample's indirect light; biased. Default: off. 0: off."""
     fresnel: Literal["exact", "schlick"]
     """Reflectance of dielectrics. Default: exact."""
+    texture_filter: Literal["auto", "whole"]
+    """How textures are filtered. Default: auto."""
     cosine_sampling: bool
     """Samples every bounce that is not a mirror's by cosine. Default: False."""
     error: bool

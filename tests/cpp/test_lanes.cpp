@@ -346,6 +346,21 @@ TEST(Lanes, Lookup16ReadsATable) {
   });
 }
 
+TEST(Lanes, Lookup256ReadsATable) {
+  std::mt19937 rng(18);
+  alignas(64) float table[256];
+  for (float& x : table) x = static_cast<float>(rng());
+  for_each_lane_type([&]<typename F>() {
+    for (uint32_t shift = 0; shift < 256; ++shift) {  // every entry in every lane
+      uint32_t index[16];
+      for (uint32_t k = 0; k < 16; ++k) index[k] = (k * 37 + shift) % 256;
+      const F value = lookup256<F>(table, load<UInt<F>>(index));
+      for (size_t k = 0; k < kWidth<F>; ++k)
+        ASSERT_EQ(lane(value, k), table[index[k]]) << kWidth<F> << " lanes, lane " << k;
+    }
+  });
+}
+
 TEST(Lanes, ReverseBits) {
   std::mt19937 rng(19);
   std::vector<uint32_t> x = {0u, 0xffffffffu, 0x0f0f0f0fu, 0x12345678u};

@@ -286,6 +286,77 @@ std::vector<float> look_up(const TextureView& view, const std::vector<float>& s,
   return out;
 }
 
+/// The same by one texel each, chosen by `bits`.
+template <typename F>
+std::vector<float> look_up_one(const TextureView& view, const std::vector<float>& s,
+                               const std::vector<float>& t, const std::vector<float>& width,
+                               const std::vector<uint32_t>& bits) {
+  std::vector<float> out(4 * s.size());
+  for (size_t i = 0; i < s.size(); i += kWidth<F>) {
+    const Footprint<F> footprint(load<F>(&width[i]), load<UInt<F>>(&bits[i]));
+    const Texel<F> x = lookup<F>(view, load<F>(&s[i]), load<F>(&t[i]), footprint, Mask<F>(true));
+    store(&out[i], x.r);
+    store(&out[s.size() + i], x.g);
+    store(&out[2 * s.size() + i], x.b);
+    store(&out[3 * s.size() + i], x.a);
+  }
+  return out;
+}
+
+/// Random numbers for as many lookups.
+std::vector<uint32_t> random_bits(size_t n, uint32_t seed) {
+  std::vector<uint32_t> bits(n);
+  for (size_t i = 0; i < n; ++i)
+    bits[i] = hash_u32<uint32_t>(static_cast<uint32_t>(i), uint32_t{seed});
+  return bits;
+}
+
+TEST(Lookup, OneTexelIsTheSameAtEveryWidthOfLanes) {
+  const auto s = padded({0.f, 1.f, 0.5f}, 513, -2.2f, 3.2f, 31);
+  const auto t = padded({0.f, 1.f, 1.f}, 513, -2.2f, 3.2f, 32);
+  const auto width = padded({0.f, -1.f, 1.f}, 513, -0.3f, 0.6f, 33);
+  const auto bits = random_bits(s.size(), 34);
+  for (const TexelFormat format : kFormats)
+    for (const Wrap wrap : kWraps) {
+      Image image = make_image(13, 21, 4, format, true, wrap, wrap, 35);
+      const Texture texture = make_texture(image);
+      const auto scalar = look_up_one<float>(texture.view(), s, t, width, bits);
+      for_each_packet([&]<typename F>() {
+        expect_same(scalar, look_up_one<F>(texture.view(), s, t, width, bits), "one texel");
+      });
+    }
+}
+
+/// Each texel is chosen as often as it weighs: numbers in a grid, the middle of each of 64 x 64
+/// places and 16 levels, have the filter's mean to the grid's step.
+TEST(Lookup, OneTexelHasTheMeanOfTheFilter) {
+  constexpr uint32_t kPlaces = 64, kLevels = 16;
+  const auto s = padded({0.f, 1.f, 0.5f}, 41, -2.2f, 3.2f, 41);
+  const auto t = padded({0.f, 1.f, 1.f}, 41, -2.2f, 3.2f, 42);
+  const auto width = padded({0.f, 1.f, 0.07f}, 41, -0.1f, 0.3f, 43);
+  for (const Wrap wrap : kWraps) {
+    Image image = make_image(16, 8, 4, TexelFormat::kF32, false, wrap, wrap, 44);
+    const Texture texture = make_texture(image);
+    const TextureView view = texture.view();
+    for (size_t i = 0; i < s.size(); ++i) {
+      double mean = 0;
+      for (uint32_t level = 0; level < kLevels; ++level)
+        for (uint32_t y = 0; y < kPlaces; ++y)
+          for (uint32_t x = 0; x < kPlaces; ++x) {
+            const uint32_t bits = (level * (1024 / kLevels) + 512 / kLevels) << 22 |
+                                  (y * (2048 / kPlaces) + 1024 / kPlaces) << 11 |
+                                  (x * (2048 / kPlaces) + 1024 / kPlaces);
+            mean += double{lookup<float>(view, s[i], t[i], {width[i], bits}, true).r};
+          }
+      mean /= kLevels * kPlaces * kPlaces;
+      const double filtered = double{lookup<float>(view, s[i], t[i], width[i], true).r};
+      // The shares of two levels are rounded to half of the grid's step, those of two texels of
+      // both axes, too; texels are 4 apart at most.
+      EXPECT_NEAR(mean, filtered, 4 * (0.5 / kLevels + 1.0 / kPlaces)) << i;
+    }
+  }
+}
+
 TEST(Lookup, AgreesWithTheReferenceInAllFormatsAndWraps) {
   const auto s = padded({0.f, 1.f, 0.5f, -0.f, 2.f, -1.f, 0.25f}, 1001, -2.2f, 3.2f, 21);
   const auto t = padded({0.f, 1.f, 1.f, 0.5f, -2.f, 3.f, 0.75f}, 1001, -2.2f, 3.2f, 22);

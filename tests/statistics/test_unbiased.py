@@ -36,6 +36,7 @@ def mixed(generated: Any) -> Any:
         ("late roulette", {"roulette": "throughput", "roulette_depth": 4}),
         ("sobol", {"sampler": "sobol"}),
         ("cosine", {"cosine_sampling": True}),
+        ("textures", {"texture_filter": "whole"}),
     ],
 )
 @pytest.mark.parametrize("scene", ["cornell", "mixed"])
