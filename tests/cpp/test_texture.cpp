@@ -7,6 +7,7 @@
 
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/hash.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb {
