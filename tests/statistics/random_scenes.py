@@ -175,7 +175,7 @@ def settings(random: Generator, features: list[str]) -> dict[str, Any]:
         "sampler": one("independent", "independent", "sobol"),
         "roulette": one("off", "off", "throughput", "cost-aware"),
         "roulette_depth": 1,
-        # As the naive integrator does: where shading is not linear in what is read, one texel has another mean.
+        # As the naive integrator does: one texel has another mean where shading is not linear.
         "texture_filter": "whole",
         "light_selection": one("auto", "tree", "power"),
         "cosine_sampling": bool(random.random() < 0.15),
