@@ -133,8 +133,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       v.coat_compensation = layer.compensation;
       coat_albedo = v.coat_on * layer.albedo;
       v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_.weight)));
-      v.coated =
-          darkened(v, z) * coat_.tint(z) * F(v.under_fuzz * F(coat_.weight - coat_albedo));
+      v.coated = darkened(v, z) * coat_.tint(z) * F(v.under_fuzz * F(coat_.weight - coat_albedo));
     }
     choose_shares(v, F(v.under_fuzz * coat_albedo));
     return v;
