@@ -2,7 +2,8 @@
 """Wavecomb beside Mitsuba 3 and Cycles on the same stages: speed, noise, memory, first picture.
 
     benchmarks/peers/setup                      # once: Cycles, in an environment of its own
-    python benchmarks/peers/compare.py --rounds 3 --threads 2 --stages cornell,mixed,dragon
+    python benchmarks/peers/compare.py --rounds 5 --plain --stages cornell,mixed,dragon,room
+    python benchmarks/peers/compare.py --stages shot.usd          # or any stage of meshes
     python benchmarks/peers/compare.py --quick                    # does it run?
 
 All renderers get the same arrays, camera, box filter and depth; no denoising, clamping, adaptive
@@ -38,25 +39,35 @@ from renderers import RENDERERS, ROOT, Job
 from report import commit, machine, summary, tables
 from speed import rounds
 
-SCENES = ("cornell", "mixed", "dragon")
+SCENES = ("cornell", "mixed", "dragon", "room")
 
 
 def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
-    """Writes a stage and its recorded arrays where they are missing."""
+    """Writes a generated stage where it is missing, and the arrays of any."""
     from recording import record
 
     from wavecomb.scenes import write_scene
 
-    stage = args.cache / f"{scene}.usdc"
-    recorded = args.cache / f"{scene}-recorded"
-    if not stage.exists():
-        write_scene(scene, stage, aspect=1.0)
+    if scene in SCENES:
+        stage = args.cache / f"{label(scene, args)}.usdc"
+        if not stage.exists():
+            write_scene(scene, stage, aspect=1.0, plain=args.plain)
+    else:
+        stage = Path(scene)
+    recorded = args.cache / f"{label(scene, args)}-recorded"
     # Always anew: the reader may have changed.
     record(stage).save(recorded)
     digest = hashlib.sha1()
     for file in sorted(recorded.iterdir()):
         digest.update(file.read_bytes())
     return Job(stage, recorded, digest.hexdigest(), size, args.threads, args.max_depth)
+
+
+def label(scene: str, args: argparse.Namespace) -> str:
+    """What a stage is called in tables and files."""
+    if scene not in SCENES:
+        return Path(scene).stem
+    return f"{scene}-plain" if args.plain and scene != "room" else scene
 
 
 def measure(scene: str, args: argparse.Namespace) -> dict[str, Any]:
@@ -76,7 +87,7 @@ def measure(scene: str, args: argparse.Namespace) -> dict[str, Any]:
     if noise:
         for name, ratios in out["ratios"].items():
             ratios["picture"] = differ(found.converged("wavecomb"), found.converged(name))
-        show(args.cache / f"{scene}.png", args.renderers, found)
+        show(args.cache / f"{label(scene, args)}.png", args.renderers, found)
     return out
 
 
@@ -110,7 +121,7 @@ def arguments() -> argparse.Namespace:
         def parse(text: str) -> list[str]:
             names = text.split(",")
             for name in names:
-                if name not in known:
+                if name not in known and not (known is SCENES and Path(name).is_file()):
                     raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(known)}")
             return names
 
@@ -120,7 +131,8 @@ def arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--stages", type=listed(SCENES), default=list(SCENES), help=",".join(SCENES))
+    add("--stages", type=listed(SCENES), default=list(SCENES), help=",".join(SCENES) + ", or files")
+    add("--plain", action="store_true", help="generated stages without names of programs")
     add("--renderers", type=listed(RENDERERS), default=list(RENDERERS), help=",".join(RENDERERS))
     add("--rounds", type=int, default=3)
     add("--threads", type=int, default=2)
@@ -160,7 +172,7 @@ def main() -> None:
     output = args.output or ROOT / "benchmarks" / "results" / "peers.json"
     output.parent.mkdir(parents=True, exist_ok=True)
     for scene in args.stages:
-        result["scenes"][scene] = measure(scene, args)
+        result["scenes"][label(scene, args)] = measure(scene, args)
         result["machine"]["load_after"] = list(os.getloadavg())
         part = output.with_suffix(".part")
         part.write_text(json.dumps(result, indent=1) + "\n")
