@@ -31,7 +31,10 @@ RINGS = 32
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape: positions, normals (n, 3), uvs (n, 2), triangles (m, 3)."""
+    """A shape: positions, normals (n, 3), uvs (n, 2), triangles (m, 3).
+
+    Contract: prims of equal sizes share the arrays; nobody writes to them.
+    """
 
     positions: Array
     normals: Array
@@ -89,7 +92,12 @@ def _cone(number: Number, token: Token) -> Shape:
 
 def _cube(number: Number, token: Token) -> Shape:
     del token
-    half = 0.5 * number("size", 2.0)
+    return _box(0.5 * number("size", 2.0))
+
+
+@lru_cache(maxsize=256)
+def _box(half: float) -> Shape:
+    """A cube from -half to half."""
     positions, normals, uvs = [], [], []
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
     for axis in range(3):
@@ -113,11 +121,15 @@ def _cube(number: Number, token: Token) -> Shape:
 
 
 def _plane(number: Number, token: Token) -> Shape:
-    w, h = 0.5 * number("width", 2.0), 0.5 * number("length", 2.0)
+    return _rectangle(0.5 * number("width", 2.0), 0.5 * number("length", 2.0), token("axis", "Z"))
+
+
+@lru_cache(maxsize=256)
+def _rectangle(w: float, h: float, axis: str) -> Shape:
+    """A plane from (-w, -h) to (w, h), whose normal is an axis."""
     corners = np.array([[-w, -h, 0], [w, -h, 0], [w, h, 0], [-w, h, 0]])
     normals = np.tile([0.0, 0.0, 1.0], (4, 1))
     uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
-    axis = token("axis", "Z")
     return Shape(
         _turn_plane(corners, axis),
         _turn_plane(normals, axis),
