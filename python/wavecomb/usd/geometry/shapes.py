@@ -42,8 +42,11 @@ class Shape:
     triangles: NDArray[np.uint32]
 
 
-def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
-    """The shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane prim; None for others."""
+def read_shape(prim: Usd.Prim, time: Usd.TimeCode, names: frozenset[str]) -> Shape | None:
+    """The shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane prim; None for others.
+
+    ``names``: of what is authored; sizes are asked for all the same, as value clips may have them.
+    """
     kind = str(prim.GetTypeName())
     if kind not in _READERS:
         return None
@@ -59,7 +62,7 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
         return word(value) if word(value) in ("X", "Y", "Z") else default
 
     shape = _READERS[kind](number, token)
-    if prim.GetAttribute("orientation").Get(time) == "leftHanded":
+    if "orientation" in names and prim.GetAttribute("orientation").Get(time) == "leftHanded":
         inward = np.ascontiguousarray(shape.triangles[:, ::-1])
         return Shape(shape.positions, -shape.normals, shape.uvs, inward)
     return shape
