@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import cProfile
 import json
 import os
 import subprocess
@@ -15,11 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 from parts import only_where
-from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 from usd_recorder import Recorder
 
+import wavecomb
 from wavecomb.picture.image import write_png
 from wavecomb.usd import load_stage
+from wavecomb.usd.geometry.primvar import authored_names
+from wavecomb.usd.geometry.shapes import read_shape
 from wavecomb.usd.looks import pixels
 from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError
 
@@ -104,9 +108,51 @@ def test_help_imports_little() -> None:
         "import sys\nfrom wavecomb.cli import main\n"
         "try: main(['render', '--help'])\nexcept SystemExit: pass\n"
         "heavy = {'numpy', 'pxr', 'OpenImageIO', 'rich'} & set(sys.modules)\n"
-        "assert not heavy, heavy"
+        "assert not heavy, heavy\n"
+        "names = 'bench', 'compare', 'info', 'merge', 'scene', 'view'\n"
+        "others = {f'wavecomb.cli.{name}' for name in names}\n"
+        "others &= set(sys.modules)\n"
+        "assert not others, others"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def calls_to_read(path: Path, cubes: int) -> int:
+    """Calls of functions, Python's and USD's, that reading a stage of cubes takes."""
+    stage = Usd.Stage.CreateNew(str(path))
+    for i in range(cubes):
+        cube = UsdGeom.Cube.Define(stage, f"/Cube{i}")
+        cube.CreateSizeAttr(1.5)
+        cube.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
+    stage.Save()
+    profile = cProfile.Profile()
+    wavecomb.load(path, isolate=False)  # what is imported or made once is no cost of a prim
+    with profile:
+        wavecomb.load(path, isolate=False)
+    return sum(entry.callcount for entry in profile.getstats())
+
+
+def test_a_cube_takes_few_calls(tmp_path: Path) -> None:
+    few, many = (calls_to_read(tmp_path / f"{n}.usdc", n) for n in (100, 300))
+    # 140 where each cube was made anew.
+    assert (many - few) / 200 < 110
+
+
+def test_shapes_of_equal_size_share_their_arrays() -> None:
+    stage = Usd.Stage.CreateInMemory()
+    cubes = [UsdGeom.Cube.Define(stage, f"/Cube{i}") for i in range(3)]
+    cubes[2].CreateSizeAttr(3.0)
+    cubes[1].CreateSizeAttr(2.0)
+    cubes[1].CreateOrientationAttr("leftHanded")
+    plane, time = UsdGeom.Plane.Define(stage, "/Plane").GetPrim(), Usd.TimeCode.Default()
+    one, turned, large = (
+        read_shape(cube.GetPrim(), time, authored_names(cube.GetPrim())) for cube in cubes
+    )
+    assert one is not None and turned is not None and large is not None
+    assert one.positions is turned.positions
+    np.testing.assert_array_equal(one.normals, -turned.normals)
+    assert large.positions.max() == 1.5 and one.positions.max() == 1.0
+    assert read_shape(plane, time, frozenset()) is read_shape(plane, time, frozenset())
 
 
 def big_mesh(path: Path, side: int, smooth: bool) -> None:

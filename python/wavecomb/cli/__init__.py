@@ -7,15 +7,8 @@ import os
 
 import click
 
-from wavecomb.cli.bench import bench_command
-from wavecomb.cli.compare import compare_command
 from wavecomb.cli.group import Commands, print_version
-from wavecomb.cli.info import info_command
-from wavecomb.cli.merge import merge_command
 from wavecomb.cli.options import examples
-from wavecomb.cli.render import render_command
-from wavecomb.cli.scene import scene_command
-from wavecomb.cli.view import view_command
 
 __all__ = ["main"]
 
@@ -47,12 +40,3 @@ def main() -> None:
     """
     # NumPy's matrix products here are three wide: more threads would only spin beside ours.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-main.add_command(render_command)
-main.add_command(view_command)
-main.add_command(info_command)
-main.add_command(scene_command)
-main.add_command(compare_command)
-main.add_command(merge_command)
-main.add_command(bench_command)

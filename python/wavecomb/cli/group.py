@@ -7,6 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, NoReturn
 
 import click
@@ -17,15 +18,29 @@ ERROR = 2
 INTERRUPTED = 130
 
 
+NAMES = ("render", "view", "info", "scene", "compare", "merge", "bench")
+"""The commands, in the order of the help; ``wavecomb.cli.NAME`` has ``NAME_command``."""
+
+
 class Commands(click.Group):
     """A group that turns every exception into one line on stderr and an exit code.
 
-    ``WAVECOMB_DEBUG=1`` shows tracebacks instead.
+    ``WAVECOMB_DEBUG=1`` shows tracebacks instead. A command's module is imported when it is asked
+    for, so that ``wavecomb render`` does not wait for the others.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """In the order they were added."""
-        return list(self.commands)
+        """In the order of ``NAMES``."""
+        return list(NAMES)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of a name; None: there is none."""
+        if cmd_name not in NAMES:
+            return None
+        command: click.Command = getattr(
+            import_module(f"wavecomb.cli.{cmd_name}"), f"{cmd_name}_command"
+        )
+        return command
 
     def main(
         self,

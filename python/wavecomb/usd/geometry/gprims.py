@@ -96,8 +96,8 @@ class GprimReader:
                 self.time, report, self.surfaces.subdivide, self.skeletons, self.motion
             )
             if kind == "shape":
-                return meshes.shape(draw.prim, draw.matrix)
-            mesh = meshes.mesh(draw.prim, draw.matrix, names, draw.inherited, displaced)
+                return meshes.shape(draw.prim, draw.matrix, draw.names)
+            mesh = meshes.mesh(draw.prim, draw.matrix, names, draw.names, draw.inherited, displaced)
             if mesh is not None and self.deforms(kind, draw.prim):
                 return meshes.over_shutter(draw.prim, mesh, draw.matrix, draw.track)
             return mesh

@@ -88,10 +88,10 @@ class MeshReader:
         self.skeletons = skeletons
         self.motion = motion
 
-    def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> MeshArrays:
-        """An implicit shape, in its group's space."""
+    def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d, names: frozenset[str]) -> MeshArrays:
+        """An implicit shape, in its group's space; ``names``: of what is authored."""
         mirrored = check_matrix(matrix)
-        shape = read_shape(prim, self.time)
+        shape = read_shape(prim, self.time, names)
         if shape is None or len(shape.triangles) == 0:
             raise MeshError("no faces")
         positions = bake(shape.positions, matrix)
@@ -109,6 +109,7 @@ class MeshReader:
         prim: Usd.Prim,
         matrix: Gf.Matrix4d,
         uv_names: Sequence[str],
+        names: frozenset[str],
         inherited: Sequence[Any] = (),
         displaced: bool = False,
     ) -> MeshArrays | None:
@@ -118,6 +119,7 @@ class MeshReader:
             prim: A UsdGeomMesh.
             matrix: From the mesh to its group.
             uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
+            names: Properties that it has opinions of (``authored_names``).
             inherited: Primvars of its ancestors.
             displaced: Its points will be moved.
 
@@ -127,7 +129,6 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         skin = self._skin(prim)
-        names = authored_names(prim)
         value = points_now(prim, time) if "velocities" in names else get("points").Get(time)
         points = as_array(value)
         if skin is not None and points is not None and len(points):

@@ -99,7 +99,8 @@ def extent(positions: Array) -> Array:
     bounds = np.empty((2, 3), np.float32)
     np.minimum.reduce(positions, axis=0, out=bounds[0])
     np.maximum.reduce(positions, axis=0, out=bounds[1])
+    (a, b, c), (x, y, z) = bounds.tolist()
     # Written so that NaN fails too.
-    if not (bounds[0].min() > -LIMIT and bounds[1].max() < LIMIT):
+    if not (a > -LIMIT and b > -LIMIT and c > -LIMIT and x < LIMIT and y < LIMIT and z < LIMIT):
         raise MeshError("a point is not finite or absurdly far away")
     return bounds

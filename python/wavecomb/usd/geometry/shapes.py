@@ -31,7 +31,10 @@ RINGS = 32
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape: positions, normals (n, 3), uvs (n, 2), triangles (m, 3)."""
+    """A shape: positions, normals (n, 3), uvs (n, 2), triangles (m, 3).
+
+    Contract: prims of equal sizes share the arrays; nobody writes to them.
+    """
 
     positions: Array
     normals: Array
@@ -39,8 +42,11 @@ class Shape:
     triangles: NDArray[np.uint32]
 
 
-def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
-    """The shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane prim; None for others."""
+def read_shape(prim: Usd.Prim, time: Usd.TimeCode, names: frozenset[str]) -> Shape | None:
+    """The shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane prim; None for others.
+
+    ``names``: of what is authored; sizes are asked for all the same, as value clips may have them.
+    """
     kind = str(prim.GetTypeName())
     if kind not in _READERS:
         return None
@@ -56,7 +62,7 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
         return word(value) if word(value) in ("X", "Y", "Z") else default
 
     shape = _READERS[kind](number, token)
-    if prim.GetAttribute("orientation").Get(time) == "leftHanded":
+    if "orientation" in names and prim.GetAttribute("orientation").Get(time) == "leftHanded":
         inward = np.ascontiguousarray(shape.triangles[:, ::-1])
         return Shape(shape.positions, -shape.normals, shape.uvs, inward)
     return shape
@@ -89,7 +95,12 @@ def _cone(number: Number, token: Token) -> Shape:
 
 def _cube(number: Number, token: Token) -> Shape:
     del token
-    half = 0.5 * number("size", 2.0)
+    return _box(0.5 * number("size", 2.0))
+
+
+@lru_cache(maxsize=256)
+def _box(half: float) -> Shape:
+    """A cube from -half to half."""
     positions, normals, uvs = [], [], []
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
     for axis in range(3):
@@ -113,11 +124,15 @@ def _cube(number: Number, token: Token) -> Shape:
 
 
 def _plane(number: Number, token: Token) -> Shape:
-    w, h = 0.5 * number("width", 2.0), 0.5 * number("length", 2.0)
+    return _rectangle(0.5 * number("width", 2.0), 0.5 * number("length", 2.0), token("axis", "Z"))
+
+
+@lru_cache(maxsize=256)
+def _rectangle(w: float, h: float, axis: str) -> Shape:
+    """A plane from (-w, -h) to (w, h), whose normal is an axis."""
     corners = np.array([[-w, -h, 0], [w, -h, 0], [w, h, 0], [-w, h, 0]])
     normals = np.tile([0.0, 0.0, 1.0], (4, 1))
     uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
-    axis = token("axis", "Z")
     return Shape(
         _turn_plane(corners, axis),
         _turn_plane(normals, axis),

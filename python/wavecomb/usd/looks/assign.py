@@ -40,6 +40,7 @@ class Draw:
         material: Bound to it.
         subset_materials: Bound to each subset.
         track: In place of ``matrix`` where that changes while the shutter is open.
+        names: Properties that it has opinions of (``authored_names``).
     """
 
     prim: Usd.Prim
@@ -49,6 +50,7 @@ class Draw:
     material: UsdShade.Material | None = None
     subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
     track: Track | None = None
+    names: frozenset[str] = frozenset()
 
 
 @dataclass

@@ -79,6 +79,7 @@ class Traversal:
         self.xforms = UsdGeom.XformCache(time)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
+        self._names: dict[frozenset[str], frozenset[str]] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
         """What a prim is to the walk; found once for each type."""
@@ -168,7 +169,9 @@ class Traversal:
             if kind in DRAWN:
                 if shown:
                     subsets = [c for c in children if _binds(c)] if children else ()
-                    found.draws.append(Draw(prim, matrix, inherited, subsets, track=track))
+                    names = self._names.setdefault(names, names)  # most prims share theirs
+                    draw = Draw(prim, matrix, inherited, subsets, track=track, names=names)
+                    found.draws.append(draw)
             elif kind == "instancer":
                 if shown:
                     placed = Placed(prim, matrix, purpose, inherited, track=track)
