@@ -3,11 +3,8 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 
 def usable_cores() -> int:
@@ -31,21 +28,6 @@ def give_back_memory() -> None:
     from wavecomb import _core
 
     _core.give_back_memory()
-
-
-@contextmanager
-def without_collection() -> Iterator[None]:
-    """Has Python look for no reference cycles meanwhile.
-
-    Where much is made and kept, each look goes through all of it and finds nothing.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def temporary_folder() -> str:

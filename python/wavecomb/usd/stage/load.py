@@ -16,7 +16,7 @@ from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.load_options import LoadOptions
-from wavecomb.machine import give_back_memory, without_collection
+from wavecomb.machine import give_back_memory
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import trail
 from wavecomb.run.isolate.memory import describe_limit
@@ -148,8 +148,7 @@ def load_stage(
 
         try:
             choice = _Choice(opened, chosen, editable)
-            with without_collection():
-                filled = _fill(builder, choice, textures, report, surfaces_of, cache, progress)
+            filled = _fill(builder, choice, textures, report, surfaces_of, cache, progress)
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
         except Tf.ErrorException as error:
