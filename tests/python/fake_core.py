@@ -20,6 +20,7 @@ import wavecomb
 from wavecomb.errors import WavecombError
 from wavecomb.load_options import LoadOptions
 from wavecomb.options import settings
+from wavecomb.run.aovs import core_aovs
 
 
 class Error(ValueError):
@@ -174,6 +175,7 @@ class Fake:
 def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     """Puts the stand-in where the native module and the loader are imported from."""
     settings()  # of the core that there is, as what these make of its tables
+    core_aovs()
     importlib.import_module("wavecomb.run.boxed.calls")
     importlib.import_module("wavecomb.usd.lights.light")
     fake = Fake()

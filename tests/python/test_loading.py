@@ -228,7 +228,8 @@ def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
     # One set of arrays is in memory after loading, not two.
     assert got["load"] - got["imports"] < 1.4 * parts["meshes"] + 10e6
     assert got["peak"] - got["imports"] <= 1.5 * sum(parts.values())
-    assert got["shares"]["1"] > 0.95
+    # The thread that asked gathers the picture: a tenth of so short a render.
+    assert got["shares"]["1"] > 0.8
     assert got["shares"]["2"] < 0.75
 
 
