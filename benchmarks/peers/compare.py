@@ -157,6 +157,18 @@ def arguments() -> argparse.Namespace:
     return args
 
 
+def told() -> list[str]:
+    """The command line but for where files go."""
+    words = iter(sys.argv[1:])
+    out = []
+    for word in words:
+        if word in ("--output", "--cache"):
+            next(words, None)
+        elif not word.startswith(("--output=", "--cache=")):
+            out.append(word)
+    return out
+
+
 def main() -> None:
     args = arguments()
     args.cache.mkdir(parents=True, exist_ok=True)
@@ -165,6 +177,8 @@ def main() -> None:
         "schema": "wavecomb-peers/2",
         "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         **commit(),
+        "command": " ".join(["benchmarks/peers/compare.py", *told()]),
+        "rounds": args.rounds,
         "machine": machine(),
         "settings": {**plain, "filter": "box"},
         "scenes": {},
