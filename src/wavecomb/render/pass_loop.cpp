@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "wavecomb/core/clock.h"
 #include "wavecomb/render/adaptive.h"
 #include "wavecomb/render/pixel_order.h"
 

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/render/pass_plan.h"
 #include "wavecomb/render/pass_runner.h"
@@ -45,8 +45,6 @@ class PassLoop {
   const PassState& pass() const { return pass_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   /// Decides on the next pass. False: the picture is done.
   bool begin_pass(std::span<const uint32_t> samples);
   bool is_late() const;

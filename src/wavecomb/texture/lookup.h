@@ -201,6 +201,17 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
   return t;
 }
 
+/// The texel of column x and row y of a level; `in`: whether they are on the image, which is black
+/// beyond it where the texture wraps so.
+template <typename F>
+inline Texel<F> tap(const TextureView& texture, const LevelLanes<F>& level, const UInt<F>& x,
+                    const UInt<F>& y, const Mask<F>& in, const Mask<F>& active) {
+  const Texel<F> texel = fetch<F>(texture, texel_place<F>(level, x, y), active);
+  if (texture.wrap_s != Wrap::kBlack && texture.wrap_t != Wrap::kBlack) return texel;
+  const F zero(0.f);
+  return select_texel<F>(in, texel, {zero, zero, zero, texture.has_alpha ? zero : F(1.f)});
+}
+
 /// Bilinear lookup in one level; s and t as wrap_coordinate gives them.
 template <typename F>
 inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level, const F& s,
@@ -209,18 +220,13 @@ inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level,
   // Rows count from the top, t from the bottom.
   const Taps<F> x = make_taps<F>(texture.wrap_s, fma(s, width, F(-0.5f)), level.width);
   const Taps<F> y = make_taps<F>(texture.wrap_t, fnma(t, height, F(height - 0.5f)), level.height);
-  const auto tap = [&](const UInt<F>& i, const UInt<F>& j, const Mask<F>& in) {
-    Texel<F> texel = fetch<F>(texture, texel_place<F>(level, i, j), active);
-    if (texture.wrap_s == Wrap::kBlack || texture.wrap_t == Wrap::kBlack) {
-      const F zero(0.f);
-      texel = select_texel<F>(in, texel, {zero, zero, zero, texture.has_alpha ? zero : F(1.f)});
-    }
-    return texel;
+  const auto at = [&](const UInt<F>& i, const UInt<F>& j, const Mask<F>& in) {
+    return tap<F>(texture, level, i, j, in, active);
   };
   const Texel<F> top =
-      lerp_texel<F>(tap(x.i0, y.i0, x.in0 & y.in0), tap(x.i1, y.i0, x.in1 & y.in0), x.weight);
+      lerp_texel<F>(at(x.i0, y.i0, x.in0 & y.in0), at(x.i1, y.i0, x.in1 & y.in0), x.weight);
   const Texel<F> low =
-      lerp_texel<F>(tap(x.i0, y.i1, x.in0 & y.in1), tap(x.i1, y.i1, x.in1 & y.in1), x.weight);
+      lerp_texel<F>(at(x.i0, y.i1, x.in0 & y.in1), at(x.i1, y.i1, x.in1 & y.in1), x.weight);
   return lerp_texel<F>(top, low, y.weight);
 }
 
@@ -232,13 +238,7 @@ inline Texel<F> one_texel(const TextureView& texture, const LevelLanes<F>& level
   const F left = footprint.number(0, 11) - 0.5f, up = footprint.number(11, 11) - 0.5f;
   const Taps<F> x = make_taps<F>(texture.wrap_s, fma(s, width, left), level.width);
   const Taps<F> y = make_taps<F>(texture.wrap_t, fnma(t, height, F(height + up)), level.height);
-  Texel<F> texel = fetch<F>(texture, texel_place<F>(level, x.i0, y.i0), active);
-  if (texture.wrap_s == Wrap::kBlack || texture.wrap_t == Wrap::kBlack) {
-    const F zero(0.f);
-    texel = select_texel<F>(x.in0 & y.in0, texel,
-                            {zero, zero, zero, texture.has_alpha ? zero : F(1.f)});
-  }
-  return texel;
+  return tap<F>(texture, level, x.i0, y.i0, x.in0 & y.in0, active);
 }
 
 /// `lookup` in a texture that is not made of tiles.
