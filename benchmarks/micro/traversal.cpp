@@ -3,6 +3,7 @@
 #include <map>
 
 #include "scene_testing.h"
+#include "spheres.h"
 #include "wavecomb/render/ray_recording.h"
 #include "widths.h"
 
@@ -11,25 +12,9 @@ namespace {
 
 using namespace scene_testing;
 
-/// A box with spheres in it: 20 triangles, or some millions.
+/// A box of 20 triangles or so, or one with a million in it.
 ScenePtr make_scene(bool large) {
-  if (!large) return cornell();
-  SceneBuilder b;
-  const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.7f, 0.7f, 0.7f}));
-  MeshData room = box({-1, -1, -1}, {1, 1, 1});
-  room.indices.resize(30);  // open towards +z
-  b.add_to_group(0, b.add_mesh(make_mesh(room, white)));
-  for (int i = 0; i < 8; ++i) {
-    const float x = i & 1 ? 0.45f : -0.45f, y = i & 2 ? 0.45f : -0.45f, z = i & 4 ? 0.4f : -0.5f;
-    MeshData ball = sphere(256, true);
-    ball.transform(translate(x, y, z) * scale(0.35f, 0.35f, 0.35f));
-    b.add_to_group(0, b.add_mesh(make_mesh(ball, white)));
-  }
-  Light light = make_light(LightKind::kRect, {12, 11, 9}, translate(0, 0.99f, 0) * rotate(0, -90));
-  light.width = light.height = 0.5f;
-  b.add_light(light);
-  b.set_camera(make_camera({0, 0, 3.6}, {0, 0, 0}, 0.9f));
-  return b.build();
+  return large ? spheres(256) : cornell();
 }
 
 /// The rays of a picture of 128 x 128 with 16 samples, all diffuse bounces, in slot order or put in

@@ -10,6 +10,7 @@
 
 #include "embree_modes.h"
 #include "scene_testing.h"
+#include "spheres.h"
 #include "wavecomb/integrate/ray_recorder.h"
 
 namespace wavecomb::micro {
@@ -89,26 +90,6 @@ void time_modes(const char* name, const ScenePtr& scene, int rounds) {
   }
 }
 
-/// A box with eight spheres in it.
-ScenePtr spheres() {
-  SceneBuilder b;
-  const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.7f, 0.7f, 0.7f}));
-  MeshData room = box({-1, -1, -1}, {1, 1, 1});
-  room.indices.resize(30);  // open towards +z
-  b.add_to_group(0, b.add_mesh(make_mesh(room, white)));
-  for (int i = 0; i < 8; ++i) {
-    MeshData ball = sphere(64, true);
-    ball.transform(translate(i & 1 ? 0.45f : -0.45f, i & 2 ? 0.45f : -0.45f, i & 4 ? 0.4f : -0.5f) *
-                   scale(0.35f, 0.35f, 0.35f));
-    b.add_to_group(0, b.add_mesh(make_mesh(ball, white)));
-  }
-  Light light = make_light(LightKind::kRect, {12, 11, 9}, translate(0, 0.99f, 0) * rotate(0, -90));
-  light.width = light.height = 0.5f;
-  b.add_light(light);
-  b.set_camera(make_camera({0, 0, 3.6}, {0, 0, 0}, 0.9f));
-  return b.build();
-}
-
 }  // namespace
 }  // namespace wavecomb::micro
 
@@ -120,6 +101,6 @@ int main(int argc, char** argv) {
     return 2;
   }
   time_modes("Cornell", wavecomb::scene_testing::cornell(), rounds);
-  time_modes("spheres", spheres(), rounds);
+  time_modes("spheres", spheres(64), rounds);
   return 0;
 }
