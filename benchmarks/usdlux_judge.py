@@ -59,6 +59,11 @@ class Verdict:
         return abs(self.difference) <= MEAN_LIMIT
 
     @property
+    def mean_is_open(self) -> bool:
+        """Whether the means are further apart than that, but by three standard errors at most."""
+        return 0 < abs(self.difference) - MEAN_LIMIT <= 3 * self.noise
+
+    @property
     def agrees(self) -> bool:
         """Whether that holds and each block is within noise."""
         return self.mean_agrees and self.outside == 0

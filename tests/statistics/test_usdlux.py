@@ -14,7 +14,7 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 pytest.importorskip("OpenImageIO")
 import usdlux
-from usdlux_judge import judge
+from usdlux_judge import Verdict, judge
 
 FEW = ("sphere:18", "rect:28", "cylinder:1", "disk:1", "iesTest:5")
 """A colour temperature, a soft cone, shapes, and a profile that is scaled by -0.5."""
@@ -61,6 +61,22 @@ def test_the_referee_accepts_noise() -> None:
         verdict = judge(ours, fake(rng, 0.1))
         assert verdict.agrees, verdict
         assert verdict.noise < 0.005
+
+
+def test_a_mean_near_its_limit_is_open() -> None:
+    """0.6 % off with a standard error of about 0.1 %; 2 % off is a fault, 0.1 % is none."""
+    rng = np.random.default_rng(4)
+    ours = np.stack([fake(rng, 0.2) for _ in range(8)])
+    reference = fake(rng, 0.1)
+    exact = float(ours.mean() / reference.mean())
+
+    def off_by(difference: float) -> Verdict:
+        return judge(ours, reference * exact / (1 + difference))
+
+    assert 0.0003 < off_by(0).noise < 0.003
+    assert off_by(0.006).mean_is_open and not off_by(0.006).mean_agrees
+    assert not off_by(0.02).mean_is_open and not off_by(0.02).mean_agrees
+    assert not off_by(0.001).mean_is_open and off_by(0.001).mean_agrees
 
 
 @pytest.mark.parametrize("fault", ["mean", "block", "colour"])
