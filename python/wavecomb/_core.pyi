@@ -490,7 +490,7 @@ class Settings:
     costs: Literal["auto", "measured", "model"]
     """Where the estimated costs of materials come from. Default: auto."""
     policy: str
-    """The order in which hits are shaded. Default: program."""
+    """The order in which hits are shaded. Default: code."""
     ray_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
     """The order in which bounce rays are traced. Default: auto."""
     shadow_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]

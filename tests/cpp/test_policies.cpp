@@ -99,6 +99,16 @@ TEST(Policies, ProgramGroupsPrograms) {
   EXPECT_EQ(order_of("program", r), (Order{1, 2, 4, 5, 6, 0, 3, 7}));
 }
 
+TEST(Policies, CodeGroupsProgramsAndTheirGraphs) {
+  Records r = by_hand();
+  EXPECT_EQ(order_of("code", r), order_of("program", r)) << "no graphs";
+  r.traits[1].graph = 300;  // beyond one digit of the sort
+  r.traits[2].graph = 7;
+  r.traits[3].graph = 7;
+  // Program 0: no graph, graph 7, graph 300; program 1: no graph, graph 7, apart from program 0's.
+  EXPECT_EQ(order_of("code", r), (Order{4, 2, 6, 1, 5, 0, 7, 3}));
+}
+
 TEST(Policies, MaterialIsTypeThenCost) {
   Records r = by_hand();
   // Program 0: 20 ns (materials 2 and 4, apart), 80 ns; program 1: 10 ns, 50 ns.
@@ -160,8 +170,8 @@ TEST(Policies, RandomRunsAreMaterialsRunsInAnotherOrder) {
 TEST(Policies, NamesAndUnknownNames) {
   const std::vector<std::string> names = policy_names();
   EXPECT_EQ(names,
-            (std::vector<std::string>{"none", "program", "material", "texture", "texture-locality",
-                                      "cost-benefit", "random-runs", "adaptive"}));
+            (std::vector<std::string>{"none", "program", "code", "material", "texture",
+                                      "texture-locality", "cost-benefit", "random-runs", "adaptive"}));
   EXPECT_THROW(make_policy("best"), Error);
   EXPECT_THROW(make_policy(""), Error);
 }

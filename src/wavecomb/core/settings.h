@@ -93,7 +93,7 @@ struct Settings {
   uint32_t lanes = 0;      ///< 1, 4, 8, 16; 0: widest built
   /// Packets are faster; both find the same hits, to the bit (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
-  std::string policy = "program";
+  std::string policy = "code";
   Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster
   RayOrder ray_order = RayOrder::kAuto;          ///< of bounce rays
   RayOrder shadow_order = RayOrder::kAuto;       ///< of shadow rays

@@ -52,7 +52,7 @@ uint32_t pass_step(const Settings& settings, uint64_t pixels, uint32_t wave_size
 std::vector<std::unique_ptr<SchedulingPolicy>> choose_policies(const std::string& name) {
   std::vector<std::unique_ptr<SchedulingPolicy>> policies;
   if (name == "adaptive")
-    for (const char* one : {"none", "program", "material", "texture", "texture-locality"})
+    for (const char* one : {"none", "code", "material", "texture", "texture-locality"})
       policies.push_back(make_policy(one));
   else
     policies.push_back(make_policy(name));
