@@ -467,6 +467,8 @@ class Settings:
     """Samples every bounce that is not a mirror's by cosine. Default: False."""
     error: bool
     """Keeps errors and variances where nothing else asks. Default: False."""
+    crop: bool
+    """The picture is its region alone, in memory and in files. Default: False."""
     roulette: Literal["off", "throughput", "cost-aware"]
     """How paths end early. Each is unbiased, but another estimate. Default: throughput."""
     roulette_depth: int
