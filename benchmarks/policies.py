@@ -40,7 +40,7 @@ SAMPLES = (4, 32)
 def main() -> None:
     """Renders, prints the tables, writes the JSON."""
     args = _arguments()
-    stages = [*GENERATED.items(), *((str(path), None) for path in args.files)]
+    stages = [*((name, GENERATED[name]) for name in args.stages), *((str(path), None) for path in args.files)]
     found: dict[str, Any] = {}
     for name, options in stages:
         stage = _stage(name, options, args)
@@ -57,6 +57,7 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--stages", nargs="*", default=list(GENERATED), help="generated ones")
     parser.add_argument("--files", type=Path, nargs="*", default=[], help="stages of others")
     parser.add_argument("--samples", type=int, nargs="+", default=list(SAMPLES))
     parser.add_argument("--size", type=int, default=256)
