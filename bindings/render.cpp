@@ -42,6 +42,7 @@ class PythonPolicy final : public SchedulingPolicy {
     for (const MaterialTraits& m : material_traits(scene)) {
       texture_.push_back(m.texture);
       texture_bytes_.push_back(m.texture_bytes);
+      graph_.push_back(m.graph);
     }
   }
   ~PythonPolicy() override {
@@ -65,6 +66,7 @@ class PythonPolicy final : public SchedulingPolicy {
     if (columns_ & kTextureColumn) view["texture_key"] = copy(queue.texture_key);
     view["material_texture"] = copy(std::span<const uint32_t>(texture_));
     view["material_texture_bytes"] = copy(std::span<const uint64_t>(texture_bytes_));
+    view["material_graph"] = copy(std::span<const uint32_t>(graph_));
     nb::dict cost;
     cost["material_ns"] = copy(std::span<const float>(costs.material_ns));
     cost["texture_ns"] = copy(std::span<const float>(costs.texture_ns));
@@ -113,6 +115,7 @@ class PythonPolicy final : public SchedulingPolicy {
   uint32_t columns_ = 0;
   std::vector<uint32_t> texture_;
   std::vector<uint64_t> texture_bytes_;
+  std::vector<uint32_t> graph_;
 };
 
 CostProfile to_profile(const nb::dict& d) {

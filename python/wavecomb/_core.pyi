@@ -467,6 +467,8 @@ class Settings:
     """Samples every bounce that is not a mirror's by cosine. Default: False."""
     error: bool
     """Keeps errors and variances where nothing else asks. Default: False."""
+    crop: bool
+    """The picture is its region alone, in memory and in files. Default: False."""
     roulette: Literal["off", "throughput", "cost-aware"]
     """How paths end early. Each is unbiased, but another estimate. Default: throughput."""
     roulette_depth: int
@@ -490,7 +492,7 @@ class Settings:
     costs: Literal["auto", "measured", "model"]
     """Where the estimated costs of materials come from. Default: auto."""
     policy: str
-    """The order in which hits are shaded. Default: program."""
+    """The order in which hits are shaded. Default: code."""
     ray_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
     """The order in which bounce rays are traced. Default: auto."""
     shadow_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]

@@ -49,8 +49,8 @@ class SchedulingPolicy:
         Args:
             queue: Arrays of one entry a record, in order of arrival: "program", "material" and
                 the ``columns`` asked for; "depth", an int; and arrays by material id:
-                "material_texture" (its largest texture, 0xffffffff for none) and
-                "material_texture_bytes".
+                "material_texture" (its largest texture, 0xffffffff for none),
+                "material_texture_bytes" and "material_graph" (its value graph, likewise).
             costs: "material_ns" and "texture_ns", arrays by id, and "mean_ns": estimated cost of a
                 record in nanoseconds, frozen while a pass runs.
             keys: (records,), zeros, to be filled.

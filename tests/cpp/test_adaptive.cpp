@@ -137,7 +137,7 @@ TEST(ErrorMap, UnknownAndBrokenPixels) {
 
 AdaptiveCheck check(const Film& film, const Settings& settings) {
   const PassRules rules{settings.spp, settings.min_spp, true, false, 16};
-  return check_adaptive(measure_error(film), film.width(), film.samples(), settings, rules);
+  return check_adaptive(measure_error(film), film.window(), film.samples(), settings, rules);
 }
 
 TEST(Adaptive, NoisyPixelsAndTheirNeighboursGoOn) {

@@ -99,6 +99,16 @@ TEST(Policies, ProgramGroupsPrograms) {
   EXPECT_EQ(order_of("program", r), (Order{1, 2, 4, 5, 6, 0, 3, 7}));
 }
 
+TEST(Policies, CodeGroupsProgramsAndMaterialsThatVary) {
+  Records r = by_hand();
+  // Program 0: constant, then materials 1 and 2, which have textures; program 1: all constant.
+  EXPECT_EQ(order_of("code", r), (Order{4, 1, 5, 2, 6, 0, 3, 7}));
+  r.traits[3].graph = 7;
+  EXPECT_EQ(order_of("code", r), (Order{4, 1, 5, 2, 6, 0, 7, 3}));
+  for (MaterialTraits& m : r.traits) m.texture = m.graph = MaterialTraits::kNone;
+  EXPECT_EQ(order_of("code", r), order_of("program", r)) << "all are constant";
+}
+
 TEST(Policies, MaterialIsTypeThenCost) {
   Records r = by_hand();
   // Program 0: 20 ns (materials 2 and 4, apart), 80 ns; program 1: 10 ns, 50 ns.
@@ -160,8 +170,8 @@ TEST(Policies, RandomRunsAreMaterialsRunsInAnotherOrder) {
 TEST(Policies, NamesAndUnknownNames) {
   const std::vector<std::string> names = policy_names();
   EXPECT_EQ(names,
-            (std::vector<std::string>{"none", "program", "material", "texture", "texture-locality",
-                                      "cost-benefit", "random-runs", "adaptive"}));
+            (std::vector<std::string>{"none", "program", "code", "material", "texture",
+                                      "texture-locality", "cost-benefit", "random-runs", "adaptive"}));
   EXPECT_THROW(make_policy("best"), Error);
   EXPECT_THROW(make_policy(""), Error);
 }

@@ -29,7 +29,8 @@ class Error(ValueError):
 
 class Settings:
     adaptive = noise = time_limit = 0.0
-    error = False
+    error = crop = False
+    region = None
 
     def __init__(self, **settings: Any) -> None:
         defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}

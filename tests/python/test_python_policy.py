@@ -99,6 +99,7 @@ def test_sees_what_is_documented(scene: Any) -> None:
         size = queue["material_texture_bytes"]
         assert size[1] > size[0] > 0
         assert (size[2:] == 0).all()
+        assert (queue["material_graph"] == 0xFFFFFFFF).all()
         assert costs["material_ns"].shape == texture.shape
         assert costs["texture_ns"].shape == (2,)
         assert costs["mean_ns"] > 0
@@ -108,7 +109,7 @@ def test_columns_come_only_when_asked_for(scene: Any) -> None:
     def order(queue: Any, costs: Any, keys: Any) -> bool:
         assert set(queue) == {
             *("program", "material", "depth", "throughput"),
-            *("material_texture", "material_texture_bytes"),
+            *("material_texture", "material_texture_bytes", "material_graph"),
         }
         return False
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from wavecomb.cli.done import Done
 from wavecomb.cli.job import FrameShot, Job, Names, how_far, purpose_at
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
@@ -17,9 +18,7 @@ from wavecomb.run.faults import describe
 from wavecomb.run.frame_names import frame_text, has_place, parse_frames
 
 if TYPE_CHECKING:
-    from wavecomb.picture.rendered import Picture
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd import LoadReport
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -82,8 +81,8 @@ def render_sequence(
     source: StageOptions,
     purpose: PurposeOptions,
     skip: bool,
-) -> tuple[Picture | None, list[str]]:
-    """Renders frames one after another; the last picture, and all files that were written.
+) -> tuple[Done | None, list[str]]:
+    """Renders frames one after another; what came of the last, and all files that were written.
 
     Raises:
         WavecombError: A frame failed; it is named, and those before it are written.
@@ -94,8 +93,7 @@ def render_sequence(
         wanted = [f for f in frames if not all(map(os.path.exists, names.at(f).all()))]
         if len(wanted) < len(frames):
             job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames are there")
-    picture: Picture | None = None
-    report: LoadReport | None = None
+    done: Done | None = None
     opened: Frames | None = None
     files: list[str] = []
     for number, frame in enumerate(wanted, 1):
@@ -105,19 +103,20 @@ def render_sequence(
             if opened is None:
                 opened = open_frames(job, source)
             here = purpose_at(purpose, frame)
-            picture, stopped, report = job.run(
-                FrameShot(opened, frame), source.changed(frame=frame), here
-            )
-            if stopped is not None:
-                done = f"{number - 1} of {len(wanted)} frames are written"
+            done = job.run(
+                FrameShot(opened, frame), source.changed(frame=frame), here, names.at(frame),
+                keeps_stopped=False,
+            )  # fmt: skip
+            if done.stopped is not None:
+                so_far = f"{number - 1} of {len(wanted)} frames are written"
                 kept = f"; {here.checkpoint} goes on with it" if here.checkpoint else ""
                 click.echo(
-                    f"stopped in {place} {how_far(picture)}, which is not written{kept}; {done}, "
+                    f"stopped in {place} {how_far(done)}, which is not written{kept}; {so_far}, "
                     "and --skip-existing goes on after them",
                     err=True,
                 )
-                raise click.exceptions.Exit(128 + stopped)
-            picture, written = job.write(picture, names.at(frame), denoise=purpose.denoise)
+                raise click.exceptions.Exit(128 + done.stopped)
+            done, written = job.write(done, names.at(frame), denoise=purpose.denoise)
         except click.exceptions.Exit:
             raise
         except Exception as error:
@@ -125,10 +124,10 @@ def render_sequence(
                 raise
             raise WavecombError(f"{place}: {describe(error)}") from error
         files += written
-        job.reporter.ended(picture, written)
-    if picture is not None and report is not None:
-        job.reporter.finished(picture, report, files)
-    return picture, files
+        job.reporter.ended(done, written)
+    if done is not None:
+        job.reporter.finished(done, done.report, files)
+    return done, files
 
 
 def open_frames(job: Job, source: StageOptions) -> Frames:

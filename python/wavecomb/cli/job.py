@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from wavecomb.cli.aovs import AovOptions
+from wavecomb.cli.done import Done
 from wavecomb.cli.options import StageOptions, stage_warnings, warn
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.run.frame_names import fill
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from wavecomb.picture.rendered import Picture
     from wavecomb.run.checkpoint import Checkpoint
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd import LoadedStage, LoadReport
+    from wavecomb.usd import LoadedStage
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,9 @@ class Shot(Protocol):
     def render(self, *arguments: Any, **named: Any) -> Any:
         """Renders it; the arguments are those of ``_core.render`` after the scene."""
 
+    def render_part(self, *arguments: Any, **named: Any) -> Any:
+        """The same for one of several parts of a picture."""
+
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
         """``make_stats`` of that."""
 
@@ -58,6 +63,7 @@ class Still:
 
     def __init__(self, source: StageOptions, stage: str, settings: Any, kept: Any = None) -> None:
         """``kept``: held until the stage is loaded."""
+        self._renderer: Any = None
         self._kept = kept
         self._source = source
         self._stage = stage
@@ -78,6 +84,15 @@ class Still:
 
         assert self._loaded is not None
         return _core.render(self._loaded.scene, *arguments, **named)
+
+    def render_part(self, settings: Any, *arguments: Any, **named: Any) -> Any:
+        """Renders a part of it, and keeps what the next one needs, too."""
+        from wavecomb import _core
+
+        assert self._loaded is not None
+        if self._renderer is None:
+            self._renderer = _core.Renderer(self._loaded.scene, settings.threads)
+        return self._renderer.render(settings, *arguments, **named)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
         """Those of the picture."""
@@ -103,6 +118,8 @@ class FrameShot:
         """Renders it."""
         return self._frames.render(*arguments, **named)
 
+    render_part = render
+
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
         """Those of the picture."""
         return self._frames.stats(result, resumed_s=resumed_s)
@@ -120,16 +137,24 @@ class Job:
     reporter: Reporter
     exposure: float
     tone_map: Any
+    film_memory: float | None = None
 
     def run(
         self,
         shot: Shot,
         source: StageOptions,
         purpose: PurposeOptions,
+        names: Names,
         resumed: Checkpoint | None = None,
-    ) -> tuple[Picture, int | None, LoadReport]:
-        """The picture, the number of the signal that stopped it, and what to say of the stage."""
+        *,
+        keeps_stopped: bool = True,
+    ) -> Done:
+        """Loads and renders. A picture in bands is written, too, to ``names``.
+
+        ``keeps_stopped``: also where it was stopped after its first sample.
+        """
         from wavecomb.picture.rendered import picture_of
+        from wavecomb.run.bands import band_rows
         from wavecomb.run.progress import Interrupt
         from wavecomb.run.settings import check_memory
         from wavecomb.run.watcher import Watcher
@@ -137,8 +162,15 @@ class Job:
         with self.reporter.loading(self.stage) as progress:
             loaded = shot.load(progress)
         warn(stage_warnings(loaded))
+        groups = len(loaded.scene.light_groups) if "light_groups" in self.aovs else 1
+        rows = band_rows(
+            self.settings, self.aovs, self.film_memory, whole=purpose.whole,
+            tile=self.layers.tile, light_groups=groups,
+        )  # fmt: skip
+        if rows is not None:
+            return self._run_bands(shot, loaded, rows, names, keeps_stopped)
         if "light_groups" in self.aovs:
-            check_memory(self.settings, self.aovs, len(loaded.scene.light_groups))
+            check_memory(self.settings, self.aovs, groups)
         sinks, state, seconds = self._sinks(loaded, source, purpose, resumed)
         with Interrupt() as interrupt, self.reporter.rendering() as bar:
             watcher = Watcher(
@@ -153,7 +185,75 @@ class Job:
         stats = shot.stats(result, seconds)
         stopped = (interrupt.signal or signal.SIGINT) if result.cancelled else None
         picture = picture_of(result, stats, scene=loaded.scene, aovs=self.aovs)
-        return picture, stopped, loaded.report
+        return Done(stats, result.costs, loaded.report, stopped, picture)
+
+    def _run_bands(
+        self, shot: Shot, loaded: LoadedStage, rows: int, names: Names, keeps_stopped: bool
+    ) -> Done:
+        """Renders and writes a picture band by band; of one that was stopped, all are there."""
+        from wavecomb.picture.growing import GrowingFiles
+        from wavecomb.picture.rendered import picture_of, window_of
+        from wavecomb.run.bands import (
+            picture_size,
+            render_bands,
+            sum_stats,
+            without_samples,
+        )
+        from wavecomb.run.progress import Interrupt
+        from wavecomb.run.stats import write_stats
+        from wavecomb.run.watcher import Watcher
+
+        settings, height = self.settings.to_dict(), picture_size(self.settings)[1]
+        parts: list[dict[str, Any]] = []
+        costs: Any = None
+        files = GrowingFiles(
+            names.output,
+            names.png,
+            height=height,
+            window=window_of(settings),
+            file_options=self.layers.file_options(),
+            exposure=self.exposure,
+            tone_map=self.tone_map,
+        )
+        with Interrupt() as interrupt, self.reporter.rendering() as bar:
+
+            def render(band: Any, shown: Any) -> Any:
+                watcher = Watcher(
+                    reporter=shown,
+                    is_stopped=lambda: interrupt.requested,
+                    warn=lambda line: warn([line]),
+                )
+                return shot.render_part(band, None, None, self.profile, watcher=watcher, state=None)
+
+            def picture_in(result: Any) -> Picture:
+                of_all = {**shot.stats(result, 0.0), "settings": settings}
+                del of_all["seconds"]  # nobody knows yet
+                return picture_of(result, of_all, scene=loaded.scene, aovs=self.aovs)
+
+            with contextlib.suppress(_NotKept), files:
+                for result in render_bands(render, self.settings, rows, bar):
+                    parts.append(shot.stats(result, 0.0))
+                    costs = result.costs
+                    if result.cancelled and not (keeps_stopped and _any_samples(parts)):
+                        raise _NotKept
+                    files.add(picture_in(result))
+                    if result.cancelled:
+                        break
+                while files.rows < height:
+                    files.add(
+                        without_samples(
+                            lambda part: picture_in(shot.render_part(part)),
+                            self.settings,
+                            min(rows, height - files.rows),
+                        )
+                    )
+        stats = sum_stats(parts, settings)
+        stopped = (interrupt.signal or signal.SIGINT) if stats["cancelled"] else None
+        written = [] if stopped is not None and not keeps_stopped else files.written
+        if names.stats is not None and written:
+            write_stats(names.stats, stats)
+            written.append(names.stats)
+        return Done(stats, costs, loaded.report, stopped, files=tuple(written))
 
     def _sinks(
         self,
@@ -194,12 +294,15 @@ class Job:
             )
         return sinks, state, seconds
 
-    def write(self, picture: Picture, names: Names, *, denoise: bool) -> tuple[Picture, list[str]]:
-        """Writes all files of a picture; gives it as written, and their names."""
+    def write(self, done: Done, names: Names, *, denoise: bool) -> tuple[Done, list[str]]:
+        """Writes all files of a picture, unless they are; gives it as written, and their names."""
+        if done.picture is None:
+            return done, list(done.files)
         import numpy as np
 
         from wavecomb.run.stats import write_stats
 
+        picture = done.picture
         broken = int((~np.isfinite(picture.beauty).all(axis=2)).sum())
         warn([f"{broken} pixels of the picture are not finite"] if broken else [])
         if denoise:
@@ -211,7 +314,15 @@ class Job:
         if names.stats is not None:
             write_stats(names.stats, picture.stats)
             written.append(names.stats)
-        return picture, written
+        return replace(done, stats=picture.stats, picture=picture), written
+
+
+class _NotKept(Exception):
+    """A picture in bands that was stopped and is not to be written."""
+
+
+def _any_samples(parts: list[dict[str, Any]]) -> bool:
+    return any(part["counts"]["samples"] for part in parts)
 
 
 def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
@@ -223,14 +334,12 @@ def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
     )
 
 
-def how_far(picture: Any) -> str:
+def how_far(done: Done) -> str:
     """How much is done, as can be said of a render without and with a fixed end."""
     from wavecomb.run.stats import rendered_pixels
 
-    stats = picture.stats
-    settings = stats["settings"]
-    samples = stats["counts"]["samples"] + stats["resumed_samples"]
-    mean = samples / rendered_pixels(settings)
+    settings = done.stats["settings"]
+    mean = done.samples / rendered_pixels(settings)
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         return f"with {mean:.3g} samples a pixel"
     return f"at {100.0 * mean / settings['spp']:.0f} %"

@@ -62,13 +62,16 @@ class Plan:
             return tuple(before)
         return layers.names if self.choice.aovs is None else aov_names.expand(self.choice.aovs)
 
-    def settings(self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool) -> Any:
+    def settings(
+        self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool, fits: Any = None
+    ) -> Any:
         """Checked settings.
 
         Args:
             chosen: By options, and by the render that goes on.
             aovs: Layers that are kept.
             resumed: Whether a render goes on: it has a size and a region.
+            fits: As in ``make_settings``.
         """
         from wavecomb.run.settings import DEFAULT_SIZE, make_settings
 
@@ -78,7 +81,7 @@ class Plan:
         if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
             chosen["region"] = region
         try:
-            return make_settings(size, chosen.pop("spp"), aovs=aovs, **chosen)
+            return make_settings(size, chosen.pop("spp"), aovs=aovs, fits=fits, **chosen)
         except WavecombError as error:
             if size != self.choice.resolution:
                 raise

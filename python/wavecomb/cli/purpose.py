@@ -131,6 +131,14 @@ class PurposeOptions:
         return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
 
     @property
+    def whole(self) -> str:
+        """An option that needs all of the picture at once; empty: there is none."""
+        for name in ("denoise", "checkpoint", "resume", "preview"):
+            if getattr(self, name):
+                return f"--{name}"
+        return ""
+
+    @property
     def checkpoint_file(self) -> str | None:
         """Where checkpoints go."""
         return self.checkpoint if self.checkpoint is not None else self.resume

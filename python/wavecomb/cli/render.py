@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.aovs import AovOptions, aov_options
+from wavecomb.cli.done import Done
 from wavecomb.cli.frames import check_frames, frame_options, open_frames, render_sequence
 from wavecomb.cli.job import Job, Names, Shot, Still, how_far, purpose_at
 from wavecomb.cli.options import StageOptions, examples, isolation_options, stage_options
@@ -92,6 +93,13 @@ from wavecomb.run import aovs as aov_names
     help="Costs of materials. A file is read if it is there, and written at the end.  "
     "[default: auto]",
 )
+@click.option(
+    "--film-memory",
+    type=Real(0, above=True),
+    metavar="MB",
+    help="A picture that takes more is rendered and written in bands of rows.  "
+    "[default: half of the machine's memory]",
+)
 @click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="Of the PNG, in stops.")
 @click.option(
     "--tone-map",
@@ -114,6 +122,7 @@ def render_command(
     costs: str | None,
     frames: str | None,
     skip_existing: bool,
+    film_memory: float | None,
     **options: Any,
 ) -> None:
     """Render STAGE to an OpenEXR file, or its frames to one each.
@@ -123,6 +132,7 @@ def render_command(
     SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
     all. docs/render.md and docs/aovs.md say more.
     """
+    from wavecomb.run.bands import band_rows
     from wavecomb.run.settings import keeps_error
 
     source = StageOptions.take(options)
@@ -171,16 +181,23 @@ def render_command(
     plans = plan_products(choices, output, png, stats_file, purpose, frames, output_dir)
     reporter = make_reporter(purpose.progress, quiet)
 
+    def fits(settings: Any, aovs: Any) -> None:
+        band_rows(settings, aovs, film_memory, whole=purpose.whole, tile=layers.tile)
+
     def job_of(plan: Plan, numbers: tuple[float, ...] | None) -> Job:
         aovs = plan.aovs(layers, before)
         guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
-        settings = plan.settings(chosen, aov_names.with_guides(aovs, guides), resumed is not None)
+        settings = plan.settings(
+            chosen, aov_names.with_guides(aovs, guides), resumed is not None, fits
+        )
         shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
         further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
         layers.check(plan.names.output, (*aovs, *further))
         if layers.split:
             plan.check_split((*aovs, *further), numbers)
-        return Job(stage, settings, aovs, profile, layers, reporter, exposure, tone_map)
+        return Job(
+            stage, settings, aovs, profile, layers, reporter, exposure, tone_map, film_memory
+        )
 
     # All is checked before the first is rendered.
     all_numbers = [checked(plan.names, plan) for plan in plans]
@@ -201,26 +218,26 @@ def render_command(
         if shared is not None:
             shot = plan.shot(shared, source.frame, job.settings)
         opened = None
-        picture, stopped, report = job.run(shot, here, purpose, resumed)
+        done = job.run(shot, here, purpose, plan.names, resumed)
         del shot  # the scene: nothing needs it while files are written
-        if stopped is not None and not picture.samples.any():
+        if done.stopped is not None and not done.samples:
             click.echo("stopped before the first sample; nothing was written", err=True)
-            raise click.exceptions.Exit(128 + stopped)
-        picture, files = job.write(picture, plan.names, denoise=purpose.denoise)
+            raise click.exceptions.Exit(128 + done.stopped)
+        done, files = job.write(done, plan.names, denoise=purpose.denoise)
         if costs_file is not None:
-            _save_costs(costs_file, picture)
+            _save_costs(costs_file, done)
             files.append(costs_file)
-        reporter.finished(picture, report, files)
-        if stopped is not None:
-            done = f"{plan.names.output} holds what was done"
-            click.echo(f"stopped {how_far(picture)}; {done}", err=True)
-            raise click.exceptions.Exit(128 + stopped)
+        reporter.finished(done, done.report, files)
+        if done.stopped is not None:
+            kept = f"{plan.names.output} holds what was done"
+            click.echo(f"stopped {how_far(done)}; {kept}", err=True)
+            raise click.exceptions.Exit(128 + done.stopped)
 
 
-def _save_costs(costs_file: str, picture: Any) -> None:
+def _save_costs(costs_file: str, done: Done) -> None:
     from wavecomb.run.costs import save_costs
 
-    save_costs(costs_file, picture.costs)
+    save_costs(costs_file, done.costs)
 
 
 def _check_outputs(

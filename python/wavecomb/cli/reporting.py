@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -23,6 +23,7 @@ from wavecomb.run.progress import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from wavecomb.cli.done import Done
     from wavecomb.usd import LoadReport
 
 TIMES = ("load", "build", "render")
@@ -39,7 +40,7 @@ class Reporter:
     def begins(self, frame: str, number: int, count: int) -> None:
         """A frame of a sequence begins, the number-th of so many."""
 
-    def ended(self, picture: Any, files: Sequence[str]) -> None:
+    def ended(self, done: Done, files: Sequence[str]) -> None:
         """A frame of a sequence is written."""
 
     def said(self, line: str) -> None:
@@ -49,7 +50,7 @@ class Reporter:
         """What shows the progress of the render, as a context manager."""
         return Silent()
 
-    def finished(self, picture: Any, report: LoadReport, files: Sequence[str]) -> None:
+    def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """All files are written."""
 
 
@@ -77,11 +78,11 @@ class Summary(Reporter):
         self._frame = f"frame {frame} ({number} of {count})"
         self._place = f"{self._frame}: "
 
-    def ended(self, picture: Any, files: Sequence[str]) -> None:
+    def ended(self, done: Done, files: Sequence[str]) -> None:
         """A line."""
         from wavecomb.run.progress import time_text
 
-        seconds = picture.stats["seconds"]
+        seconds = done.stats["seconds"]
         times = ", ".join(f"{name} {time_text(seconds[name])}" for name in TIMES)
         click.echo(f"{self._frame}: {times}; wrote {', '.join(files)}")
 
@@ -89,12 +90,12 @@ class Summary(Reporter):
         """The line."""
         click.echo(line)
 
-    def finished(self, picture: Any, report: LoadReport, files: Sequence[str]) -> None:
+    def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """The summary; of a sequence, that of its last frame."""
         if self._frame:
             click.echo(f"{self._frame}:")
             files = [f"{len(files)} files"]
-        print_summary(picture.stats, report, files)
+        print_summary(done.stats, report, files)
 
 
 class Lines(Reporter):
@@ -111,19 +112,19 @@ class Lines(Reporter):
         """A line {"event": "frame", ...}."""
         self._lines.event("frame", frame=float(frame), number=number, count=count)
 
-    def ended(self, picture: Any, files: Sequence[str]) -> None:
+    def ended(self, done: Done, files: Sequence[str]) -> None:
         """A line {"event": "wrote", ...} for each file."""
         for name in files:
             self._lines.wrote(name)
 
-    def finished(self, picture: Any, report: LoadReport, files: Sequence[str]) -> None:
+    def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """A line {"event": "done", ...}; the figures of a sequence are those of its last frame."""
-        stats = picture.stats
+        stats = done.stats
         self._lines.event(
             "done",
             files=list(files),
             cancelled=stats["cancelled"],
-            samples_done=int(picture.samples.sum()),
+            samples_done=done.samples,
             seconds=stats["seconds"]["render"],
             error=stats["error"],
         )

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from wavecomb.scheduling import SchedulingPolicy
 
 Region = tuple[int, int, int, int]
+NOT_LIVE = ("progressive", "crop")
+"""Settings that a live render has of itself: passes that double, and all of the picture."""
 
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 else:
     _Rows = make_dataclass(
         "_Rows",
-        [(row.name, Any, row.default) for row in settings().values() if row.name != "progressive"],
+        [(row.name, Any, row.default) for row in settings().values() if row.name not in NOT_LIVE],
         frozen=True,
     )
 

@@ -23,6 +23,8 @@ Compression = Literal["none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a
 COMPRESSIONS: tuple[str, ...] = get_args(Compression)
 _LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
 MAX_TILE = 4096
+Window = tuple[int, int, int, int]
+"""Column and row of the first pixel in the whole picture, and that picture's width and height."""
 
 _HALF_MAX = 65504.0
 _SUFFIXES = {
@@ -92,6 +94,7 @@ def write_exr(
     compression: Compression = "zip",
     tile: int = 0,
     metadata: Mapping[str, Any] | None = None,
+    window: Window | None = None,
     called: str | os.PathLike[str] | None = None,
 ) -> None:
     """Writes an OpenEXR file with one part; whole or not at all.
@@ -106,35 +109,80 @@ def write_exr(
         tile: Edge of square tiles, pixels, a multiple of 16; 0: scanlines.
         metadata: Attributes of the file: str, int, float, or (4, 4) arrays. "Software" is set if
             it is not given.
+        window: Where the pixels lie in a larger picture; None: they are all of it.
         called: The file in messages, where ``path`` is to be renamed to it.
     """
     name = os.fspath(path if called is None else called)
-    if Path(name).suffix.lower() != ".exr":
-        raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
-    if not layers:
-        raise ValueError(f"{name}: there is nothing to write")
-    check_options(name, layers, compression, tile)
-    planes: list[NDArray[Any]] = []
-    halves: list[bool] = []
-    names: list[str] = []
-    for layer, pixels in layers.items():
-        plane = np.asarray(pixels)
-        plane = plane[:, :, None] if plane.ndim == 2 else plane
-        if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0].shape[:2]):
-            raise ValueError(f"{name}: layer {layer!r} has the shape {np.shape(pixels)}")
-        planes.append(plane)
-        halves.append(half and (layer in _COLOURS or layer.startswith("light_")))
-        names += channel_names(layer, plane.shape[2])
-    spec = _spec(planes, halves, names, tile)
-    spec.attribute("compression", compression)
-    for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
-        _attribute(spec, key, value)
-    both = list(zip(planes, halves, strict=True))
-    bands = (
-        np.concatenate([_values(plane[rows], as_half) for plane, as_half in both], axis=2)
-        for rows in bands_of(spec.height, tile or BAND)
-    )
-    write_bands(path, spec, bands, called=name)
+    sheet = Sheet(
+        name, layers, half=half, compression=compression, tile=tile, metadata=metadata,
+        window=window,
+    )  # fmt: skip
+    bands = (sheet.values(layers, rows) for rows in bands_of(sheet.spec.height, tile or BAND))
+    write_bands(path, sheet.spec, bands, called=name)
+
+
+class Sheet:
+    """How layers lie in an EXR file: its header, and its values of some rows.
+
+    Attributes:
+        spec: OpenImageIO's.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        layers: Mapping[str, NDArray[Any]],
+        *,
+        half: bool,
+        compression: Compression,
+        tile: int,
+        metadata: Mapping[str, Any] | None,
+        window: Window | None = None,
+        height: int | None = None,
+    ) -> None:
+        """Arguments are those of ``write_exr``; height: rows of the file, where layers are some."""
+        if Path(name).suffix.lower() != ".exr":
+            raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
+        if not layers:
+            raise ValueError(f"{name}: there is nothing to write")
+        check_options(name, layers, compression, tile)
+        self._name = name
+        planes = self._planes(layers)
+        self._halves = [half and _may_be_half(layer) for layer in layers]
+        names = [
+            channel
+            for layer, plane in zip(layers, planes, strict=True)
+            for channel in channel_names(layer, plane.shape[2])
+        ]
+        self.spec = _spec(planes, self._halves, names, tile)
+        if height is not None:
+            self.spec.height = self.spec.full_height = height
+        if window is not None:
+            self.spec.x, self.spec.y, self.spec.full_width, self.spec.full_height = window
+        self.spec.attribute("compression", compression)
+        for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
+            _attribute(self.spec, key, value)
+
+    def values(
+        self, layers: Mapping[str, NDArray[Any]], rows: slice = slice(None)
+    ) -> NDArray[np.float32]:
+        """Rows of layers as (rows, width, channels of the file)."""
+        both = zip(self._planes(layers), self._halves, strict=True)
+        return np.concatenate([_values(plane[rows], as_half) for plane, as_half in both], axis=2)
+
+    def _planes(self, layers: Mapping[str, NDArray[Any]]) -> list[NDArray[Any]]:
+        planes: list[NDArray[Any]] = []
+        for layer, pixels in layers.items():
+            plane = np.asarray(pixels)
+            plane = plane[:, :, None] if plane.ndim == 2 else plane
+            if plane.ndim != 3 or (planes and plane.shape[:2] != planes[0].shape[:2]):
+                raise ValueError(f"{self._name}: layer {layer!r} has the shape {np.shape(pixels)}")
+            planes.append(plane)
+        return planes
+
+
+def _may_be_half(layer: str) -> bool:
+    return layer in _COLOURS or layer.startswith("light_")
 
 
 def check_options(name: str, layers: Any, compression: str, tile: int) -> None:
@@ -196,25 +244,60 @@ def write_bands(
     called: str | None = None,
 ) -> None:
     """Writes a picture, given a band of rows at a time from the top; of tiles, a row of them."""
-    import OpenImageIO as oiio
-
-    name = called or os.fspath(path)
     with replacing(path) as part:
-        output = oiio.ImageOutput.create(str(part))
+        file = RowFile(part, spec, called or os.fspath(path))
+        for pixels in bands:
+            file.add(pixels)
+        file.close()
+
+
+class RowFile:
+    """A picture that is written a band of rows at a time from the top; of tiles, rows of them.
+
+    Failures are OSError, one line that names the file.
+    """
+
+    def __init__(self, part: Path, spec: Any, called: str) -> None:
+        """Opens it.
+
+        Args:
+            part: The file.
+            spec: OpenImageIO's.
+            called: The file in messages.
+        """
+        import OpenImageIO as oiio
+
+        self._part, self._spec, self._called = str(part), spec, called
+        self._row = 0
+        output = oiio.ImageOutput.create(self._part)
         if output is None:
-            raise OSError(f"{name}: no writer for this kind: {one_line(oiio.geterror(), name)}")
-        ok, row = output.open(str(part), spec), 0
-        while ok and (pixels := next(bands, None)) is not None:
-            end = row + len(pixels)
-            if spec.tile_width:
-                ok = output.write_tiles(0, spec.width, row, end, 0, 1, pixels)
-            else:
-                ok = output.write_scanlines(row, end, 0, pixels)
-            row = end
-        problem = output.geterror()
-        if not (output.close() and ok):
-            problem = problem or output.geterror()
-            raise OSError(f"{name}: cannot be written: {one_line(problem, str(part))}")
+            why = one_line(oiio.geterror(), called)
+            raise OSError(f"{called}: no writer for this kind: {why}")
+        self._output = output
+        self._check(self._output.open(self._part, spec))
+
+    def add(self, pixels: NDArray[Any]) -> None:
+        """The next rows, (rows, width, channels)."""
+        first = self._spec.y + self._row
+        self._row += len(pixels)
+        last, left = self._spec.y + self._row, self._spec.x
+        if self._spec.tile_width:
+            ok = self._output.write_tiles(left, left + self._spec.width, first, last, 0, 1, pixels)
+        else:
+            ok = self._output.write_scanlines(first, last, 0, pixels)
+        self._check(ok)
+
+    def close(self) -> None:
+        """Ends the file."""
+        self._check(self._output.close())
+
+    def _check(self, ok: bool) -> None:
+        if ok:
+            return
+        problem = self._output.geterror()
+        self._output.close()
+        problem = problem or self._output.geterror()
+        raise OSError(f"{self._called}: cannot be written: {one_line(problem, self._part)}")
 
 
 def _values(rows: NDArray[Any], as_half: bool) -> NDArray[np.float32]:

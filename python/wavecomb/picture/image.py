@@ -62,21 +62,22 @@ def write_png(
         display(linear[rows], exposure=exposure, tone_map=tone_map)
         for rows in bands_of(linear.shape[0])
     )
-    write_bands(name, _png_spec(linear), bands)
+    write_bands(name, png_spec(*linear.shape[:2]), bands)
 
 
 def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> None:
     """Writes 8-bit sRGB codes, (height, width, 3), as they are; whole or not at all."""
     name = os.fspath(path)
     pixels = _colours(codes)
-    write_bands(name, _png_spec(pixels), (pixels[rows] for rows in bands_of(pixels.shape[0])))
+    spec = png_spec(*pixels.shape[:2])
+    write_bands(name, spec, (pixels[rows] for rows in bands_of(pixels.shape[0])))
 
 
-def _png_spec(pixels: NDArray[Any]) -> Any:
+def png_spec(height: int, width: int) -> Any:
+    """What OpenImageIO is told of a PNG file of 8-bit sRGB colours."""
     import OpenImageIO as oiio
 
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, "uint8")
+    spec = oiio.ImageSpec(width, height, 3, "uint8")
     spec.attribute("oiio:ColorSpace", "sRGB")
     spec.attribute("Software", "Wavecomb")
     return spec

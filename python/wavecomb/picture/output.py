@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture import cryptomatte
-from wavecomb.picture.exr import Compression, check_options, is_exact, write_exr
+from wavecomb.picture.exr import Compression, Window, check_options, is_exact, write_exr
 from wavecomb.picture.files import replacing_all
 
 if TYPE_CHECKING:
@@ -185,6 +185,7 @@ def save_layers(
     compression: Compression = "zip",
     tile: int = 0,
     split: bool = False,
+    window: Window | None = None,
 ) -> list[Path]:
     """Writes layers to one file, or to one for each AOV; all of them whole, or none.
 
@@ -195,7 +196,10 @@ def save_layers(
     """
     if not split:
         attributes = {**metadata, **cryptomatte.metadata(manifests)}
-        write_exr(path, layers, half=half, compression=compression, tile=tile, metadata=attributes)
+        write_exr(
+            path, layers, half=half, compression=compression, tile=tile, metadata=attributes,
+            window=window,
+        )  # fmt: skip
         return [Path(path)]
     check_options(os.fspath(path), (), compression, tile)
     by_aov: dict[str, dict[str, NDArray[Any]]] = {}
@@ -213,6 +217,7 @@ def save_layers(
                 compression="zip" if exact else compression,
                 tile=tile,
                 metadata={**metadata, **cryptomatte.metadata(own)},
+                window=window,
                 called=files[aov],
             )
     return list(files.values())

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -146,7 +146,6 @@ class Picture:
         """
         from wavecomb.picture.image import write_png
         from wavecomb.picture.output import save_layers
-        from wavecomb.picture.working_space import to_rec709
 
         kind = Path(path).suffix.lower()
         if kind == ".exr":
@@ -159,13 +158,23 @@ class Picture:
                 compression=compression,
                 tile=tile,
                 split=split,
+                window=self.window(),
             )
         if kind == ".png":
-            shown = self.beauty if self.denoised is None else self.denoised
-            shown = to_rec709(shown, self.stats.get("working_space", "rec709"))
-            write_png(path, shown, exposure=exposure, tone_map=tone_map)
+            write_png(path, self.shown(), exposure=exposure, tone_map=tone_map)
             return [Path(path)]
         raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
+
+    def shown(self) -> NDArray[Any]:
+        """The colours of a PNG, linear Rec.709: the denoised picture where there is one."""
+        from wavecomb.picture.working_space import to_rec709
+
+        shown = self.beauty if self.denoised is None else self.denoised
+        return to_rec709(shown, self.stats.get("working_space", "rec709"))
+
+    def window(self) -> tuple[int, int, int, int] | None:
+        """Where a cropped picture lies, as ``write_exr`` takes it; None: it is whole."""
+        return window_of(self.stats.get("settings", {}))
 
     def file_metadata(self) -> dict[str, Any]:
         """Attributes of an EXR file: version, stage, camera, settings, times, matrices."""
@@ -192,6 +201,8 @@ def picture_of(
     from wavecomb.picture.output import scene_metadata
 
     height, width = result.beauty.shape[:2]
+    settings = stats.get("settings", {})
+    width, height = settings.get("width", width), settings.get("height", height)
     return Picture(
         beauty=result.beauty,
         albedo=result.albedo,
@@ -208,3 +219,11 @@ def picture_of(
         metadata={} if scene is None else scene_metadata(scene, width, height),
         chosen=tuple(aovs),
     )
+
+
+def window_of(settings: Mapping[str, Any]) -> tuple[int, int, int, int] | None:
+    """Column and row of a cropped picture's first pixel, and the whole picture's size."""
+    if not settings.get("crop") or settings.get("region") is None:
+        return None
+    x0, y0 = settings["region"][:2]
+    return int(x0), int(y0), int(settings["width"]), int(settings["height"])

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.run import aovs as aov_names
@@ -54,11 +54,13 @@ def make_settings(
     spp: int,
     *,
     aovs: Sequence[str] = aov_names.DEFAULT,
+    fits: Callable[[Settings, Sequence[str]], Any] | None = None,
     **settings: Any,
 ) -> Settings:
     """Checked settings; raises WavecombError or _core.Error in one line. aovs: as expanded.
 
-    Checks what the core cannot know: whether the picture fits in the memory of this machine.
+    Checks what the core cannot know: whether the picture fits in the memory of this machine, by
+    ``check_memory`` unless ``fits`` is given.
     """
     from wavecomb import _core
     from wavecomb.errors import WavecombError
@@ -74,8 +76,8 @@ def make_settings(
         settings["aovs"] = aov_names.for_core(aovs)
         settings["error"] = settings.get("error", False) or bool({"error", "variance"} & {*aovs})
     chosen = _core.Settings(width=width, height=height, spp=int(spp), **settings)
-    check_memory(chosen, aovs)
     chosen.check()
+    (check_memory if fits is None else fits)(chosen, aovs)
     return chosen
 
 
@@ -89,15 +91,23 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
     """
     from wavecomb.errors import WavecombError
 
-    others = [name for name in aovs if name not in aov_names.ERRORS]
-    each = aov_names.bytes_per_pixel(others, light_groups)
-    each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
-    needed, there = settings.width * settings.height * each, machine_limit()
+    needed, there = picture_bytes(settings, aovs, light_groups), machine_limit()
     if there is not None and needed > 0.8 * there:
         raise WavecombError(
             f"size {settings.width} x {settings.height}: needs about {needed / 2**30:.0f} GiB of "
             f"memory, this machine has {there / 2**30:.0f}; choose a smaller size or fewer AOVs"
         )
+
+
+def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> int:
+    """Memory of film and picture; the arguments are those of ``check_memory``."""
+    others = [name for name in aovs if name not in aov_names.ERRORS]
+    each = aov_names.bytes_per_pixel(others, light_groups)
+    each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
+    if settings.crop and settings.region is not None:
+        x0, y0, x1, y1 = settings.region
+        return (x1 - x0) * (y1 - y0) * each
+    return settings.width * settings.height * each
 
 
 def keeps_error(settings: Settings) -> bool:

@@ -49,7 +49,11 @@ struct Region {
   uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 
   bool contains(uint32_t x, uint32_t y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
-  uint64_t pixels() const { return uint64_t{x1 - x0} * (y1 - y0); }
+  uint32_t width() const { return x1 - x0; }
+  uint32_t height() const { return y1 - y0; }
+  uint64_t pixels() const { return uint64_t{width()} * height(); }
+  /// Number of a pixel of it, row by row.
+  size_t index(uint32_t x, uint32_t y) const { return size_t{y - y0} * width() + (x - x0); }
 };
 
 /// Settings of a render. The picture depends on those above the line only.
@@ -87,13 +91,14 @@ struct Settings {
   /// The pixels that are rendered; all others have no samples. Without: all. A pixel of it is the
   /// same as in the whole picture, but in adaptive renders, which see errors within it only.
   std::optional<Region> region;
+  bool crop = false;  ///< the film, and so the picture, is of the region alone
   // ---- below: how it is computed; never changes the picture ----
   uint32_t threads = 0;    ///< 0: all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0: default
   uint32_t lanes = 0;      ///< 1, 4, 8, 16; 0: widest built
   /// Packets are faster; both find the same hits, to the bit (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
-  std::string policy = "program";
+  std::string policy = "code";
   Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which measures faster
   RayOrder ray_order = RayOrder::kAuto;          ///< of bounce rays
   RayOrder shadow_order = RayOrder::kAuto;       ///< of shadow rays
@@ -105,6 +110,8 @@ struct Settings {
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Pixels that are rendered.
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }
+  /// Pixels that the film has.
+  Region film() const { return crop ? rendered() : Region{0, 0, width, height}; }
   bool keeps_error() const { return error || is_adaptive(); }
   /// Throws Error naming the option and what it may be.
   void check() const;

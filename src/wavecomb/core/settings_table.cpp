@@ -143,6 +143,7 @@ std::vector<SettingInfo> picture_settings() {
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
                                "Samples every bounce that is not a mirror's by cosine."),
       row<&S::error>("error", "Errors", "Keeps errors and variances where nothing else asks."),
+      row<&S::crop>("crop", "Crop", "The picture is its region alone, in memory and in files."),
   };
 }
 

@@ -7,11 +7,8 @@
 
 namespace wavecomb {
 
-Film::Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error)
-    : width_(width),
-      height_(height),
-      pixels_(size_t{width} * height),
-      aovs_(size_t{width} * height, aovs) {
+Film::Film(const Region& window, const AovLayout& aovs, bool with_error)
+    : window_(window), pixels_(window.pixels()), aovs_(window.pixels(), aovs) {
   if (with_error) errors_.resize(pixels_.size());
 }
 

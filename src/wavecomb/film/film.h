@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/core/settings.h"
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/error_sums.h"
 #include "wavecomb/film/splats.h"
@@ -17,11 +18,15 @@ namespace wavecomb {
 /// Sums of samples per pixel, in double precision, so that 65,536 samples stay exact to float.
 ///
 /// Contract: a pixel is written by one thread at a time, its samples in sample order; different
-/// pixels may be written at once. Splats are added by whom and when they come. Row 0 is the top.
+/// pixels may be written at once. Splats are added by whom and when they come. Row 0 is the top of
+/// the window; places (x, y) are the picture's.
 class Film {
  public:
-  /// `with_error`: keeps what errors and variances are told from.
-  Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error = false);
+  /// Of the pixels of `window`. `with_error`: keeps what errors and variances are told from.
+  Film(const Region& window, const AovLayout& aovs, bool with_error = false);
+  /// Of a whole picture.
+  Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error = false)
+      : Film(Region{0, 0, width, height}, aovs, with_error) {}
 
   /// Sums of one pixel.
   struct Pixel {
@@ -29,16 +34,18 @@ class Film {
     uint32_t samples = 0;
   };
 
-  uint32_t width() const { return width_; }
-  uint32_t height() const { return height_; }
+  uint32_t width() const { return window_.width(); }
+  uint32_t height() const { return window_.height(); }
+  /// The pixels of the picture that it has.
+  const Region& window() const { return window_; }
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
   /// Keeps splats from now on, in units of `unit`; the beauty is then the pixel's mean and theirs.
   void keep_splats(FixedPoint unit) { splats_ = SplatLayer(pixels_.size(), unit); }
   SplatLayer& splats() { return splats_; }
-  /// Number of a pixel, row by row.
-  size_t index(uint32_t x, uint32_t y) const { return size_t{y} * width_ + x; }
+  /// Number of a pixel of the picture, row by row of the window.
+  size_t index(uint32_t x, uint32_t y) const { return window_.index(x, y); }
   const Pixel& pixel(size_t i) const { return pixels_[i]; }
   const ErrorSums& error(size_t i) const { return errors_[i]; }
   size_t pixel_count() const { return pixels_.size(); }
@@ -83,7 +90,7 @@ class Film {
   Layers finish(const std::vector<std::string>& light_groups) &&;
 
  private:
-  uint32_t width_, height_;
+  Region window_;
   std::vector<Pixel> pixels_;
   AovFilm aovs_;
   std::vector<ErrorSums> errors_;

@@ -52,6 +52,7 @@ std::vector<MaterialTraits> material_traits(const Scene& scene) {
   for (const Material& material : scene.materials()) {
     MaterialTraits t;
     t.program = view.material_variant[traits.size()];
+    t.graph = material.graph;
     for (const TextureUse& use : material.textures) {
       if (use.texture == kNoTexture) continue;
       const uint64_t bytes = scene.textures()[use.texture]->spanned_bytes();

@@ -33,12 +33,14 @@ double error_threshold(const ErrorMap& map, const Settings& settings) {
   return worst > even ? even : 0.5 * worst;
 }
 
-AdaptiveCheck check_adaptive(const ErrorMap& map, uint32_t width, std::span<const uint32_t> samples,
-                             const Settings& settings, const PassRules& rules) {
-  const size_t count = samples.size(), height = count / width;
+AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
+                             std::span<const uint32_t> samples, const Settings& settings,
+                             const PassRules& rules) {
+  const size_t count = samples.size(), width = window.width(), height = window.height();
   const Region region = settings.rendered();
   const auto is_rendered = [&](size_t i) {
-    return region.contains(static_cast<uint32_t>(i % width), static_cast<uint32_t>(i / width));
+    return region.contains(window.x0 + static_cast<uint32_t>(i % width),
+                           window.y0 + static_cast<uint32_t>(i / width));
   };
   const double threshold = error_threshold(map, settings);
   const bool done = settings.noise > 0 && map.mean_relative <= settings.noise;

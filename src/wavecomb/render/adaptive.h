@@ -28,10 +28,12 @@ struct AdaptiveCheck {
   uint64_t expected_samples = 0;
 };
 
-/// Looks at the pixels of settings.rendered() only. Active are those above the threshold, and those
-/// around them, that have less than the most samples. With a noise target none is once the mean
-/// relative error is within it. A pixel that was done goes on again when noise comes up beside it.
-AdaptiveCheck check_adaptive(const ErrorMap& map, uint32_t width, std::span<const uint32_t> samples,
-                             const Settings& settings, const PassRules& rules);
+/// Looks at the pixels of settings.rendered() only, of a film of `window`. Active are those above
+/// the threshold, and those around them, that have less than the most samples. With a noise target
+/// none is once the mean relative error is within it. A pixel that was done goes on again when
+/// noise comes up beside it.
+AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
+                             std::span<const uint32_t> samples, const Settings& settings,
+                             const PassRules& rules);
 
 }  // namespace wavecomb

@@ -40,7 +40,7 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film
 void PassLoop::run() {
   for (;;) {
     const std::vector<uint32_t> samples = film_.samples();
-    const PassPlan plan = plan_pass(order_, film_.width(), samples, pass_);
+    const PassPlan plan = plan_pass(order_, film_.window(), samples, pass_);
     if (plan.batches.empty()) {
       if (!begin_pass(samples)) return;
       continue;
@@ -64,7 +64,7 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
     const ErrorMap map = measure_error(film_);
     error_ = map.mean_relative;
     if (rules_.adaptive && is_check(done, rules_)) {
-      AdaptiveCheck check = check_adaptive(map, film_.width(), samples, settings_, rules_);
+      AdaptiveCheck check = check_adaptive(map, film_.window(), samples, settings_, rules_);
       pass_.active = std::move(check.active);
       active_pixels_ = check.active_count;
       expected_samples_ = check.expected_samples;

@@ -52,11 +52,11 @@ uint64_t PassPlan::samples() const {
   return n;
 }
 
-PassPlan plan_pass(std::span<const uint32_t> order, uint32_t width,
+PassPlan plan_pass(std::span<const uint32_t> order, const Region& window,
                    std::span<const uint32_t> samples, const PassState& pass) {
   std::map<uint32_t, std::vector<uint32_t>> by_count;
   for (const uint32_t pixel : order) {
-    const size_t i = size_t{pixel >> 16} * width + (pixel & 0xffffu);
+    const size_t i = window.index(pixel & 0xffffu, pixel >> 16);
     if (pass.is_active(i) && samples[i] < pass.target) by_count[samples[i]].push_back(pixel);
   }
   PassPlan plan;

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "wavecomb/core/settings.h"
+
 namespace wavecomb {
 
 /// Adaptive renders look at errors at multiples of this many samples a pixel: two blocks of each
@@ -67,9 +69,9 @@ struct PassPlan {
 /// What is left of a pass: its pixels below the target, those of one sample count together, fewest
 /// samples first.
 ///
-/// Args: `order`: the pixels that are rendered (x | y << 16); `width` of the picture; `samples`
-/// each pixel has, row by row. Empty batches: the pass is done.
-PassPlan plan_pass(std::span<const uint32_t> order, uint32_t width,
+/// Args: `order`: the pixels that are rendered (x | y << 16); `window`: the film's; `samples` each
+/// pixel of it has, row by row. Empty batches: the pass is done.
+PassPlan plan_pass(std::span<const uint32_t> order, const Region& window,
                    std::span<const uint32_t> samples, const PassState& pass);
 
 }  // namespace wavecomb

@@ -52,7 +52,7 @@ uint32_t pass_step(const Settings& settings, uint64_t pixels, uint32_t wave_size
 std::vector<std::unique_ptr<SchedulingPolicy>> choose_policies(const std::string& name) {
   std::vector<std::unique_ptr<SchedulingPolicy>> policies;
   if (name == "adaptive")
-    for (const char* one : {"none", "program", "material", "texture", "texture-locality"})
+    for (const char* one : {"none", "code", "material", "texture", "texture-locality"})
       policies.push_back(make_policy(one));
   else
     policies.push_back(make_policy(name));
@@ -220,7 +220,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const FilterTable filter(settings.filter, settings.used_filter_width());
   const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
   const AovTables aovs(scene, settings);
-  Film film(settings.width, settings.height, aovs.layout, settings.keeps_error());
+  const Region window = settings.film();
+  Film film(window, aovs.layout, settings.keeps_error());
   PassState pass;
   if (options.resume) options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();
@@ -311,15 +312,15 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
 
   RenderStatistics& s = impl_->statistics = statistics();
   impl_->profile = costs.profile();
-  if (!options.wants_picture) return {settings.width, settings.height, {}, {}, {}, {}, {}};
+  if (!options.wants_picture) return {window.width(), window.height(), {}, {}, {}, {}, {}};
   ErrorMap error;
   error.mean_relative = std::numeric_limits<double>::infinity();
   if (film.has_error()) error = measure_error(film);
   s.error = error.mean_relative;
   Film::Layers layers = std::move(film).finish(aovs.kept_names);
   s.peak_rss_bytes = peak_rss_bytes();
-  Picture picture{settings.width,
-                  settings.height,
+  Picture picture{window.width(),
+                  window.height(),
                   std::move(layers.beauty),
                   std::move(layers.albedo),
                   std::move(layers.normal),

@@ -16,6 +16,9 @@ constexpr Entry kPolicies[] = {
     {{"none", "Arrival order; nothing is paid for it."}, &make_none_policy},
     {{"program", "By program, the kind of material: what lanes need and no more."},
      &make_program_policy},
+    {{"code", "By program, then by material where textures or a graph give its inputs: what lanes run and "
+      "read together."},
+     &make_code_policy},
     {{"material", "By program, then by estimated cost of the material, then by material."},
      &make_material_policy},
     {{"texture", "By program, then by the size of the material's largest texture."},
@@ -33,7 +36,7 @@ constexpr Entry kPolicies[] = {
 };
 
 constexpr PolicyInfo kAdaptive{"adaptive",
-                               "Chooses among none, program, material, texture and "
+                               "Chooses among none, code, material, texture and "
                                "texture-locality, queue by queue, by the times that it learns."};
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace wavecomb {
 
 std::unique_ptr<SchedulingPolicy> make_none_policy();
 std::unique_ptr<SchedulingPolicy> make_program_policy();
+std::unique_ptr<SchedulingPolicy> make_code_policy();
 std::unique_ptr<SchedulingPolicy> make_material_policy();
 std::unique_ptr<SchedulingPolicy> make_texture_policy();
 std::unique_ptr<SchedulingPolicy> make_texture_locality_policy();

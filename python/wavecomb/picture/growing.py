@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files of a picture that comes in bands of rows from the top, so that it is never held whole."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.picture.exr import RowFile, Sheet, Window, is_exact
+from wavecomb.picture.files import replacing
+from wavecomb.picture.image import Transfer, display, png_spec
+from wavecomb.picture.output import aov_of, split_names
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from wavecomb.picture.rendered import Picture
+
+
+class GrowingFiles:
+    """The EXR file of a picture, or one for each AOV, and its PNG.
+
+    A context manager: the files have their names where it ends well, and are absent where it does
+    not.
+
+    Attributes:
+        written: Names of the files, once there was a band.
+        rows: Rows so far.
+    """
+
+    def __init__(
+        self,
+        output: str,
+        png: str | None,
+        *,
+        height: int,
+        window: Window | None,
+        file_options: Mapping[str, Any],
+        exposure: float = 0.0,
+        tone_map: Transfer = "clamp",
+    ) -> None:
+        """What ``Picture.save`` gets, and the rows of the whole picture.
+
+        Args:
+            output: Ends in .exr.
+            png: Ends in .png; None: there is none.
+            height: Rows of all bands together.
+            window: Where they lie in a larger picture, as in ``write_exr``.
+            file_options: half, compression, tile and split of ``Picture.save``.
+            exposure: Of the PNG.
+            tone_map: Likewise.
+        """
+        self.written: list[str] = []
+        self.rows = 0
+        self._output, self._png = output, png
+        self._height, self._window = height, window
+        self._options = {"half": False, "compression": "zip", "tile": 0, **file_options}
+        self._split = bool(self._options.pop("split", False))
+        self._exposure, self._tone_map = exposure, tone_map
+        self._parts = contextlib.ExitStack()
+        self._sheets: dict[str, tuple[Sheet, RowFile]] = {}
+        self._display: RowFile | None = None
+
+    def __enter__(self) -> GrowingFiles:
+        """Nothing is opened before the first band."""
+        return self
+
+    def add(self, band: Picture) -> None:
+        """The next rows; all bands have the same layers."""
+        self.rows += len(band.beauty)
+        layers = self._by_file(band.layers())
+        if not self._sheets:
+            self._open(layers, band)
+        for name, its_layers in layers.items():
+            sheet, file = self._sheets[name]
+            file.add(sheet.values(its_layers))
+        if self._display is not None:
+            self._display.add(
+                display(band.shown(), exposure=self._exposure, tone_map=self._tone_map)
+            )
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Ends the files, or takes them away."""
+        files = [file for _, file in self._sheets.values()]
+        files += [self._display] if self._display is not None else []
+        with self._parts:
+            if error is not None:
+                with contextlib.suppress(OSError):
+                    for file in files:
+                        file.close()
+                raise error
+            for file in files:
+                file.close()
+
+    def _by_file(
+        self, layers: dict[str, NDArray[np.float32]]
+    ) -> dict[str, dict[str, NDArray[np.float32]]]:
+        if not self._split:
+            return {self._output: layers}
+        by_aov: dict[str, dict[str, NDArray[np.float32]]] = {}
+        for name, pixels in layers.items():
+            by_aov.setdefault(aov_of(name), {})[name] = pixels
+        names = split_names(self._output, by_aov)
+        return {str(names[aov]): its_layers for aov, its_layers in by_aov.items()}
+
+    def _open(self, layers: Mapping[str, Mapping[str, NDArray[np.float32]]], band: Picture) -> None:
+        metadata = band.file_metadata()
+        for name, its_layers in layers.items():
+            options = dict(self._options)
+            if self._split and any(map(is_exact, its_layers)):
+                options["compression"] = "zip"
+            sheet = Sheet(
+                name, its_layers, metadata=metadata, window=self._window, height=self._height,
+                **options,
+            )  # fmt: skip
+            part: Path = self._parts.enter_context(replacing(name))
+            self._sheets[name] = sheet, RowFile(part, sheet.spec, name)
+            self.written.append(name)
+        if self._png is not None:
+            part = self._parts.enter_context(replacing(self._png))
+            spec = png_spec(self._height, band.beauty.shape[1])
+            self._display = RowFile(part, spec, self._png)
+            self.written.append(self._png)

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/schedule/policies/policies.h"
+
+namespace wavecomb {
+namespace {
+
+/// What lanes run and read together: the program, and within it the material where textures or a
+/// value graph give its inputs, since those that meet in a packet are read one after another. Where
+/// all materials are constant, the keys are those of "program", and the sort has one digit.
+class CodePolicy final : public SchedulingPolicy {
+ public:
+  std::string_view name() const override { return "code"; }
+  bool order(const ShadingQueueView& queue, const CostSnapshot&,
+             std::span<uint64_t> keys) const override {
+    for (size_t i = 0; i < queue.size(); ++i) {
+      const uint32_t material = queue.material[i];
+      const MaterialTraits& traits = queue.materials[material];
+      const bool varies = (traits.texture & traits.graph) != MaterialTraits::kNone;
+      keys[i] = (uint64_t{queue.program[i]} << 32) | (varies ? material + 1 : 0);
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SchedulingPolicy> make_code_policy() {
+  return std::make_unique<CodePolicy>();
+}
+
+}  // namespace wavecomb
