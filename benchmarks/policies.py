@@ -40,7 +40,8 @@ SAMPLES = (4, 32)
 def main() -> None:
     """Renders, prints the tables, writes the JSON."""
     args = _arguments()
-    stages = [*((name, GENERATED[name]) for name in args.stages), *((str(path), None) for path in args.files)]
+    stages: list[tuple[str, dict[str, Any] | None]] = [(n, GENERATED[n]) for n in args.stages]
+    stages += [(str(path), None) for path in args.files]
     found: dict[str, Any] = {}
     for name, options in stages:
         stage = _stage(name, options, args)

@@ -169,9 +169,9 @@ TEST(Policies, RandomRunsAreMaterialsRunsInAnotherOrder) {
 
 TEST(Policies, NamesAndUnknownNames) {
   const std::vector<std::string> names = policy_names();
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"none", "program", "code", "material", "texture",
-                                      "texture-locality", "cost-benefit", "random-runs", "adaptive"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"none", "program", "code", "material", "texture",
+                                             "texture-locality", "cost-benefit", "random-runs",
+                                             "adaptive"}));
   EXPECT_THROW(make_policy("best"), Error);
   EXPECT_THROW(make_policy(""), Error);
 }

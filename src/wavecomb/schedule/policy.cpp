@@ -16,7 +16,8 @@ constexpr Entry kPolicies[] = {
     {{"none", "Arrival order; nothing is paid for it."}, &make_none_policy},
     {{"program", "By program, the kind of material: what lanes need and no more."},
      &make_program_policy},
-    {{"code", "By program, then by material where textures or a graph give its inputs: what lanes run and "
+    {{"code",
+      "By program, then by material where textures or a graph give its inputs: what lanes run and "
       "read together."},
      &make_code_policy},
     {{"material", "By program, then by estimated cost of the material, then by material."},

@@ -16,10 +16,10 @@ namespace wavecomb {
 /// What there is to know of a material without knowing what a material is.
 struct MaterialTraits {
   static constexpr uint32_t kNone = 0xffffffffu;  ///< no texture, no graph
-  uint32_t program = 0;        ///< the code that shades it
-  uint32_t texture = kNone;    ///< its largest texture
-  uint64_t texture_bytes = 0;  ///< memory of that texture, 0 without one
-  uint32_t graph = kNone;      ///< the value graph that its inputs come from
+  uint32_t program = 0;                           ///< the code that shades it
+  uint32_t texture = kNone;                       ///< its largest texture
+  uint64_t texture_bytes = 0;                     ///< memory of that texture, 0 without one
+  uint32_t graph = kNone;                         ///< the value graph that its inputs come from
 };
 
 /// Columns of a ShadingQueueView that are worked out only for policies that ask.
