@@ -241,7 +241,7 @@ def test_kept_picture_against_live_settings(qtbot, session):
         policy = window.findChild(QComboBox, "policyB")
         policy.setCurrentIndex(policy.findText("material"))
         policy.activated.emit(policy.currentIndex())
-        assert live.setup.policy == "material" and session.setup.policy == "program"
+        assert live.setup.policy == "material" and session.setup.policy == "code"
 
         def done():
             frame = live.last_frame

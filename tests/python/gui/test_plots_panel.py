@@ -79,14 +79,14 @@ def test_restarts_with_other_settings_are_series(
 ) -> None:
     render(panel, session, qtbot)
     render(panel, session, qtbot, policy="none", lanes=1)
-    render(panel, session, qtbot, policy="program", lanes=0)
+    render(panel, session, qtbot, policy="code", lanes=0)
     assert [len(one.runs) for one in panel.log.series] == [2, 1]
     assert panel.log.series[1].changed == "none, 1 lane"
     first, second = (one.best for one in panel.log.series)
     assert second.lane_utilisation() == 1.0 and 0.0 < first.lane_utilisation() <= 1.0
     assert first.last.samples == second.last.samples == 96 * 96 * 4
     legend = panel._legends[0].text().replace("&nbsp;", " ")
-    assert "program, widest lanes" in legend and "none, 1 lane" in legend
+    assert "code, widest lanes" in legend and "none, 1 lane" in legend
     assert theme.series(0).name() in legend and theme.series(1).name() in legend
     bars = panel.phases.plot.bars
     for row in (0, 1):
@@ -216,7 +216,7 @@ def test_runs_are_pinned_copied_saved_and_cleared(
     qtbot.waitUntil(file.exists, timeout=10000)
     with file.open(newline="") as lines:
         rows = list(csv.DictReader(lines))
-    assert [row["policy"] for row in rows] == ["program", "material"]
+    assert [row["policy"] for row in rows] == ["code", "material"]
     assert all(int(row["samples"]) == 96 * 96 * 4 for row in rows)
     with qtbot.waitSignal(session.failed, timeout=10000) as failed:
         panel.runs.save(str(tmp_path / "missing" / "runs.csv"))
@@ -235,7 +235,7 @@ def test_both_are_repeated_in_turn(panel: PlotsPanel, session: Any, qtbot: Any) 
     with qtbot.waitSignal(panel.runs.rounds.ended, timeout=60000) as ended:
         click(panel, "runs_repeat")
     assert ended.args == [True]
-    assert order[:6] == ["program", "none"] * 3, "in turn, so that drift meets both"
+    assert order[:6] == ["code", "none"] * 3, "in turn, so that drift meets both"
     assert (session.setup.policy, session.setup.ray_order) == ("none", "slot"), "put back"
     assert [len(one.runs) for one in panel.log.series] == [4, 4]
     verdict = panel.runs._rows[1].ratio
