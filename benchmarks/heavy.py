@@ -22,11 +22,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sitting import RESULTS, ROOT, head, log, phase_times, ratio, row, show, write_result
+from sitting import (
+    RESULTS,
+    ROOT,
+    head,
+    log,
+    phase_times,
+    ratio,
+    row,
+    show,
+    stage_file,
+    write_result,
+)
 
 import wavecomb
 from wavecomb.options import settings
-from wavecomb.scenes import write_scene
 
 SMALL_MB = 2.0
 LANES = (0, 1)
@@ -72,13 +82,10 @@ def _arguments() -> argparse.Namespace:
 
 def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
     """All figures of one field."""
-    path = args.folder / f"heavy-{args.materials}-{args.triangles}-{texture_mb:g}.usdc"
-    if not path.exists():
-        log(f"writing {path}")
-        write_scene(
-            "heavy", path, materials=args.materials, texture_mb=texture_mb,
-            triangles=args.triangles,
-        )  # fmt: skip
+    path = stage_file(
+        args.folder / f"heavy-{args.materials}-{args.triangles}-{texture_mb:g}.usdc",
+        "heavy", materials=args.materials, texture_mb=texture_mb, triangles=args.triangles,
+    )  # fmt: skip
     stage = wavecomb.load(path).scene
     textures = sum(size for _, size in stage.textures)
     shuffle = random.Random(1)

@@ -7,7 +7,7 @@ r"""Instructions a record, by library, as valgrind counts them: other work does 
 valgrind knows no AVX-512, so a tree is built for an instruction set below it:
 
     .venv/bin/python -m pip install --no-build-isolation --no-deps -e . \
-      --config-settings=build-dir=build/editable \\
+      --config-settings=build-dir=build/editable \
       --config-settings=cmake.define.WAVECOMB_ARCH=x86-64-v3
 
 Each tree renders the stage with its own environment, 96 x 96 by one thread in lanes of 8, once with

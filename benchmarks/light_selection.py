@@ -26,10 +26,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sitting import RESULTS, ROOT, head, log, ratio, row, show, write_result
+from sitting import RESULTS, ROOT, head, log, ratio, row, show, stage_file, write_result
 
 import wavecomb
-from wavecomb.scenes import write_scene
 
 Layers = dict[str, np.ndarray]
 
@@ -69,10 +68,7 @@ def _arguments() -> argparse.Namespace:
 
 def measure(count: int, args: argparse.Namespace) -> dict[str, Any]:
     """All figures of one number of lights."""
-    path = args.folder / f"lights-{count}.usdc"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_scene("lights", path, lights=count)
+    path = stage_file(args.folder / f"lights-{count}.usdc", "lights", lights=count)
     scene = wavecomb.load(path).scene
     size = (args.size[0], args.size[1])
 

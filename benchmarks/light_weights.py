@@ -28,10 +28,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sitting import RESULTS, ROOT, head, log, ratio, row, show, summary, write_result
+from sitting import RESULTS, ROOT, head, log, ratio, row, show, stage_file, summary, write_result
 
 import wavecomb
-from wavecomb.scenes import write_scene
 
 Picture = NDArray[np.float64]
 OUTLIERS = 1e-3
@@ -88,10 +87,7 @@ def stage_path(name: str, folder: Path) -> Path:
     """The stage, written where it is not there yet."""
     scene, options = STAGES[name]
     path = folder / f"weights-{name}.usdc"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_scene(scene, path, **options)
-    return path
+    return stage_file(path, scene, **options)
 
 
 def measure(name: str, depth: int, args: argparse.Namespace) -> dict[str, Any]:

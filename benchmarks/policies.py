@@ -19,11 +19,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sitting import RESULTS, ROOT, head, log, phase_times, ratio, row, show, write_result
+from sitting import (
+    RESULTS,
+    ROOT,
+    head,
+    log,
+    phase_times,
+    ratio,
+    row,
+    show,
+    stage_file,
+    write_result,
+)
 
 import wavecomb
 from wavecomb.options import settings
-from wavecomb.scenes import write_scene
 
 GENERATED: dict[str, dict[str, Any]] = {
     "cornell": {"plain": True},
@@ -72,11 +82,7 @@ def _arguments() -> argparse.Namespace:
 def _stage(name: str, options: dict[str, Any] | None, args: argparse.Namespace) -> Any:
     if options is None:
         return wavecomb.load(name)
-    path = args.folder / f"{name}.usdc"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_scene(name, path, **options)
-    return wavecomb.load(path)
+    return wavecomb.load(stage_file(args.folder / f"{name}.usdc", name, **options))
 
 
 def measure(stage: Any, wave: int, spp: int, args: argparse.Namespace) -> dict[str, Any]:

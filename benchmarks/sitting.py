@@ -26,13 +26,20 @@ STAGES = ("cornell", "mixed", "dragon")
 # ---- what is rendered ----------------------------------------------------------------------------
 
 
+def stage_file(path: Path, name: str, **options: Any) -> Path:
+    """`path`, where a generated stage is written unless it is there. Options: of `write_scene`."""
+    if not path.exists():
+        log(f"writing {path}")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_scene(name, path, **options)
+    return path
+
+
 def load_stage(name: str, folder: Path, triangles: int) -> Any:
     """A generated stage, loaded; written to `folder` where it is not there yet."""
     path = folder / f"{name}-{triangles}.usdc"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_scene(name, path, **({} if name == "cornell" else {"triangles": triangles}))
-    return wavecomb.load(path)
+    options = {} if name == "cornell" else {"triangles": triangles}
+    return wavecomb.load(stage_file(path, name, **options))
 
 
 def phase_times(stats: Mapping[str, Any]) -> dict[str, float]:

@@ -193,19 +193,16 @@ class Job:
         """Renders and writes a picture band by band; of one that was stopped, all are there."""
         from wavecomb.picture.growing import GrowingFiles
         from wavecomb.picture.rendered import picture_of, window_of
-        from wavecomb.run.bands import (
-            picture_size,
-            render_bands,
-            sum_stats,
-            without_samples,
-        )
+        from wavecomb.run.bands import render_bands, sum_stats, without_samples
         from wavecomb.run.progress import Interrupt
+        from wavecomb.run.settings import picture_size
         from wavecomb.run.stats import write_stats
         from wavecomb.run.watcher import Watcher
 
         settings, height = self.settings.to_dict(), picture_size(self.settings)[1]
         parts: list[dict[str, Any]] = []
         costs: Any = None
+        broken = 0
         files = GrowingFiles(
             names.output,
             names.png,
@@ -225,10 +222,13 @@ class Job:
                 )
                 return shot.render_part(band, None, None, self.profile, watcher=watcher, state=None)
 
-            def picture_in(result: Any) -> Picture:
-                of_all = {**shot.stats(result, 0.0), "settings": settings}
+            def picture_in(result: Any, stats: dict[str, Any]) -> Picture:
+                of_all = {**stats, "settings": settings}
                 del of_all["seconds"]  # nobody knows yet
                 return picture_of(result, of_all, scene=loaded.scene, aovs=self.aovs)
+
+            def stopped_part(part: Any) -> Picture:
+                return picture_in(shot.render_part(part), parts[-1])
 
             with contextlib.suppress(_NotKept), files:
                 for result in render_bands(render, self.settings, rows, bar):
@@ -236,17 +236,15 @@ class Job:
                     costs = result.costs
                     if result.cancelled and not (keeps_stopped and _any_samples(parts)):
                         raise _NotKept
-                    files.add(picture_in(result))
+                    picture = picture_in(result, parts[-1])
+                    broken += _broken_pixels(picture)
+                    files.add(picture)
                     if result.cancelled:
                         break
                 while files.rows < height:
-                    files.add(
-                        without_samples(
-                            lambda part: picture_in(shot.render_part(part)),
-                            self.settings,
-                            min(rows, height - files.rows),
-                        )
-                    )
+                    left = min(rows, height - files.rows)
+                    files.add(without_samples(stopped_part, self.settings, left))
+        _warn_of_broken(broken)
         stats = sum_stats(parts, settings)
         stopped = (interrupt.signal or signal.SIGINT) if stats["cancelled"] else None
         written = [] if stopped is not None and not keeps_stopped else files.written
@@ -298,13 +296,10 @@ class Job:
         """Writes all files of a picture, unless they are; gives it as written, and their names."""
         if done.picture is None:
             return done, list(done.files)
-        import numpy as np
-
         from wavecomb.run.stats import write_stats
 
         picture = done.picture
-        broken = int((~np.isfinite(picture.beauty).all(axis=2)).sum())
-        warn([f"{broken} pixels of the picture are not finite"] if broken else [])
+        _warn_of_broken(_broken_pixels(picture))
         if denoise:
             picture = picture.with_denoised(threads=self.settings.threads)
         written = [str(name) for name in picture.save(names.output, **self.layers.file_options())]
@@ -319,6 +314,16 @@ class Job:
 
 class _NotKept(Exception):
     """A picture in bands that was stopped and is not to be written."""
+
+
+def _broken_pixels(picture: Picture) -> int:
+    import numpy as np
+
+    return int((~np.isfinite(picture.beauty).all(axis=2)).sum())
+
+
+def _warn_of_broken(count: int) -> None:
+    warn([f"{count} pixels of the picture are not finite"] if count else [])
 
 
 def _any_samples(parts: list[dict[str, Any]]) -> bool:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.picture.exr import RowFile, Sheet, Window, is_exact
+from wavecomb.picture.exr import RowFile, Sheet, Window
 from wavecomb.picture.files import replacing
 from wavecomb.picture.image import Transfer, display, png_spec
-from wavecomb.picture.output import aov_of, split_names
+from wavecomb.picture.output import by_aov, compression_for, split_names
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -93,32 +93,31 @@ class GrowingFiles:
         """Ends the files, or takes them away."""
         files = [file for _, file in self._sheets.values()]
         files += [self._display] if self._display is not None else []
-        with self._parts:
-            if error is not None:
-                with contextlib.suppress(OSError):
-                    for file in files:
-                        file.close()
-                raise error
-            for file in files:
+        if error is None:
+            with self._parts:
+                for file in files:
+                    file.close()
+            return
+        for file in files:
+            with contextlib.suppress(OSError):
                 file.close()
+        self._parts.__exit__(kind, error, trace)
 
     def _by_file(
         self, layers: dict[str, NDArray[np.float32]]
     ) -> dict[str, dict[str, NDArray[np.float32]]]:
         if not self._split:
             return {self._output: layers}
-        by_aov: dict[str, dict[str, NDArray[np.float32]]] = {}
-        for name, pixels in layers.items():
-            by_aov.setdefault(aov_of(name), {})[name] = pixels
-        names = split_names(self._output, by_aov)
-        return {str(names[aov]): its_layers for aov, its_layers in by_aov.items()}
+        grouped = by_aov(layers)
+        names = split_names(self._output, grouped)
+        return {str(names[aov]): its_layers for aov, its_layers in grouped.items()}
 
     def _open(self, layers: Mapping[str, Mapping[str, NDArray[np.float32]]], band: Picture) -> None:
         metadata = band.file_metadata()
         for name, its_layers in layers.items():
             options = dict(self._options)
-            if self._split and any(map(is_exact, its_layers)):
-                options["compression"] = "zip"
+            if self._split:
+                options["compression"] = compression_for(its_layers, options["compression"])
             sheet = Sheet(
                 name, its_layers, metadata=metadata, window=self._window, height=self._height,
                 **options,

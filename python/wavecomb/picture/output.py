@@ -175,6 +175,19 @@ def split_names(path: str | os.PathLike[str], aovs: Collection[str]) -> dict[str
     }
 
 
+def by_aov(layers: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[Any]]]:
+    """AOV -> its layers: several of a Cryptomatte, else one."""
+    grouped: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, pixels in layers.items():
+        grouped.setdefault(aov_of(name), {})[name] = pixels
+    return grouped
+
+
+def compression_for(layers: Iterable[str], compression: Compression) -> Compression:
+    """Of the file of these layers alone: zip where what is asked for would spoil one."""
+    return "zip" if any(map(is_exact, layers)) else compression
+
+
 def save_layers(
     path: str | os.PathLike[str],
     layers: Mapping[str, NDArray[Any]],
@@ -202,19 +215,16 @@ def save_layers(
         )  # fmt: skip
         return [Path(path)]
     check_options(os.fspath(path), (), compression, tile)
-    by_aov: dict[str, dict[str, NDArray[Any]]] = {}
-    for name, pixels in layers.items():
-        by_aov.setdefault(aov_of(name), {})[name] = pixels
-    files = split_names(path, by_aov)
+    grouped = by_aov(layers)
+    files = split_names(path, grouped)
     with replacing_all(files.values()) as parts:
-        for (aov, its_layers), part in zip(by_aov.items(), parts, strict=True):
-            exact = any(map(is_exact, its_layers))
+        for (aov, its_layers), part in zip(grouped.items(), parts, strict=True):
             own = {aov: manifests[aov]} if aov in manifests else {}
             write_exr(
                 part,
                 its_layers,
                 half=half,
-                compression="zip" if exact else compression,
+                compression=compression_for(its_layers, compression),
                 tile=tile,
                 metadata={**metadata, **cryptomatte.metadata(own)},
                 window=window,

@@ -17,7 +17,7 @@ import numpy as np
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.isolate.memory import machine_limit
-from wavecomb.run.settings import check_memory, keeps_error, picture_bytes
+from wavecomb.run.settings import check_memory, keeps_error, picture_bytes, picture_size
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 STEP = 64
 """Bands have a multiple of so many rows, or of a tile."""
+_ADDED = ("samples_done", "rays", "seconds")
+"""Of a status: what bands before it count for."""
+_SECONDS = ("render", "build", "denoise")
+"""Of the statistics: what all bands took together."""
 
 
 def band_rows(
@@ -83,14 +87,6 @@ def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
     if settings.region is not None and not settings.crop:
         return "--region without --crop"
     return ""
-
-
-def picture_size(settings: Settings) -> tuple[int, int]:
-    """Width and height of the picture, which may be cropped."""
-    if not settings.crop or settings.region is None:
-        return settings.width, settings.height
-    x0, y0, x1, y1 = settings.region
-    return x1 - x0, y1 - y0
 
 
 def render_bands(
@@ -165,12 +161,6 @@ class _Whole:
 
     def next_band(self) -> None:
         self._before = self._last
-
-
-_ADDED = ("samples_done", "rays", "seconds")
-
-
-_SECONDS = ("render", "build", "denoise")
 
 
 def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]:

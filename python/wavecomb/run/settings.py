@@ -104,10 +104,16 @@ def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1
     others = [name for name in aovs if name not in aov_names.ERRORS]
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
-    if settings.crop and settings.region is not None:
-        x0, y0, x1, y1 = settings.region
-        return (x1 - x0) * (y1 - y0) * each
-    return settings.width * settings.height * each
+    width, height = picture_size(settings)
+    return width * height * each
+
+
+def picture_size(settings: Settings) -> tuple[int, int]:
+    """Width and height of the picture, which may be cropped."""
+    if not settings.crop or settings.region is None:
+        return settings.width, settings.height
+    x0, y0, x1, y1 = settings.region
+    return x1 - x0, y1 - y0
 
 
 def keeps_error(settings: Settings) -> bool:
