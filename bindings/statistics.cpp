@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <map>
+#include <string>
 
 namespace nb = nanobind;
 using namespace wavecomb;
@@ -62,6 +63,16 @@ nb::dict programs_dict(const RenderStatistics& s) {
     out[name.c_str()] = d;
   }
   return out;
+}
+
+nb::dict sharing_dict(const Sharing& s) {
+  nb::dict d, passes;
+  d["groups"] = s.groups();
+  d["longest_s"] = s.longest_s();
+  for (size_t i = 0; i < kSharedBy.size(); ++i)
+    passes[std::to_string(kSharedBy[i]).c_str()] = s.passes_s(i);
+  d["passes_s"] = passes;
+  return d;
 }
 
 nb::dict light_calibration_dict(const LightShares& s) {
@@ -139,6 +150,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   nb::dict uses;
   for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
   d["policy_uses"] = uses;
+  d["sharing"] = sharing_dict(s.sharing);
   d["threads"] = s.threads;
   d["wave_size"] = s.wave_size;
   d["lanes"] = s.lanes;

@@ -144,7 +144,7 @@ def test_schema(fake: Fake, stage: Path) -> None:
         *("phases_s", "sort_overhead", "counts", "passes", "resumed_samples", "error"),
         *("mean_path_length", "depths", "lane_utilisation"),
         *("coherence", "programs", "materials", "cost_prediction", "light_calibration"),
-        "policy_uses",
+        *("policy_uses", "sharing"),
         *("samples_per_s", "rays_per_s", "memory_bytes", "peak_rss_bytes", "machine"),
         *("unsupported", "warnings"),
     ]

@@ -174,6 +174,12 @@ def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -
     out = dict(_mean(bands, records))
     for name in ("counts", "phases_s", "policy_uses"):
         out[name] = _sum([band[name] for band in bands])
+    sharing = [band["sharing"] for band in bands]
+    out["sharing"] = {
+        "groups": sum(one["groups"] for one in sharing),
+        "longest_s": max(one["longest_s"] for one in sharing),
+        "passes_s": _sum([one["passes_s"] for one in sharing]),
+    }
     out["depths"] = {
         name: _sum_lists([band["depths"][name] for band in bands]) for name in bands[0]["depths"]
     }

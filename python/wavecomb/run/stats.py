@@ -112,6 +112,7 @@ def make_stats(
             **core.pop("light_calibration", {}),
         },
         "policy_uses": core.pop("policy_uses", {}),
+        "sharing": core.pop("sharing", {"groups": 0, "longest_s": 0.0, "passes_s": {}}),
         "samples_per_s": core.pop("samples_per_s", 0.0),
         "rays_per_s": core.pop("rays_per_s", 0.0),
         "memory_bytes": {**dict.fromkeys(MEMORY, 0), **core.pop("memory_bytes", {})},

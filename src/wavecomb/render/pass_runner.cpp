@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "wavecomb/core/clock.h"
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/core/task_order.h"
 #include "wavecomb/integrate/statistics.h"
@@ -34,12 +33,15 @@ PassRunner::PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_s
 
 void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) {
   const std::vector<WaveGroup> groups = wave_groups(plan, wave_size_, threads());
+  std::vector<float> group_s(groups.size());
   const auto run_groups = [&](const tbb::blocked_range<size_t>& range) {
     for (size_t g = range.begin(); g != range.end(); ++g) {
       const WaveGroup& group = groups[g];
+      const Clock::time_point begun = Clock::now();
       for (uint32_t done = 0; done < group.samples && !halted(); done += group.wave_samples)
         run_wave({group.pixels, group.pixel_count, group.first_sample + done,
                   std::min(group.wave_samples, group.samples - done)});
+      group_s[g] = static_cast<float>(seconds_since(begun));
     }
   };
   integrator_.begin_pass();
@@ -47,6 +49,7 @@ void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted) 
   tbb::parallel_for(tbb::blocked_range<size_t>(0, groups.size(), 1), order.around(run_groups),
                     tbb::simple_partitioner());
   order.join();
+  sharing_.add_pass(group_s);
   integrator_.end_pass();
 }
 

@@ -3,12 +3,13 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <functional>
 #include <vector>
 
+#include "wavecomb/core/clock.h"
 #include "wavecomb/integrate/integrator.h"
 #include "wavecomb/render/pass_plan.h"
+#include "wavecomb/render/sharing.h"
 
 namespace wavecomb {
 
@@ -41,6 +42,8 @@ class PassRunner {
   uint64_t rays_done() const { return rays_; }
   /// Since construction, until the first wave was done.
   double first_samples_s() const { return first_samples_s_; }
+  /// Of the passes that were run.
+  const Sharing& sharing() const { return sharing_; }
 
  private:
   void run_wave(const WaveTask& task);
@@ -49,8 +52,9 @@ class PassRunner {
   uint32_t wave_size_;
   std::vector<char> workers_;  ///< one for each worker, by whose addresses they are told apart
   std::atomic<uint64_t> samples_{0}, rays_{0};
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  Clock::time_point start_ = Clock::now();
   double first_samples_s_ = 0;
+  Sharing sharing_;
 };
 
 }  // namespace wavecomb

@@ -50,6 +50,7 @@ struct RenderStatistics {
   uint64_t packets = 0, packet_lanes = 0;
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;           ///< begun
+  Sharing sharing;
   uint64_t resumed_samples = 0;  ///< that a checkpoint brought; not in `samples`
   double error = 0;              ///< mean relative error of the picture; infinite: not known
   SceneBytes scene_bytes;
