@@ -9,6 +9,7 @@
 
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/embree_hierarchy.h"
+#include "wavecomb/accel/triangle_list.h"
 
 namespace wavecomb {
 namespace {
@@ -63,8 +64,9 @@ struct EmbreeAccelerator::Impl {
   std::shared_ptr<const EmbreeHierarchy> hierarchy;
   SceneView view;
   RTCScene top;
-  uint32_t first_world, first_light;  ///< EmbreeHierarchy's
-  uint32_t native;                    ///< rays of the widest native packet
+  uint32_t first_world, first_light;         ///< EmbreeHierarchy's
+  uint32_t native;                           ///< rays of the widest native packet
+  std::unique_ptr<const TriangleList> list;  ///< in place of the hierarchy where the scene is small
 
   Impl(std::shared_ptr<const Scene> of, std::shared_ptr<const EmbreeHierarchy> built)
       : scene(std::move(of)),
@@ -73,7 +75,8 @@ struct EmbreeAccelerator::Impl {
         top(hierarchy->top()),
         first_world(hierarchy->first_world()),
         first_light(hierarchy->first_light()),
-        native(widest_packet(hierarchy->device())) {}
+        native(widest_packet(hierarchy->device())),
+        list(TriangleList::make(*scene, light_shapes(*scene))) {}
 
   /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
@@ -231,6 +234,10 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
+  if (impl_->list) {
+    const uint32_t lanes = std::min(width, impl_->native);
+    return impl_->list->intersect(impl_->view, rays, hits, lanes, keys);
+  }
   coherent = coherent && !impl_->view.has_motion;
   switch (impl_->packet(width)) {
     case 16:
@@ -247,6 +254,10 @@ void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint
 
 void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,
                                  bool coherent, const PresenceKeys& keys) const {
+  if (impl_->list) {
+    const uint32_t lanes = std::min(width, impl_->native);
+    return impl_->list->occluded(impl_->view, rays, occluded, lanes, keys);
+  }
   QueryContext context;
   rtcInitRayQueryContext(&context.base);
   context.scene = &impl_->view;

@@ -50,12 +50,9 @@ float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
 bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
             uint32_t prim, float u, float v, uint32_t slot) {
   const bool instanced = hit_inst != RTC_INVALID_GEOMETRY_ID;
-  const uint32_t inst = instanced ? hit_inst : 0;
-  if (context.keys->shadow_set &&
-      !casts_shadow(*context.scene, inst, instanced ? geom : geom - context.first_world, slot,
-                    *context.keys))
-    return false;
-  return is_present(*context.scene, inst, mesh, prim, u, v, slot, *context.keys);
+  return is_met(*context.scene, instanced ? hit_inst : 0,
+                instanced ? geom : geom - context.first_world, mesh, prim, u, v, slot,
+                *context.keys);
 }
 
 void presence_filter(const RTCFilterFunctionNArguments* args) {

@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "wavecomb/accel/embree_filters.h"
+#include "wavecomb/accel/presence.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/task_order.h"
 
@@ -41,23 +42,6 @@ struct EmbreeDevice {
 };
 
 namespace {
-
-/// By mesh: whether it may be partly present as some instance wears it.
-std::vector<uint8_t> filtered_meshes(const Scene& scene) {
-  const SceneGeometry& geometry = *scene.geometry();
-  std::vector<uint8_t> filtered(geometry.meshes.size(), 0);
-  if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
-  if (scene.view().lights.links.members || !scene.view().has_presence) return filtered;
-  const auto needs = [&](uint32_t m) { return scene.materials()[m].needs_presence(); };
-  const auto& instances = geometry.instance_records;
-  const bool inherited = std::any_of(instances.begin(), instances.end(),
-                                     [&](const InstanceRecord& i) { return needs(i.material); });
-  for (uint32_t mesh = 0; mesh < filtered.size(); ++mesh)
-    filtered[mesh] = geometry.any_material(mesh, kInheritMaterial, [&](uint32_t m) {
-      return m == kInheritMaterial ? inherited : needs(m);
-    });
-  return filtered;
-}
 
 void set_transform(RTCGeometry g, uint32_t step, const Affine& m) {
   const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y, m.row[1].y, m.row[2].y,

@@ -1,12 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/accel/presence.h"
 
+#include <algorithm>
+
 #include "wavecomb/core/hash.h"
 #include "wavecomb/surface/hit.h"
 #include "wavecomb/surface/presence.h"
 #include "wavecomb/surface/uv.h"
 
 namespace wavecomb {
+
+std::vector<uint8_t> filtered_meshes(const Scene& scene) {
+  const SceneGeometry& geometry = *scene.geometry();
+  std::vector<uint8_t> filtered(geometry.meshes.size(), 0);
+  if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
+  if (scene.view().lights.links.members || !scene.view().has_presence) return filtered;
+  const auto needs = [&](uint32_t m) { return scene.materials()[m].needs_presence(); };
+  const auto& instances = geometry.instance_records;
+  const bool inherited = std::any_of(instances.begin(), instances.end(),
+                                     [&](const InstanceRecord& i) { return needs(i.material); });
+  for (uint32_t mesh = 0; mesh < filtered.size(); ++mesh)
+    filtered[mesh] = geometry.any_material(mesh, kInheritMaterial, [&](uint32_t m) {
+      return m == kInheritMaterial ? inherited : needs(m);
+    });
+  return filtered;
+}
 
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
                   const PresenceKeys& keys) {
@@ -31,6 +49,12 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
       hash_u32(keys.pixel_hash[slot * keys.stride], keys.sample[slot * keys.stride]);
   const uint32_t where = hash_u32(instance * 0x9e3779b9u + mesh, prim);
   return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
+}
+
+bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
+            float u, float v, uint32_t slot, const PresenceKeys& keys) {
+  if (keys.shadow_set && !casts_shadow(scene, instance, geom, slot, keys)) return false;
+  return is_present(scene, instance, mesh, prim, u, v, slot, keys);
 }
 
 }  // namespace wavecomb

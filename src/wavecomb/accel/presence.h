@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/scene/scene.h"
@@ -15,9 +16,18 @@ namespace wavecomb {
 bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
                 float v, uint32_t slot, const PresenceKeys& keys);
 
+/// By mesh: 1 where rays must ask whether they meet it: some of it may be partly present as some
+/// instance wears it, or it is not in the way of every light.
+std::vector<uint8_t> filtered_meshes(const Scene& scene);
+
 /// Whether geometry `geom` of an instance is in the way of the shadow ray of a slot, by what the
 /// keys say of linking.
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
                   const PresenceKeys& keys);
+
+/// Whether the ray of a slot meets triangle `prim` at (u, v): it is present, and for a shadow ray,
+/// in the way of its light.
+bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
+            float u, float v, uint32_t slot, const PresenceKeys& keys);
 
 }  // namespace wavecomb
