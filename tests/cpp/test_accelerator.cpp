@@ -286,9 +286,10 @@ class BruteForce {
   std::vector<Triangle> triangles_;
 };
 
-TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
-  const auto scene = soup_scene(60);
-  const EmbreeAccelerator accel(scene, 2);
+/// Of `triangles`, by a list or by the hierarchy; of the rays one in `one_in` hits something.
+void expect_brute_force(uint32_t triangles, HitRule rule, size_t one_in) {
+  const auto scene = soup_scene(triangles);
+  const EmbreeAccelerator accel(scene, 2, rule);
   const BruteForce exact(*scene);
   const size_t n = size_for_build(20000);
   const Rays rays = random_rays(n, 3, 11);
@@ -315,8 +316,37 @@ TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
     }
     clear_count += match && match->edge > 1e-3;
   }
-  EXPECT_GT(hit_count, n / 2);
+  EXPECT_GT(hit_count, n / one_in);
   EXPECT_GT(clear_count, hit_count * 9 / 10);
+}
+
+TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
+  expect_brute_force(60, HitRule::kCanonical, 2);
+}
+
+/// Scenes that are small enough for a list, by the list and by the hierarchy.
+class SmallScene : public testing::TestWithParam<HitRule> {};
+INSTANTIATE_TEST_SUITE_P(Accelerator, SmallScene,
+                         testing::Values(HitRule::kCanonical, HitRule::kHierarchy),
+                         [](const auto& rule) {
+                           return rule.param == HitRule::kCanonical ? "List" : "Hierarchy";
+                         });
+
+TEST_P(SmallScene, IsTracedAsAsked) {
+  const bool by_list = GetParam() == HitRule::kCanonical;
+  EXPECT_EQ(EmbreeAccelerator(soup_scene(4), 1, GetParam()).has_list(), by_list);
+  EXPECT_EQ(EmbreeAccelerator(cornell(), 1, GetParam()).has_list(), by_list);
+  EXPECT_FALSE(EmbreeAccelerator(soup_scene(60), 1, GetParam()).has_list());
+  EXPECT_FALSE(EmbreeAccelerator(curve_testing::hairy(), 1, GetParam()).has_list());
+}
+
+TEST_P(SmallScene, HitsEqualBruteForceInDoublePrecision) {
+  expect_brute_force(4, GetParam(), 5);
+}
+
+TEST_P(SmallScene, HitsDoNotDependOnPackets) {
+  const EmbreeAccelerator accel(soup_scene(4), 1, GetParam());
+  expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(30000), 3, 5));
 }
 
 TEST(Accelerator, HitsDoNotDependOnPackets) {
@@ -467,6 +497,70 @@ TEST(Accelerator, ClosedMeshesHaveNoHoles) {
   }
 }
 
+/// A closed tube of `n` sides along an axis that no coordinate axis is parallel to.
+std::shared_ptr<const Scene> turned_tube(uint32_t n, float half_length) {
+  MeshData m;
+  const Affine turn = rotate(0, 37) * rotate(1, 23) * rotate(2, 51);
+  const auto vertex = [&](float x, float y, float z) {
+    const Vec3<float> p = turn.point({x, y, z});
+    m.vertex(p.x, p.y, p.z);
+  };
+  for (uint32_t i = 0; i < n; ++i)
+    for (const float side : {-half_length, half_length}) {
+      const double angle = 2 * M_PI * i / n;
+      vertex(side, static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)));
+    }
+  vertex(-half_length, 0, 0);
+  vertex(half_length, 0, 0);
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t a = 2 * i, b = 2 * ((i + 1) % n), end = 2 * n;
+    m.triangle(a, a + 1, b);
+    m.triangle(b, a + 1, b + 1);
+    m.triangle(a, b, end);
+    m.triangle(a + 1, b + 1, end + 1);
+  }
+  SceneBuilder b;
+  b.add_to_group(0, b.add_mesh(make_mesh(m)));
+  return b.build();
+}
+
+// Rays from inside closed rooms, at points of their surfaces, at their edges and at their vertices.
+TEST(Accelerator, ListsHaveNoHoles) {
+  for (const float half_length : {1.f, 30.f, 500.f}) {
+    const auto scene = turned_tube(20, half_length);
+    const EmbreeAccelerator accel(scene, 1);
+    ASSERT_TRUE(accel.has_list());
+    const Mesh& mesh = scene->meshes()[0];
+    const size_t n = size_for_build(200000);
+    std::mt19937 rng(6);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    const auto corner = [&](uint32_t face, uint32_t k, size_t axis) {
+      return static_cast<double>(mesh.positions[3 * mesh.indices[3 * face + k] + axis]);
+    };
+    Rays rays(n);
+    for (size_t i = 0; i < n; ++i) {
+      const auto point = [&](uint32_t kind, double shrink) {
+        const auto face = static_cast<uint32_t>(rng() % mesh.triangle_count());
+        double a = kind == 2 ? 0 : uniform(rng), b = kind == 0 ? uniform(rng) : 0;
+        if (a + b > 1) a = 1 - a, b = 1 - b;
+        std::array<double, 3> p;
+        for (size_t k = 0; k < 3; ++k)
+          p[k] = shrink * ((1 - a - b) * corner(face, 0, k) + a * corner(face, 1, k) +
+                           b * corner(face, 2, k));
+        return p;
+      };
+      rays.aim(i, point(0, 0.9 * uniform(rng)), point(static_cast<uint32_t>(i % 3), 1));
+    }
+    const Keys keys(n);
+    const Hits hits = trace(accel, rays, 16, false, keys.keys());
+    EXPECT_EQ(std::count(hits.inst.begin(), hits.inst.begin() + static_cast<long>(n), kNoHit), 0)
+        << half_length;
+    const auto shadow = blocked(accel, rays, 16, false, keys.keys());
+    EXPECT_EQ(std::count(shadow.begin(), shadow.end(), 0u), 0) << half_length;
+    expect_hits_do_not_depend_on_packets(accel, rays);
+  }
+}
+
 // Two triangles in the very same place: which of them is reported is a matter of ids, not of
 // packets.
 TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
@@ -513,9 +607,10 @@ TEST(Accelerator, IncoherentRaysAtCrossingSurfacesDoNotDependOnPackets) {
   expect_hits_do_not_depend_on_packets(accel, rays.in_order(order));
 }
 
-TEST(Accelerator, OcclusionAgreesWithIntersection) {
-  const auto scene = soup_scene(300);
-  const EmbreeAccelerator accel(scene, 2);
+/// Of `triangles`, by a list or by the hierarchy; of the rays one in `one_in` is blocked.
+void expect_occlusion_agrees(uint32_t triangles, HitRule rule, size_t one_in) {
+  const auto scene = soup_scene(triangles);
+  const EmbreeAccelerator accel(scene, 2, rule);
   const size_t n = size_for_build(50000);
   const Rays rays = random_rays(n, 3, 17);
   const Keys keys(n);
@@ -533,11 +628,19 @@ TEST(Accelerator, OcclusionAgreesWithIntersection) {
     EXPECT_EQ(shadow[i], expected ? 1u : 0u) << i;
     count += expected;
   }
-  EXPECT_GT(count, n / 10);
+  EXPECT_GT(count, n / one_in);
   EXPECT_LT(count, n * 9 / 10);
 }
 
-TEST(Accelerator, LightShapesAreFoundByTheirRecord) {
+TEST(Accelerator, OcclusionAgreesWithIntersection) {
+  expect_occlusion_agrees(300, HitRule::kCanonical, 10);
+}
+
+TEST_P(SmallScene, OcclusionAgreesWithIntersection) {
+  expect_occlusion_agrees(4, GetParam(), 40);
+}
+
+TEST_P(SmallScene, LightShapesAreFoundByTheirRecord) {
   SceneBuilder b;
   b.add_light(make_light(LightKind::kSphere, {1, 1, 1}, translate(4, 0, 0)));
   b.add_light(make_light(LightKind::kDome, {1, 1, 1}));  // comes first among the records
@@ -549,7 +652,7 @@ TEST(Accelerator, LightShapesAreFoundByTheirRecord) {
   b.add_light(point);
   b.add_light(make_light(LightKind::kDistant, {1, 1, 1}));
   const auto scene = b.build();
-  const EmbreeAccelerator accel(scene, 1);
+  const EmbreeAccelerator accel(scene, 1, GetParam());
   const auto& record = scene->light_set().of_input;
   Rays rays(9);
   const auto from_centre = [&](size_t i, double x, double y, double z) {
@@ -584,12 +687,12 @@ TEST(Accelerator, LightShapesAreFoundByTheirRecord) {
   }
 }
 
-TEST(Accelerator, CylinderLightsAreOpenAtTheirEnds) {
+TEST_P(SmallScene, CylinderLightsAreOpenAtTheirEnds) {
   SceneBuilder b;
   Light tube = make_light(LightKind::kCylinder, {1, 1, 1}, translate(0, 0, 3));  // along x
   tube.length = 4;
   b.add_light(tube);
-  const EmbreeAccelerator accel(b.build(), 1);
+  const EmbreeAccelerator accel(b.build(), 1, GetParam());
   Rays rays(5);
   rays.aim(0, {0, 0, 0}, {1.9, 0, 3});
   rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});   // beside its end
@@ -649,7 +752,7 @@ std::shared_ptr<const Scene> leaves(int n, float opacity, float threshold, bool 
   return b.build();
 }
 
-TEST(Accelerator, PresenceIsAProbability) {
+TEST_P(SmallScene, PresenceIsAProbability) {
   const size_t n = size_for_build(20000, 4);
   Rays rays(n);
   std::mt19937 rng(1);
@@ -662,7 +765,7 @@ TEST(Accelerator, PresenceIsAProbability) {
   for (const bool instanced : {false, true}) {
     for (const float opacity : {0.f, 0.25f, 0.5f, 1.f}) {
       const auto scene = leaves(3, opacity, 0, false, instanced);
-      const EmbreeAccelerator accel(scene, 1);
+      const EmbreeAccelerator accel(scene, 1, GetParam());
       SCOPED_TRACE(testing::Message() << "opacity " << opacity << (instanced ? ", instanced" : ""));
       expect_hits_do_not_depend_on_packets(accel, rays);
       const Hits hits = trace(accel, rays, 16, false, keys.keys());
@@ -693,7 +796,7 @@ TEST(Accelerator, PresenceIsAProbability) {
   }
 }
 
-TEST(Accelerator, PresenceKeysMayStandInRows) {
+TEST_P(SmallScene, PresenceKeysMayStandInRows) {
   // As in the path pool: both words of a key inside a row of 16.
   const size_t n = 2000, words = 16;
   Rays rays(n);
@@ -709,7 +812,7 @@ TEST(Accelerator, PresenceKeysMayStandInRows) {
     rows[words * i + 14] = keys.sample[i];
   }
   const PresenceKeys in_rows{rows.data() + 13, rows.data() + 14, words, 5};
-  const EmbreeAccelerator accel(leaves(3, 0.4f, 0, false, true), 1);
+  const EmbreeAccelerator accel(leaves(3, 0.4f, 0, false, true), 1, GetParam());
   for (const uint32_t width : {1u, 4u, 8u, 16u}) {
     expect_same_hits(trace(accel, rays, width, false, keys.keys(5)),
                      trace(accel, rays, width, false, in_rows), n, "keys in rows");
@@ -718,7 +821,7 @@ TEST(Accelerator, PresenceKeysMayStandInRows) {
   }
 }
 
-TEST(Accelerator, PresenceByTextureAndThreshold) {
+TEST_P(SmallScene, PresenceByTextureAndThreshold) {
   const size_t n = 4096;
   Rays rays(n);
   for (size_t i = 0; i < n; ++i) {
@@ -729,7 +832,7 @@ TEST(Accelerator, PresenceByTextureAndThreshold) {
   for (const bool instanced : {false, true}) {
     for (const float threshold : {0.f, 0.5f, 0.9f}) {
       const auto scene = leaves(1, 1, threshold, true, instanced);
-      const EmbreeAccelerator accel(scene, 1);
+      const EmbreeAccelerator accel(scene, 1, GetParam());
       expect_hits_do_not_depend_on_packets(accel, rays);
       const Hits hits = trace(accel, rays, 16, false, keys.keys());
       for (size_t i = 0; i < n; ++i) {
@@ -768,9 +871,9 @@ TEST(Accelerator, MemoryIsAccounted) {
   EXPECT_LT(b.bytes(), 20000u * 1000);
 }
 
-TEST(Accelerator, EmptySceneAndZeroAreaFaces) {
+TEST_P(SmallScene, EmptySceneAndZeroAreaFaces) {
   SceneBuilder empty;
-  const EmbreeAccelerator nothing(empty.build(), 1);
+  const EmbreeAccelerator nothing(empty.build(), 1, GetParam());
   SceneBuilder flat;
   MeshData m;
   m.vertex(0, 0, 0);
@@ -782,7 +885,7 @@ TEST(Accelerator, EmptySceneAndZeroAreaFaces) {
   flat.add_to_group(0, flat.add_mesh(make_mesh(MeshData{})));
   const auto flat_scene = flat.build();
   EXPECT_EQ(flat_scene->unique_triangles(), 2u);
-  const EmbreeAccelerator line(flat_scene, 1);
+  const EmbreeAccelerator line(flat_scene, 1, GetParam());
   Rays rays(40);
   for (size_t i = 0; i < 40; ++i) rays.aim(i, {0.05 * static_cast<double>(i), 3, 0}, {0.1, 0, 0});
   const Keys keys(40);

@@ -76,7 +76,9 @@ struct EmbreeAccelerator::Impl {
         first_world(hierarchy->first_world()),
         first_light(hierarchy->first_light()),
         native(widest_packet(hierarchy->device())),
-        list(TriangleList::make(*scene, light_shapes(*scene))) {}
+        list(hierarchy->rule() == HitRule::kCanonical
+                 ? TriangleList::make(*scene, light_shapes(*scene))
+                 : nullptr) {}
 
   /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
@@ -282,6 +284,10 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
     rtcOccluded1(impl_->top, &ray, &args);
     occluded[i] = ray.tfar < 0.f ? 1 : 0;
   }
+}
+
+bool EmbreeAccelerator::has_list() const {
+  return impl_->list != nullptr;
 }
 
 size_t EmbreeAccelerator::bytes() const {

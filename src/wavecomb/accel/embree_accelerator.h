@@ -46,11 +46,13 @@ struct PresenceKeys {
 /// Which of equally close hits a hierarchy is built to give.
 enum class HitRule : uint8_t {
   kCanonical,  ///< the same one for any packet (docs/decisions/canonical-hits.md)
+  kHierarchy,  ///< likewise, and by the hierarchy where a list would do. For tests and benchmarks
   kEmbree,     ///< whichever Embree keeps; no filter anywhere. For BareTraversal only
 };
 
 /// A two-level bounding volume hierarchy: each group of meshes committed once, instanced any number
-/// of times; the world's own meshes in the top level.
+/// of times; the world's own meshes in the top level. Small still scenes are traced by a list of
+/// triangles beside it (triangle_list.h).
 ///
 /// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is
 /// thread-safe.
@@ -78,6 +80,8 @@ class EmbreeAccelerator {
   void occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width, bool coherent,
                 const PresenceKeys& keys) const;
 
+  /// Whether rays are tested against a list in place of the hierarchy.
+  bool has_list() const;
   /// Memory that Embree holds for the hierarchy, bytes.
   size_t bytes() const;
   /// Widest packets that Embree traces natively here.

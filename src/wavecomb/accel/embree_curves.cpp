@@ -96,7 +96,7 @@ RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, Hit
   rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // only read
   rtcSetGeometryBoundsFunction(g, curve_box, nullptr);
   rtcSetGeometryIntersectFunction(
-      g, rule == HitRule::kCanonical ? intersect_curves : intersect_curves_bare);
+      g, rule != HitRule::kEmbree ? intersect_curves : intersect_curves_bare);
   rtcSetGeometryOccludedFunction(g, occlude_curves);
   rtcCommitGeometry(g);
   return g;

@@ -56,8 +56,8 @@ EmbreeHierarchy::EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeH
     : geometry_(scene.geometry()),
       rule_(rule),
       device_(origin ? origin->device_ : std::make_shared<EmbreeDevice>()),
-      filtered_(rule == HitRule::kCanonical ? filtered_meshes(scene)
-                                            : std::vector<uint8_t>(geometry_->meshes.size(), 0)),
+      filtered_(rule != HitRule::kEmbree ? filtered_meshes(scene)
+                                         : std::vector<uint8_t>(geometry_->meshes.size(), 0)),
       shapes_(light_shapes(scene)) {
   const std::lock_guard lock(device_->building);
   tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
@@ -108,9 +108,8 @@ void EmbreeHierarchy::check(const char* doing) const {
 
 RTCScene EmbreeHierarchy::new_scene() const {
   RTCScene s = rtcNewScene(device());
-  const RTCSceneFlags filter = rule_ == HitRule::kCanonical
-                                   ? RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
-                                   : RTC_SCENE_FLAG_NONE;
+  const RTCSceneFlags filter =
+      rule_ != HitRule::kEmbree ? RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS : RTC_SCENE_FLAG_NONE;
   rtcSetSceneFlags(s, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | filter));
   rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
   return s;
@@ -174,7 +173,7 @@ void EmbreeHierarchy::attach_light(uint32_t id, const PlacedShape& shape) const 
     rtcSetGeometryUserData(g, const_cast<PlacedShape*>(&shape));  // only read
     rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
-        g, rule_ == HitRule::kCanonical ? intersect_lights : intersect_lights_bare);
+        g, rule_ != HitRule::kEmbree ? intersect_lights : intersect_lights_bare);
     rtcSetGeometryOccludedFunction(g, occlude_lights);
     rtcCommitGeometry(g);
     rtcAttachGeometryByID(top_, g, id);

@@ -38,13 +38,17 @@ struct ListTracer {
   const RaySpan& rays;
   const PresenceKeys& keys;
 
-  /// Where rays cross the plane of a triangle, and on which side of its edges.
+  /// Where rays cross a plane: at distance height / slope, slope positive.
+  template <typename F>
+  struct Plane {
+    F height, slope;
+  };
+  /// Where rays cross a triangle's plane with respect to its edges.
   template <typename F>
   struct Crossing {
     F b, c;      ///< barycentrics of the second and third vertex, times `sum`
     F sum;       ///< twice the triangle's area as the ray sees it
-    F n, d;      ///< distance is n / d, d positive
-    Mask<F> in;  ///< within the triangle, ahead of the ray
+    Mask<F> in;  ///< within the triangle
   };
 
   /// Rays [base, base + width) and what they share with all triangles.
@@ -65,20 +69,22 @@ struct ListTracer {
       }
     }
 
+    WAVECOMB_INLINE Plane<F> plane(const TriangleList::Triangle& t) const {
+      const Vec3<F> n(Vec3<float>{t.n[0], t.n[1], t.n[2]});
+      const Vec3<F> p{F(t.p[0]) - o.x, F(t.p[1]) - o.y, F(t.p[2]) - o.z};
+      const F slope = dot(n, d);
+      const UInt<F> sign = float_bits<F>(slope) & 0x80000000u;
+      return {bits_float<F>(float_bits<F>(dot(n, p)) ^ sign), abs(slope)};
+    }
+
     WAVECOMB_INLINE Crossing<F> cross(const TriangleList::Triangle& t) const {
       const auto [i, j, k] = t.vertex;
       // No fma: a shared edge has the same products on both sides.
       const F a = x[k] * y[j] - y[k] * x[j], b = x[i] * y[k] - y[i] * x[k],
               c = x[j] * y[i] - y[j] * x[i];
       const F sum = a + b + c;
-      const Vec3<F> n(Vec3<float>{t.n[0], t.n[1], t.n[2]});
-      const Vec3<F> p{F(t.p[0]) - o.x, F(t.p[1]) - o.y, F(t.p[2]) - o.z};
-      const F slope = dot(n, d);
-      const F height =
-          bits_float<F>(float_bits<F>(dot(n, p)) ^ (float_bits<F>(slope) & 0x80000000u));
-      const Mask<F> in =
-          ((min(a, min(b, c)) >= 0.f) | (max(a, max(b, c)) <= 0.f)) & (height > 0.f) & (sum != 0.f);
-      return {b, c, sum, height, abs(slope), in};
+      const Mask<F> in(((min(a, min(b, c)) >= 0.f) | (max(a, max(b, c)) <= 0.f)) & (sum != 0.f));
+      return {b, c, sum, in};
     }
   };
 
@@ -135,12 +141,14 @@ struct ListTracer {
       const Packet<F> packet(list, rays, base);
       F t = limits<F>(base), b(0.f), c(0.f), sum(1.f);
       U entry(count + shapes);
+      Plane<F> plane{};
       for (uint32_t i = 0; i < count; ++i) {
         const TriangleList::Triangle& triangle = list.triangles_[i];
+        if (!triangle.in_same_plane) plane = packet.plane(triangle);
         const Crossing<F> at = packet.cross(triangle);
-        Mask<F> take = at.in & (at.n < t * at.d) & active;
+        Mask<F> take = at.in & (plane.height > 0.f) & (plane.height < t * plane.slope) & active;
         if (none(take)) continue;
-        const F distance = at.n / at.d;
+        const F distance = plane.height / plane.slope;
         take = take & (distance < t);
         if (triangle.filtered) take = met<F>(take, i, at.b, at.c, at.sum, base);
         t = select(take, distance, t);
@@ -175,10 +183,15 @@ struct ListTracer {
       Mask<F> open = first_lanes<F>(rays.size - base);
       const Packet<F> packet(list, rays, base);
       const F tfar = limits<F>(base);
+      Plane<F> plane{};
       for (uint32_t i = 0; i < list.triangles_.size(); ++i) {
         const TriangleList::Triangle& triangle = list.triangles_[i];
+        if (!triangle.in_same_plane) {
+          if (none(open)) break;
+          plane = packet.plane(triangle);
+        }
         const Crossing<F> at = packet.cross(triangle);
-        Mask<F> take = at.in & (at.n < tfar * at.d) & open;
+        Mask<F> take = at.in & (plane.height > 0.f) & (plane.height < tfar * plane.slope) & open;
         if (triangle.filtered && any(take)) take = met<F>(take, i, at.b, at.c, at.sum, base);
         open = open & not_(take);
       }
@@ -273,7 +286,11 @@ void TriangleList::add(const Vec3<float> (&corners)[3], uint32_t inst, uint32_t 
     t.vertex[k] = vertex(corners[k]);
   }
   t.p[0] = corners[0].x, t.p[1] = corners[0].y, t.p[2] = corners[0].z;
-  t.filtered = filtered ? 1 : 0;
+  if (triangles_.size() > 1) {
+    const Triangle& before = *(triangles_.end() - 2);
+    t.in_same_plane = std::ranges::equal(t.n, before.n) && std::ranges::equal(t.p, before.p);
+  }
+  t.filtered = filtered;
   t.mesh = mesh;
   ids_.prim.push_back(prim);
   ids_.geom.push_back(geom);

@@ -44,7 +44,8 @@ class TriangleList {
   struct Triangle {
     float n[3], p[3];
     uint16_t vertex[3];
-    uint16_t filtered;  ///< 1: asks whether it is met
+    bool filtered;       ///< asks whether it is met
+    bool in_same_plane;  ///< as the one before, to the bit
     uint32_t mesh;
   };
   struct Vertex {
