@@ -341,7 +341,7 @@ TEST_P(SmallScene, IsTracedAsAsked) {
 }
 
 TEST_P(SmallScene, HitsEqualBruteForceInDoublePrecision) {
-  expect_brute_force(4, GetParam(), 5);
+  expect_brute_force(4, GetParam(), 10);
 }
 
 TEST_P(SmallScene, HitsDoNotDependOnPackets) {
