@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "wavecomb/render/allotment.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
@@ -64,6 +65,7 @@ struct RenderStatistics {
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;
+  AllotmentFacts allotment;
   std::optional<StoreStatistics> texture_store;  ///< where textures have a limit
 };
 
