@@ -180,7 +180,12 @@ def _check_header(header: dict[str, Any]) -> None:
 
     settings = header["settings"]
     known = picture_settings(
-        {**_core.Settings().to_dict(), "roulette": "cost-aware", "adaptive": 1.0, "allocate": "error"}
+        {
+            **_core.Settings().to_dict(),
+            "roulette": "cost-aware",
+            "adaptive": 1.0,
+            "allocate": "error",
+        }
     )
     if not settings.keys() <= known.keys() or not {"width", "height", "spp"} <= settings.keys():
         raise ArchiveError("it has settings that are not known")
