@@ -32,9 +32,9 @@ struct Allotment {
 
 /// Where a pass stands: what a checkpoint keeps beside the film.
 struct PassState {
-  uint32_t target = 0;          ///< samples that each pixel of the pass has at its end; or the mean
-  std::vector<uint8_t> active;  ///< by pixel, row by row: 1: of the pass. Empty: all are
-  Allotment allotment;
+  uint32_t target = 0;  ///< samples that each pixel of the pass has at its end; or the mean
+  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1: of the pass. Empty: all are
+  Allotment allotment{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
 };
