@@ -75,6 +75,16 @@ nb::dict sharing_dict(const Sharing& s) {
   return d;
 }
 
+nb::object allotment_dict(const AllotmentFacts& s) {
+  if (s.pilot == 0) return nb::none();
+  nb::dict d;
+  d["pilot"] = s.pilot;
+  d["least"] = s.least;
+  d["most"] = s.most;
+  d["gain"] = s.gain > 0 ? nb::cast(s.gain) : nb::none();
+  return d;
+}
+
 nb::dict light_calibration_dict(const LightShares& s) {
   nb::dict d;
   d["seconds"] = s.seconds;
@@ -147,6 +157,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   costs["calibration_s"] = s.calibration_s;
   d["cost_prediction"] = costs;
   d["light_calibration"] = light_calibration_dict(s.light_calibration);
+  d["allotment"] = allotment_dict(s.allotment);
   nb::dict uses;
   for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
   d["policy_uses"] = uses;

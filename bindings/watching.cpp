@@ -45,6 +45,8 @@ nb::dict state_dict(const Snapshot& s) {
   nb::dict d;
   d["pass.target"] = s.pass.target;
   d["pass.active"] = view(s.pass.active.data(), s.pass.active.size());
+  const auto& counts = s.pass.allotment.counts;
+  d["pass.counts"] = view(counts.data(), counts.size() * sizeof(uint32_t));
   for (const Film::Block& block : s.film.blocks())
     d[("film." + block.name).c_str()] = view(block.bytes.data(), block.bytes.size());
   return d;
@@ -152,6 +154,11 @@ std::function<void(Film&, PassState&)> resumed_from(const nb::dict& state) {
     const auto active = nb::cast<Bytes>(state["pass.active"]);
     if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
     pass.active.assign(active.data(), active.data() + active.size());
+    if (!state.contains("pass.counts")) return;  // of a version that allotted nothing
+    const auto counts = nb::cast<Bytes>(state["pass.counts"]);
+    if (counts.size() != 0) bytes_of(state, "pass.counts", film.pixel_count() * sizeof(uint32_t));
+    pass.allotment.counts.resize(counts.size() / sizeof(uint32_t));
+    if (counts.size() != 0) std::memcpy(pass.allotment.counts.data(), counts.data(), counts.size());
   };
 }
 

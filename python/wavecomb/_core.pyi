@@ -485,6 +485,8 @@ class Settings:
     """Samples of each pixel before the first look at errors. Default: 16."""
     spp: int
     """Samples of each pixel; with adaptive sampling, the most. Default: 64."""
+    allocate: Literal["even", "error", "efficiency"]
+    """How the samples of a render are allotted to its pixels. Default: even."""
     time_limit: float
     """Seconds of rendering. Default: none. 0: none."""
     integrator: Literal["wavefront", "reference"]

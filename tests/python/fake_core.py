@@ -31,6 +31,7 @@ class Settings:
     adaptive = noise = time_limit = 0.0
     error = crop = False
     region = None
+    allocate = "even"
 
     def __init__(self, **settings: Any) -> None:
         defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}

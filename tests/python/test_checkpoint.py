@@ -67,6 +67,8 @@ class StopAt:
         {"spp": 200},
         {"noise": 0.03, "spp": 1024},
         {"adaptive": 0.04, "spp": 1024},
+        {"allocate": "error", "spp": 200},
+        {"allocate": "efficiency", "spp": 200},
         pytest.param({"spp": 700}, marks=pytest.mark.long),
         pytest.param({"noise": 0.015, "spp": 4096}, marks=pytest.mark.long),
         pytest.param({"adaptive": 0.02, "spp": 4096}, marks=pytest.mark.long),

@@ -73,6 +73,14 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
             f"resumed after {time_text(stats['seconds']['resumed'])} and "
             f"{count_text(before)} samples"
         )
+    if allotted := stats.get("allotment"):
+        line = (
+            f"samples by {settings['allocate']}: {allotted['least']} to {allotted['most']} a pixel "
+            f"after {allotted['pilot']} of each"
+        )
+        if allotted["gain"] is not None:
+            line += f"; expected efficiency {allotted['gain']:.2f} of even"
+        lines.append(line)
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
         line = f"{stats['passes']} passes, {mean:.3g} samples a pixel"

@@ -80,6 +80,8 @@ def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
     """What of the settings needs all pixels at once; empty: nothing."""
     if settings.time_limit:
         return "--time-limit"
+    if settings.allocate != "even":
+        return f"--allocate {settings.allocate}"
     if keeps_error(settings):
         return "a picture with errors (--adaptive, --noise, --aov error, --aov variance)"
     if any(name in aov_names.of_kind("coverage") for name in aovs):
@@ -127,7 +129,7 @@ def without_samples(
 
     of_one_pixel = {
         "width": picture_size(settings)[0], "height": max(rows, 2), "region": (0, 0, 1, 1),
-        "crop": False, "spp": 1, "costs": "model", "light_weights": "power",
+        "crop": False, "spp": 1, "costs": "model", "light_weights": "power", "allocate": "even",
     }  # fmt: skip
     picture = render(_core.Settings(**{**settings.to_dict(), **of_one_pixel}))
 

@@ -76,8 +76,10 @@ def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
         if name not in rows or rows[name].changes_picture
     }
     del chosen["time_limit"]
-    if chosen["roulette"] != "cost-aware":
+    if chosen["roulette"] != "cost-aware" and chosen["allocate"] != "efficiency":
         del chosen["costs"]
+    if chosen["allocate"] == "even":
+        del chosen["allocate"]
     if not (chosen["adaptive"] or chosen["noise"]):
         del chosen["min_spp"]
     return chosen
@@ -178,7 +180,12 @@ def _check_header(header: dict[str, Any]) -> None:
 
     settings = header["settings"]
     known = picture_settings(
-        {**_core.Settings().to_dict(), "roulette": "cost-aware", "adaptive": 1.0}
+        {
+            **_core.Settings().to_dict(),
+            "roulette": "cost-aware",
+            "adaptive": 1.0,
+            "allocate": "error",
+        }
     )
     if not settings.keys() <= known.keys() or not {"width", "height", "spp"} <= settings.keys():
         raise ArchiveError("it has settings that are not known")
@@ -258,8 +265,8 @@ def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
 
 
 def _take_more_samples(checkpoint: Checkpoint, before: dict[str, Any], now: dict[str, Any]) -> None:
-    """A render that is not adaptive may go on to another number of samples."""
-    if before.get("adaptive") or before.get("noise"):
+    """A render that is even and not adaptive may go on to another number of samples."""
+    if any(before.get(name) for name in ("adaptive", "noise", "allocate")):
         return
     if now["spp"] >= checkpoint.state["pass.target"]:
         before["spp"] = now["spp"]

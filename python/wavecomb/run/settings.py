@@ -118,4 +118,6 @@ def picture_size(settings: Settings) -> tuple[int, int]:
 
 def keeps_error(settings: Settings) -> bool:
     """Whether a render with these settings has the layers error and variance."""
-    return bool(settings.adaptive or settings.noise or settings.error)
+    return bool(
+        settings.adaptive or settings.noise or settings.error or settings.allocate != "even"
+    )

@@ -24,6 +24,14 @@ void Settings::check() const {
   }
   if (adaptive > 0 && noise > 0)
     throw Error("adaptive and noise are both given; choose one to end the render by");
+  if (allots() && is_adaptive())
+    throw Error(
+        "allocate is for renders of a given number of samples or seconds; adaptive and "
+        "noise allot samples by themselves: give one");
+  if (allots() && region)
+    throw Error(
+        "allocate error and efficiency look at the whole picture, and a region then would "
+        "not be its part; give allocate even, or no region");
   if (is_adaptive() && min_spp > spp)
     throw Error("min_spp is " + std::to_string(min_spp) + "; it must not be above spp, which is " +
                 std::to_string(spp));

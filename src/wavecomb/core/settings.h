@@ -38,6 +38,8 @@ enum class Traversal : uint8_t { kPackets, kSingle };
 /// How textures are filtered. kAuto: whole where the camera sees them, by one texel after bounces
 /// (docs/decisions/one-texel.md).
 enum class TextureFilter : uint8_t { kAuto, kWhole };
+/// How a render's samples are allotted to pixels (render/allotment.h).
+enum class Allocate : uint8_t { kEven, kError, kEfficiency };
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
 /// Largest picture.
@@ -85,6 +87,8 @@ struct Settings {
   /// Adaptive sampling until the picture's mean relative error is no larger; 0: off. Not both.
   float noise = 0;
   uint32_t min_spp = 16;  ///< adaptive: before the first look at errors; spp is the most
+  /// How samples are allotted where spp, or a time limit, says how many there are in all.
+  Allocate allocate = Allocate::kEven;
   /// The most seconds that rendering may take; 0: no limit. What is done by then is the picture.
   float time_limit = 0;
   bool error = false;  ///< keep errors and variances where nothing else asks for them
@@ -112,7 +116,8 @@ struct Settings {
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }
   /// Pixels that the film has.
   Region film() const { return crop ? rendered() : Region{0, 0, width, height}; }
-  bool keeps_error() const { return error || is_adaptive(); }
+  bool allots() const { return allocate != Allocate::kEven; }
+  bool keeps_error() const { return error || is_adaptive() || allots(); }
   /// Throws Error naming the option and what it may be.
   void check() const;
 };

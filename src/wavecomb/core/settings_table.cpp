@@ -179,6 +179,11 @@ std::vector<SettingInfo> work_settings() {
                           "Samples of each pixel before the first look at errors."),
       number<&S::spp>("spp", "Samples", 1, kMostSamples,
                       "Samples of each pixel; with adaptive sampling, the most."),
+      choice<&S::allocate>("allocate", "Samples go",
+                           {{"even", "To all pixels alike."},
+                            {"error", "Where the relative error is: by deviation over brightness."},
+                            {"efficiency", "Likewise, and to cheap pixels rather than dear ones."}},
+                           "How the samples of a render are allotted to its pixels."),
       number<&S::time_limit>("time_limit", "Time limit", 0, 1e9f, "Seconds of rendering.", "none"),
   };
 }

@@ -12,6 +12,10 @@ namespace wavecomb {
 
 AovTables::AovTables(const Scene& scene, const Settings& settings) {
   layout.set = settings.aovs;
+  if (settings.allocate == Allocate::kEfficiency) {
+    layout.set.bits = layout.set.bits | Aov::kCost;
+    models_cost = settings.costs != CostSource::kMeasured;
+  }
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials need none of it; positions of objects do.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);

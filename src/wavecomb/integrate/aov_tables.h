@@ -24,6 +24,8 @@ struct AovTables {
   /// By light: where its group is kept among the film's, or kNoGroup.
   std::vector<uint32_t> kept_group;
   std::vector<std::string> kept_names;  ///< of the film's groups
+  /// The cost AOV is what the model says, which is reproducible, instead of time.
+  bool models_cost = false;
 
   /// What AovHit calls geometry `geom` of instance `inst`; kNothingHit where nobody wants to know.
   template <typename F>

@@ -163,6 +163,7 @@ class PathTracer {
     keys_.shadow_set = nullptr;
     context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
     counts_.add_rays(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, kModelRayNs);
     return h;
   }
 
@@ -173,6 +174,7 @@ class PathTracer {
     keys_.shadow_set = context_.scene.lights.links.members ? &shadow_set_ : nullptr;
     context_.accel->occluded(ray, &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, kModelRayNs);
     return blocked != 0;
   }
 
@@ -209,6 +211,7 @@ class PathTracer {
                         uint32_t material, const PathState<F>& path, VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, time_};
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     return kernels[scene.material_program[material]](
@@ -247,7 +250,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
       worker.clock.enter(Phase::kGenerate);
       const auto start = worker.aovs.start_cost();
       const Color<float> radiance = tracer.exposed_path(pixel, task.first_sample + s);
-      worker.aovs.spread_cost(1, start, [](size_t) { return 0; });
+      if (!worker.aovs.models_cost()) worker.aovs.spread_cost(1, start, [](size_t) { return 0; });
       worker.clock.enter(Phase::kResolve);
       if (film.has_error())
         film.error(x, y).add(tracer.radiance(), sum.samples, {sum.r, sum.g, sum.b});

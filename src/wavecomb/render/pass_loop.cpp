@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "wavecomb/core/error.h"
 #include "wavecomb/render/adaptive.h"
 #include "wavecomb/render/pixel_order.h"
 
@@ -12,14 +13,23 @@ namespace wavecomb {
 PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film& film,
                    PassRunner& runner, RenderCosts& costs, Watch& watch)
     : settings_(settings),
-      rules_{settings.spp, settings.min_spp,    settings.is_adaptive(), settings.time_limit > 0,
-             step,         settings.progressive},
+      rules_{settings.spp, settings.min_spp,     settings.is_adaptive(), settings.time_limit > 0,
+             step,         settings.progressive, pilot_samples(settings)},
       pass_(std::move(pass)),
       film_(film),
       runner_(runner),
       costs_(costs),
       watch_(watch),
       order_(morton_pixel_order(settings.rendered())) {
+  if (!pass_.allotment.counts.empty()) {
+    const auto& counts = pass_.allotment.counts;
+    const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
+    if (rules_.pilot == 0 || *least < rules_.pilot || counts.size() != film.pixel_count())
+      throw Error("the counts of samples to resume from are not of such a render");
+    allotment_ = {rules_.pilot, *least, *most, 0};
+  }
+  pass_.allotment.pilot = rules_.pilot;
+  pass_.allotment.spp = rules_.spp;
   const std::vector<uint32_t> samples = film.samples();
   resumed_samples_ = std::accumulate(samples.begin(), samples.end(), uint64_t{0});
   const uint32_t target =
@@ -29,7 +39,7 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film
     const size_t i = film.index(pixel & 0xffffu, pixel >> 16);
     const bool active = pass_.is_active(i);
     active_pixels_ += active ? 1 : 0;
-    expected_samples_ += active ? std::max(samples[i], target) : samples[i];
+    expected_samples_ += active ? std::max(samples[i], pass_.allotment.at(i, target)) : samples[i];
     all_begun &= samples[i] > 0;
   }
   may_be_cut_ = all_begun;
@@ -70,6 +80,8 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
       expected_samples_ = check.expected_samples;
     }
   }
+  if (rules_.pilot > 0 && done == rules_.pilot && pass_.allotment.counts.empty())
+    pass_.allotment = allot(film_, settings_, allotment_);
   const uint64_t active = active_pixels_;
   if (active == 0 || (done >= rules_.spp && !rules_.adaptive)) return false;
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};

@@ -10,6 +10,7 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/film/film.h"
+#include "wavecomb/render/allotment.h"
 #include "wavecomb/render/pass_plan.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
@@ -43,6 +44,7 @@ class PassLoop {
   RenderStatus status() const;
   /// While the work stands still.
   const PassState& pass() const { return pass_; }
+  const AllotmentFacts& allotment() const { return allotment_; }
 
  private:
   /// Decides on the next pass. False: the picture is done.
@@ -58,6 +60,7 @@ class PassLoop {
   RenderCosts& costs_;
   Watch& watch_;
   std::vector<uint32_t> order_;
+  AllotmentFacts allotment_;
   Clock::time_point start_ = Clock::now();
   uint64_t resumed_samples_ = 0;
   double samples_per_s_ = 0;  ///< of the last pass

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <utility>
 
 namespace wavecomb {
 namespace {
@@ -34,8 +35,9 @@ uint32_t next_check(uint32_t done, const PassRules& rules) {
 }
 
 uint32_t next_target(uint32_t done, const PassRules& rules, const TimeLeft& left, uint64_t pixels) {
-  const uint32_t target =
+  uint32_t target =
       rules.adaptive ? next_check(done, rules) : std::min(rules.spp, done + rules.step);
+  if (done < rules.pilot) target = std::min(target, rules.pilot);
   if (!rules.timed && !rules.progressive) return target;
   uint32_t samples = std::min(target - done, done == 0 ? 1u : std::bit_floor(done));
   if (!rules.timed) return done + samples;
@@ -54,16 +56,19 @@ uint64_t PassPlan::samples() const {
 
 PassPlan plan_pass(std::span<const uint32_t> order, const Region& window,
                    std::span<const uint32_t> samples, const PassState& pass) {
-  std::map<uint32_t, std::vector<uint32_t>> by_count;
+  using FromTo = std::pair<uint32_t, uint32_t>;
+  std::map<FromTo, std::vector<uint32_t>> by_count;
   for (const uint32_t pixel : order) {
     const size_t i = window.index(pixel & 0xffffu, pixel >> 16);
-    if (pass.is_active(i) && samples[i] < pass.target) by_count[samples[i]].push_back(pixel);
+    const uint32_t target = pass.allotment.at(i, pass.target);
+    if (pass.is_active(i) && samples[i] < target) by_count[{samples[i], target}].push_back(pixel);
   }
   PassPlan plan;
-  for (const auto& [count, pixels] : by_count) {
+  for (const auto& [counts, pixels] : by_count) {
+    const auto [from, to] = counts;
     const size_t begin = plan.pixels.size();
     plan.pixels.insert(plan.pixels.end(), pixels.begin(), pixels.end());
-    plan.batches.push_back({begin, plan.pixels.size(), count, pass.target - count});
+    plan.batches.push_back({begin, plan.pixels.size(), from, to - from});
   }
   return plan;
 }

@@ -16,10 +16,25 @@ namespace wavecomb {
 /// half (ErrorSums), and a net of Sobol's sequence.
 inline constexpr uint32_t kCheckSamples = 16;
 
+/// Samples that pixels are to have, where they are not all to have the same (render/allotment.h).
+struct Allotment {
+  uint32_t pilot = 0;            ///< samples that all have first; 0: pixels are alike
+  uint32_t spp = 0;              ///< in the mean
+  std::vector<uint32_t> counts;  ///< by pixel, at the end; empty until the pilot is done
+
+  /// Samples that a pixel has when the mean is `target`.
+  uint32_t at(size_t pixel, uint32_t target) const {
+    if (counts.empty() || target <= pilot) return target;
+    const uint64_t more = counts[pixel] - pilot;
+    return pilot + static_cast<uint32_t>(more * (target - pilot) / (spp - pilot));
+  }
+};
+
 /// Where a pass stands: what a checkpoint keeps beside the film.
 struct PassState {
-  uint32_t target = 0;          ///< samples that each pixel of the pass has at its end
-  std::vector<uint8_t> active;  ///< by pixel, row by row: 1: of the pass. Empty: all are
+  uint32_t target = 0;  ///< samples that each pixel of the pass has at its end; or the mean
+  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1: of the pass. Empty: all are
+  Allotment allotment{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
 };
@@ -32,6 +47,7 @@ struct PassRules {
   bool timed = false;        ///< there is a limit: passes must fit
   uint32_t step = 16;        ///< not adaptive: samples that a pass adds
   bool progressive = false;  ///< passes double from one sample on
+  uint32_t pilot = 0;        ///< a pass ends when pixels have so many; 0: they are alike
 };
 
 /// Time until the limit, and the speed so far.
@@ -66,8 +82,8 @@ struct PassPlan {
   uint64_t samples() const;
 };
 
-/// What is left of a pass: its pixels below the target, those of one sample count together, fewest
-/// samples first.
+/// What is left of a pass: its pixels below the target, those of one sample count and one target
+/// together, fewest samples first.
 ///
 /// Args: `order`: the pixels that are rendered (x | y << 16); `window`: the film's; `samples` each
 /// pixel of it has, row by row. Empty batches: the pass is done.

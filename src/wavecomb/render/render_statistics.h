@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "wavecomb/render/allotment.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
@@ -49,7 +50,7 @@ struct RenderStatistics {
   uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
   uint64_t packets = 0, packet_lanes = 0;
   uint32_t threads = 0, wave_size = 0, lanes = 0;
-  uint32_t passes = 0;           ///< begun
+  uint32_t passes = 0;  ///< begun
   Sharing sharing;
   uint64_t resumed_samples = 0;  ///< that a checkpoint brought; not in `samples`
   double error = 0;              ///< mean relative error of the picture; infinite: not known
@@ -65,6 +66,7 @@ struct RenderStatistics {
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;
+  AllotmentFacts allotment;
   std::optional<StoreStatistics> texture_store;  ///< where textures have a limit
 };
 

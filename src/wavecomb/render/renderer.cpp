@@ -273,6 +273,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.passes = status.passes;
     s.resumed_samples = status.resumed_samples;
     s.error = status.error;
+    s.allotment = loop.allotment();
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();
     s.accelerator_bytes = impl_->accel->bytes();

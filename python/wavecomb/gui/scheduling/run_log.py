@@ -262,6 +262,7 @@ _WORDS = {
     "roulette_depth": "roulette from",
     "light_selection": "lights",
     "light_weights": "light shares",
+    "allocate": "samples by",
     "adaptive": "pixel error",
     "min_spp": "min spp",
     "time_limit": "seconds",

@@ -42,13 +42,21 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
-/// Spreads a batch's time over the paths of its records, for the cost AOV.
-inline void spread_batch(Wave& wave, size_t begin, size_t end,
+/// Spreads a batch's time over the paths of its records, for the cost AOV; or what the model says.
+inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const ShadingQueue& queue = wave.shading;
   const auto slot = [&](size_t i) {
     return queue.slot[queue.ordered || queue.moved ? queue.sorted_indices[begin + i] : begin + i];
   };
+  if (wave.aovs.models_cost()) {
+    const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
+    for (size_t i = begin; i < end; ++i)
+      wave.aovs.add_cost(
+          slot(i - begin),
+          context.roulette_costs->material(material[queue.ordered ? queue.sorted_indices[i] : i]));
+    return;
+  }
   wave.aovs.spread_cost(end - begin, start, slot);
 }
 
@@ -83,7 +91,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
     if (timed || wave.aovs.wants_cost()) start = PhaseClock::Clock::now();
     kernels[program](wave, context, settings, depth, begin, end);
     if (timed) charge_batch(wave, begin, end, start);
-    if (wave.aovs.wants_cost()) spread_batch(wave, begin, end, start);
+    if (wave.aovs.wants_cost()) spread_batch(wave, context, begin, end, start);
     begin = end;
   }
 }
