@@ -528,7 +528,7 @@ std::shared_ptr<const Scene> turned_tube(uint32_t n, float half_length) {
 TEST(Accelerator, ListsHaveNoHoles) {
   for (const float half_length : {1.f, 30.f, 500.f}) {
     const auto scene = turned_tube(20, half_length);
-    const EmbreeAccelerator accel(scene, 1);
+    const EmbreeAccelerator accel(scene, 1, HitRule::kCanonical);
     ASSERT_TRUE(accel.has_list());
     const Mesh& mesh = scene->meshes()[0];
     const size_t n = size_for_build(200000);

@@ -61,7 +61,7 @@ class EmbreeAccelerator {
   /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory
   /// ...).
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
-                    HitRule rule = HitRule::kCanonical);
+                    HitRule rule = HitRule::kHierarchy);
   /// For a scene that was edited out of origin's: shares the hierarchy, or those groups of it whose
   /// meshes are as they were. Built anew are groups with meshes that begin or cease to be partly
   /// present, and then, or where a light's shape or place is another, the top level.
