@@ -327,17 +327,39 @@ TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
 /// Scenes that are small enough for a list, by the list and by the hierarchy.
 class SmallScene : public testing::TestWithParam<HitRule> {};
 INSTANTIATE_TEST_SUITE_P(Accelerator, SmallScene,
-                         testing::Values(HitRule::kCanonical, HitRule::kHierarchy),
+                         testing::Values(HitRule::kList, HitRule::kCanonical),
                          [](const auto& rule) {
-                           return rule.param == HitRule::kCanonical ? "List" : "Hierarchy";
+                           return rule.param == HitRule::kList ? "List" : "Hierarchy";
                          });
 
 TEST_P(SmallScene, IsTracedAsAsked) {
-  const bool by_list = GetParam() == HitRule::kCanonical;
+  const bool by_list = GetParam() == HitRule::kList;
   EXPECT_EQ(EmbreeAccelerator(soup_scene(4), 1, GetParam()).has_list(), by_list);
   EXPECT_EQ(EmbreeAccelerator(cornell(), 1, GetParam()).has_list(), by_list);
   EXPECT_FALSE(EmbreeAccelerator(soup_scene(60), 1, GetParam()).has_list());
   EXPECT_FALSE(EmbreeAccelerator(curve_testing::hairy(), 1, GetParam()).has_list());
+}
+
+// As where the near plane of a camera lies on one.
+TEST_P(SmallScene, RaysThatStartOnASurfaceMeetItThere) {
+  SceneBuilder b;
+  b.add_to_group(0, b.add_mesh(make_mesh(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}))));
+  const EmbreeAccelerator accel(b.build(), 1, GetParam());
+  Rays rays(40);
+  for (size_t i = 0; i < rays.size; ++i) {
+    const double x = 0.02 * static_cast<double>(i) + 0.1;
+    rays.aim(i, {x, 0.4, 0}, {x + 0.1, 0.3, i % 2 == 0 ? -1.0 : 1.0});
+  }
+  const Keys keys(rays.size);
+  for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+    const Hits hits = trace(accel, rays, width, false, keys.keys());
+    const auto shadow = blocked(accel, rays, width, false, keys.keys());
+    for (size_t i = 0; i < rays.size; ++i) {
+      EXPECT_NE(hits.inst[i], kNoHit) << i;
+      EXPECT_EQ(hits.t[i], 0.f) << i;
+      EXPECT_EQ(shadow[i], 1u) << i;
+    }
+  }
 }
 
 TEST_P(SmallScene, HitsEqualBruteForceInDoublePrecision) {
@@ -528,7 +550,7 @@ std::shared_ptr<const Scene> turned_tube(uint32_t n, float half_length) {
 TEST(Accelerator, ListsHaveNoHoles) {
   for (const float half_length : {1.f, 30.f, 500.f}) {
     const auto scene = turned_tube(20, half_length);
-    const EmbreeAccelerator accel(scene, 1, HitRule::kCanonical);
+    const EmbreeAccelerator accel(scene, 1, HitRule::kList);
     ASSERT_TRUE(accel.has_list());
     const Mesh& mesh = scene->meshes()[0];
     const size_t n = size_for_build(200000);

@@ -76,9 +76,7 @@ struct EmbreeAccelerator::Impl {
         first_world(hierarchy->first_world()),
         first_light(hierarchy->first_light()),
         native(widest_packet(hierarchy->device())),
-        list(hierarchy->rule() == HitRule::kCanonical
-                 ? TriangleList::make(*scene, light_shapes(*scene))
-                 : nullptr) {}
+        list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr) {}
 
   /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
@@ -236,10 +234,8 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
-  if (impl_->list) {
-    const uint32_t lanes = std::min(width, impl_->native);
-    return impl_->list->intersect(impl_->view, rays, hits, lanes, keys);
-  }
+  if (impl_->list)
+    return impl_->list->intersect(impl_->view, rays, hits, impl_->packet(width), keys);
   coherent = coherent && !impl_->view.has_motion;
   switch (impl_->packet(width)) {
     case 16:
@@ -256,10 +252,8 @@ void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint
 
 void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,
                                  bool coherent, const PresenceKeys& keys) const {
-  if (impl_->list) {
-    const uint32_t lanes = std::min(width, impl_->native);
-    return impl_->list->occluded(impl_->view, rays, occluded, lanes, keys);
-  }
+  if (impl_->list)
+    return impl_->list->occluded(impl_->view, rays, occluded, impl_->packet(width), keys);
   QueryContext context;
   rtcInitRayQueryContext(&context.base);
   context.scene = &impl_->view;

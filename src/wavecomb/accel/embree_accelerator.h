@@ -46,13 +46,12 @@ struct PresenceKeys {
 /// Which of equally close hits a hierarchy is built to give.
 enum class HitRule : uint8_t {
   kCanonical,  ///< the same one for any packet (docs/decisions/canonical-hits.md)
-  kHierarchy,  ///< likewise, and by the hierarchy where a list would do. For tests and benchmarks
+  kList,       ///< likewise, and small still scenes by a list (triangle_list.h). Not in use yet
   kEmbree,     ///< whichever Embree keeps; no filter anywhere. For BareTraversal only
 };
 
 /// A two-level bounding volume hierarchy: each group of meshes committed once, instanced any number
-/// of times; the world's own meshes in the top level. Small still scenes are traced by a list of
-/// triangles beside it (triangle_list.h).
+/// of times; the world's own meshes in the top level.
 ///
 /// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is
 /// thread-safe.
@@ -61,7 +60,7 @@ class EmbreeAccelerator {
   /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory
   /// ...).
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
-                    HitRule rule = HitRule::kHierarchy);
+                    HitRule rule = HitRule::kCanonical);
   /// For a scene that was edited out of origin's: shares the hierarchy, or those groups of it whose
   /// meshes are as they were. Built anew are groups with meshes that begin or cease to be partly
   /// present, and then, or where a light's shape or place is another, the top level.

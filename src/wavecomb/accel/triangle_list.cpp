@@ -146,7 +146,7 @@ struct ListTracer {
         const TriangleList::Triangle& triangle = list.triangles_[i];
         if (!triangle.in_same_plane) plane = packet.plane(triangle);
         const Crossing<F> at = packet.cross(triangle);
-        Mask<F> take = at.in & (plane.height > 0.f) & (plane.height < t * plane.slope) & active;
+        Mask<F> take = at.in & (plane.height >= 0.f) & (plane.height < t * plane.slope) & active;
         if (none(take)) continue;
         const F distance = plane.height / plane.slope;
         take = take & (distance < t);
@@ -191,7 +191,7 @@ struct ListTracer {
           plane = packet.plane(triangle);
         }
         const Crossing<F> at = packet.cross(triangle);
-        Mask<F> take = at.in & (plane.height > 0.f) & (plane.height < tfar * plane.slope) & open;
+        Mask<F> take = at.in & (plane.height >= 0.f) & (plane.height < tfar * plane.slope) & open;
         if (triangle.filtered && any(take)) take = met<F>(take, i, at.b, at.c, at.sum, base);
         open = open & not_(take);
       }
@@ -204,6 +204,21 @@ struct ListTracer {
 
 namespace {
 
+/// Runs trace(F*) with the lane type F of a width.
+template <typename Trace>
+void in_lanes(uint32_t width, const Trace& trace) {
+  switch (width) {
+    case 16:
+      return trace(static_cast<Lanes<16>*>(nullptr));
+    case 8:
+      return trace(static_cast<Lanes<8>*>(nullptr));
+    case 4:
+      return trace(static_cast<Lanes<4>*>(nullptr));
+    default:
+      return trace(static_cast<float*>(nullptr));
+  }
+}
+
 /// A ball around a shape of its own.
 TriangleList::Shape in_a_ball(const PlacedShape& placed) {
   const Bounds box = own_shape_bounds(placed);
@@ -213,11 +228,12 @@ TriangleList::Shape in_a_ball(const PlacedShape& placed) {
 
 }  // namespace
 
-std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene,
-                                                       const std::vector<PlacedShape>& shapes) {
+std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene) {
   const SceneGeometry& geometry = *scene.geometry();
-  if (scene.view().has_motion || scene.view().has_curves) return nullptr;
   uint64_t triangles = scene.instanced_triangles();
+  if (scene.view().has_motion || scene.view().has_curves || triangles > kMostTriangles)
+    return nullptr;
+  const std::vector<PlacedShape> shapes = light_shapes(scene);
   uint32_t own = 0;
   for (const PlacedShape& placed : shapes) {
     if (placed.shape == LightShape::kParallelogram)
@@ -309,31 +325,13 @@ uint16_t TriangleList::vertex(const Vec3<float>& p) {
 void TriangleList::intersect(const SceneView& scene, const RaySpan& rays, const HitSpan& hits,
                              uint32_t width, const PresenceKeys& keys) const {
   const ListTracer tracer{*this, scene, rays, keys};
-  switch (width) {
-    case 16:
-      return tracer.intersect<Lanes<16>>(hits);
-    case 8:
-      return tracer.intersect<Lanes<8>>(hits);
-    case 4:
-      return tracer.intersect<Lanes<4>>(hits);
-    default:
-      return tracer.intersect<float>(hits);
-  }
+  in_lanes(width, [&]<typename F>(F*) { tracer.intersect<F>(hits); });
 }
 
 void TriangleList::occluded(const SceneView& scene, const RaySpan& rays, uint32_t* occluded,
                             uint32_t width, const PresenceKeys& keys) const {
   const ListTracer tracer{*this, scene, rays, keys};
-  switch (width) {
-    case 16:
-      return tracer.occluded<Lanes<16>>(occluded);
-    case 8:
-      return tracer.occluded<Lanes<8>>(occluded);
-    case 4:
-      return tracer.occluded<Lanes<4>>(occluded);
-    default:
-      return tracer.occluded<float>(occluded);
-  }
+  in_lanes(width, [&]<typename F>(F*) { tracer.occluded<F>(occluded); });
 }
 
 }  // namespace wavecomb

@@ -30,9 +30,7 @@ class TriangleList {
   static constexpr uint32_t kMostShapes = 4;      ///< of lights that are not parallelograms
 
   /// Null where there is more, where something moves, or where there are curves or points.
-  /// `shapes`: light_shapes(scene).
-  static std::unique_ptr<const TriangleList> make(const Scene& scene,
-                                                  const std::vector<PlacedShape>& shapes);
+  static std::unique_ptr<const TriangleList> make(const Scene& scene);
 
   /// As EmbreeAccelerator's of the same names; `width` is 1, 4, 8 or 16.
   void intersect(const SceneView& scene, const RaySpan& rays, const HitSpan& hits, uint32_t width,
