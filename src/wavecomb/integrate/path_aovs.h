@@ -216,22 +216,23 @@ class PathAovs {
 
   bool wants_cost() const { return bool(cost_ns_); }
   /// Costs are of the model: no time is taken.
-  bool models_cost() const { return cost_ns_ && tables_ && tables_->models_cost; }
+  bool models_cost() const { return wants_cost() && tables_ && tables_->models_cost; }
+  bool wants_time() const { return wants_cost() && !models_cost(); }
   /// Adds a cost of the model, in nanoseconds. A path's come in the order of its vertices.
   void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
-  PhaseClock::Clock::time_point start_cost() const {
-    return cost_ns_ && !models_cost() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
-  }
-  /// What the model says of each ray that is traced. Spreads the time since `start` evenly over the
-  /// paths in slots slot(0) ... slot(n - 1): time is taken a batch at a time, so a path's share is
-  /// the mean of its batch.
+  /// What the model says of a ray of each path in slots slot(0) ... slot(n - 1), where it is asked.
   template <typename Slot>
-  void spread_cost(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
-    if (!cost_ns_ || n == 0) return;
-    if (models_cost()) {
-      for (size_t i = 0; i < n; ++i) add_cost(slot(i), kModelRayNs);
-      return;
-    }
+  void charge_rays(size_t n, const Slot& slot) const {
+    for (size_t i = 0; models_cost() && i < n; ++i) add_cost(slot(i), kModelRayNs);
+  }
+  PhaseClock::Clock::time_point start_time() const {
+    return wants_time() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
+  }
+  /// Spreads the time since `start` evenly over the paths in slots slot(0) ... slot(n - 1), where
+  /// it is taken: a batch at a time, so a path's share is the mean of its batch.
+  template <typename Slot>
+  void spread_time(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
+    if (!wants_time() || n == 0) return;
     const double ns =
         std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count();
     const auto share = static_cast<float>(ns / static_cast<double>(n));

@@ -163,7 +163,7 @@ class PathTracer {
     keys_.shadow_set = nullptr;
     context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
     counts_.add_rays(depth, 1);
-    if (aovs_.models_cost()) aovs_.add_cost(kSlot, kModelRayNs);
+    aovs_.charge_rays(1, [](size_t) { return kSlot; });
     return h;
   }
 
@@ -174,7 +174,7 @@ class PathTracer {
     keys_.shadow_set = context_.scene.lights.links.members ? &shadow_set_ : nullptr;
     context_.accel->occluded(ray, &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);
-    if (aovs_.models_cost()) aovs_.add_cost(kSlot, kModelRayNs);
+    aovs_.charge_rays(1, [](size_t) { return kSlot; });
     return blocked != 0;
   }
 
@@ -248,9 +248,9 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
     Film::Pixel sum = film.pixel(x, y);
     for (uint32_t s = 0; s < task.samples; ++s) {
       worker.clock.enter(Phase::kGenerate);
-      const auto start = worker.aovs.start_cost();
+      const auto start = worker.aovs.start_time();
       const Color<float> radiance = tracer.exposed_path(pixel, task.first_sample + s);
-      if (!worker.aovs.models_cost()) worker.aovs.spread_cost(1, start, [](size_t) { return 0; });
+      worker.aovs.spread_time(1, start, [](size_t) { return 0; });
       worker.clock.enter(Phase::kResolve);
       if (film.has_error())
         film.error(x, y).add(tracer.radiance(), sum.samples, {sum.r, sum.g, sum.b});

@@ -29,6 +29,11 @@ size_t batch_end(const ShadingQueue& queue, size_t begin) {
   return limit;
 }
 
+/// Where the columns have record i of the order.
+inline size_t place_of_record(const ShadingQueue& queue, size_t i) {
+  return queue.ordered ? queue.sorted_indices[i] : i;
+}
+
 /// Charges a batch's time to the materials of its records.
 inline void charge_batch(Wave& wave, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
@@ -37,27 +42,23 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   const ShadingQueue& queue = wave.shading;
   const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
   std::array<uint32_t, kMaxBatch> materials;
-  for (size_t i = begin; i < end; ++i)
-    materials[i - begin] = material[queue.ordered ? queue.sorted_indices[i] : i];
+  for (size_t i = begin; i < end; ++i) materials[i - begin] = material[place_of_record(queue, i)];
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
-/// Spreads a batch's time over the paths of its records, for the cost AOV; or what the model says.
+/// Spreads a batch's time over the paths of its records, or adds what the model says of them, for
+/// the cost AOV.
 inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const ShadingQueue& queue = wave.shading;
   const auto slot = [&](size_t i) {
     return queue.slot[queue.ordered || queue.moved ? queue.sorted_indices[begin + i] : begin + i];
   };
-  if (wave.aovs.models_cost()) {
-    const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
-    for (size_t i = begin; i < end; ++i)
-      wave.aovs.add_cost(
-          slot(i - begin),
-          context.roulette_costs->material(material[queue.ordered ? queue.sorted_indices[i] : i]));
-    return;
-  }
-  wave.aovs.spread_cost(end - begin, start, slot);
+  wave.aovs.spread_time(end - begin, start, slot);
+  const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
+  for (size_t i = 0; wave.aovs.models_cost() && i < end - begin; ++i)
+    wave.aovs.add_cost(
+        slot(i), context.roulette_costs->material(material[place_of_record(queue, begin + i)]));
 }
 
 /// Whether scene and settings ask for nothing that plain kernels know nothing of.
@@ -84,11 +85,10 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
     const size_t end = batch_end<F>(queue, begin);
-    const uint32_t at = queue.ordered ? queue.sorted_indices[begin] : static_cast<uint32_t>(begin);
-    const uint32_t program = queue.uints(ShadingQueue::kProgram)[at];
+    const uint32_t program = queue.uints(ShadingQueue::kProgram)[place_of_record(queue, begin)];
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
-    if (timed || wave.aovs.wants_cost()) start = PhaseClock::Clock::now();
+    if (timed || wave.aovs.wants_time()) start = PhaseClock::Clock::now();
     kernels[program](wave, context, settings, depth, begin, end);
     if (timed) charge_batch(wave, begin, end, start);
     if (wave.aovs.wants_cost()) spread_batch(wave, context, begin, end, start);

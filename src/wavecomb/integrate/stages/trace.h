@@ -67,10 +67,12 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size, times};
   if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
   const HitBuffer& h = wave.hits;
-  const auto start = wave.aovs.start_cost();
+  const auto start = wave.aovs.start_time();
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
                            coherent, presence_keys(wave.pool, depth, false));
-  wave.aovs.spread_cost(q.size, start, [&](size_t i) { return q.slot[i]; });
+  const auto slot_of = [&](size_t i) { return q.slot[i]; };
+  wave.aovs.charge_rays(q.size, slot_of);
+  wave.aovs.spread_time(q.size, start, slot_of);
   wave.counts.add_rays(depth, q.size);
 }
 
@@ -84,7 +86,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
                      q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
-  const auto start = wave.aovs.start_cost();
+  const auto start = wave.aovs.start_time();
   context.accel->occluded(
       rays, q.occluded, context.traversal_width, false,
       presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
@@ -110,7 +112,9 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
       if (wave.history) wave.history.light<F>(depth, slot, c, active);
     }
   }
-  wave.aovs.spread_cost(q.size, start, [&](size_t i) { return q.slot[i]; });
+  const auto slot_of = [&](size_t i) { return q.slot[i]; };
+  wave.aovs.charge_rays(q.size, slot_of);
+  wave.aovs.spread_time(q.size, start, slot_of);
   wave.counts.add_shadow_rays(depth, q.size);
 }
 
