@@ -13,15 +13,15 @@ right half a white box whose paths are many times as long.
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import statistics
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sitting import write_result
 
 import wavecomb
 
@@ -77,12 +77,6 @@ def rel_mse(picture: Any, reference: Any) -> float:
     return float(np.mean((picture - reference) ** 2 / (reference**2 + 0.01)))
 
 
-def processor_seconds() -> float:
-    """Of this process so far."""
-    times = os.times()
-    return times.user + times.system
-
-
 def measure(scene: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
     """A row for each number of samples and way."""
     common: dict[str, Any] = {"size": (options.size, options.size), "threads": options.threads}
@@ -95,23 +89,23 @@ def measure(scene: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
         seconds: dict[str, list[float]] = {way: [] for way in WAYS}
         for seed in range(options.seeds):
             for way in WAYS[seed % 3 :] + WAYS[: seed % 3]:
-                before = processor_seconds()
+                before = time.process_time()
                 picture = wavecomb.render(scene, spp=spp, seed=seed, allocate=way, **common)
-                seconds[way].append(processor_seconds() - before)
+                seconds[way].append(time.process_time() - before)
                 errors[way].append(rel_mse(np.asarray(picture.beauty, np.float64), reference))
                 if picture.samples.sum() != spp * options.size**2:
                     sys.exit(f"{way} at {spp}: another number of samples")
         even = statistics.mean(errors["even"]) * statistics.mean(seconds["even"])
         for way in WAYS:
-            error, time = statistics.mean(errors[way]), statistics.mean(seconds[way])
+            error, took = statistics.mean(errors[way]), statistics.mean(seconds[way])
             rounds = [
                 errors["even"][i] * seconds["even"][i] / (errors[way][i] * seconds[way][i])
                 for i in range(options.seeds)
             ]
             spread = statistics.stdev(rounds) / options.seeds**0.5 if options.seeds > 1 else 0.0
             rows.append(
-                {"spp": spp, "allocate": way, "rel_mse": error, "seconds": time,
-                 "efficiency": even / (error * time), "standard_error": spread}
+                {"spp": spp, "allocate": way, "rel_mse": error, "seconds": took,
+                 "efficiency": even / (error * took), "standard_error": spread}
             )  # fmt: skip
     return rows
 
@@ -125,7 +119,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--reference", type=int, default=4096)
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--json")
+    parser.add_argument("--output", type=Path, help="a JSON file")
     options = parser.parse_args()
     results = {}
     for name in options.stages:
@@ -143,8 +137,9 @@ def main() -> None:
                 f"± {row['standard_error']:.2f}",
                 flush=True,
             )
-        if options.json:
-            Path(options.json).write_text(json.dumps(results, indent=1) + "\n")
+        if options.output:
+            content = {"size": options.size, "rounds": options.seeds, "stages": results}
+            write_result(options.output, "wavecomb-allotment/1", content)
 
 
 if __name__ == "__main__":
