@@ -46,7 +46,7 @@ struct PresenceKeys {
 /// Which of equally close hits a hierarchy is built to give.
 enum class HitRule : uint8_t {
   kCanonical,  ///< the same one for any packet (docs/decisions/canonical-hits.md)
-  kList,       ///< likewise, and small still scenes by a list (triangle_list.h). Not in use yet
+  kList,       ///< likewise, and small still scenes by a list (triangle_list.h): the default
   kEmbree,     ///< whichever Embree keeps; no filter anywhere. For BareTraversal only
 };
 
@@ -60,7 +60,7 @@ class EmbreeAccelerator {
   /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses (out of memory
   /// ...).
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
-                    HitRule rule = HitRule::kCanonical);
+                    HitRule rule = HitRule::kList);
   /// For a scene that was edited out of origin's: shares the hierarchy, or those groups of it whose
   /// meshes are as they were. Built anew are groups with meshes that begin or cease to be partly
   /// present, and then, or where a light's shape or place is another, the top level.
