@@ -5,9 +5,12 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <optional>
+
 #include "bind.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/geometry/ears.h"
+#include "wavecomb/geometry/plain_mesh.h"
 #include "wavecomb/geometry/quads.h"
 #include "wavecomb/geometry/screen_size.h"
 #include "wavecomb/geometry/surface.h"
@@ -207,6 +210,71 @@ nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
       split_quads({points.data(), points.size()}, {indices.data(), indices.size()}, first), 3);
 }
 
+/// Values from which it pays to let other threads of Python's go on.
+constexpr size_t kMuch = 1 << 15;
+
+/// Corners of each face, baked points, bounds, and of quads what `split_quads` says of them; None:
+/// not plain.
+nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
+                      const Array<int32_t>& indices, const std::optional<Array<double>>& matrix,
+                      double limit) {
+  if (points.ndim() != 2 || points.shape(1) != 3) throw Error("points must have the shape (n, 3)");
+  if (matrix && matrix->size() != 16) throw Error("a matrix must have the shape (4, 4)");
+  const std::span<const int32_t> corners{indices.data(), indices.size()};
+  std::span<const float> there{points.data(), points.size()};
+  std::vector<float> baked;
+  std::optional<PointBounds> bounds;
+  uint32_t size = 0;
+  std::vector<int64_t> split;
+  std::vector<uint32_t> triangles;
+  {
+    std::optional<nb::gil_scoped_release> release;
+    if (points.size() >= kMuch) release.emplace();
+    size = corners_of_faces({counts.data(), counts.size()}, corners, points.shape(0));
+    if (size == 4) {
+      split = split_quads(there, corners, {});
+      triangles.reserve(split.size());
+      for (const int64_t corner : split)
+        triangles.push_back(static_cast<uint32_t>(corners[static_cast<size_t>(corner)]));
+    }
+    if (size != 0 && matrix) {
+      baked.resize(points.size());
+      bake_points(there, std::span<const double, 16>(matrix->data(), 16), baked);
+      there = baked;
+    }
+    if (size != 0) bounds = bounds_of(there, limit);
+  }
+  if (!bounds) return nb::none();
+  nb::object positions = matrix ? array_of(std::move(baked), 3) : nb::none();
+  std::vector<float> box;
+  for (const auto& row : *bounds) box.insert(box.end(), row.begin(), row.end());
+  nb::object quads = nb::none(), faces = nb::none();
+  if (size == 4) quads = array_of(std::move(split), 3), faces = array_of(std::move(triangles), 3);
+  return nb::make_tuple(size, positions, array_of(std::move(box), 3), quads, faces);
+}
+
+/// Whether triangles have each point; None where they have all.
+nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
+  std::vector<uint8_t> used(point_count, 0);
+  size_t found = 0;
+  {
+    std::optional<nb::gil_scoped_release> release;
+    if (triangles.size() >= kMuch) release.emplace();
+    for (size_t i = 0; i < triangles.size(); ++i) {
+      const uint32_t point = triangles.data()[i];
+      if (point >= point_count) throw Error("a triangle has a point that is not there");
+      found += 1 - used[point];
+      used[point] = 1;
+    }
+  }
+  if (found == point_count) return nb::none();
+  auto* held = new std::vector<uint8_t>(std::move(used));
+  const nb::capsule owner(held,
+                          [](void* p) noexcept { delete static_cast<std::vector<uint8_t>*>(p); });
+  using Made = nb::ndarray<nb::numpy, bool>;
+  return nb::cast(Made(reinterpret_cast<bool*>(held->data()), {held->size()}, owner));
+}
+
 nb::tuple ears(const Array<double>& corners, uint64_t most_steps) {
   if (corners.ndim() != 2 || corners.shape(1) != 2)
     throw Error("corners must have the shape (k, 2)");
@@ -238,6 +306,9 @@ void bind_geometry(nb::module_& m) {
   m.def("edge_pixels", &pixels, "points"_a, "counts"_a, "indices"_a, "transforms"_a, "to_camera"_a,
         "centre"_a, "half"_a, "pixels_per_unit"_a, "projection"_a = "perspective");
   m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
+  m.def("plain_mesh", &plain_mesh, "points"_a, "counts"_a, "indices"_a, "matrix"_a = nb::none(),
+        nb::kw_only(), "limit"_a);
+  m.def("used_points", &used_points, "triangles"_a, "point_count"_a);
   m.def("clip_ears", &ears, "corners"_a, "most_steps"_a = kEarSteps);
   m.def("weld_corners", &weld, "corners"_a, "point_count"_a, "values"_a);
 }

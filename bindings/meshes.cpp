@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 
 #include "arguments.h"
 #include "bind.h"
@@ -20,6 +21,9 @@ namespace nb = nanobind;
 using namespace wavecomb;
 
 namespace {
+
+/// In place of a group: none.
+constexpr uint32_t kNoGroup = 0xffffffffu;
 
 /// Keeps arrays alive from C++; they are let go of with the GIL held.
 std::shared_ptr<const void> hold(nb::list arrays) {
@@ -118,6 +122,48 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
   mesh.asset_length = asset_length;
   mesh.mesh_light = mesh_light.value_or(kNoLight);
   return builder.add_mesh(std::move(mesh));
+}
+
+/// Plain meshes whose arrays lie one after the other; the first one's id.
+uint32_t add_meshes(SceneBuilder& builder, const Array<float>& positions,
+                    const Array<uint32_t>& indices, const Array<uint32_t>& points,
+                    const Array<uint32_t>& triangles, const Array<uint32_t>& materials,
+                    const Array<uint32_t>& asset_lengths, const Array<uint32_t>& groups,
+                    const std::vector<std::string>& names) {
+  const size_t count = names.size();
+  if (positions.ndim() != 2 || positions.shape(1) != 3 || indices.ndim() != 2 ||
+      indices.shape(1) != 3)
+    throw Error("meshes need positions of shape (n, 3) and indices of shape (m, 3)");
+  for (const Array<uint32_t>* each : {&points, &triangles, &materials, &asset_lengths, &groups})
+    if (each->ndim() != 1 || each->size() != count)
+      throw Error("meshes need one of each number for each name");
+  const auto total = [&](const Array<uint32_t>& sizes) {
+    return std::accumulate(sizes.data(), sizes.data() + count, uint64_t{0});
+  };
+  if (total(points) != positions.shape(0) || total(triangles) != indices.shape(0))
+    throw Error("the sizes of meshes do not add up to their arrays");
+  nb::list owners;
+  owners.append(nb::cast(positions));
+  owners.append(nb::cast(indices));
+  const std::shared_ptr<const void> owner = hold(std::move(owners));
+  const float* position = positions.data();
+  const uint32_t* index = indices.data();
+  uint32_t first = 0;
+  for (size_t i = 0; i < count; ++i) {
+    Mesh mesh;
+    mesh.name = names[i];
+    mesh.positions = {position, 3 * size_t{points.data()[i]}};
+    mesh.indices = {index, 3 * size_t{triangles.data()[i]}};
+    mesh.material = materials.data()[i];
+    mesh.asset_length = asset_lengths.data()[i];
+    mesh.owner = owner;
+    position += mesh.positions.size();
+    index += mesh.indices.size();
+    const uint32_t id = builder.add_mesh(std::move(mesh));
+    if (i == 0) first = id;
+    if (groups.data()[i] != kNoGroup) builder.add_to_group(groups.data()[i], id);
+  }
+  return first;
 }
 
 void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positions,
@@ -251,6 +297,8 @@ void def_meshes(nb::class_<SceneBuilder>& builder) {
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "attributes"_a = nb::dict(), "name"_a = "",
            "light_group"_a = "", "asset_length"_a = 0, "mesh_light"_a = nb::none())
+      .def("add_meshes", &add_meshes, "positions"_a, "indices"_a, "points"_a, "triangles"_a,
+           "materials"_a, "asset_lengths"_a, "groups"_a, "names"_a)
       .def("replace_mesh", &replace_mesh, "mesh"_a, "positions"_a, "indices"_a, nb::kw_only(),
            "normals"_a = nb::none(), "uvs"_a = nb::none(), "face_materials"_a = nb::none(),
            "material"_a = kInheritMaterial, "attributes"_a = nb::dict())

@@ -208,6 +208,22 @@ class SceneBuilder:
         No copy of C-ordered arrays of these types: they are kept alive. Do not change them
         afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
         names the asset that it is part of; 0: none known. mesh_light: what add_mesh_light gave."""
+    def add_meshes(
+        self,
+        positions: NDArray[np.float32],
+        indices: NDArray[np.uint32],
+        points: NDArray[np.uint32],
+        triangles: NDArray[np.uint32],
+        materials: NDArray[np.uint32],
+        asset_lengths: NDArray[np.uint32],
+        groups: NDArray[np.uint32],
+        names: list[str],
+    ) -> int:
+        """Many meshes that have nothing but points and one material; the first one's id.
+
+        Positions (n, 3) and indices (m, 3) are those of one mesh after another, of so many points
+        and triangles each; indices count from the mesh's first point. groups: to put each into;
+        0xffffffff: none. Others as in add_mesh."""
     def replace_mesh(
         self,
         mesh: int,
@@ -779,6 +795,32 @@ def split_quads(
     """Corners (2 k, 3) of the two triangles of each quad, cut along the better diagonal.
 
     points (n, 3); indices (corners,), in range; starts (k,): first corners, None: all are quads."""
+
+def plain_mesh(
+    points: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    matrix: Any = None,
+    *,
+    limit: float,
+) -> (
+    tuple[
+        int,
+        NDArray[np.float32] | None,
+        NDArray[np.float32],
+        NDArray[np.int64] | None,
+        NDArray[np.uint32] | None,
+    ]
+    | None
+):
+    """A mesh of triangles alone or of quads alone; None of any other, and of one with a mistake.
+
+    Corners of each face, 3 or 4; points (n, 3) under a matrix (4, 4) for row vectors, None without
+    one; their bounds (2, 3), all within the limit; of quads the corners of ``split_quads`` and the
+    points (2 k, 3) that they are at."""
+
+def used_points(triangles: NDArray[np.uint32], point_count: int) -> NDArray[np.bool_] | None:
+    """Which of the points (n,) triangles (m, 3) have; None: all."""
 
 def clip_ears(corners: NDArray[np.float64], most_steps: int = ...) -> tuple[NDArray[np.int64], int]:
     """Triangles (k - 2, 3) of a polygon in the plane, corners (k, 2), counter-clockwise, by

@@ -383,3 +383,78 @@ def test_flipped_bits_make_a_scene_or_an_error_and_nothing_else(tmp_path: Path) 
             assert "\n" not in str(error)
             outcomes["error"] += 1
     assert min(outcomes.values()) > 20, outcomes
+
+
+def plain_meshes(count: int) -> dict[str, Any]:
+    """Arguments of ``add_meshes``: quads, the last of them in no group."""
+    ones = np.ones(count, np.uint32)
+    groups = np.zeros(count, np.uint32)
+    groups[-1] = 0xFFFFFFFF
+    return {
+        "positions": np.tile(QUAD, (count, 1)), "indices": np.tile(FACES, (count, 1)),
+        "points": 4 * ones, "triangles": 2 * ones, "materials": 0 * ones,
+        "asset_lengths": 0 * ones, "groups": groups, "names": [f"/Quad{i}" for i in range(count)],
+    }  # fmt: skip
+
+
+def test_small_meshes_go_over_many_at_a_time() -> None:
+    from wavecomb import _core
+    from wavecomb.run.boxed.record import RecordingBuilder
+    from wavecomb.run.boxed.replay import Replay
+
+    rng = np.random.default_rng(3)
+    large = rng.random((4000, 3), np.float32), rng.integers(0, 4000, (50, 3)).astype(np.uint32)
+    lit = {"name": "/Lit", "material": 0, "light_group": "lamps"}
+
+    def fill(builder: Any) -> None:
+        builder.add_material("diffuse", name="/White")
+        group = builder.add_group("some", root="/Some")
+        for i in range(1500):
+            where = QUAD + np.float32(i)
+            number = builder.add_mesh(where, FACES, material=0, name=f"/Q{i}", asset_length=i % 3)
+            builder.add_to_group(0 if i % 2 else group, number)
+            if i == 700:
+                builder.add_to_group(0, builder.add_mesh(*large, material=0, name="/Large"))
+                assert builder.add_mesh(QUAD, FACES, material=0, name="/Nowhere") == 702
+                builder.add_to_group(0, builder.add_mesh(QUAD, FACES, **lit))
+                builder.add_to_group(group, 3)  # in two groups
+                with pytest.raises(ValueError, match="/Bad"):
+                    builder.add_mesh(QUAD, FACES + np.uint32(2), material=0, name="/Bad")
+                builder.add_instances(0, group, np.eye(4)[None])
+        builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5))
+
+    def send(sender: Sender) -> None:
+        builder = RecordingBuilder(sender, 0)
+        fill(builder)
+        builder.build()
+
+    direct, again = _core.SceneBuilder(1), _core.SceneBuilder(1)
+    fill(direct)
+    got = messages_of(stream_of(send))
+    assert len(got) < 20, "not one for each mesh"
+    made = Replay(again, scenes={})
+    for message in got:
+        made.make(message)
+    assert direct.build().fingerprint() == again.build().fingerprint()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"points": np.full(3, 5, np.uint32)}, "do not add up"),
+        ({"points": np.array([0xFFFFFFFF, 0xFFFFFFFF, 14], np.uint32)}, "do not add up"),
+        ({"triangles": np.full(3, 1, np.uint32)}, "do not add up"),
+        ({"points": np.array([4, 8, 0], np.uint32)}, "/Quad2"),
+        ({"groups": np.full(3, 7, np.uint32)}, "group 7 was never added"),
+        ({"materials": np.zeros(2, np.uint32)}, "one of each number for each name"),
+        ({"names": ["/A", "/B"]}, "one of each number for each name"),
+        ({"indices": np.full((6, 3), 4, np.uint32)}, "/Quad0"),
+        ({"positions": np.zeros((4, 9), np.float32)}, r"positions of shape \(n, 3\)"),
+    ],
+)
+def test_meshes_that_do_not_fit_together_are_refused(change: dict[str, Any], words: str) -> None:
+    replay().make(call("add_meshes", plain_meshes(3), id=0))
+    with pytest.raises(ValueError, match=words):
+        replay().make(call("add_meshes", plain_meshes(3) | change, id=0))
+    with pytest.raises(Refused):
+        replay().make(call("add_meshes", plain_meshes(3) | {"points": np.zeros(3)}, id=0))

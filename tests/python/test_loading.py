@@ -25,7 +25,7 @@ from wavecomb.usd import load_stage
 from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import read_shape
 from wavecomb.usd.looks import pixels
-from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError
+from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError, is_finite
 
 LINUX = only_where(sys.platform == "linux", "reads /proc")
 
@@ -117,13 +117,22 @@ def test_help_imports_little() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
-def calls_to_read(path: Path, cubes: int) -> int:
-    """Calls of functions, Python's and USD's, that reading a stage of cubes takes."""
+def calls_to_read(path: Path, count: int, kind: str) -> int:
+    """Calls of Python's functions that reading a stage of cubes or meshes takes."""
     stage = Usd.Stage.CreateNew(str(path))
-    for i in range(cubes):
-        cube = UsdGeom.Cube.Define(stage, f"/Cube{i}")
-        cube.CreateSizeAttr(1.5)
-        cube.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
+    material = UsdShade.Material.Define(stage, "/Grey")
+    for i in range(count):
+        if kind == "cube":
+            prim = UsdGeom.Cube.Define(stage, f"/Cube{i}")
+            prim.CreateSizeAttr(1.5)
+        else:
+            prim = UsdGeom.Mesh.Define(stage, f"/Mesh{i}")
+            prim.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+            prim.CreateFaceVertexCountsAttr([4])
+            prim.CreateFaceVertexIndicesAttr([0, 1, 2, 3])
+            prim.CreateSubdivisionSchemeAttr("none")
+            UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()).Bind(material)
+        prim.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
     stage.Save()
     profile = cProfile.Profile()
     wavecomb.load(path, isolate=False)  # what is imported or made once is no cost of a prim
@@ -132,10 +141,22 @@ def calls_to_read(path: Path, cubes: int) -> int:
     return sum(entry.callcount for entry in profile.getstats())
 
 
-def test_a_cube_takes_few_calls(tmp_path: Path) -> None:
-    few, many = (calls_to_read(tmp_path / f"{n}.usdc", n) for n in (100, 300))
-    # 140 where each cube was made anew.
-    assert (many - few) / 200 < 110
+@pytest.mark.parametrize(("kind", "most"), [("cube", 106), ("mesh", 103)])
+def test_a_prim_takes_few_calls(kind: str, most: int, tmp_path: Path) -> None:
+    few, many = (calls_to_read(tmp_path / f"{n}.usdc", n, kind) for n in (100, 300))
+    assert (many - few) / 200 < most
+
+
+def test_finite_pixels_are_told_by_their_bits() -> None:
+    halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
+    for value in halves:
+        assert is_finite(np.array([[1, value, -2]], np.float16)) == bool(np.isfinite(value))
+    edges = [0x7F7FFFFF, 0x7F800000, 0x7F800001, 0xFF7FFFFF, 0xFF800000, 0xFFC00000, 0x80000000]
+    for value in np.array(edges, np.uint32).view(np.float32):
+        assert is_finite(np.array([[1, value, -2]], np.float32)) == bool(np.isfinite(value))
+        turned = np.array([[1, value], [0, -2]], np.float32).T[:, ::-1]
+        assert is_finite(turned) == bool(np.isfinite(value))
+    assert is_finite(np.zeros((0, 3), np.float16))
 
 
 def test_shapes_of_equal_size_share_their_arrays() -> None:

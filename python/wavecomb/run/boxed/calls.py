@@ -248,6 +248,18 @@ CALLS: dict[str, Call] = {
         "meshes",
         keeps=True,
     ),
+    "add_meshes": Call(
+        {
+            "positions": array(_FLOATS, 2), "indices": array(_IDS, 2),
+            **dict.fromkeys(
+                ("points", "triangles", "materials", "asset_lengths", "groups"), array(_IDS, 1)
+            ),
+            "names": many(text),
+        },
+        {},
+        "meshes",
+        keeps=True,
+    ),
     "replace_mesh": Call(
         {"mesh": whole, **_MESH}, {"normals": maybe(array(_FLOATS, 2, 3, 4)), **_FACES}, keeps=True
     ),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wavecomb import _core
+from wavecomb.run.boxed.batch import MeshBatch
 from wavecomb.run.boxed.calls import CALLS
 from wavecomb.run.boxed.wire import Sender
 from wavecomb.usd.looks.texture import Prepared
@@ -58,6 +59,7 @@ class RecordingBuilder:
         self._counts: Counter[str] = Counter(groups=1)
         self._checker = _core.SceneBuilder(1)
         self._tiles: dict[int, tuple[Any, ...]] = {}
+        self._batch = MeshBatch()
         self.read_again: Callable[[int], Prepared] | None = None
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
@@ -72,6 +74,34 @@ class RecordingBuilder:
 
         return record
 
+    def add_mesh(self, positions: Any, indices: Any, **named: Any) -> int:
+        """As that of ``SceneBuilder``; small plain ones go over many at a time."""
+        arguments = {"positions": positions, "indices": indices, **named}
+        if not MeshBatch.takes(arguments):
+            number = self._record("add_mesh", arguments)
+            assert number is not None
+            return number
+        if self._problem("add_mesh", arguments) is not None:
+            self._record("add_mesh", arguments)  # raises it
+        if self._batch.is_full:
+            self._send_batch()
+        number = self._counts["meshes"]
+        self._counts["meshes"] += 1
+        self._batch.add(number, arguments)
+        return number
+
+    def add_to_group(self, group: int, mesh: int) -> None:
+        """As that of ``SceneBuilder``."""
+        if not self._batch.put_last(group, mesh):
+            self._record("add_to_group", {"group": group, "mesh": mesh})
+
+    def _send_batch(self) -> None:
+        """Sends the meshes that wait: before any other call, so that the order stays."""
+        if len(self._batch):
+            batch, self._batch = self._batch, MeshBatch()
+            body = {"call": "add_meshes", "with": batch.call(), "id": batch.first}
+            self._sender.send("call", body, flush=False)
+
     def share_texture(self, scene: RemoteScene, texture: int) -> int:
         """A texture of an earlier scene."""
         number = self._record("share_texture", {"scene": scene.number, "texture": texture})
@@ -79,6 +109,7 @@ class RecordingBuilder:
         return number
 
     def _record(self, name: str, arguments: dict[str, Any]) -> int | None:
+        self._send_batch()
         call = CALLS[name]
         error = self._problem(name, arguments) if name in _SHAPES else None
         body: dict[str, Any] = {"call": name, "with": arguments}
@@ -145,4 +176,5 @@ class RecordingBuilder:
 
     def build(self) -> RemoteScene:
         """What stands for the scene."""
+        self._send_batch()
         return RemoteScene(self._scene)

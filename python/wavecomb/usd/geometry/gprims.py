@@ -52,6 +52,10 @@ class GprimReader:
         self.skeletons = skeletons
         self.motion = motion
         self.cache = cache
+        self._meshes = self._mesh_reader(report)
+
+    def _mesh_reader(self, report: LoadReport) -> MeshReader:
+        return MeshReader(self.time, report, self.surfaces.subdivide, self.skeletons, self.motion)
 
     def deforms(self, kind: str, prim: Usd.Prim) -> bool:
         """Whether the shape of a gprim may change while the shutter is open."""
@@ -92,9 +96,7 @@ class GprimReader:
                 ):
                     return over_shutter(draw.prim, strands, draw.matrix, self.motion, report)
                 return strands
-            meshes = MeshReader(
-                self.time, report, self.surfaces.subdivide, self.skeletons, self.motion
-            )
+            meshes = self._meshes if report is self.report else self._mesh_reader(report)
             if kind == "shape":
                 return meshes.shape(draw.prim, draw.matrix, draw.names)
             mesh = meshes.mesh(draw.prim, draw.matrix, names, draw.names, draw.inherited, displaced)
@@ -108,6 +110,11 @@ class GprimReader:
         return self.cache.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)
 
 
+_OPTIONS: dict[str, Any] = {
+    "face_materials": None, "attributes": {}, "light_group": "", "asset_length": 0,
+}  # fmt: skip
+
+
 def add_shape(
     builder: _core.SceneBuilder, shape: MeshArrays | CurveArrays, options: dict[str, Any]
 ) -> int:
@@ -115,10 +122,14 @@ def add_shape(
 
     ``options``: Keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` all take.
     """
+    # What is not there is not said: a stage may have a hundred thousand of them.
     if isinstance(shape, MeshArrays):
-        return builder.add_mesh(
-            shape.positions, shape.triangles, normals=shape.normals, uvs=shape.uvs, **options
-        )
+        if shape.normals is not None:
+            options["normals"] = shape.normals
+        if shape.uvs is not None:
+            options["uvs"] = shape.uvs
+        return builder.add_mesh(shape.positions, shape.triangles, **options)
+    options = {**_OPTIONS, **options}
     if shape.segments is None:
         return builder.add_points(shape.positions, shape.radii, uvs=shape.uvs, **options)
     return builder.add_curves(

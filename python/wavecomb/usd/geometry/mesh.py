@@ -22,6 +22,7 @@ from wavecomb.usd.geometry.mesh_arrays import (
     bake_normals,
     check_matrix,
     extent,
+    plain,
 )
 from wavecomb.usd.geometry.normals import smooth_normals
 from wavecomb.usd.geometry.primvar import (
@@ -142,12 +143,12 @@ class MeshReader:
         indices = as_integers(get("faceVertexIndices").Get(time))
         holes = as_integers(get("holeIndices").Get(time)) if "holeIndices" in names else None
         flip = "orientation" in names and word(get("orientation").Get(time)) == "leftHanded"
-        positions = points if matrix == IDENTITY else bake(points, matrix)
-        bounds = extent(positions)
-        topology = triangulate(points, counts, indices, holes, flip)
-        if topology.hurried:
-            what = "a face crosses itself too often to be split with care; its triangles overlap"
-            self.report.warn(what, prim.GetPath())
+        placed = None
+        if not flip and holes is None:
+            placed = plain(points, counts, indices, matrix)
+        if placed is None:
+            placed = self._placed(prim, points, counts, indices, holes, flip, matrix)
+        positions, bounds, topology = placed
         scheme = _scheme(prim, names, time)
         subdivided = self.subdivide and scheme in SCHEMES
         normals = self._normals(prim, points, topology, scheme, names)
@@ -168,6 +169,29 @@ class MeshReader:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
             normals, uvs = _reverse(normals), _reverse(uvs)
         return MeshArrays(positions, triangles, normals, uvs, bounds, topology, cage)
+
+    def _placed(
+        self,
+        prim: Usd.Prim,
+        points: Array,
+        counts: NDArray[np.int32],
+        indices: NDArray[np.int32],
+        holes: NDArray[np.int32] | None,
+        flip: bool,
+        matrix: Gf.Matrix4d,
+    ) -> tuple[Array, Array, Topology]:
+        """Points in the group, their bounds, and the triangles of any faces.
+
+        Raises:
+            MeshError: It cannot be drawn.
+        """
+        positions = points if matrix == IDENTITY else bake(points, matrix)
+        bounds = extent(positions)
+        topology = triangulate(points, counts, indices, holes, flip)
+        if topology.hurried:
+            what = "a face crosses itself too often to be split with care; its triangles overlap"
+            self.report.warn(what, prim.GetPath())
+        return positions, bounds, topology
 
     def over_shutter(
         self, prim: Usd.Prim, mesh: MeshArrays, matrix: Gf.Matrix4d, track: Track | None

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf
 
+from wavecomb import _core
 from wavecomb.usd.geometry.cage import Cage
 from wavecomb.usd.geometry.triangulate import MeshError, Topology
 
@@ -75,6 +76,26 @@ def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
         part = slice(first, first + _CHUNK)
         out[part] = points[part] @ linear + offset
     return out
+
+
+def plain(
+    points: Array, counts: NDArray[np.int32], indices: NDArray[np.int32], matrix: Gf.Matrix4d
+) -> tuple[Array, Array, Topology] | None:
+    """A mesh of triangles alone or quads alone: its points under a transform, bounds, triangles.
+
+    In one step, since a stage may have a hundred thousand. None of any other mesh, and of one with
+    a mistake: that is for ``triangulate`` and ``extent``, which say what it is.
+    """
+    is_identity = matrix == IDENTITY
+    found = _core.plain_mesh(points, counts, indices, None if is_identity else matrix, limit=LIMIT)
+    if found is None:
+        return None
+    size, baked, bounds, corners, triangles = found
+    positions = points if baked is None else baked
+    if triangles is None:
+        triangles = indices.reshape(-1, 3).view(np.uint32)
+    topology = Topology(triangles, corners, None, indices, len(points), len(counts), size - 2)
+    return positions, bounds, topology
 
 
 def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd
+from pxr import Usd, Vt
 
 from wavecomb.usd.geometry.triangulate import Topology
 
@@ -38,6 +38,8 @@ def as_array(value: Any) -> NDArray[Any] | None:
     """A VtArray, vector or number as (k, c) without a copy where there is none to make."""
     if value is None:
         return None
+    if type(value) is Vt.Vec3fArray:  # points of nearly all meshes
+        return np.asarray(value)
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):
@@ -54,6 +56,8 @@ def as_array(value: Any) -> NDArray[Any] | None:
 
 def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
     """The whole numbers of a value (k,); none where it holds anything else."""
+    if type(value) is Vt.IntArray and dtype is np.int32:
+        return np.asarray(value)
     array = as_array(value)
     if array is None or array.dtype.kind not in "iu":
         return np.empty(0, dtype)

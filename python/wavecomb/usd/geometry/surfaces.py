@@ -136,6 +136,9 @@ class Surfaces:
 
     def is_displaced(self, draw: Draw) -> bool:
         """Whether a material that is bound to a mesh moves its points."""
+        if not draw.subsets:  # nearly all
+            material = draw.material
+            return material is not None and bool(self.materials.surface(material).displacement)
         bound = (draw.material, *draw.subset_materials)
         return any(m is not None and self.materials.surface(m).displacement for m in bound)
 

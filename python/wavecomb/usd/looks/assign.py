@@ -28,7 +28,20 @@ from wavecomb.usd.stage.report import LoadReport
 FaceIds = NDArray[np.uint32]
 
 
-@dataclass
+@dataclass(slots=True)
+class Parent:
+    """A prim that others are children of.
+
+    Attributes:
+        prim: It.
+        asset: How much of its path names its asset, once somebody asked (``identity.Assets``).
+    """
+
+    prim: Usd.Prim
+    asset: int | None = None
+
+
+@dataclass(slots=True)
 class Draw:
     """A gprim to draw.
 
@@ -41,6 +54,8 @@ class Draw:
         subset_materials: Bound to each subset.
         track: In place of ``matrix`` where that changes while the shutter is open.
         names: Properties that it has opinions of (``authored_names``).
+        kind: What it is to the walk: mesh, shape, curves or points.
+        parent: The prim that it is a child of, where the walk came from there.
     """
 
     prim: Usd.Prim
@@ -51,6 +66,8 @@ class Draw:
     subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
     track: Track | None = None
     names: frozenset[str] = frozenset()
+    kind: str = ""
+    parent: Parent | None = None
 
 
 @dataclass
@@ -79,6 +96,10 @@ class Assigner:
 
     def uv_names(self, draw: Draw) -> tuple[str, ...]:
         """Texture coordinates that the bound materials read, first use first."""
+        if not draw.subsets:
+            own = () if draw.material is None else self.table.surface(draw.material).uv_names
+            if len(own) <= 1:
+                return own
         names: list[str] = []
         for material in (draw.material, *draw.subset_materials):
             if material is not None:
@@ -97,11 +118,14 @@ class Assigner:
             mesh: Its arrays.
             otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
         """
+        surface = None if draw.material is None else self.table.surface(draw.material)
+        if surface is not None and not draw.subsets and _is_alike(surface):
+            return Worn(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
-        if draw.material is None:
+        if surface is None:
             worn = Worn(self._display(primvars, otherwise))
         else:
-            worn = Worn(self._bound(primvars, self.table.surface(draw.material)))
+            worn = Worn(self._bound(primvars, surface))
         if draw.subsets and isinstance(mesh, MeshArrays) and mesh.topology is not None:
             worn.by_face = self._subsets(draw, mesh.topology, worn.material, primvars)
         worn.reads = primvars.read
@@ -189,6 +213,11 @@ class Assigner:
                 primvars.keep(found)
         shown = colour(colours.first, DEFAULT_COLOUR) if colours.is_constant else DEFAULT_COLOUR
         return self.table.plain(shown, opacity, tuple(varying))
+
+
+def _is_alike(surface: Surface) -> bool:
+    """Whether a surface is the same on all gprims."""
+    return not (surface.primvars or asks_for(surface.graph) or surface.emission_attributes())
 
 
 class _Primvars:

@@ -127,6 +127,7 @@ class MaterialTable:
         self.time = time
         self._report = report
         self._surfaces: dict[Sdf.Path, Surface] = {}
+        self._by_object: dict[int, tuple[UsdShade.Material, Surface]] = {}
         self._ids: dict[str, int] = {}
         self._graph_ids: dict[Graph, int] = {}
         self._surface_ids: dict[int, tuple[Surface, int]] = {}
@@ -143,6 +144,9 @@ class MaterialTable:
 
     def surface(self, material: UsdShade.Material) -> Surface:
         """The surface of a bound material."""
+        known = self._by_object.get(id(material))
+        if known is not None:
+            return known[1]
         path = material.GetPath()
         surface = self._surfaces.get(path)
         if surface is None:
@@ -155,6 +159,8 @@ class MaterialTable:
                 surface = replace(surface, name=self._report.place(path))
             self._surfaces[path] = surface
             self._report.tally("materials")
+        # Holding the object keeps its address from being used again.
+        self._by_object[id(material)] = material, surface
         return surface
 
     def add(self, surface: Surface, brightest: float = 0.0) -> int:

@@ -15,6 +15,9 @@ from wavecomb.usd.lights.light import Light
 
 Matrices = NDArray[np.float64]
 
+_MANY_BOXES = 1024
+"""More are made one before others are added."""
+
 
 @dataclass
 class Group:
@@ -22,7 +25,7 @@ class Group:
 
     Attributes:
         number: In the scene, once something is in it.
-        bounds: (2, 3) in its own space.
+        boxes: Bounds (2, 3) of what is in it, in its own space.
         outlines: Where what is in it reaches farthest, in its own space; see ``framing``.
         root: Prim path that the names of what is in it begin with.
         lights: With their transforms (4, 4) in the group.
@@ -34,7 +37,7 @@ class Group:
     name: str
     root: str = ""
     number: int | None = None
-    bounds: NDArray[Any] | None = None
+    boxes: list[NDArray[Any]] = field(default_factory=list)
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
     children: list[tuple[Group, Matrices]] = field(default_factory=list)
     surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
@@ -51,11 +54,18 @@ class Group:
 
     def grow(self, bounds: NDArray[Any]) -> None:
         """Makes the bounds hold others (2, 3) too."""
-        if self.bounds is None:
-            self.bounds = np.array(bounds, np.float64)
-        else:
-            np.minimum(self.bounds[0], bounds[0], out=self.bounds[0])
-            np.maximum(self.bounds[1], bounds[1], out=self.bounds[1])
+        self.boxes.append(bounds)
+        whole = self.bounds if len(self.boxes) > _MANY_BOXES else None
+        if whole is not None:
+            self.boxes = [whole]
+
+    @property
+    def bounds(self) -> NDArray[np.float64] | None:
+        """(2, 3) Of all that is in it, in its own space."""
+        if not self.boxes:
+            return None
+        boxes = np.array(self.boxes, np.float64)
+        return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def reach(self, points: NDArray[np.float64], more: NDArray[np.float64] | None) -> None:
         """Adds points to the outlines; ``more``: directions in which these are exact."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from wavecomb.run.isolate import memory, patience, trail
 from wavecomb.usd.geometry.attributes import on_shape
@@ -100,6 +100,7 @@ class GroupBuilder:
         self.placer = GroupPlacer(builder, self.mesh_lights, report, framed)
         self.worn = InstanceMaterials(traversal, materials, report)
         self._groups: dict[Hashable, Group] = {}
+        self._known: dict[Sdf.Path, UsdShade.Material] = {}
         self._building: set[Hashable] = set()
 
     def world(self) -> Group:
@@ -140,17 +141,23 @@ class GroupBuilder:
         prims += [subset for draw in found.draws for subset in draw.subsets]
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        materials = iter(bound_materials(prims, self.traversal.binding_purposes))
+        # One object for each material, by which tables find it quicker than by its path.
+        known = self._known
+        materials = iter(
+            None if material is None else known.setdefault(material.GetPath(), material)
+            for material in bound_materials(prims, self.traversal.binding_purposes)
+        )
         for draw in found.draws:
             draw.material = next(materials)
         for placed in found.instances:
             placed.material = next(materials)
         for draw in found.draws:
-            draw.subset_materials = [next(materials) for _ in draw.subsets]
-            # A subset without a binding of its own computes the mesh's.
+            if draw.subsets:
+                draw.subset_materials = [next(materials) for _ in draw.subsets]
+                # A subset without a binding of its own computes the mesh's.
         bound = [m for draw in found.draws for m in (draw.material, *draw.subset_materials)]
         bound += [placed.material for placed in found.instances]
-        used = {material.GetPath(): material for material in bound if material is not None}
+        used = {id(material): material for material in bound if material is not None}
         for material in used.values():
             self.materials.expect(material)
 
@@ -160,7 +167,7 @@ class GroupBuilder:
 
     def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
         """Adds one gprim to a group."""
-        kind = self.traversal.kind(draw.prim)
+        kind = draw.kind
         baked = kind == "mesh" and self.gprims.deforms(kind, draw.prim)
         if draw.track is not None and not baked:
             steps = draw.track.steps()
@@ -179,22 +186,22 @@ class GroupBuilder:
         names = self.assigner.uv_names(draw)
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
-        if trail.is_expendable():
-            trail.note("reading", draw.prim.GetPath())
+        path = str(draw.prim.GetPath())
+        trail.note("reading", path)
         try:
             shape = self.gprims.read(kind, draw, names)
         except MeshError as error:
-            self.report.warn(f"{_WORDS[kind]} left out: {error}", draw.prim.GetPath())
+            self.report.warn(f"{_WORDS[kind]} left out: {error}", path)
             return
         except (Tf.ErrorException, MemoryError) as error:
             if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
                 raise MemoryError from error
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
-            self.report.warn(f"{_WORDS[kind]} left out: {what}", draw.prim.GetPath())
+            self.report.warn(f"{_WORDS[kind]} left out: {what}", path)
             return
         if shape is None:
             what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
-            self.report.note(what, draw.prim.GetPath())
+            self.report.note(what, path)
             return
         if lamp is not None and lamp.material is not None:
             worn = Worn(lamp.material)
@@ -203,20 +210,24 @@ class GroupBuilder:
         material, faces = worn.material, None
         if worn.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
             faces = worn.by_face[shape.topology.face_ids()]
-        name = self.report.place(draw.prim.GetPath())
+        name = self.report.place(path)
         may_shine = (
             lamp is not None
             or material == INHERIT_MATERIAL
             or self.materials.any_emits(material, faces)
         )
         options: dict[str, Any] = {
-            "face_materials": faces,
             "material": material,
-            "attributes": on_shape(worn.reads, shape, draw.matrix.GetDeterminant3() < 0),
             "name": name,
-            "light_group": self.light_groups.of(draw.prim, draw.inherited) if may_shine else "",
-            "asset_length": self.placer.asset_length(draw.prim, name),
+            "asset_length": self.placer.asset_length(draw.prim, path, name, draw.parent),
         }
+        if faces is not None:
+            options["face_materials"] = faces
+        if worn.reads:
+            mirrored = draw.matrix.GetDeterminant3() < 0
+            options["attributes"] = on_shape(worn.reads, shape, mirrored)
+        if may_shine:
+            options["light_group"] = self.light_groups.of(draw.prim, draw.inherited)
         if lamp is not None:
             options["mesh_light"] = lamp.number
             if lamp.is_sampled_only:

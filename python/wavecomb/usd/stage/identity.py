@@ -9,6 +9,7 @@ from typing import Any
 
 from pxr import Kind, Sdf, Usd, UsdGeom
 
+from wavecomb.usd.looks.assign import Parent
 from wavecomb.usd.stage.report import LoadReport
 
 OTHER = "other"
@@ -79,11 +80,27 @@ class LightGroups:
         return channel
 
 
+def _is_asset(prim: Usd.Prim) -> bool:
+    """Whether its kind is component, or derived from that."""
+    kind = prim.GetKind()
+    return bool(kind) and Kind.Registry.IsA(kind, Kind.Tokens.component)
+
+
 class Assets:
     """Finds the asset that a prim is part of: its nearest model of kind component."""
 
     def __init__(self) -> None:
         self._known: dict[Sdf.Path, int] = {Sdf.Path.absoluteRootPath: 0}
+
+    def length_below(self, prim: Usd.Prim, path: str, parent: Parent | None) -> int:
+        """As ``length``, of a prim with this path whose siblings were seen before."""
+        if parent is None:
+            return self.length(prim)
+        if _is_asset(prim):
+            return len(path)
+        if parent.asset is None:
+            parent.asset = self.length(parent.prim)
+        return parent.asset
 
     def length(self, prim: Usd.Prim) -> int:
         """How much of the prim's path names its asset; 0 where no ancestor is a component."""
@@ -95,8 +112,7 @@ class Assets:
             if length is not None:
                 break
             above.append(path)
-            kind = prim.GetKind()
-            if kind and Kind.Registry.IsA(kind, Kind.Tokens.component):
+            if _is_asset(prim):
                 length = len(str(path))
                 break
             prim = prim.GetParent()

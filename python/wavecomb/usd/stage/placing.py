@@ -4,24 +4,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
+from wavecomb import _core
 from wavecomb.usd.cameras import framing
 from wavecomb.usd.geometry.curves import CurveArrays
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.lights.mesh_light import MeshLights
+from wavecomb.usd.looks.assign import Parent
 from wavecomb.usd.stage.group import Group, Matrices, middle_of
 from wavecomb.usd.stage.identity import Assets
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.report import LoadReport
-
-if TYPE_CHECKING:
-    from wavecomb import _core
 
 
 class GroupPlacer:
@@ -41,10 +39,15 @@ class GroupPlacer:
         self.framed = framed
         self.assets = Assets()
 
-    def asset_length(self, prim: Usd.Prim, name: str) -> int:
-        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset."""
-        length = self.assets.length(prim)
-        return length and length + len(name) - len(str(prim.GetPath()))
+    def asset_length(
+        self, prim: Usd.Prim, path: str, name: str, parent: Parent | None = None
+    ) -> int:
+        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset.
+
+        ``path``: its own; ``parent``: of it, where that is known.
+        """
+        length = self.assets.length_below(prim, path, parent)
+        return length and length + len(name) - len(path)
 
     def number(self, group: Group) -> int:
         """A group's number in the scene; made when something comes into it."""
@@ -94,8 +97,9 @@ class GroupPlacer:
             parent.has_surfaces = True
         if child.number is None:
             return
-        names = [self.report.place(prim.GetPath()) for prim in prims]
-        lengths = [self.asset_length(*pair) for pair in zip(prims, names, strict=True)]
+        paths = [str(prim.GetPath()) for prim in prims]
+        names = [self.report.place(path) for path in paths]
+        lengths = [self.asset_length(*each) for each in zip(prims, paths, names, strict=True)]
         self.builder.add_instances(
             self.number(parent),
             child.number,
@@ -132,6 +136,6 @@ def outline_of(
     smooth = None if shape.cage is None else surfaces.limit_points(shape.cage)
     if smooth is not None:
         return framing.outline(smooth, more)
-    used = np.zeros(shape.positions.shape[-2], bool)
-    used[shape.triangles] = True
-    return framing.outline(shape.positions[..., used, :].reshape(-1, 3), more)
+    used = _core.used_points(shape.triangles, shape.positions.shape[-2])
+    points = shape.positions if used is None else shape.positions[..., used, :]
+    return framing.outline(points.reshape(-1, 3), more)

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
-from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import SHAPES
 from wavecomb.usd.geometry.shutter import Motion, Track
 from wavecomb.usd.geometry.skeleton import Skeletons
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import Light, LightReader
-from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.looks.assign import Draw, Parent
 from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.looks.network import word
 from wavecomb.usd.stage.instancing import sound
@@ -79,7 +78,7 @@ class Traversal:
         self.xforms = UsdGeom.XformCache(time)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
-        self._names: dict[frozenset[str], frozenset[str]] = {}
+        self._names: dict[tuple[str, ...], frozenset[str]] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
         """What a prim is to the walk; found once for each type."""
@@ -125,17 +124,24 @@ class Traversal:
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
         # (prim, transform of its parent, its track, purpose, inherited primvars, predicate for its
-        # children)
-        stack: list[tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any]]
-        stack = [(prim, IDENTITY, None, purpose, (), predicate) for prim in reversed(roots)]
+        # children, its parent)
+        stack: list[
+            tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None]
+        ]
+        stack = [(prim, IDENTITY, None, purpose, (), predicate, None) for prim in reversed(roots)]
+        kinds, has_instances = self._kinds, bool(roots and roots[0].GetStage().GetPrototypes())
         while stack:
-            prim, matrix, track, purpose, inherited, pick = stack.pop()
-            kind = self.kind(prim)
+            prim, matrix, track, purpose, inherited, pick, parent = stack.pop()
+            type_name = prim.GetTypeName()
+            kind = kinds.get(type_name) or self.kind(prim)
             if kind == "shading":
                 continue
             names: frozenset[str] = frozenset()
             if kind != "other":
-                names = authored_names(prim)
+                listed = tuple(prim.GetAuthoredPropertyNames())
+                names = self._names.get(listed) or self._names.setdefault(
+                    listed, frozenset(listed)
+                )  # most prims share theirs
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
@@ -154,7 +160,7 @@ class Traversal:
                     elif own != IDENTITY:
                         matrix = own * matrix
             shown = purpose in self.purposes
-            if prim.IsInstance():
+            if has_instances and prim.IsInstance():
                 prototype = prim.GetPrototype()
                 if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
@@ -163,15 +169,15 @@ class Traversal:
                     found.instances.append(placed)
                     continue
                 pick = proxies
-            if prim.GetTypeName() == "SkelRoot":
+            if type_name == "SkelRoot":
                 self.skeletons.enter(prim)
             children = prim.GetChildren() if pick is None else prim.GetFilteredChildren(pick)
             if kind in DRAWN:
                 if shown:
                     subsets = [c for c in children if _binds(c)] if children else ()
-                    names = self._names.setdefault(names, names)  # most prims share theirs
-                    draw = Draw(prim, matrix, inherited, subsets, track=track, names=names)
-                    found.draws.append(draw)
+                    found.draws.append(
+                        Draw(prim, matrix, inherited, subsets, None, [], track, names, kind, parent)
+                    )
             elif kind == "instancer":
                 if shown:
                     placed = Placed(prim, matrix, purpose, inherited, track=track)
@@ -192,8 +198,10 @@ class Traversal:
                 and any(name.startswith("primvars:") for name in names)
             ):
                 inherited = self.inherit(prim, inherited)
-            for child in reversed(children):
-                stack.append((child, matrix, track, purpose, inherited, pick))
+            if children:
+                above = Parent(prim)
+                for child in reversed(children):
+                    stack.append((child, matrix, track, purpose, inherited, pick, above))
         return found
 
     def _shared(self, prototype: Usd.Prim) -> bool:
