@@ -265,6 +265,7 @@ TEST(EmissivePresence, PacketsEqualScalar) {
   for (const bool by_tree : {false, true}) {
     LightView lights = scene->view().lights;
     lights.by_tree = by_tree;
+    if (by_tree) lights.tree = scene->light_tree(1).view();
     lane_testing::for_each_packet([&]<typename F>() {
       constexpr size_t kLanes = kWidth<F>;
       std::mt19937 rng(kLanes);

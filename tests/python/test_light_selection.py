@@ -169,3 +169,38 @@ def test_the_street_has_the_lights_that_were_asked_for(tmp_path: Path) -> None:
     assert text.count('def Mesh "Sign_') == 5 == text.count('def Mesh "Strip_')
     with pytest.raises(SceneError, match="lights must be from 1"):
         write_scene("lights", path, lights=0)
+
+
+def test_a_tree_that_nobody_chooses_by_is_not_built() -> None:
+    """One strong lamp and many faint ones: by power, unless a render asks for the tree."""
+
+    def scene() -> wavecomb.Scene:
+        rng = np.random.default_rng(6)
+        builder = wavecomb.SceneBuilder()
+        floor = np.array([[-4, -1, -8], [4, -1, -8], [4, -1, 0], [-4, -1, 0]], np.float32)
+        quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+        white = builder.add_material("diffuse", name="White", base_color=(0.7, 0.7, 0.7))
+        builder.add_to_group(0, builder.add_mesh(floor, quad, material=white))
+        at = rng.uniform([-3, 0, -7], [3, 2, -2], (5000, 1, 3))
+        dust = (at + rng.uniform(-0.02, 0.02, (5000, 3, 3))).reshape(-1, 3).astype(np.float32)
+        faces = np.arange(len(dust), dtype=np.uint32).reshape(-1, 3)
+        glow = builder.add_material("emissive", name="Glow", emission=(2, 2, 2))
+        builder.add_to_group(0, builder.add_mesh(dust, faces, material=glow))
+        lamp = np.eye(4)
+        lamp[3, :3] = 0, 3, -4
+        builder.add_light("sphere", lamp, color=(9000, 9000, 9000), radius=0.5)
+        builder.set_camera(np.eye(4), window=(-0.8, 0.8, -0.6, 0.6))
+        return builder.build()
+
+    def render(of: wavecomb.Scene, how: str) -> wavecomb.Picture:
+        return wavecomb.render(of, size=SIZE, spp=4, light_selection=how)
+
+    one, other = scene(), scene()
+    power = render(one, "power")
+    before = power.stats["memory_bytes"]["records"]
+    assert wavecomb.compare(render(one, "auto"), power).equal
+    tree = render(one, "tree")
+    assert tree.stats["memory_bytes"]["records"] - before >= 5000 * 64
+    assert not wavecomb.compare(tree, power).equal
+    assert wavecomb.compare(render(other, "tree"), tree).equal, "whenever it is built"
+    assert wavecomb.compare(render(one, "power"), power).equal

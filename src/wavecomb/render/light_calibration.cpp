@@ -183,14 +183,15 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   LightParts parts = divide_lights(scene, view.lights.by_tree);
   if (parts.size() == 0) return out;
   const LightSet& set = scene.light_set();
-  const bool has_nodes = parts.by_tree && set.tree.nodes.size() > 1 && set.size() <= kMostWeighed;
+  const LightTree& tree = parts.by_tree ? scene.light_tree(settings.threads) : set.tree;
+  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMostWeighed;
   if (parts.size() < 2 && !has_nodes) return out;
 
   // Half by heads, so that what power thinks little of is looked at, too.
   std::vector<double> even(parts.size());
   for (size_t i = 0; i < parts.size(); ++i)
     even[i] = 0.5 * parts.power[i] + 0.5 / static_cast<double>(parts.size());
-  const WeighedLights first = weigh_lights(set, parts, even, {});
+  const WeighedLights first = weigh_lights(set, tree, parts, even, {});
   SceneView probing = view;
   first.apply(probing.lights);
   const std::vector<uint32_t> pixels = spread_pixels(settings, path_count(settings));
@@ -211,7 +212,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   }
   std::vector<NodeTilt> tilts;
   if (has_nodes) tilts = balance_nodes(probing.lights.tree, probes, scales);
-  out.weighed = weigh_lights(set, parts, balance.shares(parts.power), tilts);
+  out.weighed = weigh_lights(set, tree, parts, balance.shares(parts.power), tilts);
   out.parts = std::move(parts);
   out.paths = static_cast<uint32_t>(pixels.size());
   out.tilted_nodes = static_cast<uint32_t>(tilts.size());

@@ -85,9 +85,9 @@ void make_parts(const std::vector<Candidate>& candidates, size_t most, LightPart
     if (!alone[i]) put(candidates[i], static_cast<uint32_t>(parts.size() - 1));
 }
 
-void weigh_tree(const LightSet& set, const LightParts& parts, std::span<const double> shares,
-                std::span<const NodeTilt> tilts, WeighedLights& out) {
-  const LightTree& tree = set.tree;
+void weigh_tree(const LightSet& set, const LightTree& tree, const LightParts& parts,
+                std::span<const double> shares, std::span<const NodeTilt> tilts,
+                WeighedLights& out) {
   out.infinite_ends.resize(set.infinite_count);
   out.infinite_pdf.resize(set.infinite_count);
   std::vector<uint32_t> numbers(set.infinite_count, 0);
@@ -196,12 +196,12 @@ void WeighedLights::apply(LightView& view) const {
   if (!nodes.empty()) view.tree.nodes = nodes.data();
 }
 
-WeighedLights weigh_lights(const LightSet& set, const LightParts& parts,
+WeighedLights weigh_lights(const LightSet& set, const LightTree& tree, const LightParts& parts,
                            std::span<const double> shares, std::span<const NodeTilt> tilts) {
   WeighedLights out;
   out.shares.assign(parts.size(), 0);
   if (parts.by_tree)
-    weigh_tree(set, parts, shares, tilts, out);
+    weigh_tree(set, tree, parts, shares, tilts, out);
   else
     weigh_table(set, parts, shares, out);
   return out;

@@ -62,8 +62,8 @@ struct WeighedLights {
 
 /// Lights of which part i is chosen with probability shares[i] (> 0, sum 1), to within rounding to
 /// numbers of 24 bits and the floor of build_pick_table. Within a part all is as before, but for
-/// the odds at the nodes of `tilts`.
-WeighedLights weigh_lights(const LightSet& set, const LightParts& parts,
+/// the odds at the nodes of `tilts`. `tree`: of the set, with nodes where there are tilts.
+WeighedLights weigh_lights(const LightSet& set, const LightTree& tree, const LightParts& parts,
                            std::span<const double> shares, std::span<const NodeTilt> tilts);
 
 }  // namespace wavecomb

@@ -228,6 +228,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const uint32_t wave_size = wave_size_for(settings, pixels);
   SceneView scene_view = scene.view();
   scene_view.lights.by_tree = chooses_by_tree(settings.light_selection, scene_view.lights);
+  if (scene_view.lights.by_tree) scene_view.lights.tree = scene.light_tree(threads).view();
   scene_view.materials.energy = energy_tables(scene.materials());
   WaveContext context{
       scene_view,

@@ -114,7 +114,8 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       const TriangleSource& triangle, const Vec3<float>& centre, float radius,
                       std::span<const TexturePtr> textures, const LightSet* before,
                       std::span<const IesProfile> profiles,
-                      std::span<const PlacedMeshLight> mesh_lights, size_t most_picked) {
+                      std::span<const PlacedMeshLight> mesh_lights, size_t most_picked,
+                      TreeTime tree_time) {
   (void)centre;  // directions of infinite lights do not depend on it
   check_light_count(lights.size() + triangle_count);
   SceneCounts counts{.lights = lights.size() + mesh_lights.size()};
@@ -155,7 +156,12 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
     for (size_t i = 0; i < triangle_count; ++i)
       set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
   }
-  set.tree = build_light_tree(set, powers);
+  set.tree = outline_light_tree(set, powers);
+  if (tree_time == TreeTime::kNow || set.pick_bins.empty() ||
+      pays_as_tree(set.tree.effective_lights))
+    set.tree = build_light_tree(set, powers);
+  else
+    set.powers = std::move(powers);
   return set;
 }
 

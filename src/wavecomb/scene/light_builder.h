@@ -53,7 +53,8 @@ struct LightSet {
   std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
   std::vector<uint32_t> pick_bins;        ///< empty where the tree alone chooses
   PickTable pick;                         ///< without its pointer
-  LightTree tree;
+  LightTree tree;                         ///< an outline where it is left for later
+  std::vector<double> powers;             ///< to build the tree by, where it is
   std::vector<Distribution2D> distributions;
   std::vector<LightRecord> portals;
   std::vector<PortalGroup> portal_groups;
@@ -85,6 +86,9 @@ inline constexpr uint32_t kMaxLights = 1u << 28;
 /// Throws Error for more lights and emissive triangles than kMaxLights.
 void check_light_count(uint64_t count);
 
+/// When the tree of lights is built.
+enum class TreeTime { kNow, kWhenChosen };
+
 /// Emissive triangle i. Called from many threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
@@ -103,7 +107,8 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 /// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
 /// the power that they send through it. `before`: lights with the same textures, whose densities of
 /// domes are taken over where they fit, or null. Throws Error for more than kMaxLights lights. Of
-/// more than `most_picked` there is no table to choose by power.
+/// more than `most_picked` there is no table to choose by power. The tree is as large as all else:
+/// at kWhenChosen it is built only where LightSelection::kAuto chooses by it.
 ///
 /// Contract: each light has passed check_light, each mesh light check_mesh_light
 /// (scene/light_table.h).
@@ -112,7 +117,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       std::span<const TexturePtr> textures, const LightSet* before = nullptr,
                       std::span<const IesProfile> profiles = {},
                       std::span<const PlacedMeshLight> mesh_lights = {},
-                      size_t most_picked = kMaxPicked);
+                      size_t most_picked = kMaxPicked, TreeTime tree_time = TreeTime::kNow);
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "wavecomb/core/error.h"
@@ -23,40 +24,71 @@ constexpr float kLeastForTree = 3;
 /// Ranges that are built apart from one another, and the least lights that are worth it.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
+/// Three axes side by side; what is in the fourth place does not count.
+using Float4 = float __attribute__((vector_size(16)));
+using Int4 = int32_t __attribute__((vector_size(16)));
+
+Float4 least_of(const Float4& a, const Float4& b) {
+  return b < a ? b : a;
+}
+Float4 most_of(const Float4& a, const Float4& b) {
+  return a < b ? b : a;
+}
+
 /// A light of the tree, as splitting sees it.
-struct Item {
-  float lo[3], hi[3];
-  float axis[3];  ///< of its normals, times (1 + cos of their cone) / 2
-  float intensity;
+struct alignas(16) Item {
+  float lo[3];
   uint32_t light;
+  float hi[3];
+  float intensity;
+  float axis[4];  ///< of its normals, times (1 + cos of their cone) / 2; then 0
 
   float centre(size_t k) const { return 0.5f * lo[k] + 0.5f * hi[k]; }
+  Float4 low() const {
+    Int4 bits;
+    std::memcpy(&bits, lo, sizeof bits);
+    return std::bit_cast<Float4>(bits & Int4{-1, -1, -1, 0});
+  }
+  Float4 high() const { return load(hi); }
+  Float4 normals() const { return load(axis); }
+  Float4 middle() const { return 0.5f * low() + 0.5f * high(); }
+
+ private:
+  static Float4 load(const float* at) {
+    Float4 v;
+    std::memcpy(&v, at, sizeof v);
+    return v;
+  }
 };
+static_assert(sizeof(Item) == 48);
 
 /// Sums over items from which a split is judged.
 struct Bin {
-  float lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
-  float axis[3] = {0, 0, 0};
+  Float4 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = {-INFINITY, -INFINITY, -INFINITY, 0};
+  Float4 axis = {0, 0, 0, 0};
   double intensity = 0;
   size_t count = 0;
 
   void add(const Item& item) {
     // Normals of triangles have no sign: both sides shine.
-    const float d = axis[0] * item.axis[0] + axis[1] * item.axis[1] + axis[2] * item.axis[2];
-    merge(item, d < 0 ? -1.f : 1.f, 1);
+    const Float4 other = item.normals(), product = axis * other;
+    const int32_t flip = product[0] + product[1] + product[2] < 0 ? INT32_MIN : 0;
+    merge(item.low(), item.high(),
+          std::bit_cast<Float4>(std::bit_cast<Int4>(other) ^ Int4{flip, flip, flip, flip}));
+    intensity += double{item.intensity};
+    count += 1;
   }
-  void add(const Bin& other) { merge(other, 1.f, other.count); }
+  void add(const Bin& other) {
+    merge(other.lo, other.hi, other.axis);
+    intensity += other.intensity;
+    count += other.count;
+  }
 
  private:
-  template <typename T>
-  void merge(const T& o, float sign, size_t items) {
-    for (size_t k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], o.lo[k]);
-      hi[k] = std::max(hi[k], o.hi[k]);
-      axis[k] += sign * o.axis[k];
-    }
-    intensity += double{o.intensity};
-    count += items;
+  void merge(const Float4& low, const Float4& high, const Float4& normals) {
+    lo = least_of(lo, low);
+    hi = most_of(hi, high);
+    axis += normals;
   }
 };
 
@@ -183,29 +215,36 @@ class Builder {
   size_t split(const Range& r) {
     const std::span<Item> items(items_.data() + r.begin, r.size());
     if (items.size() == 2) return r.begin + 1;
-    std::array<float, 3> lo, hi;
-    for (size_t k = 0; k < 3; ++k) {
-      lo[k] = INFINITY;
-      hi[k] = -INFINITY;
-      for (const Item& item : items) {
-        lo[k] = std::min(lo[k], item.centre(k));
-        hi[k] = std::max(hi[k], item.centre(k));
-      }
+    Float4 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = {-INFINITY, -INFINITY, -INFINITY, 0};
+    for (const Item& item : items) {
+      const Float4 middle = item.middle();
+      lo = least_of(lo, middle);
+      hi = most_of(hi, middle);
     }
-    const float longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+    const Float4 extents = hi - lo;
+    const float longest = std::max({extents[0], extents[1], extents[2]});
     const size_t bins = items.size() < 32 ? 4 : kBins;
-    double least = INFINITY;
-    size_t axis = 3, last = 0;
-    const auto bin_of = [&](const Item& item, size_t k) {
-      const float at = (item.centre(k) - lo[k]) / (hi[k] - lo[k]) * static_cast<float>(bins);
-      return at > 0 ? std::min(static_cast<size_t>(std::min(at, 1e6f)), bins - 1) : size_t{0};
+    const auto bins_of = [&](const Item& item) {
+      const Float4 at = (item.middle() - lo) / extents * static_cast<float>(bins);
+      const Float4 zero = {0, 0, 0, 0}, last = zero + static_cast<float>(bins - 1);
+      const Float4 up = at > zero ? at : zero;  // not of NaN
+      return __builtin_convertvector(least_of(last, up), Int4);
     };
     const bool has_room = r.depth + std::bit_width(items.size() - 1) < kMaxTreeDepth;
-    for (size_t k = 0; k < 3 && has_room && std::isfinite(longest); ++k) {
-      const float extent = hi[k] - lo[k];
+    if (!has_room || !std::isfinite(longest)) return halve(r, items, lo, hi);
+    // All axes in one pass: their sums wait for one another less, and items are read once.
+    std::array<std::array<Bin, kBins>, 3> table;
+    for (std::array<Bin, kBins>& of : table) std::fill_n(of.begin(), bins, Bin{});
+    for (const Item& item : items) {
+      const Int4 at = bins_of(item);
+      for (size_t k = 0; k < 3; ++k) table[k][static_cast<size_t>(at[k])].add(item);
+    }
+    double least = INFINITY;
+    size_t axis = 3, last = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const float extent = extents[k];
       if (!(extent > 0)) continue;
-      std::array<Bin, kBins> of{};
-      for (const Item& item : items) of[bin_of(item, k)].add(item);
+      const std::array<Bin, kBins>& of = table[k];
       std::array<double, kBins> left{};
       Bin sum;
       for (size_t i = 0; i + 1 < bins; ++i) {
@@ -225,14 +264,14 @@ class Builder {
       }
     }
     if (axis == 3) return halve(r, items, lo, hi);
-    const auto middle = std::partition(
-        items.begin(), items.end(), [&](const Item& item) { return bin_of(item, axis) <= last; });
+    const auto middle = std::partition(items.begin(), items.end(), [&](const Item& item) {
+      return static_cast<size_t>(bins_of(item)[axis]) <= last;
+    });
     return r.begin + static_cast<size_t>(middle - items.begin());
   }
 
   /// In the middle of the longest axis: for lights at one place, or where the tree gets deep.
-  static size_t halve(const Range& r, std::span<Item> items, const std::array<float, 3>& lo,
-                      const std::array<float, 3>& hi) {
+  static size_t halve(const Range& r, std::span<Item> items, const Float4& lo, const Float4& hi) {
     size_t axis = 0;
     for (size_t k = 1; k < 3; ++k)
       if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
@@ -304,6 +343,15 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t l
   }
 }
 
+/// Sum of powers relative to the largest, and that.
+std::pair<double, double> total_power(std::span<const double> powers) {
+  double total = 0, largest = 0;
+  for (const double power : powers) largest = std::max(largest, power);
+  for (const double power : powers)
+    if (power > 0) total += power / largest;
+  return {total, largest};
+}
+
 }  // namespace
 
 LightTreeView LightTree::view() const {
@@ -311,24 +359,34 @@ LightTreeView LightTree::view() const {
           root,         numbers,       effective_lights};
 }
 
-LightTree build_light_tree(const LightSet& set, std::span<const double> powers) {
+bool pays_as_tree(float effective_lights) {
+  return effective_lights >= kLeastForTree;
+}
+
+LightTree outline_light_tree(const LightSet& set, std::span<const double> powers) {
   LightTree tree;
+  const std::span<const double> finite = powers.subspan(set.infinite_count);
+  const auto lit = static_cast<size_t>(
+      std::count_if(finite.begin(), finite.end(), [](double power) { return power > 0; }));
+  share_numbers(set, powers, lit, tree);
+  if (lit == 0) return tree;
+  const auto [total, largest] = total_power(finite);
+  double squares = 0;
+  for (const double power : finite)
+    if (power > 0) squares += power / largest * (power / largest);
+  tree.effective_lights = static_cast<float>(total * total / squares);
+  return tree;
+}
+
+LightTree build_light_tree(const LightSet& set, std::span<const double> powers) {
+  LightTree tree = outline_light_tree(set, powers);
+  tree.trails.assign(powers.size(), kNoLight);
   std::vector<uint32_t> lit;
   for (size_t i = set.infinite_count; i < powers.size(); ++i)
     if (powers[i] > 0) lit.push_back(static_cast<uint32_t>(i));
-  tree.trails.assign(powers.size(), kNoLight);
-  share_numbers(set, powers, lit.size(), tree);
   if (lit.empty()) return tree;
-
-  double total = 0, largest = 0;
-  for (const uint32_t i : lit) largest = std::max(largest, powers[i]);
-  double squares = 0;
-  for (const uint32_t i : lit) {
-    total += powers[i] / largest;
-    squares += powers[i] / largest * (powers[i] / largest);
-  }
-  tree.effective_lights = static_cast<float>(total * total / squares);
-  total *= largest;
+  const auto [relative, largest] = total_power(powers.subspan(set.infinite_count));
+  double total = relative * largest;
   if (!std::isfinite(total)) total = largest;
   std::vector<Item> items(lit.size());
   constexpr size_t kChunk = 4096;
@@ -349,7 +407,7 @@ bool chooses_by_tree(LightSelection selection, const LightView& lights) {
                 " lights can be chosen; the scene has " + with_commas(lights.count) +
                 " lights and emissive triangles; choose --light-selection tree");
   if (tree_alone) return true;
-  if (selection == LightSelection::kAuto) return effective >= kLeastForTree;
+  if (selection == LightSelection::kAuto) return pays_as_tree(effective);
   return selection == LightSelection::kTree && effective > 0;
 }
 

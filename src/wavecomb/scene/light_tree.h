@@ -27,6 +27,13 @@ struct LightTree {
   LightTreeView view() const;
 };
 
+/// What is known of the tree of `set` before there is one: the share that infinite lights have
+/// beside it, and effective_lights. It has no nodes and no trails.
+LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
+
+/// Whether kAuto chooses by a tree of so many effective lights.
+bool pays_as_tree(float effective_lights);
+
 /// Builds the tree over the finite lights of `set` whose `powers` (of all lights, W) are above 0:
 /// A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
 /// Splitting", 2018, section 4: binned, by bound, orientation and power ("SAOH"), down to single

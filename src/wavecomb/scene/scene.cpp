@@ -181,9 +181,9 @@ SceneBytes Scene::bytes() const {
          materials_->openpbr, materials_->graphs->programs, materials_->graphs->ops,
          materials_->graphs->constants, materials_->graphs->images, materials_->graphs->outputs) +
       of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
-         set.triangle_uvs, set.pick_bins, set.tree.nodes, set.tree.trails, set.portals,
-         set.portal_groups, set.shapings, set.ies, set.ies_numbers) +
-      g.names.bytes();
+         set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
+         set.ies, set.ies_numbers) +
+      lights_->tree_bytes() + g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;
 }

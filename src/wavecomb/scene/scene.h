@@ -79,6 +79,9 @@ class Scene {
   const std::vector<Placement>& placements() const { return geometry_->placements; }
   const NameTable& names() const { return geometry_->names; }
   const LightSet& light_set() const { return lights_->set; }
+  /// The tree of lights with its nodes, which light_set() may have but an outline of; built on so
+  /// many threads (0: all) where it is not yet. Any thread may ask.
+  const LightTree& light_tree(uint32_t threads) const { return lights_->tree(threads); }
   const Camera& camera() const { return camera_; }
   const Bounds& bounds() const { return geometry_->bounds; }
   /// Triangles of all meshes, each counted once, and with every instance counted.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/triangle_means.h"
 
@@ -23,6 +24,10 @@ struct EmissiveMesh {
   const Affine* to_world;
   uint32_t mesh_light;  ///< index of its PlacedMeshLight, or kNoLight
 };
+
+uint64_t bytes_of(const LightTree& tree) {
+  return tree.nodes.size() * sizeof(tree.nodes[0]) + tree.trails.size() * sizeof(tree.trails[0]);
+}
 
 /// Area of a mesh in the middle of the shutter, one side, as `to_world` places it.
 double world_area(const Mesh& mesh, const Affine& to_world) {
@@ -135,11 +140,25 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   const Bounds& b = geometry.bounds;
   const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
   set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
-                     before ? &before->set : nullptr, geometry.profiles, placed);
+                     before ? &before->set : nullptr, geometry.profiles, placed, kMaxPicked,
+                     TreeTime::kWhenChosen);
   // Table entries now count from the first triangle and the first mesh light; make them ids.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)
       if (entry != kNoLight) entry += set.first_triangle();
+}
+
+const LightTree& SceneLights::tree(uint32_t threads) const {
+  if (set.powers.empty()) return set.tree;
+  std::call_once(grown_, [&] {
+    with_threads(threads, [&] { late_tree_ = build_light_tree(set, set.powers); });
+    late_bytes_ = bytes_of(late_tree_);
+  });
+  return late_tree_;
+}
+
+uint64_t SceneLights::tree_bytes() const {
+  return bytes_of(set.tree) + late_bytes_;
 }
 
 std::vector<uint32_t> Scene::groups_of_lights() const {

@@ -3,8 +3,10 @@
 /// without changing it.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -134,6 +136,11 @@ struct SceneLights {
   SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
               const SceneMaterials& materials, const SceneLights* before);
 
+  /// The tree of lights, built by the first who asks where the set has but its outline. Any thread.
+  const LightTree& tree(uint32_t threads) const;
+  /// Bytes of nodes and trails, wherever they are.
+  uint64_t tree_bytes() const;
+
   std::vector<Light> lights;
   LightSet set;
   std::vector<uint32_t> emissive;     ///< SceneView::emissive_lights; empty where nothing emits
@@ -143,6 +150,11 @@ struct SceneLights {
     uint32_t first, group;
   };
   std::vector<TriangleGroup> triangle_groups;
+
+ private:
+  mutable std::once_flag grown_;
+  mutable LightTree late_tree_;
+  mutable std::atomic<uint64_t> late_bytes_{0};
 };
 
 }  // namespace wavecomb
