@@ -64,9 +64,11 @@ def load(
     """
     chosen = LoadOptions.of(options, changes)
     chosen.check()
-    from wavecomb.run.boxed.reader import Reader, is_wanted
+    from wavecomb.run.boxed.wanted import is_wanted
 
     if is_wanted(isolate):
+        from wavecomb.run.boxed.reader import Reader
+
         with Reader(path, load_limit=load_limit, memory_limit=memory_limit) as reader:
             return reader.load(chosen.as_dict(), progress=progress)
     import_usd()
@@ -149,9 +151,11 @@ def render(
     with contextlib.ExitStack() as while_reading:
         reader: Reader | None = None
         if isinstance(source, (str, os.PathLike)):
-            from wavecomb.run.boxed.reader import Reader, is_wanted
+            from wavecomb.run.boxed.wanted import is_wanted
 
             if is_wanted(isolate):
+                from wavecomb.run.boxed.reader import Reader
+
                 reader = while_reading.enter_context(Reader(source))
             size, aovs = _asked_for(source, size, aovs, settings, loading, reader)
         own, profile, names, chosen = prepare(

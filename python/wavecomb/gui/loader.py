@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from pxr import Sdf, Usd
 
 from wavecomb.run.boxed.process import Process
-from wavecomb.run.boxed.reader import Reader, is_wanted
+from wavecomb.run.boxed.reader import Reader
+from wavecomb.run.boxed.wanted import is_wanted
 from wavecomb.usd import LoadedStage
 from wavecomb.usd.looks.texture_cache import TextureCache
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from wavecomb import _core
 from wavecomb.load_options import LoadOptions, split
 from wavecomb.picture.rendered import picture_of
-from wavecomb.run.boxed.reader import Reader, is_wanted
+from wavecomb.run.boxed.reader import Reader
+from wavecomb.run.boxed.wanted import is_wanted
 from wavecomb.run.frame_names import parse_frames
 from wavecomb.run.settings import check_memory, prepare
 from wavecomb.run.stats import make_stats

@@ -77,6 +77,9 @@ def reload(stage: Usd.Stage) -> None:
 
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
     """Says which MaterialX files are missing from a stage, and what of others was left out."""
+    read_none = "wavecomb.usd.materialx.references" not in sys.modules
+    if read_none and not any(True for _ in unread_mtlx(stage)):
+        return
     if is_there():
         from wavecomb.usd.materialx import references
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -20,7 +19,6 @@ from wavecomb.run.boxed.errors import read_error
 from wavecomb.run.boxed.process import Process
 from wavecomb.run.boxed.replay import Replay
 from wavecomb.run.boxed.wire import Message, Receiver, Refused, Sender
-from wavecomb.run.isolate import trail
 from wavecomb.run.isolate.memory import MEGABYTE, machine_limit
 from wavecomb.usd.looks.texture_cache import TextureCache
 from wavecomb.usd.looks.texture_store import texture_store
@@ -32,24 +30,6 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.outline import Outline
 
 Progress = Callable[[int, int], Any]
-
-
-def is_wanted(isolate: bool | None = None) -> bool:
-    """Whether stages are to be read in such a process; None: unless WAVECOMB_ISOLATE=0.
-
-    Not by default where this process is one already, for who looks for a fault (WAVECOMB_DEBUG),
-    and where there is no Linux.
-
-    Raises:
-        WavecombError: It is asked for where there is none.
-    """
-    if isolate is not None:
-        if isolate and sys.platform != "linux":
-            raise WavecombError("isolate: there is such a process on Linux only")
-        return isolate
-    if sys.platform != "linux" or trail.is_expendable() or os.environ.get("WAVECOMB_DEBUG"):
-        return False
-    return os.environ.get("WAVECOMB_ISOLATE", "1") not in ("", "0")
 
 
 class Reader:

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from pxr import UsdSkel  # 8 ms, where there is a skeleton only
 
 Array = NDArray[Any]
 
@@ -29,6 +32,8 @@ class Skin:
         self.prim: Usd.Prim = query.GetPrim()
         self._shapes = None
         if query.HasBlendShapes():
+            from pxr import UsdSkel
+
             self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(self.prim))
 
     def varies(self) -> bool:
@@ -154,7 +159,7 @@ class Skeletons:
 
     def __init__(self, report: LoadReport) -> None:
         self.report = report
-        self._cache = UsdSkel.Cache()
+        self._cache: UsdSkel.Cache | None = None
         self._roots: set[Sdf.Path] = set()
         self._skins: dict[Sdf.Path, Skin] = {}
         self._holding: set[Sdf.Path] | None = None
@@ -164,12 +169,15 @@ class Skeletons:
         """Looks for what is bound to skeletons below a SkelRoot."""
         if prim.GetPath() in self._roots:
             return
+        from pxr import UsdSkel
+
+        cache = self._cache = self._cache or UsdSkel.Cache()
         root = UsdSkel.Root(prim)
         self._roots.add(prim.GetPath())
-        if not self._cache.Populate(root, _PROXIES):
+        if not cache.Populate(root, _PROXIES):
             return
-        for binding in self._cache.ComputeSkelBindings(root, _PROXIES) or ():
-            skeleton = self._cache.GetSkelQuery(binding.GetSkeleton())
+        for binding in cache.ComputeSkelBindings(root, _PROXIES) or ():
+            skeleton = cache.GetSkelQuery(binding.GetSkeleton())
             for query in binding.GetSkinningTargets():
                 if skeleton and (query.HasJointInfluences() or query.HasBlendShapes()):
                     skin = Skin(skeleton, query, self.report)
