@@ -39,8 +39,11 @@ TEST(Variants, MaterialsGetTheLeastThatShowsAll) {
   EXPECT_EQ(principled([](Material& m) { at(m, Input::kBaseColor).texture = 0; }),
             "textured_gloss");
   EXPECT_EQ(principled([](Material& m) { at(m, Input::kMetallic).texture = 0; }), "textured_metal");
-  EXPECT_EQ(principled([](Material& m) { m.metallic = 0.1f; }), "textured_metal");
-  EXPECT_EQ(principled([](Material& m) { m.specular_workflow = true; }), "textured_metal");
+  EXPECT_EQ(principled([](Material& m) { m.metallic = 0.1f; }), "tinted_gloss");
+  EXPECT_EQ(principled([](Material& m) { m.specular_workflow = true; }), "tinted_gloss");
+  EXPECT_EQ(principled(
+                [](Material& m) { m.specular_workflow = true, at(m, Input::kNormal).texture = 0; }),
+            "textured_metal");
   EXPECT_EQ(principled([](Material& m) { m.clearcoat = 0.1f; }), "principled");
   EXPECT_EQ(principled([](Material& m) { at(m, Input::kClearcoat).texture = 0; }), "principled");
   EXPECT_EQ(principled([](Material& m) { m.opacity = 0.9f; }), "principled");

@@ -56,7 +56,6 @@ class Integrator {
         random_(settings.seed * 0x9e3779b97f4a7c15ull + 0x2545f4914f6cdd1dull) {
     for (const Material& m : scene->materials())
       if (m.program == ProgramId::kOpenPbr) scene_.materials.energy = EnergyTables::shared().data();
-    scene_.materials.schlick_fresnel = settings.schlick_fresnel;
   }
 
   /// Radiance of one path through a pixel.

@@ -33,9 +33,6 @@
     return std::tie(__VA_ARGS__);                 \
   }
 
-/// For lambdas that are to be inlined, too.
-#define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
-
 namespace wavecomb {
 
 namespace detail {

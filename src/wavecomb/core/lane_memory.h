@@ -196,6 +196,20 @@ inline U reverse_bits(U x) {
         _mm512_broadcast_i32x4(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
     return U(_mm512_shuffle_epi8(_mm512_gf2p8affine_epi64_epi8(x.m, matrix, 0), order));
   } else
+#elif defined(__AVX2__)
+  if constexpr (kWidth<U> == 8) {
+    // The bytes, then the bits of their halves out of a table.
+    const __m256i order = _mm256_broadcastsi128_si256(
+        _mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
+    const __m256i reversed = _mm256_broadcastsi128_si256(
+        _mm_setr_epi8(0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15));
+    const __m256i half = _mm256_set1_epi8(15);
+    const __m256i bytes = _mm256_shuffle_epi8(x.m, order);
+    const __m256i low = _mm256_shuffle_epi8(reversed, _mm256_and_si256(bytes, half));
+    const __m256i top =
+        _mm256_shuffle_epi8(reversed, _mm256_and_si256(_mm256_srli_epi32(bytes, 4), half));
+    return U(_mm256_or_si256(_mm256_slli_epi32(low, 4), top));
+  } else
 #endif
   {
     x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);

@@ -15,6 +15,8 @@
 /// and what the caller does not use is not worked out. Compilers alone stop at the size of the
 /// caller.
 #define WAVECOMB_INLINE inline __attribute__((always_inline))
+/// For lambdas that are to be inlined, too.
+#define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace wavecomb {
 

@@ -47,14 +47,16 @@ inline SinCos<F> sincos_2pi(const F& x) {
           bits_float<F>(float_bits<F>(cos_abs) ^ cos_sign)};
 }
 
-/// Arc tangent of y / x over the whole circle, in [-pi, pi]; 0 when both are 0.
+/// Arc tangent of y / x over the whole circle, in [-pi, pi]; 0 when both are 0. |x| + |y| is
+/// finite.
 template <LaneValue F>
 inline F atan2(const F& y, const F& x) {
   const F ax = abs(x), ay = abs(y);
   const F hi = max(ax, ay), lo = min(ax, ay);
-  const F t = select(hi > 0.f, F(lo / hi), F(0.f));  // in [0, 1]
-  const Mask<F> reduce = t > 0.4142135623730950f;
-  const F r = select(reduce, F((t - 1.f) / (t + 1.f)), t);
+  // t = lo / hi, or (t - 1) / (t + 1) where t is above tan(pi / 8).
+  const Mask<F> reduce = lo > F(hi * 0.4142135623730950f);
+  const F over = select(reduce, F(lo - hi), lo), under = select(reduce, F(lo + hi), hi);
+  const F r = over / select(hi > 0.f, under, F(1.f));
   const F z = r * r;
   F p = fma(z, F(8.05374449538e-2f), F(-1.38776856032e-1f));
   p = fma(p, z, F(1.99777106478e-1f));

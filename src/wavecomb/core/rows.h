@@ -25,9 +25,18 @@ struct VectorOf {
 template <size_t W>
 using Vector = typename VectorOf<W>::type;
 
+/// Runs f(i) for i below N, where i is known to the compiler: arrays that are read and written by
+/// such numbers alone become registers at once, and nobody stores what is in them.
+template <size_t N, typename Function>
+WAVECOMB_INLINE void unrolled(const Function& f) {
+  [&]<size_t... I>(std::index_sequence<I...>) WAVECOMB_INLINE_LAMBDA {
+    (f(std::integral_constant<size_t, I>()), ...);
+  }(std::make_index_sequence<N>());
+}
+
 /// Block S of `a` and `b` changes places with its neighbour: one step of a transposition.
 template <size_t W, size_t S, size_t... I>
-inline void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence<I...>) {
+WAVECOMB_INLINE void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence<I...>) {
   const Vector<W> low = __builtin_shufflevector(a, b, ((I & S) == 0 ? I : W + I - S)...);
   const Vector<W> high = __builtin_shufflevector(a, b, ((I & S) == 0 ? I + S : W + I)...);
   a = low;
@@ -37,9 +46,10 @@ inline void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence<I...>) {
 /// Transposes the N x N blocks that stand side by side in N registers of W words (Eklundh 1972);
 /// its own inverse.
 template <size_t N, size_t W, size_t S = N / 2>
-inline void transpose_blocks(std::array<Vector<W>, N>& r) {
-  for (size_t i = 0; i < N; ++i)
-    if ((i & S) == 0) swap_blocks<W, S>(r[i], r[i + S], std::make_index_sequence<W>());
+WAVECOMB_INLINE void transpose_blocks(std::array<Vector<W>, N>& r) {
+  unrolled<N>([&](auto i) WAVECOMB_INLINE_LAMBDA {
+    if constexpr ((i & S) == 0) swap_blocks<W, S>(r[i], r[i + S], std::make_index_sequence<W>());
+  });
   if constexpr (S > 1) transpose_blocks<N, W, S / 2>(r);
 }
 
@@ -49,7 +59,7 @@ inline constexpr size_t kRowBlock = std::bit_ceil(N);
 
 /// N <= B words at p in a register of B words, 0 beyond them. Reads nothing beyond.
 template <size_t N, size_t B>
-inline Vector<B> load_words(const float* p) {
+WAVECOMB_INLINE Vector<B> load_words(const float* p) {
   if constexpr (N == B) {
     Vector<B> v;
     std::memcpy(&v, p, 4 * B);
@@ -57,35 +67,44 @@ inline Vector<B> load_words(const float* p) {
 #if defined(__AVX512VL__)
   } else if constexpr (B == 4) {
     return std::bit_cast<Vector<4>>(_mm_maskz_loadu_ps((1 << N) - 1, p));
+#elif defined(__AVX__)
+  } else if constexpr (B == 4) {
+    const __m128i there = _mm_setr_epi32(-1, N > 1 ? -1 : 0, N > 2 ? -1 : 0, 0);
+    return std::bit_cast<Vector<4>>(_mm_maskload_ps(p, there));
 #endif
   } else {
     Vector<B> v{};
-    for (size_t i = 0; i < N; ++i) v[i] = p[i];
+    unrolled<N>([&](auto i) WAVECOMB_INLINE_LAMBDA { v[i] = p[i]; });
     return v;
   }
 }
 
 template <size_t B, size_t... I>
-inline Vector<2 * B> join_two(const Vector<B>& a, const Vector<B>& b, std::index_sequence<I...>) {
+WAVECOMB_INLINE Vector<2 * B> join_two(const Vector<B>& a, const Vector<B>& b,
+                                       std::index_sequence<I...>) {
   return __builtin_shufflevector(a, b, I...);
 }
 /// Small vectors side by side in a wide one.
 template <size_t B, size_t W>
-inline Vector<W> join(const Vector<B>* parts) {
-  if constexpr (B == W)
-    return parts[0];
+WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
+  if constexpr (B == W) return parts[0];
+#if defined(__AVX__)
+  else if constexpr (B == 4 && W == 8)  // compilers alone move both parts about
+    return std::bit_cast<Vector<8>>(
+        _mm256_set_m128(std::bit_cast<__m128>(parts[1]), std::bit_cast<__m128>(parts[0])));
+#endif
   else
     return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
                            std::make_index_sequence<W>());
 }
 /// Words Start .. Start + sizeof...(I) - 1 of a vector.
 template <size_t Start, size_t W, size_t... I>
-inline Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
+WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
 }
 /// Stores the N-word parts of `v` from part J on; part j goes to at[j * N].
 template <size_t N, size_t W, size_t J = 0>
-inline void store_parts(const Vector<W>& v, float* const* at) {
+WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
   const Vector<N> one = part<J * N, W>(v, std::make_index_sequence<N>());
   std::memcpy(at[J * N], &one, 4 * N);
   if constexpr ((J + 1) * N < W) store_parts<N, W, J + 1>(v, at);
@@ -104,24 +123,27 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
   } else if constexpr (!InOneRegister<F>) {  // made of two halves
     const auto low = rows_at<N, typename F::Array1>(at);
     const auto high = rows_at<N, typename F::Array2>(at + F::Size1);
-    for (size_t k = 0; k < N; ++k) out[k] = F(low[k], high[k]);
+    unrolled<N>([&](auto k) WAVECOMB_INLINE_LAMBDA { out[k] = F(low[k], high[k]); });
   } else if constexpr (B <= W) {
     std::array<Vector<W>, B> r;
-    for (size_t k = 0; k < B; ++k) {
+    unrolled<B>([&](auto k) WAVECOMB_INLINE_LAMBDA {
       Vector<B> parts[W / B];
-      for (size_t j = 0; j < W / B; ++j) parts[j] = load_words<N, B>(at[k + j * B]);
+      unrolled<W / B>([&](auto j)
+                          WAVECOMB_INLINE_LAMBDA { parts[j] = load_words<N, B>(at[k + j * B]); });
       r[k] = join<B, W>(parts);
-    }
+    });
     transpose_blocks<B, W>(r);
-    for (size_t k = 0; k < N; ++k) out[k].m = std::bit_cast<decltype(F::m)>(r[k]);
+    unrolled<N>([&](auto k)
+                    WAVECOMB_INLINE_LAMBDA { out[k].m = std::bit_cast<decltype(F::m)>(r[k]); });
   } else {  // rows longer than a register: W columns at a time
     static_assert(N % W == 0);
-    for (size_t c = 0; c < N; c += W) {
+    unrolled<N / W>([&](auto block) WAVECOMB_INLINE_LAMBDA {
+      constexpr size_t c = block * W;
       const float* part[W];
-      for (size_t i = 0; i < W; ++i) part[i] = at[i] + c;
+      unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA { part[i] = at[i] + c; });
       const auto columns = rows_at<W, F>(part);
-      for (size_t k = 0; k < W; ++k) out[c + k] = columns[k];
-    }
+      unrolled<W>([&](auto k) WAVECOMB_INLINE_LAMBDA { out[c + k] = columns[k]; });
+    });
   }
   return out;
 }
@@ -135,25 +157,27 @@ WAVECOMB_INLINE void rows_to(float* const* at, const std::array<F, N>& values) {
   } else if constexpr (!InOneRegister<F>) {
     std::array<typename F::Array1, N> low;
     std::array<typename F::Array2, N> high;
-    for (size_t k = 0; k < N; ++k) {
+    unrolled<N>([&](auto k) WAVECOMB_INLINE_LAMBDA {
       low[k] = drjit::low(values[k]);
       high[k] = drjit::high(values[k]);
-    }
+    });
     rows_to<N, typename F::Array1>(at, low);
     rows_to<N, typename F::Array2>(at + F::Size1, high);
   } else if constexpr (N <= W) {
     std::array<Vector<W>, N> r;
-    for (size_t k = 0; k < N; ++k) r[k] = std::bit_cast<Vector<W>>(values[k].m);
+    unrolled<N>([&](auto k)
+                    WAVECOMB_INLINE_LAMBDA { r[k] = std::bit_cast<Vector<W>>(values[k].m); });
     transpose_blocks<N, W>(r);
-    for (size_t k = 0; k < N; ++k) store_parts<N, W>(r[k], at + k);
+    unrolled<N>([&](auto k) WAVECOMB_INLINE_LAMBDA { store_parts<N, W>(r[k], at + k); });
   } else {
-    for (size_t c = 0; c < N; c += W) {
+    unrolled<N / W>([&](auto block) WAVECOMB_INLINE_LAMBDA {
+      constexpr size_t c = block * W;
       float* part[W];
       std::array<F, W> columns;
-      for (size_t i = 0; i < W; ++i) part[i] = at[i] + c;
-      for (size_t k = 0; k < W; ++k) columns[k] = values[c + k];
+      unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA { part[i] = at[i] + c; });
+      unrolled<W>([&](auto k) WAVECOMB_INLINE_LAMBDA { columns[k] = values[c + k]; });
       rows_to<W, F>(part, columns);
-    }
+    });
   }
 }
 
@@ -173,10 +197,11 @@ WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word
   const float* at[W];
   const uint32_t bits = lane_bits<F>(active);
   if (bits == (uint64_t{1} << W) - 1) {
-    for (size_t i = 0; i < W; ++i) at[i] = from + index.value[i];
+    detail::unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA { at[i] = from + index.value[i]; });
   } else {
-    for (size_t i = 0; i < W; ++i)
+    detail::unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA {
       at[i] = (bits >> i & 1u) != 0 ? from + index.value[i] : detail::kNoRow;
+    });
   }
   return detail::rows_at<N, F>(at);
 }
@@ -189,9 +214,22 @@ WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>&
   const detail::InMemory<UInt<F>> index(word);
   const float* at[W];
   const uint32_t bits = lane_bits<F>(active);
-  for (size_t i = 0; i < W; ++i)
+  detail::unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA {
     at[i] = (bits >> i & 1u) != 0 ? static_cast<const float*>(array(i)) + index.value[i]
                                   : detail::kNoRow;
+  });
+  return detail::rows_at<N, F>(at);
+}
+
+/// The same where all lanes are active: without a branch for each.
+template <size_t N, typename F, typename Array>
+WAVECOMB_INLINE std::array<F, N> load_all_rows_of(const Array& array, const UInt<F>& word) {
+  constexpr size_t W = kWidth<F>;
+  const detail::InMemory<UInt<F>> index(word);
+  const float* at[W];
+  detail::unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA {
+    at[i] = static_cast<const float*>(array(i)) + index.value[i];
+  });
   return detail::rows_at<N, F>(at);
 }
 
@@ -205,7 +243,9 @@ WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::arra
   alignas(64) float none[N];
   float* at[W];
   const uint32_t bits = lane_bits<F>(active);
-  for (size_t i = 0; i < W; ++i) at[i] = (bits >> i & 1u) != 0 ? to + index.value[i] : none;
+  detail::unrolled<W>([&](auto i) WAVECOMB_INLINE_LAMBDA {
+    at[i] = (bits >> i & 1u) != 0 ? to + index.value[i] : none;
+  });
   detail::rows_to<N, F>(at, values);
 }
 

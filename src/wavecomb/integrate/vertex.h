@@ -11,9 +11,9 @@
 
 namespace wavecomb {
 
-/// Shades a vertex of the active lanes' paths with program `Bsdf`.
+/// The steps of a vertex of the active lanes' paths, with program `Bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
+WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   using U = UInt<F>;
   VertexResult<F> out;
   out.emitted = Color<F>(F(0.f));
@@ -47,6 +47,12 @@ VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
   scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, receiver, out);
   survive<F>(v, r_light.w, out);
   return out;
+}
+
+/// The same as a function of its own: the reference integrator's.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
+  return take_steps<Bsdf, F>(v);
 }
 
 }  // namespace wavecomb

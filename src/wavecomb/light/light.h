@@ -94,9 +94,11 @@ inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& r
 /// Runs `one(kind, lanes)` for each kind of light among the active lanes.
 template <typename F, typename Function>
 inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Function& one) {
-  for (uint32_t k = 0; k < kLightKindCount; ++k) {
-    const Mask<F> lanes = active & Mask<F>(kind == UInt<F>(k));
-    if (any(lanes)) one(static_cast<LightKind>(k), lanes);
+  for (Mask<F> pending = active; any(pending);) {
+    const uint32_t k = first_active(kind, Mask<UInt<F>>(pending));
+    const Mask<F> lanes = pending & Mask<F>(kind == UInt<F>(k));
+    one(static_cast<LightKind>(k), lanes);
+    pending = pending & not_(lanes);
   }
 }
 

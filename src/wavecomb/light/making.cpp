@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/light/making.h"
 
+#include <cmath>
+
 namespace wavecomb::making {
 
 void finish_area(MadeLight& made, const Light& light, double area) {
@@ -21,6 +23,12 @@ void finish_flat(MadeLight& made, const Light& light, const Double3& u, const Do
   put(made.record.u, u);
   put(made.record.v, v);
   put(made.record.n, n);
+  const auto measure = [](const float (&edge)[3], float& size, float& inverse) {
+    size = static_cast<float>(length(to_double(edge)));
+    inverse = size > 0 && std::isfinite(1 / size) ? 1 / size : 0.f;
+  };
+  measure(made.record.u, made.record.length_u, made.record.inverse_u);
+  measure(made.record.v, made.record.length_v, made.record.inverse_v);
   finish_area(made, light, area_factor * length(m));
 }
 

@@ -37,79 +37,85 @@ inline constexpr float kLeastRectSolidAngle = 2e-3f;
 /// Parametrization for Spherical Rectangles", CGF 32(4) 2013). The point is at the origin of x, y
 /// along the edges and z towards the rectangle, which is [x0, x1] x [y0, y1] at the distance z.
 ///
-/// The solid angle is the sum over its corners of +-atan(x y / (z sqrt(x^2 + y^2 + z^2))), which
-/// is what the paper's sum of angles minus 2 pi comes to: there each angle is pi / 2 + asin(b c), b
-/// and c the z components of the normals of the planes through two neighbouring edges.
+/// The solid angle is the sum over its corners of +-atan(x y / (z d)), d = sqrt(x^2 + y^2 + z^2),
+/// which is what the paper's sum of angles minus 2 pi comes to: there each angle is
+/// pi / 2 + asin(b c), b and c the z components of the normals of the planes through two
+/// neighbouring edges. Each angle is that of the complex number z d + i x y, so that the difference
+/// of the two along an edge x, less than pi, is one of
+///   z^2 d_0 d_1 + x^2 y_0 y_1 + i x z (y_1 d_0 - y_0 d_1).
+/// Where that is out of range (lengths beyond 10^9 or below 10^-9) the rectangle is not usable.
 template <typename F>
 struct SphericalRect {
   Vec3<F> x, y, n;
-  F width, height, x0, x1, y0, y1, z;
+  F inverse_width, inverse_height, x0, x1, y0, y1, z;
   F solid_angle;
-  F begin;   ///< k of the paper
-  F b0, b1;  ///< z components of the normals for the edges y0 and y1
+  F begin;           ///< k of the paper
+  F near_y, b0, b1;  ///< 1 / sqrt(y0^2 + z^2); z components of the normals for the edges y0 and y1
   Mask<F> usable;
 };
 
 template <typename F>
 inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const Vec3<F>& from) {
   SphericalRect<F> r;
-  const Direction<F> u = make_direction<F>(light.u()), v = make_direction<F>(light.v());
-  r.x = u.wi;
-  r.y = v.wi;
+  r.inverse_width = light[&LightRecord::inverse_u];
+  r.inverse_height = light[&LightRecord::inverse_v];
+  r.x = light.u() * r.inverse_width;
+  r.y = light.v() * r.inverse_height;
   r.n = light.n();
-  r.width = u.length;
-  r.height = v.length;
   const Vec3<F> corner = light.p() - from;
   r.x0 = dot(corner, r.x);
   r.y0 = dot(corner, r.y);
-  r.x1 = r.x0 + r.width;
-  r.y1 = r.y0 + r.height;
+  r.x1 = r.x0 + light[&LightRecord::length_u];
+  r.y1 = r.y0 + light[&LightRecord::length_v];
   r.z = -dot(corner, r.n);  // the light is seen from the side that n points to
-  const F z2 = r.z * r.z, x02 = r.x0 * r.x0, x12 = r.x1 * r.x1, y02 = r.y0 * r.y0,
-          y12 = r.y1 * r.y1;
-  const auto corner_angle = [&](const F& a, const F& b, const F& a2, const F& b2) {
-    return atan2(F(a * b), F(r.z * sqrt(F(F(a2 + b2) + z2))));
+  const F z2 = r.z * r.z, edge0 = fma(r.y0, r.y0, z2), edge1 = fma(r.y1, r.y1, z2);
+  const auto between = [&](const F& x) {
+    const F zd0 = r.z * sqrt(fma(x, x, edge0)), zd1 = r.z * sqrt(fma(x, x, edge1));
+    const F xy0 = x * r.y0, xy1 = x * r.y1;
+    return atan2(fma(xy1, zd0, F(-(xy0 * zd1))), fma(zd0, zd1, F(xy0 * xy1)));
   };
-  const F a01 = corner_angle(r.x1, r.y0, x12, y02), a12 = corner_angle(r.x1, r.y1, x12, y12),
-          a23 = corner_angle(r.x0, r.y1, x02, y12), a30 = corner_angle(r.x0, r.y0, x02, y02);
-  r.solid_angle = F(a12 - a01) + F(a30 - a23);
-  r.begin = kPi + F(a23 - a30);
+  const F right = between(r.x1), left = between(r.x0);
+  r.solid_angle = right - left;
+  r.begin = kPi + left;
   const F least(1e-30f);  // a point on the line of an edge
-  r.b0 = -r.y0 / sqrt(max(F(z2 + y02), least));
-  r.b1 = r.y1 / sqrt(max(F(z2 + y12), least));
+  r.near_y = 1.f / sqrt(max(edge0, least));
+  r.b0 = -r.y0 * r.near_y;
+  r.b1 = r.y1 / sqrt(max(edge1, least));
   r.usable = (abs(dot(r.x, r.y)) < 1e-5f) & (r.z > 0.f) & (r.solid_angle > kLeastRectSolidAngle) &
              is_finite(r.solid_angle);
   return r;
 }
 
 /// Where on the rectangle (u, v) of the unit square lands, as shares of its width and height: the
-/// paper's algorithm 2, with its z0 = -z.
+/// paper's algorithm 2, with its z0 = -z, and f = g / sin.
 template <typename F>
 inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, const F& v) {
   const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));
-  const F good_sin = select(abs(sin_a) > 1e-20f, sin_a, F(1e-20f));
-  const F f = fma(cos_a, r.b0, F(-r.b1)) / good_sin;
-  const F n0 = r.z / sqrt(max(fma(r.y0, r.y0, F(r.z * r.z)), F(1e-30f)));
-  const F a2 = F(abs(f) - n0) * F(abs(f) + n0);
-  const F x = clamp(copysign(F(r.z / sqrt(max(a2, F(1e-14f)))), f), r.x0, r.x1);
+  const F g = fma(cos_a, r.b0, F(-r.b1)), sine = abs(sin_a);
+  const F n0 = r.z * r.near_y * sine;
+  const F a2 = F(abs(g) - n0) * F(abs(g) + n0);
+  const F away = F(r.z * sine) / sqrt(max(a2, F(1e-30f)));
+  const F x = clamp(copysign(away, F(g * sin_a)), r.x0, r.x1);
   const F d2 = fma(x, x, F(r.z * r.z));
   const F h0 = r.y0 / sqrt(fma(r.y0, r.y0, d2)), h1 = r.y1 / sqrt(fma(r.y1, r.y1, d2));
   const F h = fma(v, F(h1 - h0), h0);
   const F rest = max(F((1.f - h) * (1.f + h)), F(1e-14f));
   const F y = clamp(F(h * sqrt(F(d2 / rest))), r.y0, r.y1);
-  const auto share = [](const F& at, const F& size) {
-    return clamp(F(at / select(size > 0.f, size, F(1.f))), F(0.f), F(1.f));
+  const auto share = [](const F& at, const F& inverse) {
+    return clamp(F(at * inverse), F(0.f), F(1.f));
   };
-  return {share(F(x - r.x0), r.width), share(F(y - r.y0), r.height)};
+  return {share(F(x - r.x0), r.inverse_width), share(F(y - r.y0), r.inverse_height)};
 }
 
 /// Density over solid angle of a point of the rect; 0 where it is seen from behind.
 template <typename F>
 inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_light,
                   const F& area) {
-  const F by_area = area_to_solid_angle<F>(distance2, cos_light, area);
+  const Mask<F> seen = (cos_light > 0.f) & (distance2 > 0.f) & (area > 0.f);
   const F by_angle = 1.f / select(r.usable, r.solid_angle, F(1.f));
-  return select(r.usable & (by_area > 0.f), by_angle, by_area);
+  const F pdf = select(seen, by_angle, F(0.f));
+  if (all(r.usable)) return pdf;
+  return select(r.usable, pdf, area_to_solid_angle<F>(distance2, cos_light, area));
 }
 
 /// Probability that the point on a rect with a picture of that `spread` is taken by the picture: a

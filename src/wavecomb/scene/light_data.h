@@ -99,9 +99,10 @@ struct Light {
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
 
-/// A light as lanes read it, triangles of meshes apart: 32 words. Vectors are in world space. Use
+/// A light as lanes read it, triangles of meshes apart: 48 words. Vectors are in world space. Use
 /// by kind:
-///   rect      p corner, u, v edges, n unit normal (direction of emission), area
+///   rect      p corner, u, v edges, their lengths and inverses, n unit normal (direction of
+///             emission), area
 ///   disk      p centre, u, v half axes, n, area
 ///   sphere    p centre, radius (0: point light, radiance then is radiant intensity), area
 ///   cylinder  p centre of one end, u axis to the other, radius, area
@@ -132,8 +133,10 @@ struct alignas(64) LightRecord {
   uint32_t light_link, shadow_link;
   uint32_t sync;     ///< MaterialSync of a mesh light
   uint32_t portals;  ///< of a dome: index into LightView::portal_groups, or kNoPortals
+  /// |u|, |v|, and their inverses, 0 where there is none.
+  float length_u, length_v, inverse_u, inverse_v;
 };
-static_assert(sizeof(LightRecord) == 128);
+static_assert(sizeof(LightRecord) == 192);
 
 /// Shaping as lanes read it.
 struct alignas(64) ShapingRecord {

@@ -139,8 +139,6 @@ struct MaterialView {
   const ProgramParameterRecord* own = nullptr;
   const float* energy = nullptr;  ///< EnergyTables; set where a material needs them
   GraphView graphs{};
-  /// A render setting: Schlick's approximation in place of exact Fresnel.
-  bool schlick_fresnel = false;
 };
 
 }  // namespace wavecomb

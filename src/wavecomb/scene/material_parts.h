@@ -28,6 +28,7 @@ inline constexpr uint32_t kAllParts = 511;
 /// compile unit for each.
 #define WAVECOMB_VARIANTS(X)                       \
   X(gloss, principled, 0)                          \
+  X(tinted_gloss, principled, kMetals)             \
   X(textured_gloss, principled, kVaries)           \
   X(textured_metal, principled, kVaries | kMetals) \
   X(base, openpbr, kMetals)                        \

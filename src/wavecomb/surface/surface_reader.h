@@ -39,21 +39,31 @@ namespace detail {
 template <typename F>
 class MeshReader {
  public:
-  MeshReader(const MeshRecord* meshes, const UInt<F>& mesh, const Mask<F>& active) {
-    const InMemory<UInt<F>> index(mesh);
-    const uint32_t bits = lane_bits<F>(active);
-    for (size_t i = 0; i < kWidth<F>; ++i)
-      records_[i] = meshes + ((bits >> i & 1u) != 0 ? index.value[i] : 0u);
+  WAVECOMB_INLINE MeshReader(const MeshRecord* meshes, const UInt<F>& mesh, const Mask<F>& active) {
+    if (!kIsScalar<F> && any(active) && is_uniform<F>(mesh, active)) {
+      shared_ = meshes + first_active(mesh, Mask<UInt<F>>(active));
+      for (const MeshRecord*& record : records_) record = shared_;
+      flags = select(Mask<UInt<F>>(active), UInt<F>(shared_->flags), UInt<F>(0u));
+      return;
+    }
+    const InMemory<UInt<F>> index(select(Mask<UInt<F>>(active), mesh, UInt<F>(0u)));
+    for (size_t i = 0; i < kWidth<F>; ++i) records_[i] = meshes + index.value[i];
     flags = gather_member<F>(meshes, &MeshRecord::flags, mesh, active);
   }
 
   /// Row `index` of N words of one of a mesh's arrays.
   template <size_t N>
-  std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
-                       const Mask<F>& active) const {
-    return load_rows_of<N, F>(
-        [&](size_t lane) { return reinterpret_cast<const void*>(records_[lane]->*array); },
-        index * static_cast<uint32_t>(N), active);
+  WAVECOMB_INLINE std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
+                                       const Mask<F>& active) const {
+    const UInt<F> word = index * static_cast<uint32_t>(N);
+    const auto rows = [&](size_t lane) {
+      return reinterpret_cast<const void*>(records_[lane]->*array);
+    };
+    if constexpr (kIsScalar<F>) return load_rows_of<N, F>(rows, word, active);
+    if (!all(active)) return some_rows<N>(array, word, active);
+    if (!shared_) return load_all_rows_of<N, F>(rows, word);
+    const void* const base = rows(0);
+    return load_all_rows_of<N, F>([base](size_t) { return base; }, word);
   }
   Vec3<F> vec3(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
     const auto r = row<3>(array, index, active);
@@ -83,6 +93,16 @@ class MeshReader {
   UInt<F> flags;
 
  private:
+  /// Not inline: most packets are full.
+  template <size_t N>
+  [[gnu::noinline]] std::array<F, N> some_rows(uint64_t MeshRecord::* array, UInt<F> word,
+                                               Mask<F> active) const {
+    return load_rows_of<N, F>(
+        [&](size_t lane) { return reinterpret_cast<const void*>(records_[lane]->*array); }, word,
+        active);
+  }
+
+  const MeshRecord* shared_ = nullptr;  ///< of all active lanes, where they have one
   const MeshRecord* records_[kWidth<F>];
 };
 
@@ -92,18 +112,16 @@ struct InstanceMaps {
   Vec3<F> row[3], t;
   F side;  ///< sign of the determinant
 
-  InstanceMaps(const InstanceRecord* instances, const UInt<F>& inst, const Mask<F>& active) {
-    std::array<F, 16> r;
+  WAVECOMB_INLINE InstanceMaps(const InstanceRecord* instances, const UInt<F>& inst,
+                               const Mask<F>& active) {
     if (!kIsScalar<F> && any(active) && is_uniform<F>(inst, active)) {
       const auto* shared =
           reinterpret_cast<const float*>(instances + first_active(inst, Mask<UInt<F>>(active)));
-      for (size_t k = 0; k < 16; ++k) r[k] = F(shared[k]);
+      take([shared](size_t k) { return F(shared[k]); });
     } else {
-      r = load_rows<16, F>(instances, inst * 16u, active);
+      const auto r = load_rows<16, F>(instances, inst * 16u, active);
+      take([&r](size_t k) { return r[k]; });
     }
-    for (uint32_t i = 0; i < 3; ++i) row[i] = {r[4 * i], r[4 * i + 1], r[4 * i + 2]};
-    t = {r[3], r[7], r[11]};
-    side = r[15];
   }
 
   /// Takes other transforms where instances move.
@@ -125,6 +143,15 @@ struct InstanceMaps {
     return Vec3<F>(dot(cross(row[1], row[2]), n), dot(cross(row[2], row[0]), n),
                    dot(cross(row[0], row[1]), n)) *
            side;
+  }
+
+ private:
+  /// From the words of an InstanceRecord.
+  template <typename Word>
+  WAVECOMB_INLINE void take(const Word& word) {
+    for (uint32_t i = 0; i < 3; ++i) row[i] = {word(4 * i), word(4 * i + 1), word(4 * i + 2)};
+    t = {word(3), word(7), word(11)};
+    side = word(15);
   }
 };
 

@@ -64,7 +64,7 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
                               const SurfaceInteraction<Bsdf, F>& at) {
   using U = UInt<F>;
   const SceneView& scene = v.scene;
-  Color<F> emission = at.params.emission;
+  Color<F> emission = at.emission;
   if (v.has(kMeshLights) && scene.mesh_lights) [[unlikely]]
     emission =
         mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);

@@ -20,17 +20,37 @@ template <typename Bsdf>
 inline constexpr uint32_t kVertexInputs =
     Bsdf::kInputs | (Bsdf::kEmits ? input_bit(Input::kEmission) : 0u);
 
-/// A surface as a path has met it. Steps after this one know of it `bsdf`, `throughput` and the
-/// functions, which whatever else a path meets has, too; `emit` alone is for surfaces.
+/// Where a path has met a surface. Texture coordinates are worked out only where a texture or an
+/// AOV asks for them.
 template <typename Bsdf, typename F>
-struct SurfaceInteraction {
+struct SurfacePlace {
   UInt<F> textured_inputs;  ///< MaterialRecord::textured_inputs
   Mask<F> reads_texture;    ///< lanes that need uv and a frame along it
   bool textured;            ///< whether any does
   Surface<F> s;
-  ParamsOf<Bsdf, F> params;
+
+  template <uint32_t kFeatures>
+  explicit SurfacePlace(const Vertex<F, kFeatures>& v);
+};
+
+/// What it is made of.
+template <typename Bsdf, typename F>
+struct SurfaceLook {
   Bsdf bsdf;
   Color<F> throughput;  ///< of the path, up to the surface
+  Color<F> emission;    ///< where the program emits
+  Vec3<F> normal;       ///< in tangent space, where the program reads textures
+};
+
+/// A surface as a path has met it. Steps after this one know of it `bsdf`, `throughput` and the
+/// functions, which whatever else a path meets has, too; `emit` alone is for surfaces.
+template <typename Bsdf, typename F>
+struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
+  using SurfacePlace<Bsdf, F>::s;
+  using SurfaceLook<Bsdf, F>::bsdf;
+
+  template <uint32_t kFeatures>
+  explicit SurfaceInteraction(const Vertex<F, kFeatures>& v);
 
   /// What the BSDF's directions are local to: z is the shading normal.
   template <uint32_t kFeatures>
@@ -59,53 +79,67 @@ WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F
   return {width, hash_u32<U>(path, U(0x7e3a15c1u + v.depth))};
 }
 
-/// The surface with the values of its material. Texture coordinates are worked out only where a
-/// texture or an AOV asks for them.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE SurfaceInteraction<Bsdf, F> interact_surface(const Vertex<F, kFeatures>& v) {
-  using U = UInt<F>;
-  const SceneView& scene = v.scene;
-  const PathState<F>& path = v.path;
-  U textured_inputs(0u);
-  Mask<F> reads_texture(false);
-  bool textured = false;
-  if constexpr (Bsdf::kTextured) {
-    textured_inputs = gather_member<F>(scene.materials.materials, &MaterialRecord::textured_inputs,
-                                       v.material, v.active);
-    reads_texture =
-        v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) != U(0u));
-    textured = any(reads_texture);
-  }
-  const bool wants_uv = textured || (v.notes() && v.aovs->wants_uv);
-  const Surface<F> s = setup_surface<F, v.has(kCurves), v.has(kMotion)>(
-      scene, v.hit, path.dir, wants_uv, Bsdf::kHasTerminator, v.active);
-  const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
-  const Footprint<F> footprint =
-      footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(cos_seen)));
+namespace detail {
 
-  MaterialView materials = scene.materials;
-  const bool schlick = v.has(kExperiments) && v.settings.schlick_fresnel;
-  materials.schlick_fresnel = schlick;
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE UInt<F> textured_inputs_of(const Vertex<F, kFeatures>& v) {
+  if constexpr (!Bsdf::kTextured) return UInt<F>(0u);
+  return gather_member<F>(v.scene.materials.materials, &MaterialRecord::textured_inputs, v.material,
+                          v.active);
+}
+
+/// What is made of parameters is made here, so that kernels keep none that they do not read.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, const Surface<F>& s,
+                                             bool textured) {
+  const PathState<F>& path = v.path;
+  Footprint<F> footprint(F(0.f));
+  if (textured) {
+    const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
+    footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(cos_seen)));
+  }
   const auto make_point = [&](const Mask<F>& lanes) {
     // Copies, as everything is that only graphs are given.
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;
     const Footprint<F> seen = footprint;
-    return graph_point<F>(scene, at, surface, dir, seen, lanes);
+    return graph_point<F>(v.scene, at, surface, dir, seen, lanes);
   };
-  const auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(materials, v.material, s.uv,
+  const Vec2<F> uv = s.uv;
+  const auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(v.scene.materials, v.material, uv,
                                                               footprint, make_point, v.active);
   Color<F> throughput = path.throughput;
   if constexpr (Bsdf::kAbsorbs) throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
-  return {textured_inputs, reads_texture, textured, s, params, Bsdf(params, schlick), throughput};
+  const Vec3<F> none(F(0.f));
+  return {Bsdf(params, v.has(kExperiments) && v.settings.schlick_fresnel), throughput,
+          Bsdf::kEmits ? params.emission : none, Bsdf::kTextured ? params.normal : none};
 }
+
+}  // namespace detail
+
+template <typename Bsdf, typename F>
+template <uint32_t kFeatures>
+WAVECOMB_INLINE SurfacePlace<Bsdf, F>::SurfacePlace(const Vertex<F, kFeatures>& v)
+    : textured_inputs(detail::textured_inputs_of<Bsdf, F>(v)),
+      reads_texture(v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) !=
+                                       UInt<F>(0u))),
+      textured(Bsdf::kTextured && any(reads_texture)),
+      s(setup_surface<F, v.has(kCurves), v.has(kMotion)>(
+          v.scene, v.hit, v.path.dir, textured || (v.notes() && v.aovs->wants_uv),
+          Bsdf::kHasTerminator, v.active)) {}
+
+template <typename Bsdf, typename F>
+template <uint32_t kFeatures>
+WAVECOMB_INLINE SurfaceInteraction<Bsdf, F>::SurfaceInteraction(const Vertex<F, kFeatures>& v)
+    : SurfacePlace<Bsdf, F>(v),
+      SurfaceLook<Bsdf, F>(detail::look_at<Bsdf, F>(v, s, this->textured)) {}
 
 /// What program `Bsdf` has met.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE auto interact(const Vertex<F, kFeatures>& v) {
   if constexpr (Bsdf::kOnSurface)
-    return interact_surface<Bsdf, F>(v);
+    return SurfaceInteraction<Bsdf, F>(v);
   else
     return Bsdf::interact(v);
 }
@@ -116,14 +150,15 @@ template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {
   using U = UInt<F>;
-  if (!Bsdf::kTextured || !textured) return make_frame<F>(s.ns);
+  if (!Bsdf::kTextured || !this->textured) return make_frame<F>(s.ns);
   const Vec3<F>& dir = v.path.dir;
   Vec3<F> n = s.ns;
-  const Vec3<F> tangent = select<F>(reads_texture, s.dpdu, Vec3<F>(F(0.f)));
+  const Vec3<F> tangent = select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f)));
   const Mask<F> mapped =
-      v.active & Mask<F>((textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != U(0u));
+      v.active &
+      Mask<F>((this->textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != U(0u));
   if (any(mapped)) {
-    const Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(params.normal));
+    const Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(this->normal));
     const Vec3<F> seen = facing_normal<F>(dir, s.ng, bumped);
     n = select<F>(mapped, reflecting_normal<F>(dir, s.ng, seen), n);
   }

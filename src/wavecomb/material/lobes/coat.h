@@ -27,30 +27,37 @@ inline F average_fresnel_dielectric(const F& eta) {
   return clamp(fma(p, x, F(-3.3e-4f)), F(0.f), F(1.f));
 }
 
-/// Reflectance F0 + (1 - F0) w(c) of a coat, where w is Schlick's (1 - c)^5 or follows the exact
-/// reflectance of the index: w = (F_exact - f) / (1 - f), f = F_exact(1). `exact` blends: 0 is
-/// Schlick's.
+/// Reflectance F0 + (1 - F0) w(c) of a coat of an index >= 1, where w is Schlick's (1 - c)^5 or
+/// follows the exact reflectance of the index: w = (F_exact - f) / (1 - f), f = F_exact(1). `exact`
+/// blends: 0 is Schlick's.
 template <typename F>
 struct CoatFresnel {
   F ior;
   F exact;
   F f0_exact;
+  F inverse_ior2, inverse_rest;  ///< 1 / ior^2; 1 / (1 - f)
 
   CoatFresnel() = default;
   CoatFresnel(const F& ior_, const F& exact_)
-      : ior(ior_), exact(exact_), f0_exact(f0_from_ior(ior_)) {}
+      : ior(ior_),
+        exact(exact_),
+        f0_exact(f0_from_ior(ior_)),
+        inverse_ior2(1.f / sqr(ior_)),
+        inverse_rest(1.f / F(1.f - f0_exact)) {}
 
   F weight(const F& cos_i) const {
     const F w = schlick_weight(cos_i);
     if (none(Mask<F>(exact > 0.f))) return w;
-    const F r = fresnel_dielectric(cos_i, ior).reflectance;
-    const F e = clamp(F(F(r - f0_exact) / F(1.f - f0_exact)), F(0.f), F(1.f));
+    const F c = clamp(cos_i, F(0.f), F(1.f));
+    const F t = safe_sqrt(fnma(max(fnma(c, c, F(1.f)), F(0.f)), inverse_ior2, F(1.f)));
+    const F r = dielectric_reflectance(c, t, ior);
+    const F e = clamp(F(F(r - f0_exact) * inverse_rest), F(0.f), F(1.f));
     return clamp(fma(exact, F(e - w), w), F(0.f), F(1.f));
   }
   /// 2 int w(c) c dc.
   F average_weight() const {
     const F w(1.f / 21.f);
-    const F e = F(average_fresnel_dielectric(ior) - f0_exact) / F(1.f - f0_exact);
+    const F e = F(average_fresnel_dielectric(ior) - f0_exact) * inverse_rest;
     return clamp(fma(exact, F(e - w), w), F(0.f), F(1.f));
   }
   F operator()(const F& f0, const F& cos_i) const { return fma(F(1.f - f0), weight(cos_i), f0); }
@@ -72,10 +79,16 @@ template <typename F>
 inline F seen_through_coat(const F& f_o, const F& f_i, const F& f_avg) {
   return F(1.f - f_o) * F(1.f - f_i) / max(F(1.f - f_avg), F(1e-4f));
 }
+
+/// (1 - f_o) / (1 - f_avg) of it, what does not depend on the light; of a number or a colour.
 template <typename F>
-inline Color<F> seen_through_coat(const Color<F>& f_o, const Color<F>& f_i, const Color<F>& f_avg) {
-  return {seen_through_coat(f_o.x, f_i.x, f_avg.x), seen_through_coat(f_o.y, f_i.y, f_avg.y),
-          seen_through_coat(f_o.z, f_i.z, f_avg.z)};
+inline F seen_below_coat(const F& f_o, const F& f_avg) {
+  return F(1.f - f_o) / max(F(1.f - f_avg), F(1e-4f));
+}
+template <typename F>
+inline Color<F> seen_below_coat(const Color<F>& f_o, const Color<F>& f_avg) {
+  return {seen_below_coat(f_o.x, f_avg.x), seen_below_coat(f_o.y, f_avg.y),
+          seen_below_coat(f_o.z, f_avg.z)};
 }
 
 }  // namespace wavecomb

@@ -43,17 +43,25 @@ inline F refracted_cos(const F& cos_i, const F& eta) {
   return safe_sqrt(F(1.f - sin2_i / sqr(eta)));
 }
 
-/// Exact reflectance of a dielectric for cos_i >= 0; eta = eta_t / eta_i > 0. (Born and Wolf,
-/// "Principles of Optics", 1.5.2, eq. 20 and 21, averaged over the two polarisations.)
+/// Exact reflectance of a dielectric for cosines c of incidence and t of refraction (Born and Wolf,
+/// "Principles of Optics", 1.5.2, eq. 20 and 21, averaged over the two polarisations):
+///   (p^2 + s^2) / 2,  p = (eta c - t) / (eta c + t),  s = (c - eta t) / (c + eta t)
+template <typename F>
+inline F dielectric_reflectance(const F& c, const F& t, const F& eta) {
+  const F a = eta * c, b = eta * t;
+  const F p = a + t, s = c + b;
+  // At eta = 1 both denominators vanish with c: the reflectance is then 0.
+  const F inverse = 1.f / max(F(p * s), F(1e-30f));
+  const F parallel = F(a - t) * s * inverse, perpendicular = F(c - b) * p * inverse;
+  return 0.5f * fma(parallel, parallel, sqr(perpendicular));
+}
+
+/// The same for cos_i >= 0; eta = eta_t / eta_i > 0.
 template <typename F>
 inline DielectricFresnel<F> fresnel_dielectric(const F& cos_i, const F& eta) {
   const F c = clamp(cos_i, F(0.f), F(1.f));
   const F t = refracted_cos(c, eta);
-  const F a = eta * c, b = eta * t;
-  // At eta = 1 both denominators vanish with c: the reflectance is then 0.
-  const F parallel = F(a - t) / max(F(a + t), F(1e-20f));
-  const F perpendicular = F(c - b) / max(F(c + b), F(1e-20f));
-  const F r = 0.5f * fma(parallel, parallel, sqr(perpendicular));
+  const F r = dielectric_reflectance(c, t, eta);
   const F sin2_i = max(fnma(c, c, F(1.f)), F(0.f));
   const Mask<F> total = sin2_i >= sqr(eta);
   return {select(total & (eta < 1.f), F(1.f), min(r, F(1.f))), t};

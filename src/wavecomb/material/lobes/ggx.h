@@ -24,11 +24,13 @@ struct Ggx {
 
   /// D(h) of Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007,
   /// eq. 33, in slopes, which stays exact where h.z is near 1.
-  F d(const Vec3<F>& h) const {
-    const F a2 = alpha * alpha;
-    const F r = fma(h.x, h.x, F(h.y * h.y)) / a2;
-    const F q = fma(h.z, h.z, r);
-    return 1.f / F(kPi * a2 * q * q);
+  F d(const Vec3<F>& h) const { return d_along(h, F(1.f)); }
+  /// D(h) of the normal along `sum`, whose squared length is `length2`:
+  ///   (alpha |s|^2 / (alpha^2 s_z^2 + s_x^2 + s_y^2))^2 / pi
+  F d_along(const Vec3<F>& sum, const F& length2) const {
+    const F r = fma(sum.x, sum.x, F(sum.y * sum.y));
+    const F q = fma(F(alpha * alpha), F(sum.z * sum.z), r);
+    return sqr(F(F(alpha * length2) / max(q, F(1e-30f)))) * kInvPi;
   }
 
   /// s(w) = sqrt(z^2 + alpha^2 (x^2 + y^2)) = |z| (1 + 2 Lambda(w)); never 0 for alpha > 0.

@@ -11,18 +11,20 @@ template <typename F>
 struct AnisotropicGgx {
   F ax, ay;
 
-  /// D(h) (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 85).
+  /// D(h) (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 85), all
+  /// times a^4, a^2 = ax ay.
   F d(const Vec3<F>& h) const {
-    const F q = fma(h.z, h.z, fma(F(h.x / ax), F(h.x / ax), sqr(F(h.y / ay))));
-    return 1.f / F(kPi * ax * ay * q * q);
+    const F a2 = ax * ay;
+    const F q = fma(F(a2 * h.z), F(a2 * h.z), fma(F(h.x * ay), F(h.x * ay), sqr(F(h.y * ax))));
+    return a2 * sqr(F(a2 / max(q, F(1e-30f)))) * kInvPi;
   }
   /// sqrt(z^2 + (ax x)^2 + (ay y)^2) = |z| (1 + 2 Lambda(w)).
   F s(const Vec3<F>& w) const {
     return sqrt(fma(w.z, w.z, fma(F(ax * w.x), F(ax * w.x), sqr(F(ay * w.y)))));
   }
-  /// G2 / (4 |z_o z_i|), height-correlated.
-  F g2_over_4cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
-    return 0.5f / max(fma(abs(wo.z), s(wi), F(abs(wi.z) * s(wo))), F(1e-20f));
+  /// G2 / (4 |z_o z_i|), height-correlated, where `so` is s(wo).
+  F g2_over_4cos(const Vec3<F>& wo, const F& so, const Vec3<F>& wi) const {
+    return 0.5f / max(fma(abs(wo.z), s(wi), F(abs(wi.z) * so)), F(1e-20f));
   }
   /// G2(wo, wi) / G1(wo): the weight that visible-normal sampling leaves.
   F g2_over_g1(const Vec3<F>& wo, const Vec3<F>& wi) const {

@@ -14,18 +14,33 @@ struct MicrofacetEval {
   F pdf;    ///< D G1 / (4 z_o): density of the visible-normal sampler
 };
 
-/// Torrance and Sparrow's lobe D G2 / (4 z_o z_i) (Walter et al. 2007, eq. 20); zeros where wi or
-/// wo is not above the surface. Half-vector Jacobian: dh / dwi = 1 / (4 wo . h) (eq. 14).
+/// What masking says of wo alone.
 template <typename F>
-inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const Vec3<F>& wo, const Vec3<F>& wi) {
+struct MaskedView {
+  F s;      ///< Ggx::s(wo)
+  F share;  ///< G1 / (4 z_o) = 1 / (2 (z_o + s))
+
+  MaskedView() = default;
+  MaskedView(const Ggx<F>& ggx, const Vec3<F>& wo) : s(ggx.s(wo)), share(0.5f / F(wo.z + s)) {}
+};
+
+/// Torrance and Sparrow's lobe D G2 / (4 z_o z_i) (Walter et al. 2007, eq. 20); zeros where wi or
+/// wo is not above the surface. Half-vector Jacobian: dh / dwi = 1 / (4 wo . h) (eq. 14). With
+/// unit directions wo . h = |wo + wi| / 2.
+template <typename F>
+inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const MaskedView<F>& seen,
+                                         const Vec3<F>& wo, const Vec3<F>& wi) {
   const Mask<F> valid = (wo.z > 0.f) & (wi.z > 0.f);
   const Vec3<F> sum = wo + wi;
-  const Vec3<F> h = select<F>(valid, sum * F(1.f / length(sum)), Vec3<F>(F(0.f), F(0.f), F(1.f)));
-  const F d = ggx.d(h);
-  const F f_cos = d * wi.z * ggx.g2_over_4cos(wo, wi);
-  const F pdf = 0.5f * d / F(wo.z + ggx.s(wo));
-  return {clamp(dot(wo, h), F(0.f), F(1.f)), select(valid, f_cos, F(0.f)),
-          select(valid, pdf, F(0.f))};
+  const F length2 = length_squared(sum);
+  const F d = ggx.d_along(sum, length2);
+  const F f_cos = F(0.5f * d * wi.z) / fma(wo.z, ggx.s(wi), F(wi.z * seen.s));
+  return {min(F(0.5f * sqrt(length2)), F(1.f)), select(valid, f_cos, F(0.f)),
+          select(valid, F(d * seen.share), F(0.f))};
+}
+template <typename F>
+inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const Vec3<F>& wo, const Vec3<F>& wi) {
+  return eval_microfacet(ggx, MaskedView<F>(ggx, wo), wo, wi);
 }
 
 /// A direction reflected by a visible normal; it may lie below the surface, which is no valid

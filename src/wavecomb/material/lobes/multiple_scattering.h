@@ -44,12 +44,8 @@ struct LostEnergy {
 
   /// F_ms for a mean reflectance: the geometric series of further bounces, each of which leaves the
   /// surface with probability 1 - L_avg.
-  Color<F> tint(const Color<F>& mean_reflectance) const {
-    const auto series = [this](const F& f) {
-      return F(F(f * f) * F(1.f - average)) / F(1.f - F(f * average));
-    };
-    return {series(mean_reflectance.x), series(mean_reflectance.y), series(mean_reflectance.z)};
-  }
+  F tint(const F& f) const { return F(F(f * f) * F(1.f - average)) / F(1.f - F(f * average)); }
+  Color<F> tint(const Color<F>& f) const { return {tint(f.x), tint(f.y), tint(f.z)}; }
 };
 
 }  // namespace wavecomb

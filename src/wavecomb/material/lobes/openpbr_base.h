@@ -119,6 +119,7 @@ struct OpenPbrBase {
     Mask<F> brushed;   ///< alpha_x is not alpha_y
     Mask<F> by_facet;  ///< glass that is scaled facet by facet
     F eta;             ///< relative index across the surface
+    F s, g1;           ///< masking towards the viewer: AnisotropicGgx::s; G1 / (4 z_o)
     F glass_scale;     ///< compensations
     F gloss_scale;
     Color<F> metal_scale;
@@ -132,6 +133,8 @@ struct OpenPbrBase {
     const F z = o.z;
     v.inside = v.brushed = v.by_facet = Mask<F>(false);
     v.eta = ior;
+    v.s = ggx.s(o);
+    v.g1 = 0.5f / max(F(abs(z) + v.s), F(1e-20f));
     if constexpr (kGlass) {
       v.inside = below & (glass > 0.f) & not_(thin);
       v.eta = select(v.inside, F(1.f / ior), ior);
@@ -245,8 +248,7 @@ struct OpenPbrBase {
     const F c = ih + F(oh / v.eta);
     const F jacobian = select(bends, F(F(-4.f * ih * oh) / max(F(c * c), F(1e-20f))), F(1.f));
     const F base = select(valid, F(d * jacobian), F(0.f));
-    const F g2 = ggx.g2_over_4cos(wo, i) * abs(wi.z);
-    const F g1 = 0.5f / max(F(abs(wo.z) + ggx.s(wo)), F(1e-20f));
+    const F g2 = ggx.g2_over_4cos(wo, v.s, i) * abs(wi.z);
     const F oc = clamp(oh, F(0.f), F(1.f));
     FacetWays<F> ways;
     if (kGlass && any(v.by_facet)) {
@@ -260,7 +262,7 @@ struct OpenPbrBase {
     const OpenPbrFacet<F> f = facet(v, oc, ways);
     const F share = f.reflect_share();
     const Color<F> color = select<F>(up, f.reflect, f.transmit * radiance_scale(v));
-    return {color * F(base * g2), F(base * g1) * select(up, share, F(1.f - share))};
+    return {color * F(base * g2), F(base * v.g1) * select(up, share, F(1.f - share))};
   }
 
   /// The same where nothing is transmitted.
@@ -274,10 +276,9 @@ struct OpenPbrBase {
     const Mask<F> valid = nonzero & not_(smooth) & (oh > 0.f) & (h.z > 0.f) & (ih > 0.f);
     const F d = ggx.d(select<F>(valid, h, Vec3<F>(F(0.f), F(0.f), F(1.f))));
     const F base = select(valid, d, F(0.f));
-    const F g2 = ggx.g2_over_4cos(wo, wi) * abs(wi.z);
-    const F g1 = 0.5f / max(F(abs(wo.z) + ggx.s(wo)), F(1e-20f));
+    const F g2 = ggx.g2_over_4cos(wo, v.s, wi) * abs(wi.z);
     const OpenPbrFacet<F> f = facet(v, clamp(oh, F(0.f), F(1.f)));
-    return {f.reflect * F(base * g2), F(base * g1)};
+    return {f.reflect * F(base * g2), F(base * v.g1)};
   }
 
   struct Sample {

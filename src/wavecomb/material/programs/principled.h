@@ -2,6 +2,9 @@
 /// Program "principled": UsdPreviewSurface.
 #pragma once
 
+#include <memory>
+#include <type_traits>
+
 #include "wavecomb/material/bsdf.h"
 #include "wavecomb/material/lobes/coat.h"
 #include "wavecomb/material/lobes/lambert.h"
@@ -33,6 +36,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;
   static constexpr bool kMetal = (kParts & kMetals) != 0, kCoat = (kParts & kCoats) != 0,
                         kStraight = (kParts & kPasses) != 0;
+  /// What is reflected: without metal it has no colour.
+  using Tint = std::conditional_t<kMetal, Color<F>, F>;
 
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
@@ -49,7 +54,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
 
   PrincipledBsdf(const ShadingParams<F>& params, bool schlick) : roughness_(params.roughness) {
     const F ior = coat_ior(params.ior);
-    f0_ = Color<F>(f0_from_ior(ior));
+    f0_ = Tint(f0_from_ior(ior));
     diffuse_ = params.base_color;
     F exact(schlick ? 0.f : 1.f);
     F metallic(0.f);
@@ -70,8 +75,13 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     smooth_ = alpha < kDeltaAlpha;
     ggx_.alpha = max(alpha, F(kDeltaAlpha));
     lost_ = LostEnergy<F>(ggx_.alpha);
-    multiple_ = select<F>(smooth_, Color<F>(F(0.f)), lost_.tint(interface_.average(f0_)));
-    rough_ = RoughInterface<F>(interface_, roughness_, ggx_.alpha, lost_, smooth_);
+    multiple_ = lost_.tint(interface_.average(f0_));
+    if constexpr (kMetal)
+      multiple_ = select<F>(smooth_, Color<F>(F(0.f)), multiple_);
+    else
+      multiple_ = select(smooth_, F(0.f), multiple_);
+    // In its place: it is large.
+    std::construct_at(&rough_, interface_, roughness_, ggx_.alpha, lost_, smooth_);
     average_ = rough_.average(f0_, multiple_);
     if constexpr (!kCoat) return;
     clearcoat_ = params.clearcoat;
@@ -87,7 +97,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     }
   }
 
-  Color<F> albedo() const { return min(Color<F>(diffuse_ + f0_), Color<F>(F(1.f))); }
+  Color<F> albedo() const { return min(Color<F>(diffuse_ + Color<F>(f0_)), Color<F>(F(1.f))); }
   Mask<F> has_non_delta() const {
     Mask<F> any_lobe = not_(is_black(diffuse_)) | not_(smooth_);
     if constexpr (kCoat) any_lobe = any_lobe | (not_(coat_smooth_) & (clearcoat_ > 0.f));
@@ -100,7 +110,11 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     F side;
     Vec3<F> o;
     F coat, lost;
-    Color<F> specular, straight;
+    F lost_share;      ///< of multiple scattering: lost over its mean
+    Tint specular;     ///< albedo
+    Color<F> diffuse;  ///< the diffuse base as it is seen, without what the light has to pass
+    Color<F> straight;
+    MaskedView<F> masked;
     F p_diffuse, p_specular, p_coat, p_straight;
   };
 
@@ -112,17 +126,20 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     const F z = max(v.o.z, F(0.f));
     if (has_coat()) v.coat = coat_albedo(z);
     v.lost = lost_(z);
+    v.lost_share = v.lost / lost_.average;
     v.specular = specular_albedo(z);
+    v.diffuse = diffuse_ * seen_below_coat(v.specular, average_);
+    v.masked = MaskedView<F>(ggx_, v.o);
     const F below = 1.f - v.coat;
-    const Color<F> passed = Color<F>(F(1.f)) - v.specular;
+    const Color<F> passed = Color<F>(F(1.f)) - Color<F>(v.specular);
     v.straight = Color<F>(F(0.f));
     if constexpr (kStraight) v.straight = passed * F(below * transparency_);
     // Estimated contributions; a lobe that can contribute gets at least 2 % before normalisation.
     const F floor(0.02f);
-    const F multiple = F(below * v.lost) * luminance(multiple_);
+    const F multiple = F(below * v.lost) * luminance(Color<F>(multiple_));
     const F diffuse = select(is_black(diffuse_), multiple,
                              max(fma(below, luminance(diffuse_ * passed), multiple), floor));
-    const F specular = max(F(below * luminance(v.specular)), floor);
+    const F specular = max(F(below * luminance(Color<F>(v.specular))), floor);
     F coat(0.f), straight(0.f);
     if constexpr (kCoat) coat = select(clearcoat_ > 0.f, max(v.coat, floor), F(0.f));
     if constexpr (kStraight)
@@ -151,11 +168,9 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     const Vec3<F>& o = v.o;
     const Vec3<F> i = mirror_z(wi, v.side);
     const F cosine = select(o.z > 0.f, lambert_cos(i), F(0.f));
-    const Color<F> through =
-        seen_through_coat(specular_albedo(o.z), specular_albedo(max(i.z, F(0.f))), average_);
     F passed(1.f);
     if (has_coat()) passed = select(clearcoat_ > 0.f, below_coat(o, i), F(1.f));
-    return diffuse_ * through * F(cosine * passed);
+    return v.diffuse * passing(max(i.z, F(0.f))) * F(cosine * passed);
   }
 
   BsdfSample<F> sample(const View& view, const F& u_lobe, const F& u, const F& v) const {
@@ -195,7 +210,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     s.weight = select<F>(valid, e.f_cos * F(1.f / select(valid, e.pdf, F(1.f))), zero);
     s.pdf = select(valid, e.pdf, F(0.f));
     F p_delta = view.p_specular;
-    Color<F> f_delta = view.specular;
+    Color<F> f_delta(view.specular);
     if constexpr (kCoat) {
       p_delta = select(coat, view.p_coat, p_delta);
       f_delta = select<F>(coat, Color<F>(view.coat), f_delta * F(1.f - view.coat));
@@ -230,20 +245,21 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     const F lost = select(coat_smooth_, F(0.f), coat_lost_(z));
     return clearcoat_ * rough_coat_.albedo(coat_.f0_exact, F(0.f), z, lost);
   }
-  Color<F> specular_albedo(const F& z) const {
+  Tint specular_albedo(const F& z) const {
     return rough_.albedo(f0_, multiple_, z, select(smooth_, F(0.f), lost_(z)));
   }
+  /// What the specular interface lets pass of light of cosine z.
+  Tint passing(const F& z) const { return Tint(F(1.f)) - specular_albedo(z); }
 
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const View& view) const {
     const F cosine = select(wo.z > 0.f, lambert_cos(wi), F(0.f));
     const F zi = max(wi.z, F(0.f));
-    const Color<F> through = seen_through_coat(view.specular, specular_albedo(zi), average_);
-    const F again = F(view.lost * lost_(zi)) / lost_.average;
-    Color<F> f = fma(multiple_, again, diffuse_ * through) * cosine;
+    const F again = view.lost_share * lost_(zi);
+    Color<F> f = fma(Color<F>(multiple_), again, view.diffuse * passing(zi)) * cosine;
     F pdf = view.p_diffuse * cosine;
     if (!all(smooth_)) {
-      const MicrofacetEval<F> m = eval_microfacet(ggx_, wo, wi);
-      f += interface_(f0_, m.cos_h) * select(smooth_, F(0.f), m.f_cos);
+      const MicrofacetEval<F> m = eval_microfacet(ggx_, view.masked, wo, wi);
+      f += Color<F>(interface_(f0_, m.cos_h) * select(smooth_, F(0.f), m.f_cos));
       pdf = fma(view.p_specular, select(smooth_, F(0.f), m.pdf), pdf);
     }
     if (has_coat()) {
@@ -262,7 +278,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
 
   F roughness_, coat_roughness_, clearcoat_, transparency_;
   CoatFresnel<F> coat_, interface_;
-  Color<F> f0_, diffuse_, average_, multiple_;
+  Tint f0_, average_, multiple_;
+  Color<F> diffuse_;
   LostEnergy<F> lost_, coat_lost_;
   RoughInterface<F> rough_, rough_coat_;
   Ggx<F> ggx_, coat_ggx_;
