@@ -167,15 +167,17 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->warnings = std::move(warnings_);
   std::shared_ptr<const SceneMaterials> materials;
   std::shared_ptr<const SceneLights> lights;
+  std::shared_ptr<const SceneTangents> tangents;
   with_threads(threads_, [&] {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
         std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})));
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
+    tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);
   });
-  std::shared_ptr<Scene> scene(
-      new Scene(std::move(geometry), std::move(materials), std::move(lights), nullptr, camera_));
+  std::shared_ptr<Scene> scene(new Scene(std::move(geometry), std::move(materials),
+                                         std::move(lights), std::move(tangents), nullptr, camera_));
   scene->link();
   *this = SceneBuilder(threads_, store_);
   return scene;
