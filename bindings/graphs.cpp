@@ -71,6 +71,7 @@ void run(const GraphSet& set, const TextureView* textures, const Points& points,
                            vec3(9),
                            vec3(12),
                            vec3(15),
+                           F(1.f),
                            vec3(18),
                            {}};
     run_graph<F>(view, program, textures, at, first_lanes<F>(count - i), registers);

@@ -9,6 +9,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/hash.h"
 #include "wavecomb/texture/lookup.h"
+#include "wavecomb/texture/pyramid.h"
 
 namespace wavecomb {
 namespace {
@@ -182,6 +183,29 @@ Image shrink(Image& image) {
       out.linear.push_back(sum);
     }
   return out;
+}
+
+TEST(Texture, EveryTexelHasAPlaceInItsTile) {
+  for (const auto& [width, height] : {std::pair{192u, 128u}, {64u, 7u}, {1u, 1u}, {203u, 90u}}) {
+    TextureDesc desc;
+    desc.width = width;
+    desc.height = height;
+    TextureView view;
+    const uint64_t bytes = lay_out(desc, view);
+    std::vector<uint8_t> taken(bytes / view.channels);
+    for (uint32_t n = 0; n < view.level_count; ++n) {
+      const TextureLevel& level = view.levels[n];
+      for (uint32_t y = 0; y < level.height; ++y)
+        for (uint32_t x = 0; x < level.width; ++x) {
+          const size_t at = texel_index(level, x, y);
+          ASSERT_LT(at, taken.size());
+          ASSERT_EQ(taken[at]++, 0) << x << ", " << y;
+          const detail::LevelLanes<float> lanes = detail::broadcast_level<float>(level);
+          ASSERT_EQ(detail::texel_place<float>(lanes, x, y), at);
+          ASSERT_EQ(at / 64, texel_index(level, x / 8 * 8, y / 8 * 8) / 64);  // one tile
+        }
+    }
+  }
 }
 
 TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {

@@ -201,12 +201,12 @@ class Integrator {
       if (!reads_texture) return make_frame<F>(s.ns);
       Vec3<F> n = s.ns;
       if ((record.textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != 0) {
-        n = normalize(make_frame<F>(n, s.dpdu).to_world(params.normal));
+        n = normalize(make_frame<F>(n, s.dpdu, s.handedness).to_world(params.normal));
         // A normal that looks away is bent until it is seen edge-on.
         const F towards = dot(ray.d, s.ng) < 0 ? 1.f : -1.f, seen = -dot(ray.d, n) * towards;
         if (seen < 1e-3f) n = normalize(n + ray.d * (-towards * (1e-3f - seen)));
       }
-      return make_frame<F>(n, s.dpdu);
+      return make_frame<F>(n, s.dpdu, s.handedness);
     }
   };
 

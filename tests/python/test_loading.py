@@ -254,6 +254,36 @@ def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
     assert got["shares"]["2"] < 0.75
 
 
+MANY = """
+import numpy as np
+from wavecomb import _core
+
+def memory(key):
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(key))
+
+count = 400_000
+builder = _core.SceneBuilder(1)
+group = builder.add_group("group")
+triangle = np.eye(3, dtype=np.float32)
+builder.add_to_group(group, builder.add_mesh(triangle, np.array([[0, 1, 2]], np.uint32)))
+places = np.tile(np.eye(4, dtype=np.float32), (count // 8, 1, 1))
+before = memory("VmRSS")
+for _ in range(8):
+    builder.add_instances(0, group, places)
+scene = builder.build()
+print((memory("VmHWM") - before) / count)
+"""
+
+
+@LINUX
+def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
+    """Some 150 bytes each stay, and what was added is gone before records are made."""
+    pytest.importorskip("wavecomb._core")
+    run = subprocess.run([sys.executable, "-c", MANY], capture_output=True, text=True, check=True)
+    assert 100 < float(run.stdout) < 260, run.stdout
+
+
 @pytest.mark.slow
 def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
     """OpenImageIO without an image to read, and Rich without a terminal, before the picture."""

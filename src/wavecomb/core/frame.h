@@ -6,7 +6,8 @@
 
 namespace wavecomb {
 
-/// Right-handed orthonormal basis (s, t, n). Local directions have z along n.
+/// Orthonormal basis (s, t, n), right-handed unless it was made otherwise. Local directions have z
+/// along n.
 template <typename F>
 struct Frame {
   Vec3<F> s, t, n;
@@ -31,18 +32,19 @@ WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
           n};
 }
 
-/// A frame around the unit vector `n` whose s is `tangent` made orthogonal to n; falls back to
-/// make_frame where the tangent is parallel to n (within 1e-3), zero or not finite. The bound is
-/// far above rounding, which would else decide on s.
+/// A frame around the unit vector `n` whose s is `tangent` made orthogonal to n and whose t is
+/// n x s times `handedness`, 1 or -1; falls back to make_frame where the tangent is parallel to n
+/// (within 1e-3), zero or not finite. The bound is far above rounding, which would else decide on
+/// s.
 template <typename F>
-inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent) {
+inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& handedness = F(1.f)) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);
   const F len2 = length_squared(s);
   const Mask<F> good = (len2 > 1e-6f * length_squared(tangent)) & (len2 > 0.f) & is_finite(len2);
   const Frame<F> other = make_frame(n);
   const Vec3<F> unit = s * F(1.f / sqrt(select(good, len2, F(1.f))));
   const Vec3<F> sx = select<F>(good, unit, other.s);
-  return {sx, select<F>(good, cross(n, sx), other.t), n};
+  return {sx, select<F>(good, cross(n, sx) * handedness, other.t), n};
 }
 
 /// Trigonometry of a local direction w with respect to n = (0, 0, 1).

@@ -72,6 +72,7 @@ inline void merge(Surface<F>& to, const Surface<F>& from, const Mask<F>& m) {
         select<F>(m, from.ng, to.ng),
         select<F>(m, from.ns, to.ns),
         select<F>(m, from.dpdu, to.dpdu),
+        select(m, from.handedness, to.handedness),
         {select(m, from.uv.x, to.uv.x), select(m, from.uv.y, to.uv.y)},
         select(m, from.uv_per_length, to.uv_per_length),
         select(m, from.offset, to.offset),
@@ -176,6 +177,7 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
   r.offset = max(r.offset, F(moved_size * 0x1.4p-20f));
   r.terminator = Vec3<F>(F(0.f));
   r.dpdu = Vec3<F>(F(0.f));
+  r.handedness = maps.side;
   r.uv_per_length = F(0.f);
   r.uv = {clamp(hit.u, F(0.f), F(1.f)), hit.v};
   if (with_uv) set_uv(mesh, maps, hit, c, active, strands, r);

@@ -150,6 +150,12 @@ std::vector<float> flat(const std::vector<V>& values) {
   return {first, first + values.size() * (sizeof(V) / sizeof(float))};
 }
 
+/// Floats as the values that they are.
+template <typename V>
+V* values_in(float* floats) {
+  return reinterpret_cast<V*>(floats);
+}
+
 }  // namespace
 
 Subdivision::Subdivision(const Cage& cage, uint32_t level) {
@@ -297,22 +303,17 @@ std::vector<float> Subdivision::vertex(std::span<const float> values, uint32_t w
     const std::vector<V> here = refiner_->refine<V>(
         values, [&](int l) { return refiner_->vertices_of(l); },
         [&](int l, const V* from, V* to) { refine.Interpolate(l, from, to); });
-    std::vector<V> limit(here.size());
+    std::vector<float> limit(here.size() * width);
     const V* from = here.data();
-    V* to = limit.data();
+    V* to = values_in<V>(limit.data());
     if (tangents == nullptr) {
       refine.Limit(from, to);
-      return flat(limit);
+      return limit;
     }
-    std::vector<V> first(here.size()), second(here.size());
-    V *u = first.data(), *v = second.data();
+    tangents->resize(2 * limit.size());
+    V *u = values_in<V>(tangents->data()), *v = values_in<V>(tangents->data() + limit.size());
     refine.Limit(from, to, u, v);
-    tangents->resize(here.size() * 2 * width);
-    for (size_t i = 0; i < here.size(); ++i) {
-      std::copy_n(first[i].v, width, tangents->data() + 2 * width * i);
-      std::copy_n(second[i].v, width, tangents->data() + (2 * i + 1) * width);
-    }
-    return flat(limit);
+    return limit;
   });
 }
 
@@ -336,11 +337,11 @@ std::vector<float> Subdivision::face_varying(uint32_t channel, std::span<const f
         values,
         [&](int l) { return static_cast<size_t>(refiner_->far->GetLevel(l).GetNumFVarValues(c)); },
         [&](int l, const V* from, V* to) { refine.InterpolateFaceVarying(l, from, to, c); });
-    std::vector<V> limit(here.size());
+    std::vector<float> limit(here.size() * width);
     const V* from = here.data();
-    V* to = limit.data();
+    V* to = values_in<V>(limit.data());
     refine.LimitFaceVarying(from, to, c);
-    return flat(limit);
+    return limit;
   });
 }
 

@@ -49,7 +49,7 @@ class Subdivision {
   std::vector<uint32_t> normal_sectors(const RefinedFaces& faces, uint32_t& count) const;
 
   /// Values (vertex_count, width), of the cage's points, at the limit. `tangents`, if given, gets
-  /// two derivatives of each value, (vertex_count, 2, width); width 3 only.
+  /// two derivatives of the values, (2, vertex_count, width); width 3 only.
   /// Widths are 1 to 4.
   std::vector<float> vertex(std::span<const float> values, uint32_t width,
                             std::vector<float>* tangents = nullptr) const;

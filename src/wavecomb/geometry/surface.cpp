@@ -73,8 +73,7 @@ void set_normals(Work& work, size_t normal_count, const std::vector<float>& tang
     const Point sum{sums[3 * i], sums[3 * i + 1], sums[3 * i + 2]};
     Point normal = unit(sum);
     if (!tangents.empty() && i < work.faces.vertex_count && !split[i]) {
-      const float* t = &tangents[6 * i];
-      const Point u{t[0], t[1], t[2]}, v{t[3], t[4], t[5]};
+      const Point u = point_at(tangents, i), v = point_at(tangents, work.faces.vertex_count + i);
       const Point exact = cross_of(u, v);
       // Tangents that nearly line up tell nothing.
       if (dot_of(exact, exact) > 1e-8 * dot_of(u, u) * dot_of(v, v)) normal = unit(exact);
@@ -316,6 +315,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
   SurfaceMesh mesh;
   Work work;
   std::vector<Spread> primvars;
+  std::vector<float> tangents;
   size_t normal_count = desc.cage.vertex_count;
   if (desc.level == 0) {
     work = polygons(desc);
@@ -329,17 +329,18 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     uint32_t count = 0;
     work.sectors = surface.normal_sectors(work.faces, count);
     normal_count = count;
-    std::vector<float> tangents;
     work.positions = surface.vertex(desc.points, 3, &tangents);
     // The limit of a bilinear surface has no tangents of its own at points.
     if (desc.cage.scheme == Scheme::kBilinear) tangents.clear();
-    set_normals(work, normal_count, tangents);
     Spread uvs = spread(desc.uvs, surface, work.faces);
     work.uvs = std::move(uvs.values);
     work.uv_at = std::move(uvs.at);
     for (const SurfacePrimvar& primvar : desc.primvars)
       primvars.push_back(spread(primvar, surface, work.faces));
   }
+  // OpenSubdiv's tables are gone by now.
+  if (desc.level > 0) set_normals(work, normal_count, tangents);
+  tangents = {};
   if (!desc.displacements.empty()) {
     displace(work, desc);
     set_normals(work, normal_count, {});

@@ -80,6 +80,14 @@ bool GraphSet::drives(uint32_t graph, uint32_t parameter) const {
                      [&](const GraphOutput& o) { return o.parameter == parameter; });
 }
 
+bool GraphSet::reads(uint32_t graph, uint32_t bits) const {
+  if (graph == kNoGraph) return false;
+  const auto first = ops.begin() + programs[graph].first_op;
+  return std::any_of(first, first + programs[graph].op_count, [&](const GraphOp& op) {
+    return static_cast<GraphCode>(op.code) == GraphCode::kInput && (bits >> op.number & 1u) != 0;
+  });
+}
+
 void GraphSet::add(const Graph& graph) {
   programs.push_back({static_cast<uint32_t>(ops.size()), static_cast<uint32_t>(graph.ops.size()),
                       static_cast<uint32_t>(constants.size()), static_cast<uint32_t>(images.size()),

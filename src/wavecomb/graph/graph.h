@@ -67,9 +67,9 @@ enum class GraphInput : uint8_t {
   kLocalPosition,  ///< in the space of the group of meshes that is instanced
   kNormal,         ///< unit shading normal in the world
   kLocalNormal,
-  kTangent,  ///< unit, along u in the world
-  kBitangent,
-  kView,  ///< unit, to the viewer in the world
+  kTangent,    ///< unit, along u in the world
+  kBitangent,  ///< unit, along v as far as that is across the tangent
+  kView,       ///< unit, to the viewer in the world
 };
 inline constexpr uint32_t kGraphInputCount = 8;
 inline constexpr uint32_t graph_input_bit(GraphInput i) {
@@ -148,6 +148,8 @@ struct GraphSet {
   void add(const Graph& graph);
   /// Whether program `graph` (kNoGraph: none) drives component `parameter`.
   bool drives(uint32_t graph, uint32_t parameter) const;
+  /// Whether program `graph` (kNoGraph: none) reads an input of `bits` (graph_input_bit).
+  bool reads(uint32_t graph, uint32_t bits) const;
   GraphView view() const {
     if (programs.empty()) return {};
     return {programs.data(), ops.data(), constants.data(), images.data(), outputs.data(),

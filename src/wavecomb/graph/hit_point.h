@@ -29,8 +29,10 @@ template <typename F>
     return select<F>(good, v * F(1.f / sqrt(select(good, len2, F(1.f)))), otherwise);
   };
   if ((wanted &
-       (graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent))) != 0)
+       (graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent))) != 0) {
     at.tangent = unit(s.dpdu - s.ns * dot(s.ns, s.dpdu), make_frame<F>(s.ns).s);
+    at.handedness = s.handedness;
+  }
   if ((wanted & (graph_input_bit(GraphInput::kLocalPosition) |
                  graph_input_bit(GraphInput::kLocalNormal))) == 0)
     return at;

@@ -18,6 +18,7 @@ struct GraphPoint {
   Vec3<F> position = Vec3<F>(F(0.f)), local_position = Vec3<F>(F(0.f));
   Vec3<F> normal{F(0.f), F(0.f), F(1.f)}, local_normal{F(0.f), F(0.f), F(1.f)};
   Vec3<F> tangent{F(1.f), F(0.f), F(0.f)};
+  F handedness{1.f};  ///< as in Surface
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
   MeshPlace<F> place;  ///< where attributes are read
 };
@@ -40,7 +41,7 @@ inline Vec3<F> input_value(const GraphPoint<F>& at, GraphInput input) {
     case GraphInput::kTangent:
       return at.tangent;
     case GraphInput::kBitangent:
-      return cross(at.normal, at.tangent);
+      return cross(at.normal, at.tangent) * at.handedness;
     case GraphInput::kView:
       return at.view;
   }

@@ -53,16 +53,19 @@ bool same_emission(const Material& a, const Material& b, bool any_mesh_lights) {
 
 Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
              std::shared_ptr<const SceneMaterials> materials,
-             std::shared_ptr<const SceneLights> lights, std::shared_ptr<const SceneLinks> links,
+             std::shared_ptr<const SceneLights> lights,
+             std::shared_ptr<const SceneTangents> tangents, std::shared_ptr<const SceneLinks> links,
              const Camera& camera)
     : geometry_(std::move(geometry)),
       materials_(std::move(materials)),
       lights_(std::move(lights)),
+      tangents_(std::move(tangents)),
       links_(std::move(links)),
       camera_(camera) {
   SceneView& v = view_;
   v.meshes = geometry_->mesh_records.data();
   v.instances = geometry_->instance_records.data();
+  v.tangents = tangents_->records.empty() ? nullptr : tangents_->records.data();
   v.geometry_mesh = geometry_->geometry_mesh.data();
   v.emissive_lights = lights_->emissive.data();
   v.mesh_lights = lights_->mesh_lights.empty() ? nullptr : lights_->mesh_lights.data();
@@ -120,6 +123,12 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
     }
     new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs);
   }
+  std::shared_ptr<const SceneTangents> new_tangents = tangents_;
+  if (new_materials->wants_tangents != materials_->wants_tangents)
+    with_threads(threads, [&] {
+      new_tangents =
+          std::make_shared<const SceneTangents>(*geometry_, *new_materials, tangents_.get());
+    });
   std::shared_ptr<const SceneLights> new_lights = lights_;
   if (shines_otherwise) {
     std::vector<Light> all = lights();
@@ -130,8 +139,8 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
     });
   }
   return std::shared_ptr<const Scene>(new Scene(geometry_, std::move(new_materials),
-                                                std::move(new_lights), links_,
-                                                edit.camera.value_or(camera_)));
+                                                std::move(new_lights), std::move(new_tangents),
+                                                links_, edit.camera.value_or(camera_)));
 }
 
 uint64_t Scene::unique_triangles() const {
@@ -167,6 +176,7 @@ SceneBytes Scene::bytes() const {
                 m.uvs.size_bytes() + m.face_materials.size_bytes() + m.radii.size_bytes();
   for (const Mesh& m : meshes())
     for (const MeshAttribute& a : m.attributes) b.meshes += a.values.size_bytes();
+  b.meshes += tangents_->bytes();
   for (const auto& texture : textures())
     if (!texture->store()) b.textures += texture->bytes();
   if (const TileStore* store = texture_store()) b.textures += store->statistics().resident_bytes;

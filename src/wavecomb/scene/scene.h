@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "wavecomb/scene/camera.h"
+#include "wavecomb/scene/mesh_tangents.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
@@ -19,6 +20,7 @@ namespace wavecomb {
 struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
+  const TangentRecord* tangents = nullptr;  ///< by mesh; null where no mesh has any
   const uint32_t* geometry_mesh = nullptr;  ///< mesh of (instance.geometry + geometry id)
   /// First triangle light of (instance.emissive + geometry id).
   const uint32_t* emissive_lights = nullptr;
@@ -38,8 +40,9 @@ struct SceneView {
 
 /// Memory of a scene's arrays, bytes.
 struct SceneBytes {
-  uint64_t meshes =
-      0;  ///< points, indices, radii, normals, texture coordinates, attributes, materials of faces
+  /// Points, indices, radii, normals, tangents, texture coordinates, attributes, materials of
+  /// faces.
+  uint64_t meshes = 0;
   uint64_t textures = 0;  ///< all mip levels, or what of them a store has in memory
   uint64_t records = 0;   ///< instances, materials, lights
 };
@@ -97,9 +100,9 @@ class Scene {
   /// A scene with other values, which shares with this one what did not change; equal to one built
   /// anew with them. `threads`: 0: all.
   ///
-  /// Costs microseconds for a camera, copies of the materials for a material, and the light set
-  /// where lights or emission change. Throws Error naming the object for bad values, as
-  /// SceneBuilder does, and for ids that are not there.
+  /// Costs microseconds for a camera, copies of the materials for a material, the light set where
+  /// lights or emission change, and tangents of meshes whose material asks for them anew. Throws
+  /// Error naming the object for bad values, as SceneBuilder does, and for ids that are not there.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
   /// The parts, to be compared with those of scenes that were made from one another.
@@ -111,13 +114,15 @@ class Scene {
   friend class SceneBuilder;
   Scene(std::shared_ptr<const SceneGeometry> geometry,
         std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
-        std::shared_ptr<const SceneLinks> links, const Camera& camera);
+        std::shared_ptr<const SceneTangents> tangents, std::shared_ptr<const SceneLinks> links,
+        const Camera& camera);
   /// Works out which objects are in which sets.
   void link();
 
   std::shared_ptr<const SceneGeometry> geometry_;
   std::shared_ptr<const SceneMaterials> materials_;
   std::shared_ptr<const SceneLights> lights_;
+  std::shared_ptr<const SceneTangents> tangents_;
   std::shared_ptr<const SceneLinks> links_;  ///< null where there are no sets
   Camera camera_;
   SceneView view_;

@@ -112,16 +112,14 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     const float det = m.determinant();
     return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
   };
-  size_t singular = 0;
-  for (Instance& i : flat) {
+  geometry->placements.shrink_to_fit();
+  const size_t singular = std::erase_if(flat, [&](const Instance& i) {
     bool good = i.motion.moves() || sound(i.to_world);
     for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
       good = good && sound(geometry->steps[i.motion.first + k].affine());
-    if (good)
-      geometry->instances.push_back(std::move(i));
-    else
-      ++singular;
-  }
+    return !good;
+  });
+  geometry->instances = std::move(flat);
   if (singular > 0)
     warnings_.push_back(std::to_string(singular) +
                         " instances have a singular transform and were left out");
@@ -155,6 +153,9 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     if (i.material > grey) throw Error("an instance uses a material that was never added");
   }
 
+  // What has been placed is not asked for again.
+  children_ = {};
+  node_steps_ = {};
   geometry->meshes = std::move(meshes_);
   geometry->groups = std::move(groups_);
   geometry->textures = std::move(textures_);
@@ -167,15 +168,17 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->warnings = std::move(warnings_);
   std::shared_ptr<const SceneMaterials> materials;
   std::shared_ptr<const SceneLights> lights;
+  std::shared_ptr<const SceneTangents> tangents;
   with_threads(threads_, [&] {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
         std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})));
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
+    tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);
   });
-  std::shared_ptr<Scene> scene(
-      new Scene(std::move(geometry), std::move(materials), std::move(lights), nullptr, camera_));
+  std::shared_ptr<Scene> scene(new Scene(std::move(geometry), std::move(materials),
+                                         std::move(lights), std::move(tangents), nullptr, camera_));
   scene->link();
   *this = SceneBuilder(threads_, store_);
   return scene;

@@ -50,6 +50,15 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   return r;
 }
 
+bool wants_tangents(const Material& m, const GraphSet& graphs) {
+  constexpr uint32_t kTangents =
+      graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent);
+  return m.has_texture(Input::kNormal) || graphs.drives(m.graph, kNormalOutput) ||
+         graphs.reads(m.graph, kTangents) ||
+         (m.program == ProgramId::kOpenPbr &&
+          (m.openpbr.anisotropy != 0 || graphs.drives(m.graph, graph_parameter("anisotropy"))));
+}
+
 ProgramParameterRecord make_own_record(const Material& m) {
   ProgramParameterRecord r{};
   for (size_t i = 0; i < kMaxProgramParameters; ++i) r.value[i] = m.own_value(i);
@@ -110,6 +119,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
     variants.push_back(least_variant(m.program, parts_of(m, *graphs)));
+    wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();
   }

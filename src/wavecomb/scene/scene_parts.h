@@ -121,8 +121,10 @@ struct SceneMaterials {
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
-  std::vector<uint32_t> programs;      ///< by material
-  std::vector<uint32_t> variants;      ///< by material: of its program, the least one
+  std::vector<uint32_t> programs;  ///< by material
+  std::vector<uint32_t> variants;  ///< by material: of its program, the least one
+  /// By material: whether tangents that vary smoothly show on it (mesh_tangents.h).
+  std::vector<uint8_t> wants_tangents;
   std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
   /// By material; empty where no program has parameters to itself.
   std::vector<ProgramParameterRecord> own;

@@ -5,6 +5,7 @@
 #include "wavecomb/curve/surface.h"
 #include "wavecomb/surface/facing.h"
 #include "wavecomb/surface/surface_reader.h"
+#include "wavecomb/surface/tangent.h"
 #include "wavecomb/surface/uv.h"
 
 namespace wavecomb {
@@ -108,6 +109,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   }
   s.uv = {b1, b2};
   s.dpdu = Vec3<F>(F(0.f));
+  s.handedness = maps.side;
   s.uv_per_length = F(0.f);
   if (with_uv) {
     const UvTriangle<F> t = uv_triangle<F>(mesh, {i0, i1, i2}, hit.prim, active);
@@ -115,9 +117,14 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     s.uv = t.at(b1, b2);
     const F det = fma(d1.x, d2.y, F(-(d1.y * d2.x)));
     s.uv_per_length = sqrt(F(abs(det) / safe_area2));
+    const Mask<F> mirrored = det < 0.f;
+    s.handedness = select(mirrored, F(-maps.side), maps.side);
     // dp/du = (d2.v e1 - d1.v e2) / det; only its direction is used.
-    const Vec3<F> tangent = maps.vector(e1 * d2.y - e2 * d1.y);
-    s.dpdu = select<F>(det < 0.f, -tangent, tangent);
+    const Vec3<F> across = e1 * d2.y - e2 * d1.y;
+    Vec3<F> tangent = select<F>(mirrored, -across, across);
+    if (scene.tangents)
+      tangent = detail::smooth_tangent<F>(scene, hit, {i0, i1, i2}, tangent, active);
+    s.dpdu = maps.vector(tangent);
   }
   if (kWithCurves && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);

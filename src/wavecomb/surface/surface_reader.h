@@ -27,6 +27,7 @@ struct Surface {
   Vec3<F> ng;    ///< unit geometric normal, outside by winding
   Vec3<F> ns;    ///< unit shading normal on the same side as ng
   Vec3<F> dpdu;  ///< tangent along u, any length; zero where uv is not asked for
+  F handedness;  ///< -1 where v goes along dpdu x ng, as in a mirror; else 1: along ng x dpdu
   Vec2<F> uv;
   F uv_per_length;     ///< sqrt(uv area / world area) of the triangle
   F offset;            ///< bound of the error of p along ng

@@ -158,11 +158,12 @@ WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFea
       v.active &
       Mask<F>((this->textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != U(0u));
   if (any(mapped)) {
-    const Vec3<F> bumped = normalize(make_frame<F>(n, tangent).to_world(this->normal));
+    const Vec3<F> bumped =
+        normalize(make_frame<F>(n, tangent, s.handedness).to_world(this->normal));
     const Vec3<F> seen = facing_normal<F>(dir, s.ng, bumped);
     n = select<F>(mapped, reflecting_normal<F>(dir, s.ng, seen), n);
   }
-  return make_frame<F>(n, tangent);
+  return make_frame<F>(n, tangent, s.handedness);
 }
 
 template <typename Bsdf, typename F>

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Directions in 32 bits: a point of the octahedron |x| + |y| + |z| = 1, unfolded to a square, 16
+/// bits an axis (Z. Cigolle et al., "A Survey of Efficient Representations for Independent Unit
+/// Vectors", JCGT 3(2), 2014). Off by 6e-5 at most.
+#pragma once
+
+#include <cmath>
+
+#include "wavecomb/core/math.h"
+#include "wavecomb/core/vec.h"
+
+namespace wavecomb {
+
+/// The code that stands for no direction.
+inline constexpr uint32_t kNoDirection = 0x80008000u;
+
+/// The code of the direction of `v`, kNoDirection where it has none.
+inline uint32_t encode_direction(const Vec3<float>& v) {
+  const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
+  if (!(size > 0) || !std::isfinite(size)) return kNoDirection;
+  float x = v.x / size, y = v.y / size;
+  if (v.z < 0) {
+    const float folded = std::copysign(1 - std::abs(y), x);
+    y = std::copysign(1 - std::abs(x), y);
+    x = folded;
+  }
+  const auto code = [](float t) {
+    const auto whole = static_cast<int32_t>(std::lround(t * 32767.f));
+    return static_cast<uint32_t>(whole) & 0xffffu;
+  };
+  return code(x) | code(y) << 16;
+}
+
+/// The unit direction of a code; zero for kNoDirection.
+template <typename F>
+inline Vec3<F> decode_direction(const UInt<F>& code) {
+  // The lower 16 bits as a number with a sign.
+  const auto number = [](const UInt<F>& bits) {
+    return F(F(Int<F>((bits & 0xffffu) ^ 0x8000u)) - 32768.f) * (1.f / 32767.f);
+  };
+  const F x = number(code), y = number(code >> 16);
+  const F z = 1.f - abs(x) - abs(y), fold = max(-z, F(0.f));
+  const Vec3<F> v{F(x - copysign(fold, x)), F(y - copysign(fold, y)), z};
+  const Mask<F> some = Mask<F>(code != UInt<F>(kNoDirection));
+  return v * select(some, F(1.f / length(v)), F(0.f));
+}
+
+}  // namespace wavecomb
