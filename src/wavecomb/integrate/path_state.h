@@ -8,6 +8,7 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/integrate/features.h"
+#include "wavecomb/learn/guide_view.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/hit.h"
 #include "wavecomb/surface/surface.h"
@@ -65,6 +66,10 @@ struct VertexResult {
   Color<F> direct;     ///< to add where the shadow ray is free, clamped
   Mask<F> alive;       ///< the path goes on
   PathState<F> next;   ///< the next ray and what goes with it
+  // For who learns, where Vertex::guide is there: guide_axis of the surface, and the density of the
+  // bounce by the BSDF alone.
+  UInt<F> axis;
+  F bsdf_pdf;
 };
 
 /// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
@@ -119,6 +124,7 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null where none are wanted
   const Mask<F>& active;
+  const GuideView* guide = nullptr;  ///< the field that guides bounces, or is to be learned
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// What AOVs are to be given; null where nothing is.

@@ -51,6 +51,8 @@ struct WaveContext {
   RayRecorder* recorder;               ///< gets the rays; null in any render that is not measured
   const AovTables* aovs = nullptr;     ///< what indices mean to AOVs; null where none asks
   HistoryReader* histories = nullptr;  ///< gets vertices of paths; null where none are kept
+  const GuideView* guide = nullptr;    ///< guides bounces, or is to be learned; null: neither
+  bool discards = false;               ///< paths are for `histories` alone, and the film gets none
 
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }

@@ -50,7 +50,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
     const VertexResult<F> v =
         shade_vertex<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
-                                state, wants_aovs ? &aovs : nullptr, active});
+                                state, wants_aovs ? &aovs : nullptr, active, context.guide});
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
