@@ -24,8 +24,8 @@ TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>
                       float value = 1) {
   const Vec2<float> at = octahedral_point<float>(w);
   const auto bin = [](float u) { return std::min(static_cast<uint32_t>(u * 16), 15u); };
-  return {{x, y, z}, 0, axis, static_cast<uint8_t>(bin(at.y) * 16 + bin(at.x)),
-          value, 1.f, 1.f, 0.f, 1.f};
+  return {{x, y, z}, 0,   axis, static_cast<uint8_t>(bin(at.y) * 16 + bin(at.x)), value, 1.f,
+          1.f,       0.f, 1.f};
 }
 
 /// Bounces all over the unit cube: those that face axis k go near the direction of axis k, more so
@@ -38,16 +38,16 @@ std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
     float w[3] = {random() - 0.5f, random() - 0.5f, random() - 0.5f};
     const float x = random();
     w[axis / 2] += (axis % 2 == 0 ? 1.f : -1.f) * (x < 0.5f ? 0.6f : 3.f);
-    records.push_back(bounce(x, random(), random(), axis,
-                             normalize(Vec3<float>{w[0], w[1], w[2]}), 0.5f + random()));
+    records.push_back(bounce(x, random(), random(), axis, normalize(Vec3<float>{w[0], w[1], w[2]}),
+                             0.5f + random()));
   }
   return records;
 }
 
 TEST(Guide, OctahedralMapKeepsAreas) {
   chi_square::Battery battery("octahedral map");
-  chi_square::Case c{"sphere", bsdf_testing::direction_charts(),
-                     [](const Place&) { return 1 / (4 * kPiD); }, {}};
+  chi_square::Case c{
+      "sphere", bsdf_testing::direction_charts(), [](const Place&) { return 1 / (4 * kPiD); }, {}};
   c.draw = [](Random& random, bool) {
     const float u = random(), v = random();
     return Draw::at(bsdf_testing::place_of(octahedral_direction(u, v)));
@@ -100,7 +100,7 @@ TEST(Guide, TablesHoldWhatTheyAreGiven) {
 
 TEST(Guide, SamplesFollowTheirDensity) {
   const auto records = many_bounces(60000, 1);
-  const GuideField field(kUnitGrid, records, 1, true, size_t{64} << 20);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const GuideView view = field.view();
   chi_square::Battery battery("guide");
   for (const float x : {0.2f, 0.9f})
@@ -130,7 +130,7 @@ TEST(Guide, SamplesFollowTheirDensity) {
 /// Where light comes from is found again: cells on the right know narrower lobes.
 TEST(Guide, CellsKnowTheirOwnLight) {
   const auto records = many_bounces(200000, 2);
-  const GuideField field(kUnitGrid, records, 1, true, size_t{64} << 20);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   EXPECT_EQ(field.facts().records, records.size());
   EXPECT_GT(field.facts().cells, 64u);
   EXPECT_GT(field.facts().guided_regions, 300u);
@@ -150,21 +150,38 @@ TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   std::erase_if(records, [](const TrainingRecord& r) {
     return r.p[0] < 0.25f && r.p[1] < 0.25f && r.p[2] < 0.25f;
   });
-  const GuideField field(kUnitGrid, records, 1, true, size_t{64} << 20);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const auto place = find_guide<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
   EXPECT_TRUE(place.guided);
   // Outside of the bounds, and where nothing is a number.
   for (const float x : {-5.f, 9.f, kNan, kInf})
     find_guide<float>(field.view(), {x, x, x}, 3, 0, true);
-  const GuideField empty(kUnitGrid, {}, 1, true, size_t{64} << 20);
+  const GuideField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);
   EXPECT_EQ(empty.view().grid, nullptr);
   EXPECT_FALSE(find_guide<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
 }
 
+/// What bounces bring in the mean counts those that bring nothing, too.
+TEST(Guide, MeansCountDarkBounces) {
+  std::vector<TrainingRecord> records;
+  for (int i = 0; i < 1000; ++i) records.push_back(bounce(0.5f, 0.5f, 0.5f, 2, {0.f, 1.f, 0.f}, 4));
+  GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const auto mean = [&] {
+    return find_guide<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true).mean;
+  };
+  EXPECT_FLOAT_EQ(mean(), 4.f);
+  const std::vector<uint64_t> dark(3000, dark_bounce(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2));
+  field.count_dark(dark);
+  EXPECT_FLOAT_EQ(mean(), 1.f);
+  // Of surfaces that face another way nothing is known.
+  field.count_dark(std::vector<uint64_t>(10, dark_bounce(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3)));
+  EXPECT_FLOAT_EQ(mean(), 1.f);
+}
+
 TEST(Guide, MemoryIsBounded) {
   const auto records = many_bounces(100000, 4);
-  const GuideField large(kUnitGrid, records, 1, true, size_t{64} << 20),
-      small(kUnitGrid, records, 1, true, 200 << 10);
+  const GuideField large(kUnitGrid, records, 1, true, true, size_t{64} << 20),
+      small(kUnitGrid, records, 1, true, true, 200 << 10);
   EXPECT_LE(small.bytes(), size_t{200} << 10);
   EXPECT_GT(large.bytes(), 2 * small.bytes());
   EXPECT_GT(small.facts().guided_regions, 5u);
@@ -191,11 +208,15 @@ TEST(Guide, SharesFollowMoments) {
   // Where the field is bad nothing is guided.
   std::vector<TrainingRecord> records = many_bounces(50000, 9);
   for (TrainingRecord& r : records) r.guide_pdf = 1e-3f;
-  const GuideField field(kUnitGrid, records, 1, false, size_t{64} << 20);
+  const GuideField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
   EXPECT_EQ(field.facts().guided_regions, 0u);
   EXPECT_EQ(field.facts().moment_ratio, 1);
   for (TrainingRecord& r : records) r.guide_pdf = 10.f;
-  const GuideField better(kUnitGrid, records, 1, false, size_t{64} << 20);
+  const GuideField better(kUnitGrid, records, 1, false, true, size_t{64} << 20);
+  // Unless that is not wanted: then the field only says what bounces bring.
+  const GuideField told(kUnitGrid, records, 1, false, false, size_t{64} << 20);
+  EXPECT_EQ(told.facts().guided_regions, 0u);
+  EXPECT_EQ(told.facts().regions, better.facts().regions);
   EXPECT_EQ(better.facts().guided_regions, better.facts().regions);
   EXPECT_LT(better.facts().moment_ratio, 0.2);
   EXPECT_NEAR(better.facts().guided_share, 0.75, 1e-6);
@@ -212,7 +233,7 @@ TEST(Guide, FacesTheirLargestComponent) {
 
 TEST(Guide, Lanes) {
   const auto records = many_bounces(60000, 6);
-  const GuideField field(kUnitGrid, records, 1, true, size_t{64} << 20);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const GuideView view = field.view();
   const auto u = padded({0.f, 0.5f, kOneMinusEpsilon, 0x1p-24f}, 2000, 0.f, kOneMinusEpsilon, 1);
   const auto v = padded({0.5f, 0.f, kOneMinusEpsilon, 0.25f}, 2000, 0.f, kOneMinusEpsilon, 2);
@@ -229,14 +250,17 @@ TEST(Guide, Lanes) {
         what);
   };
   each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F&,
-                       const F&) { return F(Int<F>(place.region)); }, "region");
-  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>& w, const F&, const F&) {
-    return guide_pdf<F>(view, place, w, place.guided);
-  }, "pdf");
-  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F& a, const F& b) {
-    const Vec3<F> w = sample_guide<F>(view, place, a, b, place.guided);
-    return F(w.x + 2.f * w.y + 4.f * w.z);
-  }, "sample");
+                       const F&) { return F(Int<F>(place.region)); },
+       "region");
+  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>& w, const F&,
+                       const F&) { return guide_pdf<F>(view, place, w, place.guided); },
+       "pdf");
+  each(
+      [&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F& a, const F& b) {
+        const Vec3<F> w = sample_guide<F>(view, place, a, b, place.guided);
+        return F(w.x + 2.f * w.y + 4.f * w.z);
+      },
+      "sample");
 }
 
 }  // namespace

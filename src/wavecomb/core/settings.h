@@ -27,7 +27,8 @@ enum class LightSelection : uint8_t { kAuto, kTree, kPower };
 /// What shares of the choice lights have: by what they bring to the picture, as a calibration finds
 /// before the first pass (render/light_calibration.h), or by power.
 enum class LightWeights : uint8_t { kCalibrated, kPower };
-enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
+/// How paths end early (integrate/steps/survive.h).
+enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware, kEfficient };
 /// Order of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
 /// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model

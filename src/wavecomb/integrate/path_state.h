@@ -21,6 +21,7 @@ struct ShadeSettings {
   uint32_t max_depth;
   bool roulette;    ///< by throughput, after a vertex
   bool cost_aware;  ///< by throughput and cost, before a vertex
+  bool efficient;   ///< by what is expected to come back, after a vertex, where that was learned
   uint32_t roulette_depth;
   float clamp_indirect;  ///< 0: off
   bool schlick_fresnel;
@@ -30,8 +31,9 @@ struct ShadeSettings {
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
         max_depth(s.max_depth),
-        roulette(s.roulette == RouletteKind::kThroughput),
+        roulette(s.roulette == RouletteKind::kThroughput || s.roulette == RouletteKind::kEfficient),
         cost_aware(s.roulette == RouletteKind::kCostAware),
+        efficient(s.roulette == RouletteKind::kEfficient),
         roulette_depth(s.roulette_depth),
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),
@@ -48,9 +50,10 @@ struct PathState {
   F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
-  Vec3<F> o;         ///< origin of the ray that arrived
-  UInt<F> receiver;  ///< LightReceiver::normal of the vertex before
-  UInt<F> link{0u};  ///< class of the surface that the ray left, where lights are linked
+  Vec3<F> o;          ///< origin of the ray that arrived
+  UInt<F> receiver;   ///< LightReceiver::normal of the vertex before
+  UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
+  F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
 
   LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };

@@ -10,6 +10,7 @@
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/integrate/steps/survive.h"
+#include "wavecomb/learn/guide.h"
 #include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
@@ -82,7 +83,12 @@ class PathTracer {
                                            static_cast<F>(pixel >> 16), r, true, time_);
     aovs_.begin<F>(*context_.camera, r, kSlot, true);
     F cone_at_origin = ray.width;
-    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u};
+    const F importance =
+        context_.weighs_pixels()
+            ? picture_importance<F>(*context_.guide, static_cast<F>(pixel & 0xffffu),
+                                    static_cast<F>(pixel >> 16), true)
+            : 0.f;
+    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u, 0u, importance};
     ++counts_.samples;
 
     for (uint32_t depth = 0;; ++depth) {
@@ -137,6 +143,7 @@ class PathTracer {
         note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
       path = v.next;
+      path.importance = importance;
       cone_at_origin = v.next.cone_width;
     }
   }

@@ -58,6 +58,8 @@ struct WaveContext {
   bool moves() const { return scene.has_motion || camera->moves(); }
   /// Whether paths keep the class of the surface that they left, where lights are linked.
   bool links() const { return scene.lights.links.members != nullptr; }
+  /// Whether paths keep how much their pixel needs light.
+  bool weighs_pixels() const { return guide && guide->tiles; }
   /// Vertices that each path keeps.
   uint32_t kept_vertices() const { return histories ? histories->most() : 0; }
   bool orders_rays() const {
@@ -70,7 +72,7 @@ struct WaveContext {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.moves() || context.links()),
+      : pool(capacity, context.moves() || context.links() || context.weighs_pixels()),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),

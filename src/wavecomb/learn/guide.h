@@ -20,6 +20,8 @@ struct GuidePlace {
   UInt<F> axis{0u};  ///< which way its surface faces: of kGuideAxes
   UInt<F> region{kNoGuideRegion};
   F bsdf_share{1.f};      ///< a; 1: not guided
+  F mean{0.f};            ///< what bounces bring here of a throughput of 1
+  Mask<F> known{false};   ///< lanes with a region
   Mask<F> guided{false};  ///< lanes with a < 1
 };
 
@@ -42,6 +44,28 @@ inline UInt<F> guide_steps(const F& p, float lo, float scale) {
   constexpr auto most = static_cast<float>((1u << kGuideBits) - 1);
   const F at = (p - lo) * scale;
   return UInt<F>(to_int<F>(clamp(select(is_finite(at), at, F(0.f)), F(0.f), F(most))));
+}
+
+/// The cell of a place in steps of the grid.
+template <typename F>
+inline UInt<F> guide_cell(const GuideView& guide, const UInt<F>& x, const UInt<F>& y,
+                          const UInt<F>& z, const Mask<F>& active) {
+  using U = UInt<F>;
+  constexpr uint32_t top_shift = kGuideBits - kGuideTopBits;
+  U entry = gather<U>(guide.grid,
+                      (x >> top_shift) | ((y >> top_shift) << kGuideTopBits) |
+                          ((z >> top_shift) << (2 * kGuideTopBits)),
+                      Mask<U>(active));
+  constexpr uint32_t brick_mask = (1u << kGuideBrickBits) - 1;
+  for (uint32_t level = 1; level <= kGuideLevels; ++level) {
+    const Mask<U> divided = Mask<U>(active) & Mask<U>(entry < U(kGuideCell));
+    if (none(divided)) break;
+    const auto shift = static_cast<int>(top_shift - level * kGuideBrickBits);
+    const U at = ((x >> shift) & brick_mask) | (((y >> shift) & brick_mask) << kGuideBrickBits) |
+                 (((z >> shift) & brick_mask) << (2 * kGuideBrickBits));
+    entry = select(divided, gather<U>(guide.grid, entry + at, divided), entry);
+  }
+  return entry & (kGuideCell - 1);
 }
 
 /// The bin of 16 in the words from `first` on whose numbers have k among them, and its word.
@@ -86,28 +110,25 @@ template <typename F>
   const U x = detail::guide_steps<F>(p.x, guide.lo[0], guide.scale[0]);
   const U y = detail::guide_steps<F>(p.y, guide.lo[1], guide.scale[1]);
   const U z = detail::guide_steps<F>(p.z, guide.lo[2], guide.scale[2]);
-  constexpr uint32_t top_shift = kGuideBits - kGuideTopBits;
-  U entry = gather<U>(guide.grid,
-                      (x >> top_shift) | ((y >> top_shift) << kGuideTopBits) |
-                          ((z >> top_shift) << (2 * kGuideTopBits)),
-                      Mask<U>(active));
-  constexpr uint32_t brick_mask = (1u << kGuideBrickBits) - 1;
-  for (uint32_t level = 1; level <= kGuideLevels; ++level) {
-    const Mask<U> divided = Mask<U>(active) & Mask<U>(entry < U(kGuideCell));
-    if (none(divided)) break;
-    const auto shift = static_cast<int>(top_shift - level * kGuideBrickBits);
-    const U at = ((x >> shift) & brick_mask) | (((y >> shift) & brick_mask) << kGuideBrickBits) |
-                 (((z >> shift) & brick_mask) << (2 * kGuideBrickBits));
-    entry = select(divided, gather<U>(guide.grid, entry + at, divided), entry);
-  }
-  const U cell = entry & (kGuideCell - 1);
+  const U cell = detail::guide_cell<F>(guide, x, y, z, active);
   place.region = gather<U>(guide.cells, cell * kGuideAxes + place.axis, Mask<U>(active));
-  const Mask<F> known = active & Mask<F>(place.region != U(kNoGuideRegion));
+  const Mask<F> known = place.known = active & Mask<F>(place.region != U(kNoGuideRegion));
   const F least = gather<F>(guide.material_share, material, known);
   const F share = max(gather<F>(guide.bsdf_share, place.region, known), least);
   place.bsdf_share = select(known, share, F(1.f));
+  place.mean = gather<F>(guide.mean, place.region, known);
   place.guided = known & (place.bsdf_share < 1.f);
   return place;
+}
+
+/// One over the brightness of the picture at pixel (x, y); 0: not known.
+template <typename F>
+inline F picture_importance(const GuideView& guide, const F& x, const F& y, const Mask<F>& active) {
+  using U = UInt<F>;
+  if (!guide.tiles) return F(0.f);
+  const U column = U(to_int<F>(F((x + 0.5f) * guide.tiles_of_x)));
+  const U row = U(to_int<F>(F((y + 0.5f) * guide.tiles_of_y)));
+  return gather<F>(guide.tiles, row * guide.tile_rows + column, active);
 }
 
 /// Density over solid angle with which sample_guide gives the world's unit vector w.

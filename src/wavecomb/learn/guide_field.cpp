@@ -24,10 +24,9 @@ constexpr double kMaterialRecords = 512;
 /// Share of the BSDF before there is anything to weigh it by.
 constexpr float kFirstShare = 0.5f;
 
-uint32_t code_of(const GuideGrid& grid, const TrainingRecord& r) {
+uint32_t code_of(const GuideGrid& grid, const float (&p)[3]) {
   uint32_t step[3];
-  for (int i = 0; i < 3; ++i)
-    step[i] = detail::guide_steps<float>(r.p[i], grid.lo[i], grid.scale[i]);
+  for (int i = 0; i < 3; ++i) step[i] = detail::guide_steps<float>(p[i], grid.lo[i], grid.scale[i]);
   return morton_3(step[0], step[1], step[2]);
 }
 
@@ -52,10 +51,11 @@ GuideGrid::GuideGrid(const float (&low)[3], const float (&high)[3]) {
 class GuideFieldBuilder {
  public:
   GuideFieldBuilder(GuideField& field, std::span<const TrainingRecord> records, size_t materials,
-                    bool first)
-      : field_(field), first_(first) {
+                    bool first, bool guides)
+      : field_(field), first_(first), guides_(guides) {
     std::vector<std::pair<uint32_t, uint32_t>> order(records.size());
-    for (uint32_t i = 0; i < records.size(); ++i) order[i] = {code_of(field.grid_, records[i]), i};
+    for (uint32_t i = 0; i < records.size(); ++i)
+      order[i] = {code_of(field.grid_, records[i].p), i};
     std::sort(order.begin(), order.end());
     records_.reserve(records.size());
     codes_.reserve(records.size());
@@ -72,6 +72,8 @@ class GuideFieldBuilder {
     field_.cells_.clear();
     field_.tables_.clear();
     field_.bsdf_share_.clear();
+    field_.brought_.clear();
+    field_.counts_.clear();
     field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
     bring_ = off_ = on_ = 0;
     guided_ = 0;
@@ -152,7 +154,11 @@ class GuideFieldBuilder {
     const size_t at = field_.tables_.size();
     field_.tables_.resize(at + kGuideWords);
     write_guide_table(part.density, std::span(field_.tables_).subspan(at).first<kGuideWords>());
-    field_.bsdf_share_.push_back(first_ ? kFirstShare : kBsdfShares[part.moments.best()]);
+    field_.brought_.push_back(0);
+    field_.counts_.push_back(0);
+    field_.bsdf_share_.push_back(!guides_ ? 1.f
+                                 : first_ ? kFirstShare
+                                          : kBsdfShares[part.moments.best()]);
     return part.region;
   }
 
@@ -193,6 +199,10 @@ class GuideFieldBuilder {
                                                      ? field_.material_share_[r.material]
                                                      : 0.f);
       const double brought = double{r.weight} * double{r.value};
+      if (region != kNoGuideRegion) {
+        field_.brought_[region] += double{r.value};
+        field_.counts_[region] += 1;
+      }
       bring_ += brought;
       guided_ += a < 1 ? brought * (1 - double{a}) : 0;
       if (!(r.guide_pdf > 0)) continue;
@@ -234,7 +244,7 @@ class GuideFieldBuilder {
   }
 
   GuideField& field_;
-  bool first_;
+  bool first_, guides_;
   std::vector<TrainingRecord> records_;  ///< in the order of their codes
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
@@ -243,13 +253,34 @@ class GuideFieldBuilder {
 };
 
 GuideField::GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records,
-                       size_t materials, bool first, size_t most_bytes)
+                       size_t materials, bool first, bool guides, size_t most_bytes)
     : grid_(grid) {
-  const auto builder = std::make_unique<GuideFieldBuilder>(*this, records, materials, first);
+  const auto builder =
+      std::make_unique<GuideFieldBuilder>(*this, records, materials, first, guides);
   for (size_t cell_records = kCellRecords;; cell_records *= 2) {
     builder->build(cell_records);
-    if (bytes() <= most_bytes || cell_records >= records.size()) return;
+    if (bytes() <= most_bytes || cell_records >= records.size()) break;
   }
+  count_dark({});
+}
+
+uint64_t dark_bounce(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
+  return uint64_t{code_of(grid, {p.x, p.y, p.z})} << 3 | axis;
+}
+
+void GuideField::count_dark(std::span<const uint64_t> dark) {
+  const GuideView v = view();
+  for (const uint64_t bounce : dark) {
+    if (!v.grid) break;
+    const auto code = static_cast<uint32_t>(bounce >> 3);
+    const uint32_t cell = detail::guide_cell<float>(
+        v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
+    const uint32_t region = cells_[size_t{cell} * kGuideAxes + (bounce & 7u)];
+    if (region != kNoGuideRegion) counts_[region] += 1;
+  }
+  mean_.resize(brought_.size());
+  for (size_t i = 0; i < mean_.size(); ++i)
+    mean_[i] = static_cast<float>(brought_[i] / std::max(counts_[i], 1.0));
 }
 
 GuideView GuideField::view() const {
@@ -263,13 +294,14 @@ GuideView GuideField::view() const {
   view.cells = cells_.data();
   view.tables = tables_.data();
   view.bsdf_share = bsdf_share_.data();
+  view.mean = mean_.data();
   view.material_share = material_share_.data();
   return view;
 }
 
 size_t GuideField::bytes() const {
   return (entries_.size() + cells_.size() + tables_.size()) * sizeof(uint32_t) +
-         (bsdf_share_.size() + material_share_.size()) * sizeof(float);
+         (bsdf_share_.size() + material_share_.size() + mean_.size()) * sizeof(float);
 }
 
 }  // namespace wavecomb

@@ -21,6 +21,7 @@
 #include <span>
 #include <vector>
 
+#include "wavecomb/core/vec3.h"
 #include "wavecomb/learn/guide_view.h"
 #include "wavecomb/learn/training_record.h"
 
@@ -33,6 +34,9 @@ struct GuideGrid {
   /// Corners of the bounds, lo <= hi.
   GuideGrid(const float (&low)[3], const float (&high)[3]);
 };
+
+/// A bounce at p that brought nothing, of a surface that faces `axis`.
+uint64_t dark_bounce(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis);
 
 /// What a field is, in numbers.
 struct GuideFacts {
@@ -51,7 +55,11 @@ class GuideField {
   /// density of a field yet, so that each region is guided half the time. `most_bytes`: cells
   /// stay larger where it would else take more.
   GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records, size_t materials,
-             bool first, size_t most_bytes);
+             bool first, bool guides, size_t most_bytes);
+
+  /// Tells the regions how often bounces brought nothing: `dark` of each cell's code and axis, as
+  /// dark_bounce gives it. Each mean is then over all bounces.
+  void count_dark(std::span<const uint64_t> dark);
 
   GuideView view() const;
   size_t bytes() const;
@@ -62,7 +70,8 @@ class GuideField {
 
   GuideGrid grid_;
   std::vector<uint32_t> entries_, cells_, tables_;
-  std::vector<float> bsdf_share_, material_share_;
+  std::vector<float> bsdf_share_, material_share_, mean_;
+  std::vector<double> brought_, counts_;  ///< of each region: sum of values, and of how many
   GuideFacts facts_;
 };
 

@@ -30,15 +30,20 @@ inline constexpr uint32_t kGuideBrickCells = 1u << (3 * kGuideBrickBits);
 inline constexpr uint32_t kGuideCell = 0x80000000u;
 inline constexpr uint32_t kNoGuideRegion = 0xffffffffu;
 
-/// What kernels need of the field. Without cells nothing is guided.
+/// What kernels need of the field. Without a grid nothing is guided.
 struct GuideView {
   const uint32_t* grid = nullptr;     ///< kGuideTopCells entries, then bricks
   const uint32_t* cells = nullptr;    ///< region, or kNoGuideRegion, of (kGuideAxes * cell + axis)
   const uint32_t* tables = nullptr;   ///< kGuideWords of each region
   const float* bsdf_share = nullptr;  ///< of each region: of bounces that the BSDF alone samples
+  const float* mean = nullptr;        ///< of each region: what bounces bring of a throughput of 1
   const float* material_share = nullptr;  ///< the least of those that a material allows
-  float lo[3] = {};                       ///< corner of the grid
-  float scale[3] = {};                    ///< cells of 2^-kGuideBits of the grid in a unit of space
+  /// One over the brightness of the picture, in tile_rows x tile_rows tiles; null: not known.
+  const float* tiles = nullptr;
+  uint32_t tile_rows = 0;
+  float tiles_of_x = 0, tiles_of_y = 0;  ///< tiles in a pixel
+  float lo[3] = {};                      ///< corner of the grid
+  float scale[3] = {};                   ///< cells of 2^-kGuideBits of the grid in a unit of space
 };
 
 }  // namespace wavecomb

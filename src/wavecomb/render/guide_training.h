@@ -10,20 +10,35 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/learn/guide_field.h"
+#include "wavecomb/render/picture_tiles.h"
 
 namespace wavecomb {
 
-/// What came of it.
-struct GuideTraining {
-  std::unique_ptr<const GuideField> field;  ///< null: bounces are not guided
-  GuideFacts facts;                         ///< of the last field that was made
-  uint64_t paths = 0;
+/// What a render says of it.
+struct GuideStatistics {
+  GuideFacts facts;    ///< of the last field that was made
+  uint64_t paths = 0;  ///< that taught; 0: nothing was learned
   uint32_t rounds = 0;
+  uint64_t field_bytes = 0;
+  /// Efficiency of its last round to the first, which knew of no field; 0: not known.
+  double gain = 0;
+  bool used = false;  ///< whether the picture is guided, or its roulette told, by the field
   double seconds = 0;
 };
+
+/// What came of it.
+struct GuideTraining {
+  std::unique_ptr<const GuideField> field;  ///< null: nothing was learned
+  std::optional<PictureTiles> tiles;        ///< of the picture, with a field
+  GuideStatistics statistics;
+};
+
+/// The field and the tiles as kernels read them. Contract: valid as long as `training`.
+GuideView view_of(const GuideTraining& training);
 
 /// How training paths are run.
 struct TrainingMeans {

@@ -46,7 +46,17 @@ PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> p
   for (const Tile& tile : tiles) {
     const double m = mean(tile);
     inverse_.push_back(1 / (unit * std::sqrt(m * m + least)));
+    table_.push_back(static_cast<float>(inverse_.back()));
   }
+}
+
+void PictureTiles::apply(GuideView& view) const {
+  if (!is_lit()) return;
+  view.tiles = table_.data();
+  view.tile_rows = rows_;
+  // A hair less, so that no rounding leads beyond the last.
+  view.tiles_of_x = static_cast<float>(rows_) / static_cast<float>(width_) * (1 - 0x1p-20f);
+  view.tiles_of_y = static_cast<float>(rows_) / static_cast<float>(height_) * (1 - 0x1p-20f);
 }
 
 uint32_t PictureTiles::of(uint32_t pixel) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "wavecomb/core/settings.h"
+#include "wavecomb/learn/guide_view.h"
 
 namespace wavecomb {
 
@@ -26,10 +27,13 @@ class PictureTiles {
   /// One over the scale of the picture at a pixel: of the mean of what paths of its tile bring,
   /// none above 64 medians. Contract: is_lit().
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
+  /// Lets kernels know it, where any path brought light.
+  void apply(GuideView& view) const;
 
  private:
   uint32_t width_, height_, rows_ = 1;
   std::vector<double> inverse_;
+  std::vector<float> table_;  ///< the same
 };
 
 }  // namespace wavecomb

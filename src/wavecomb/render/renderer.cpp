@@ -264,7 +264,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     training =
         train_guide(context, scene, {lanes, threads, wave_size}, [&] { return watch.stopped(); });
     if (training.field) {
-      guide = training.field->view();
+      guide = view_of(training);
       context.guide = &guide;
     }
     loop.run();
@@ -283,6 +283,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.resumed_samples = status.resumed_samples;
     s.error = status.error;
     s.allotment = loop.allotment();
+    s.guiding = training.statistics;
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();
     s.accelerator_bytes = impl_->accel->bytes();

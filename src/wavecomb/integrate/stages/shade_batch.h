@@ -48,6 +48,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                        path.receiver};
     if (links && context.scene.mesh_lights && depth > 0) [[unlikely]]
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
+    if (context.weighs_pixels()) [[unlikely]]
+      state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
     const VertexResult<F> v =
         shade_vertex<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
                                 state, wants_aovs ? &aovs : nullptr, active, context.guide});

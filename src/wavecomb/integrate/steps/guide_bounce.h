@@ -40,8 +40,8 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidePlace<F>& 
                             const F& p_bsdf) {
   if constexpr (kGuided<Bsdf>) {
     if (v.guide && any(place.guided)) [[unlikely]] {
-      const Mask<F> there = place.guided & (F(wi.z * wo.z) > 0.f);
-      const F p_guide = guide_pdf<F>(*v.guide, place, world, there);
+      const Mask<F> near = place.guided & (F(wi.z * wo.z) > 0.f);
+      const F p_guide = guide_pdf<F>(*v.guide, place, world, near);
       const F mixed = fma(place.bsdf_share, p_bsdf, F((F(1.f) - place.bsdf_share) * p_guide));
       return select(place.guided, mixed, p_bsdf);
     }
@@ -54,8 +54,8 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidePlace<F>& 
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interaction& at,
                                   const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                                  const Sample4<F>& r, const GuidePlace<F>& place,
-                                  BsdfSample<F>& b, VertexResult<F>& out) {
+                                  const Sample4<F>& r, const GuidePlace<F>& place, BsdfSample<F>& b,
+                                  VertexResult<F>& out) {
   if constexpr (kGuided<Bsdf>) {
     if (!v.guide) [[likely]]
       return;
