@@ -85,6 +85,24 @@ nb::object allotment_dict(const AllotmentFacts& s) {
   return d;
 }
 
+nb::object guiding_dict(const GuideStatistics& s) {
+  if (s.paths == 0) return nb::none();
+  nb::dict d;
+  d["seconds"] = s.seconds;
+  d["paths"] = s.paths;
+  d["rounds"] = s.rounds;
+  d["bounces"] = s.facts.records;
+  d["cells"] = s.facts.cells;
+  d["regions"] = s.facts.regions;
+  d["guided_regions"] = s.facts.guided_regions;
+  d["guided_share"] = s.facts.guided_share;
+  d["moment_ratio"] = s.facts.moment_ratio;
+  d["field_bytes"] = s.field_bytes;
+  d["gain"] = s.gain;
+  d["used"] = s.used;
+  return d;
+}
+
 nb::dict light_calibration_dict(const LightShares& s) {
   nb::dict d;
   d["seconds"] = s.seconds;
@@ -158,6 +176,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   d["cost_prediction"] = costs;
   d["light_calibration"] = light_calibration_dict(s.light_calibration);
   d["allotment"] = allotment_dict(s.allotment);
+  d["guiding"] = guiding_dict(s.guiding);
   nb::dict uses;
   for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
   d["policy_uses"] = uses;

@@ -485,7 +485,7 @@ class Settings:
     """Keeps errors and variances where nothing else asks. Default: False."""
     crop: bool
     """The picture is its region alone, in memory and in files. Default: False."""
-    roulette: Literal["off", "throughput", "cost-aware"]
+    roulette: Literal["off", "throughput", "cost-aware", "efficient"]
     """How paths end early. Each is unbiased, but another estimate. Default: throughput."""
     roulette_depth: int
     """The first vertex at which a path may end early. Default: 2."""
@@ -493,6 +493,11 @@ class Settings:
     """How a light is chosen to sample: for the place that it lights, or by power. Default: auto."""
     light_weights: Literal["calibrated", "power"]
     """How often each light is chosen. Default: calibrated."""
+    guiding: Literal["auto", "on", "off"]
+    """How bounces choose directions: by materials, or also by where light comes from. Default:
+    off."""
+    learn_memory: int
+    """Memory that what is learned may take, in MB. Default: 64."""
     adaptive: float
     """Error that a pixel may have, as a share of its brightness. Default: off. 0: off."""
     noise: float

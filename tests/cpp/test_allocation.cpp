@@ -115,8 +115,9 @@ TEST(Allocation, NoneForHistories) {
   struct Counter final : HistoryReader {
     uint64_t vertices = 0;
     uint32_t most() const override { return 5; }
-    void ended(const PathHistory& history, const float* /*radiance*/, size_t paths) override {
-      for (uint32_t slot = 0; slot < paths; ++slot) vertices += history.count(slot);
+    void ended(const PathHistory& history, const float* /*radiance*/,
+               const WaveTask& task) override {
+      for (uint32_t slot = 0; slot < task.path_count(); ++slot) vertices += history.count(slot);
     }
   };
   for (const uint32_t lanes : lane_widths()) {

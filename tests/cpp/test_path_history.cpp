@@ -24,9 +24,9 @@ class LightField final : public HistoryReader {
 
   explicit LightField(uint32_t most) : most_(most) {}
   uint32_t most() const override { return most_; }
-  void ended(const PathHistory& history, const float* radiance, size_t paths) override {
+  void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override {
     const std::lock_guard lock(mutex_);
-    for (uint32_t slot = 0; slot < paths; ++slot) {
+    for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
       const Color<float> end = load_row<RadianceRow, float>(radiance, slot, true).sum;
       ASSERT_LE(history.count(slot), most_);
       for (uint32_t i = 0; i < history.count(slot); ++i) add(history.vertex(slot, i), end);
@@ -121,8 +121,8 @@ class Furnace final : public HistoryReader {
  public:
   static constexpr uint32_t kMost = 3;
   uint32_t most() const override { return kMost; }
-  void ended(const PathHistory& history, const float* radiance, size_t paths) override {
-    for (uint32_t slot = 0; slot < paths; ++slot) {
+  void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override {
+    for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
       const float end = load_row<RadianceRow, float>(radiance, slot, true).sum.y;
       EXPECT_EQ(history.count(slot), kMost) << "walls are closed, and roulette is off";
       for (uint32_t i = 0; i < history.count(slot); ++i) {

@@ -81,6 +81,16 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         if allotted["gain"] is not None:
             line += f"; expected efficiency {allotted['gain']:.2f} of even"
         lines.append(line)
+    if learned := stats.get("guiding"):
+        line = (
+            f"learned from {count_text(learned['paths'])} paths in {time_text(learned['seconds'])}"
+            f", efficiency there {learned['gain']:.2f} of without"
+        )
+        if not learned["used"]:
+            line += "; not used"
+        elif learned["guided_share"] > 0:
+            line += f"; {_percent(learned['guided_share'])} of bounced light is guided"
+        lines.append(line)
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
         line = f"{stats['passes']} passes, {mean:.3g} samples a pixel"

@@ -27,7 +27,8 @@ enum class LightSelection : uint8_t { kAuto, kTree, kPower };
 /// What shares of the choice lights have: by what they bring to the picture, as a calibration finds
 /// before the first pass (render/light_calibration.h), or by power.
 enum class LightWeights : uint8_t { kCalibrated, kPower };
-enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware };
+/// How paths end early (integrate/steps/survive.h).
+enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware, kEfficient };
 /// Order of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
 /// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model
@@ -40,6 +41,9 @@ enum class Traversal : uint8_t { kPackets, kSingle };
 enum class TextureFilter : uint8_t { kAuto, kWhole };
 /// How a render's samples are allotted to pixels (render/allotment.h).
 enum class Allocate : uint8_t { kEven, kError, kEfficiency };
+/// Whether bounces are guided by a field that paths before the first pass have taught
+/// (render/guide_training.h). kAuto: where it pays.
+enum class Guiding : uint8_t { kAuto, kOn, kOff };
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
 /// Largest picture.
@@ -77,6 +81,8 @@ struct Settings {
   TextureFilter texture_filter = TextureFilter::kAuto;
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
+  Guiding guiding = Guiding::kOff;
+  uint32_t learn_memory_mb = 64;  ///< that what is learned may take
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;

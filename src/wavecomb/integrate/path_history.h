@@ -13,6 +13,7 @@
 
 #include "wavecomb/core/fields.h"
 #include "wavecomb/core/soa.h"
+#include "wavecomb/integrate/integrator.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/path_state.h"
 
@@ -27,7 +28,10 @@ struct HistoryRow {
   F pdf;                ///< of wi over solid angle; 0: delta
   Color<F> radiance;    ///< R_j: with the light sample of this vertex
   UInt<F> material;
-  WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material)
+  // Where bounces are guided, or to be (Vertex::guide):
+  UInt<F> axis;  ///< guide_axis of the surface
+  F bsdf_pdf;    ///< of wi by the BSDF alone
+  WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
 
 /// Contract: owned by one wave, or one reference integrator; slots below the capacity.
@@ -59,11 +63,12 @@ class PathHistory {
     if (depth >= most_) return;
     const Color<F> brought = load_row<RadianceRow, F>(radiance, slot, active).sum;
     const Vec3<F> none(F(0.f));
-    store_row<HistoryRow, F>(rows_.floats(0), slot * most_ + depth,
-                             {fma(path.dir, t, path.o), select<F>(v.alive, v.next.dir, none),
-                              select<F>(v.alive, v.next.throughput, none),
-                              select(v.alive, v.next.pdf, F(0.f)), brought, material},
-                             active);
+    store_row<HistoryRow, F>(
+        rows_.floats(0), slot * most_ + depth,
+        {fma(path.dir, t, path.o), select<F>(v.alive, v.next.dir, none),
+         select<F>(v.alive, v.next.throughput, none), select(v.alive, v.next.pdf, F(0.f)), brought,
+         material, v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
+        active);
     scatter<UInt<F>>(counts_.uints(0), UInt<F>(depth + 1), slot, Mask<UInt<F>>(active));
   }
 
@@ -100,8 +105,9 @@ class HistoryReader {
   virtual ~HistoryReader() = default;
   /// Vertices wanted of each path.
   virtual uint32_t most() const = 0;
-  /// `radiance`: RadianceRow of each path, before the camera's exposure.
-  virtual void ended(const PathHistory& history, const float* radiance, size_t paths) = 0;
+  /// The paths of `task`: slot i is sample first_sample + i % samples of pixel i / samples of it.
+  /// `radiance`: RadianceRow of each, before the camera's exposure.
+  virtual void ended(const PathHistory& history, const float* radiance, const WaveTask& task) = 0;
 };
 
 }  // namespace wavecomb

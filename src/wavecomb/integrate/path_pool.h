@@ -34,7 +34,8 @@ template <typename F>
 struct PathColdRow {
   F time;        ///< of the shutter, in [0, 1)
   UInt<F> link;  ///< PathState::link
-  WAVECOMB_FIELDS(time, link)
+  F importance;  ///< PathState::importance
+  WAVECOMB_FIELDS(time, link, importance)
 };
 
 /// A path's shadow ray, of which it has one at most at each vertex.

@@ -8,6 +8,7 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/integrate/features.h"
+#include "wavecomb/learn/guide_view.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/hit.h"
 #include "wavecomb/surface/surface.h"
@@ -20,6 +21,7 @@ struct ShadeSettings {
   uint32_t max_depth;
   bool roulette;    ///< by throughput, after a vertex
   bool cost_aware;  ///< by throughput and cost, before a vertex
+  bool efficient;   ///< by what is expected to come back, after a vertex, where that was learned
   uint32_t roulette_depth;
   float clamp_indirect;  ///< 0: off
   bool schlick_fresnel;
@@ -29,8 +31,9 @@ struct ShadeSettings {
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
         max_depth(s.max_depth),
-        roulette(s.roulette == RouletteKind::kThroughput),
+        roulette(s.roulette == RouletteKind::kThroughput || s.roulette == RouletteKind::kEfficient),
         cost_aware(s.roulette == RouletteKind::kCostAware),
+        efficient(s.roulette == RouletteKind::kEfficient),
         roulette_depth(s.roulette_depth),
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),
@@ -47,9 +50,10 @@ struct PathState {
   F pdf;  ///< of the bounce before; 0: delta or camera
   F eta_scale;
   F cone_width, cone_spread;
-  Vec3<F> o;         ///< origin of the ray that arrived
-  UInt<F> receiver;  ///< LightReceiver::normal of the vertex before
-  UInt<F> link{0u};  ///< class of the surface that the ray left, where lights are linked
+  Vec3<F> o;          ///< origin of the ray that arrived
+  UInt<F> receiver;   ///< LightReceiver::normal of the vertex before
+  UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
+  F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
 
   LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };
@@ -65,6 +69,10 @@ struct VertexResult {
   Color<F> direct;     ///< to add where the shadow ray is free, clamped
   Mask<F> alive;       ///< the path goes on
   PathState<F> next;   ///< the next ray and what goes with it
+  // For who learns, where Vertex::guide is there: guide_axis of the surface, and the density of the
+  // bounce by the BSDF alone.
+  UInt<F> axis;
+  F bsdf_pdf;
 };
 
 /// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
@@ -119,6 +127,7 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null where none are wanted
   const Mask<F>& active;
+  const GuideView* guide = nullptr;  ///< the field that guides bounces, or is to be learned
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// What AOVs are to be given; null where nothing is.

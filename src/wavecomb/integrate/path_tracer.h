@@ -10,6 +10,7 @@
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/integrate/steps/survive.h"
+#include "wavecomb/learn/guide.h"
 #include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
@@ -42,15 +43,15 @@ class PathTracer {
         aovs_(worker.aovs),
         history_(worker.history) {}
 
-  /// Radiance of a path, as the camera's exposure shows it; what else it found is in the AOVs' slot
-  /// 0.
-  Color<F> exposed_path(uint32_t pixel, uint32_t sample) {
+  /// Radiance of the path of a task of one, as the camera's exposure shows it; what else it found
+  /// is in the AOVs' slot 0.
+  Color<F> exposed_path(const WaveTask& task) {
     aovs_.clear(1);
     history_.clear(1);
     radiance_ = {};
-    const uint32_t last = trace_path(pixel, sample);
+    const uint32_t last = trace_path(*task.pixels, task.first_sample);
     aovs_.end_path(last, radiance(), 1);
-    if (history_) context_.histories->ended(history_, radiance(), 1);
+    if (history_) context_.histories->ended(history_, radiance(), task);
     const F exposure = context_.camera->exposure;
     if (exposure != 1) {
       radiance_.sum *= exposure;
@@ -82,7 +83,12 @@ class PathTracer {
                                            static_cast<F>(pixel >> 16), r, true, time_);
     aovs_.begin<F>(*context_.camera, r, kSlot, true);
     F cone_at_origin = ray.width;
-    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u};
+    const F importance =
+        context_.weighs_pixels()
+            ? picture_importance<F>(*context_.guide, static_cast<F>(pixel & 0xffffu),
+                                    static_cast<F>(pixel >> 16), true)
+            : 0.f;
+    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u, 0u, importance};
     ++counts_.samples;
 
     for (uint32_t depth = 0;; ++depth) {
@@ -137,6 +143,7 @@ class PathTracer {
         note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
       path = v.next;
+      path.importance = importance;
       cone_at_origin = v.next.cone_width;
     }
   }
@@ -214,8 +221,9 @@ class PathTracer {
     if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, time_};
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
-    return kernels[scene.material_program[material]](
-        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true});
+    return kernels[scene.material_program[material]]({scene, settings_, key, depth, mesh_hit,
+                                                      hit.geom, hit.t, material, path, &aovs, true,
+                                                      context_.guide});
   }
 
   const float* times() const { return context_.scene.has_motion ? &time_ : nullptr; }
@@ -245,11 +253,17 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
   worker.clock.start(Phase::kGenerate);
   for (uint32_t p = 0; p < task.pixel_count; ++p) {
     const uint32_t pixel = task.pixels[p], x = pixel & 0xffffu, y = pixel >> 16;
+    if (context.discards) {
+      for (uint32_t s = 0; s < task.samples; ++s)
+        tracer.exposed_path({task.pixels + p, 1, task.first_sample + s, 1});
+      continue;
+    }
     Film::Pixel sum = film.pixel(x, y);
     for (uint32_t s = 0; s < task.samples; ++s) {
       worker.clock.enter(Phase::kGenerate);
       const auto start = worker.aovs.start_time();
-      const Color<float> radiance = tracer.exposed_path(pixel, task.first_sample + s);
+      const Color<float> radiance =
+          tracer.exposed_path({task.pixels + p, 1, task.first_sample + s, 1});
       worker.aovs.spread_time(1, start, [](size_t) { return 0; });
       worker.clock.enter(Phase::kResolve);
       if (film.has_error())

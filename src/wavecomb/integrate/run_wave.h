@@ -69,8 +69,8 @@ void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& ta
   }
   clock.enter(Phase::kResolve);
   wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
-  if (wave.history) context.histories->ended(wave.history, wave.pool.radiance, task.path_count());
-  resolve(wave, context, task);
+  if (wave.history) context.histories->ended(wave.history, wave.pool.radiance, task);
+  if (!context.discards) resolve(wave, context, task);
   clock.stop();
 }
 

@@ -7,6 +7,7 @@
 #include "wavecomb/graph/hit_point.h"
 #include "wavecomb/graph/run.h"
 #include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/learn/guide.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/surface.h"
 #include "wavecomb/texture/lookup.h"
@@ -26,6 +27,12 @@
   KEYWORD template Color<F> mesh_light_emission<F>(const SceneView&, const UInt<F>&,               \
                                                    const UInt<F>&, const Color<F>&,                \
                                                    const PathState<F>&, bool, const Mask<F>&);     \
+  KEYWORD template GuidePlace<F> find_guide<F>(const GuideView&, const Vec3<F>&, const UInt<F>&,   \
+                                               const UInt<F>&, const Mask<F>&);                    \
+  KEYWORD template F guide_pdf<F>(const GuideView&, const GuidePlace<F>&, const Vec3<F>&,          \
+                                  const Mask<F>&);                                                 \
+  KEYWORD template Vec3<F> sample_guide<F>(const GuideView&, const GuidePlace<F>&, const F&,       \
+                                           const F&, const Mask<F>&);                              \
   KEYWORD template void run_graph<F>(const GraphView&, const GraphProgram&, const TextureView*,    \
                                      const GraphPoint<F>&, const Mask<F>&, F*);                    \
   KEYWORD template GraphPoint<F> graph_point<F>(const SceneView&, const MeshHit<F>&,               \

@@ -4,6 +4,7 @@
 
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/integrate/steps/sample_light.h"
 #include "wavecomb/integrate/steps/scatter.h"
@@ -22,6 +23,8 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   out.alive = Mask<F>(false);
   out.shadow_set = U(0u);
   out.next.link = U(0u);
+  out.axis = U(0u);
+  out.bsdf_pdf = F(0.f);
   if (v.wants_lights()) {
     v.aovs->emitter = v.aovs->lit_by = U(kNoLight);
     v.aovs->light_weight = F(-1.f);
@@ -37,15 +40,16 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
     out.next.link = at.link_class(v);
 
   const auto seen = at.bsdf.view(wo);
+  const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
-  sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, receiver, out);
+  sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, place, receiver, out);
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
-  scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, receiver, out);
-  survive<F>(v, r_light.w, out);
+  scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, receiver, out);
+  survive<F>(v, place, max_component(at.throughput), r_light.w, out);
   return out;
 }
 

@@ -51,11 +51,15 @@ struct WaveContext {
   RayRecorder* recorder;               ///< gets the rays; null in any render that is not measured
   const AovTables* aovs = nullptr;     ///< what indices mean to AOVs; null where none asks
   HistoryReader* histories = nullptr;  ///< gets vertices of paths; null where none are kept
+  const GuideView* guide = nullptr;    ///< guides bounces, or is to be learned; null: neither
+  bool discards = false;               ///< paths are for `histories` alone, and the film gets none
 
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }
   /// Whether paths keep the class of the surface that they left, where lights are linked.
   bool links() const { return scene.lights.links.members != nullptr; }
+  /// Whether paths keep how much their pixel needs light.
+  bool weighs_pixels() const { return guide && guide->tiles; }
   /// Vertices that each path keeps.
   uint32_t kept_vertices() const { return histories ? histories->most() : 0; }
   bool orders_rays() const {
@@ -68,7 +72,7 @@ struct WaveContext {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.moves() || context.links()),
+      : pool(capacity, context.moves() || context.links() || context.weighs_pixels()),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),

@@ -44,7 +44,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
                                0.01f * context.scene.scale, 0.f, key, 0u},
                               true);
     store_row<RadianceRow, float>(wave.pool.radiance, i, {}, true);
-    if (wave.pool.cold) store_row<PathColdRow, float>(wave.pool.cold, i, {u, 0u}, true);
+    if (wave.pool.cold) store_row<PathColdRow, float>(wave.pool.cold, i, {u, 0u, 0.f}, true);
   }
   const auto& kernels = kernels_for<F, NoMedia>(context, settings);
   const auto start = PhaseClock::Clock::now();

@@ -12,6 +12,7 @@
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/render/light_balance.h"
+#include "wavecomb/render/picture_tiles.h"
 #include "wavecomb/scene/light_tree.h"
 #include "wavecomb/scene/parallel.h"
 
@@ -23,8 +24,6 @@ constexpr uint32_t kMostPaths = 16384, kLeastPaths = 1024, kPixelsOfPath = 4;
 /// Vertices of a path that choose a light.
 constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
-/// The picture is divided in tiles, at most so many each way, of so many paths or more.
-constexpr uint32_t kMostTiles = 16, kPathsOfTile = 64;
 /// Nodes above this depth of the light tree are balanced.
 constexpr uint32_t kTiltDepth = 6;
 
@@ -44,57 +43,6 @@ std::vector<uint32_t> spread_pixels(const Settings& settings, uint32_t count) {
     pixels[i] = x | y << 16;
   }
   return pixels;
-}
-
-/// Tiles each way.
-uint32_t tile_count(uint32_t paths) {
-  uint32_t tiles = 1;
-  while (tiles < kMostTiles && (tiles + 1) * (tiles + 1) * kPathsOfTile <= paths) ++tiles;
-  return tiles;
-}
-uint32_t tile_of(const Settings& settings, uint32_t tiles, uint32_t pixel) {
-  const uint32_t x = (pixel & 0xffffu) * tiles / settings.width;
-  return x + (pixel >> 16) * tiles / settings.height * tiles;
-}
-
-/// One over the scale of the picture at each path: of the mean of what paths of its tile bring,
-/// none above kMostOfMedian medians. Empty: no path brings light.
-std::vector<double> inverse_scales(const Settings& settings, uint32_t tile_rows,
-                                   std::span<const uint32_t> pixels,
-                                   std::span<const float> luminance) {
-  constexpr double kStep = 0x1p-20, kMostOfMedian = 64;
-  std::vector<float> lit;
-  for (const float y : luminance)
-    if (std::isfinite(y) && y > 0) lit.push_back(y);
-  if (lit.empty()) return {};
-  const auto middle = lit.begin() + static_cast<std::ptrdiff_t>(lit.size() / 2);
-  std::nth_element(lit.begin(), middle, lit.end());
-  const double unit{*middle};
-  struct Tile {
-    uint64_t sum = 0, count = 0;
-  };
-  std::vector<Tile> tiles(size_t{tile_rows} * tile_rows);
-  Tile all;
-  for (size_t i = 0; i < pixels.size(); ++i) {
-    const double y = luminance[i] > 0 ? double{luminance[i]} / unit : 0;  // false for NaN
-    const auto steps = static_cast<uint64_t>(std::nearbyint(std::min(y, kMostOfMedian) / kStep));
-    Tile& tile = tiles[tile_of(settings, tile_rows, pixels[i])];
-    tile.sum += steps;
-    ++tile.count;
-    all.sum += steps;
-    ++all.count;
-  }
-  const auto mean = [&](const Tile& t) {
-    return t.count == 0 ? 0 : kStep * static_cast<double>(t.sum) / static_cast<double>(t.count);
-  };
-  // As relMSE, with room for what few paths miss.
-  const double least = 0.05 * mean(all) * mean(all);
-  std::vector<double> scales(pixels.size());
-  for (size_t i = 0; i < pixels.size(); ++i) {
-    const double m = mean(tiles[tile_of(settings, tile_rows, pixels[i])]);
-    scales[i] = 1 / (unit * std::sqrt(m * m + least));
-  }
-  return scales;
 }
 
 /// Odds at the upper nodes of the tree, by the samples that went through them.
@@ -198,15 +146,17 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   const LightProbes probes = trace_probes(scene, accel, probing, settings, pixels, stopped);
   if (stopped()) return out;
 
-  const uint32_t tiles = tile_count(static_cast<uint32_t>(pixels.size()));
-  const std::vector<double> scales = inverse_scales(settings, tiles, pixels, probes.luminance);
-  LightBalance balance(first.shares, size_t{tiles} * tiles * kVertices);
+  const PictureTiles tiles(settings, pixels, probes.luminance);
+  std::vector<double> scales;
+  if (tiles.is_lit())
+    for (const uint32_t pixel : pixels) scales.push_back(tiles.inverse_scale(pixel));
+  LightBalance balance(first.shares, size_t{tiles.count()} * kVertices);
   for (size_t path = 0; path < scales.size(); ++path) {
     for (uint32_t k = 0; k < probes.counts[path]; ++k) {
       const LightProbe& probe = probes.probes[path * probes.most + k];
       const uint32_t part = parts.of(probe.light);
       if (part != kNoPart)
-        balance.add(tile_of(settings, tiles, pixels[path]) * kVertices + k, part,
+        balance.add(tiles.of(pixels[path]) * kVertices + k, part,
                     double{probe.value} * scales[path], double{probe.weight});
     }
   }

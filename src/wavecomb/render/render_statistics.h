@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "wavecomb/render/allotment.h"
+#include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
@@ -67,6 +68,7 @@ struct RenderStatistics {
   double calibration_s = 0;
   LightShares light_calibration;
   AllotmentFacts allotment;
+  GuideStatistics guiding;
   std::optional<StoreStatistics> texture_store;  ///< where textures have a limit
 };
 

@@ -17,6 +17,7 @@
 #include "wavecomb/film/error_map.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/energy_tables.h"
+#include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/scene/light_tree.h"
 
@@ -254,11 +255,19 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), film, runner,
                 costs, watch);
   const LightCalibration* lights = nullptr;
+  GuideTraining training;
+  GuideView guide;
   const auto work = [&] {
     lights = &impl_->light_calibrations.get(impl_->scene, *impl_->accel, scene_view, settings,
                                             [&] { return watch.stopped(); });
     lights->weighed.apply(context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
+    training =
+        train_guide(context, scene, {lanes, threads, wave_size}, [&] { return watch.stopped(); });
+    if (training.field) {
+      guide = view_of(training);
+      context.guide = &guide;
+    }
     loop.run();
   };
   // The workers stand still meanwhile.
@@ -275,6 +284,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.resumed_samples = status.resumed_samples;
     s.error = status.error;
     s.allotment = loop.allotment();
+    s.guiding = training.statistics;
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();
     s.accelerator_bytes = impl_->accel->bytes();

@@ -263,6 +263,7 @@ _WORDS = {
     "light_selection": "lights",
     "light_weights": "light shares",
     "allocate": "samples by",
+    "learn_memory": "MB of learning",
     "adaptive": "pixel error",
     "min_spp": "min spp",
     "time_limit": "seconds",

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/learn/guide.h"
 
 namespace wavecomb {
 
@@ -34,6 +35,11 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
       time = path_time<F>(settings.sampler, key);
       scatter_field<F>(pool.cold, &PathColdRow<float>::time, slot, time, active);
     }
+    if (context.weighs_pixels())
+      scatter_field<F>(pool.cold, &PathColdRow<float>::importance, slot,
+                       picture_importance<F>(*context.guide, F(Int<F>(pixel & 0xffffu)),
+                                             F(Int<F>(pixel >> 16)), active),
+                       active);
     const CameraRay<F> ray =
         camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active, time);
     store_row<PathRow, F>(

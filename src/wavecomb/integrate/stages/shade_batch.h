@@ -48,9 +48,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                        path.receiver};
     if (links && context.scene.mesh_lights && depth > 0) [[unlikely]]
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
+    if (context.weighs_pixels()) [[unlikely]]
+      state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
     const VertexResult<F> v =
         take_steps<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
-                              state, wants_aovs ? &aovs : nullptr, active});
+                              state, wants_aovs ? &aovs : nullptr, active, context.guide});
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);

@@ -2,12 +2,13 @@
 /// The step `sample_light`: next event estimation, one light sample a vertex.
 ///
 /// A light, and a point of it in direction wi, chosen with density p_light over solid angle:
-///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bsdf + p_light)
+///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bounce + p_light)
 /// (balance heuristic, Veach 1997, 9.2; w = 1 for deltas, which no bounce finds). V is the shadow
 /// ray's to find.
 #pragma once
 
 #include "wavecomb/integrate/steps/bounce_sampling.h"
+#include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/light/light.h"
 
@@ -33,8 +34,8 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
                                   const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                                  const Sample4<F>& r, LightReceiver<F>& receiver,
-                                  VertexResult<F>& out) {
+                                  const Sample4<F>& r, const GuidePlace<F>& place,
+                                  LightReceiver<F>& receiver, VertexResult<F>& out) {
   using U = UInt<F>;
   const LightView& lights = v.scene.lights;
   const Mask<F> lit = v.active & at.bsdf.has_non_delta();
@@ -44,8 +45,9 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, lit);
   const Vec3<F> wi = frame.to_local(l.wi);
   const BsdfEval<F> e = at.bsdf.eval(seen, wi);
-  const F p_bsdf = bounce_pdf(v, at.bsdf, wo, seen, wi, e);
-  F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bsdf), F(1e-30f))));
+  const F p_bounce =
+      mixed_pdf<Bsdf, F>(v, place, l.wi, wi, wo, bounce_pdf(v, at.bsdf, wo, seen, wi, e));
+  F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
   U light(kNoLight);
   const bool sampled_only = v.has(kMeshLights) && lights.has_sampled_only;

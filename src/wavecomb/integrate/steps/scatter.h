@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The step `scatter`: the bounce, and the ray that goes on.
 ///
-///   T_{k+1} = T_k f(wo, wi) |cos theta_i| / p_bsdf(wi)
+///   T_{k+1} = T_k f(wo, wi) |cos theta_i| / p(wi)
+///
+/// with p the BSDF's density, or that of the mixture with a field (guide_bounce.h).
 #pragma once
 
 #include "wavecomb/integrate/steps/bounce_sampling.h"
+#include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
 
 namespace wavecomb {
@@ -12,10 +15,11 @@ namespace wavecomb {
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& at,
                              const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                             const Sample4<F>& r, const LightReceiver<F>& receiver,
-                             VertexResult<F>& out) {
+                             const Sample4<F>& r, const GuidePlace<F>& place,
+                             const LightReceiver<F>& receiver, VertexResult<F>& out) {
   const PathState<F>& path = v.path;
-  const BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, seen, r);
+  BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, seen, r);
+  guide_bounce<Bsdf, F>(v, at, frame, wo, seen, r, place, b, out);
   const Vec3<F> d = normalize(frame.to_world(b.wi));
   out.next.dir = d;
   out.next.throughput = at.throughput * b.weight;

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/learn/guide_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "wavecomb/core/morton.h"
+#include "wavecomb/learn/guide.h"
+#include "wavecomb/learn/guide_shares.h"
+#include "wavecomb/learn/guide_table.h"
+
+namespace wavecomb {
+namespace {
+
+/// A cell with more records is divided.
+constexpr size_t kCellRecords = 2048;
+/// Records with which a region has a distribution of its own.
+constexpr double kOwnRecords = 64;
+/// How many records the distribution of the cell above counts for, in directions and in shares.
+constexpr double kPrior = 64;
+/// Records of a material that restrict how much it is guided.
+constexpr double kMaterialRecords = 512;
+/// Share of the BSDF before there is anything to weigh it by.
+constexpr float kFirstShare = 0.5f;
+
+uint32_t code_of(const GuideGrid& grid, const float (&p)[3]) {
+  uint32_t step[3];
+  for (int i = 0; i < 3; ++i) step[i] = detail::guide_steps<float>(p[i], grid.lo[i], grid.scale[i]);
+  return morton_3(step[0], step[1], step[2]);
+}
+
+/// Every third bit of a Morton code, gathered.
+uint32_t compact_bits_3(uint32_t x) {
+  uint32_t out = 0;
+  for (uint32_t i = 0; i < kGuideBits; ++i) out |= (x >> (3 * i) & 1u) << i;
+  return out;
+}
+
+}  // namespace
+
+GuideGrid::GuideGrid(const float (&low)[3], const float (&high)[3]) {
+  for (int i = 0; i < 3; ++i) {
+    const double size = double{high[i]} - double{low[i]};
+    lo[i] = low[i];
+    scale[i] = size > 0 && std::isfinite(size) ? static_cast<float>((1u << kGuideBits) / size) : 0;
+  }
+}
+
+/// Divides space and makes the regions, from the whole down.
+class GuideFieldBuilder {
+ public:
+  GuideFieldBuilder(GuideField& field, std::span<const TrainingRecord> records, size_t materials,
+                    bool first, bool guides)
+      : field_(field), first_(first), guides_(guides) {
+    std::vector<std::pair<uint32_t, uint32_t>> order(records.size());
+    for (uint32_t i = 0; i < records.size(); ++i)
+      order[i] = {code_of(field.grid_, records[i].p), i};
+    std::sort(order.begin(), order.end());
+    records_.reserve(records.size());
+    codes_.reserve(records.size());
+    for (const auto& [code, i] : order) {
+      records_.push_back(records[i]);
+      codes_.push_back(code);
+    }
+    weigh_materials(materials);
+  }
+
+  void build(size_t cell_records) {
+    cell_records_ = cell_records;
+    field_.entries_.assign(kGuideTopCells, kGuideCell);
+    field_.cells_.clear();
+    field_.tables_.clear();
+    field_.bsdf_share_.clear();
+    field_.brought_.clear();
+    field_.counts_.clear();
+    field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
+    bring_ = off_ = on_ = 0;
+    guided_ = 0;
+    for (RegionPart& part : levels_[0]) part = {};
+    divide(0, 0, 0, records_.size());
+    GuideFacts& facts = field_.facts_;
+    facts.cells = static_cast<uint32_t>(field_.cells_.size() / kGuideAxes);
+    facts.regions = static_cast<uint32_t>(field_.bsdf_share_.size());
+    for (const float a : field_.bsdf_share_) facts.guided_regions += a < 1 ? 1 : 0;
+    if (bring_ > 0) facts.guided_share = guided_ / bring_;
+    if (off_ > 0) facts.moment_ratio = on_ / off_;
+  }
+
+ private:
+  /// What the records of a cell that face one way say.
+  struct RegionPart {
+    std::array<double, kGuideBins> density{};  ///< its sum is 1, or 0 where nothing is known
+    double count = 0;
+    ShareMoments moments;
+    uint32_t region = kNoGuideRegion;  ///< once it is made
+  };
+  using Cell = std::array<RegionPart, kGuideAxes>;
+
+  void weigh_materials(size_t materials) {
+    field_.material_share_.assign(std::max<size_t>(materials, 1), 0.f);
+    if (first_) return;
+    std::vector<ShareMoments> moments(field_.material_share_.size());
+    const double cut = largest(records_);
+    for (const TrainingRecord& r : records_)
+      if (r.material < moments.size()) moments[r.material].add(r, std::min(double{r.value}, cut));
+    for (size_t m = 0; m < moments.size(); ++m)
+      if (moments[m].count >= kMaterialRecords)
+        field_.material_share_[m] = kBsdfShares[moments[m].best()];
+  }
+
+  /// No value counts for more: of n, root n means, so that none outweighs all others.
+  static double largest(std::span<const TrainingRecord> records) {
+    double sum = 0;
+    for (const TrainingRecord& r : records) sum += double{r.value};
+    return records.empty() ? 0 : sum / std::sqrt(static_cast<double>(records.size()));
+  }
+
+  /// What records [begin, end) say, leaning on the cell above.
+  void read(uint32_t depth, size_t begin, size_t end) {
+    Cell& cell = levels_[depth];
+    const std::span here = std::span(records_).subspan(begin, end - begin);
+    for (RegionPart& part : cell) part = {};
+    const double cut = largest(here);
+    for (const TrainingRecord& r : here) {
+      RegionPart& part = cell[r.axis];
+      const double value = std::min(double{r.value}, cut);
+      part.density[r.bin] += value;
+      part.count += 1;
+      if (!first_) part.moments.add(r, value);
+    }
+    for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
+      RegionPart& part = cell[axis];
+      const RegionPart* above = depth > 0 ? &levels_[depth - 1][axis] : nullptr;
+      const double sum = std::accumulate(part.density.begin(), part.density.end(), 0.0);
+      const double prior = above && above->count > 0 ? kPrior : 0;
+      const double n = sum > 0 ? part.count : 0;
+      if (n + prior == 0) continue;
+      for (uint32_t b = 0; b < kGuideBins; ++b) {
+        const double own = n > 0 ? part.density[b] / sum * n : 0;
+        part.density[b] = (own + (prior > 0 ? prior * above->density[b] : 0)) / (n + prior);
+      }
+      if (prior > 0 && above->moments.count > 0)
+        part.moments.add(above->moments, kPrior / std::max(above->moments.count, kPrior));
+    }
+  }
+
+  /// The region of a part; of the cell above where too little is known. kNoGuideRegion: none.
+  uint32_t region_of(uint32_t depth, uint32_t axis) {
+    RegionPart& part = levels_[depth][axis];
+    if (part.count < kOwnRecords) return depth > 0 ? region_of(depth - 1, axis) : kNoGuideRegion;
+    if (part.region != kNoGuideRegion) return part.region;
+    part.region = static_cast<uint32_t>(field_.bsdf_share_.size());
+    const size_t at = field_.tables_.size();
+    field_.tables_.resize(at + kGuideWords);
+    write_guide_table(part.density, std::span(field_.tables_).subspan(at).first<kGuideWords>());
+    field_.brought_.push_back(0);
+    field_.counts_.push_back(0);
+    field_.bsdf_share_.push_back(!guides_ ? 1.f
+                                 : first_ ? kFirstShare
+                                          : kBsdfShares[part.moments.best()]);
+    return part.region;
+  }
+
+  /// Octree: the node of `depth` whose codes begin as `code` does; its records are [begin, end).
+  void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
+    read(depth, begin, end);
+    if (end - begin <= cell_records_ || depth == kGuideBits) {
+      add_cell(depth, code, begin, end);
+      return;
+    }
+    const uint32_t shift = 3 * (kGuideBits - depth - 1);
+    size_t from = begin;
+    for (uint32_t child = 0; child < 8; ++child) {
+      const uint32_t first = code | child << shift;
+      const uint64_t limit = uint64_t{first} + (uint64_t{1} << shift);
+      const auto to = static_cast<size_t>(
+          std::lower_bound(codes_.begin() + static_cast<std::ptrdiff_t>(from),
+                           codes_.begin() + static_cast<std::ptrdiff_t>(end), limit,
+                           [](uint32_t a, uint64_t b) { return a < b; }) -
+          codes_.begin());
+      divide(depth + 1, first, from, to);
+      from = to;
+    }
+  }
+
+  void add_cell(uint32_t depth, uint32_t code, size_t begin, size_t end) {
+    const auto cell = static_cast<uint32_t>(field_.cells_.size() / kGuideAxes);
+    for (uint32_t axis = 0; axis < kGuideAxes; ++axis)
+      field_.cells_.push_back(region_of(depth, axis));
+    fill(depth, code, kGuideCell | cell);
+    const uint32_t* regions = field_.cells_.data() + size_t{cell} * kGuideAxes;
+    for (size_t i = begin; i < end; ++i) {
+      const TrainingRecord& r = records_[i];
+      const uint32_t region = regions[r.axis];
+      float a = 1;
+      if (region != kNoGuideRegion)
+        a = std::max(field_.bsdf_share_[region], r.material < field_.material_share_.size()
+                                                     ? field_.material_share_[r.material]
+                                                     : 0.f);
+      const double brought = double{r.weight} * double{r.value};
+      if (region != kNoGuideRegion) {
+        field_.brought_[region] += double{r.value};
+        field_.counts_[region] += 1;
+      }
+      bring_ += brought;
+      guided_ += a < 1 ? brought * (1 - double{a}) : 0;
+      if (!(r.guide_pdf > 0)) continue;
+      const double moment = brought * brought * double{r.pdf};
+      off_ += moment / double{r.bsdf_pdf};
+      on_ += moment / (double{a} * double{r.bsdf_pdf} + (1 - double{a}) * double{r.guide_pdf});
+    }
+  }
+
+  /// Writes `entry` to all of the grid that the node covers.
+  void fill(uint32_t depth, uint32_t code, uint32_t entry) {
+    const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
+                   z = compact_bits_3(code >> 2);
+    std::vector<uint32_t>& entries = field_.entries_;
+    uint32_t bits = kGuideTopBits, first = 0, width = kGuideTopBits;
+    for (;;) {
+      const uint32_t shift = kGuideBits - bits, mask = (1u << width) - 1;
+      const uint32_t at[3] = {x >> shift & mask, y >> shift & mask, z >> shift & mask};
+      if (depth <= bits) {
+        const uint32_t size = 1u << (bits - depth);
+        for (uint32_t k = 0; k < size; ++k)
+          for (uint32_t j = 0; j < size; ++j)
+            for (uint32_t i = 0; i < size; ++i)
+              entries[first + (at[0] + i) + ((at[1] + j) << width) + ((at[2] + k) << (2 * width))] =
+                  entry;
+        return;
+      }
+      uint32_t& here = entries[first + at[0] + (at[1] << width) + (at[2] << (2 * width))];
+      if (here >= kGuideCell) {
+        here = static_cast<uint32_t>(entries.size());
+        first = here;
+        entries.resize(entries.size() + kGuideBrickCells, kGuideCell);
+      } else {
+        first = here;
+      }
+      bits += kGuideBrickBits;
+      width = kGuideBrickBits;
+    }
+  }
+
+  GuideField& field_;
+  bool first_, guides_;
+  std::vector<TrainingRecord> records_;  ///< in the order of their codes
+  std::vector<uint32_t> codes_;
+  size_t cell_records_ = kCellRecords;
+  std::array<Cell, kGuideBits + 1> levels_;  ///< from the whole down to where divide() is
+  double bring_ = 0, guided_ = 0, off_ = 0, on_ = 0;
+};
+
+GuideField::GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records,
+                       size_t materials, bool first, bool guides, size_t most_bytes)
+    : grid_(grid) {
+  const auto builder =
+      std::make_unique<GuideFieldBuilder>(*this, records, materials, first, guides);
+  for (size_t cell_records = kCellRecords;; cell_records *= 2) {
+    builder->build(cell_records);
+    if (bytes() <= most_bytes || cell_records >= records.size()) break;
+  }
+  count_dark({});
+}
+
+uint64_t dark_bounce(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
+  return uint64_t{code_of(grid, {p.x, p.y, p.z})} << 3 | axis;
+}
+
+void GuideField::count_dark(std::span<const uint64_t> dark) {
+  const GuideView v = view();
+  for (const uint64_t bounce : dark) {
+    if (!v.grid) break;
+    const auto code = static_cast<uint32_t>(bounce >> 3);
+    const uint32_t cell = detail::guide_cell<float>(
+        v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
+    const uint32_t region = cells_[size_t{cell} * kGuideAxes + (bounce & 7u)];
+    if (region != kNoGuideRegion) counts_[region] += 1;
+  }
+  mean_.resize(brought_.size());
+  for (size_t i = 0; i < mean_.size(); ++i)
+    mean_[i] = static_cast<float>(brought_[i] / std::max(counts_[i], 1.0));
+}
+
+GuideView GuideField::view() const {
+  GuideView view;
+  for (int i = 0; i < 3; ++i) {
+    view.lo[i] = grid_.lo[i];
+    view.scale[i] = grid_.scale[i];
+  }
+  if (bsdf_share_.empty()) return view;
+  view.grid = entries_.data();
+  view.cells = cells_.data();
+  view.tables = tables_.data();
+  view.bsdf_share = bsdf_share_.data();
+  view.mean = mean_.data();
+  view.material_share = material_share_.data();
+  return view;
+}
+
+size_t GuideField::bytes() const {
+  return (entries_.size() + cells_.size() + tables_.size()) * sizeof(uint32_t) +
+         (bsdf_share_.size() + material_share_.size() + mean_.size()) * sizeof(float);
+}
+
+}  // namespace wavecomb

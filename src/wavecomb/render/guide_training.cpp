@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/guide_training.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "wavecomb/core/clock.h"
+#include "wavecomb/learn/guide.h"
+#include "wavecomb/render/lane_kernels.h"
+#include "wavecomb/render/pass_runner.h"
+#include "wavecomb/render/picture_tiles.h"
+#include "wavecomb/render/pixel_order.h"
+
+namespace wavecomb {
+namespace {
+
+/// Share of a render's samples that training may take, and its most and least paths.
+constexpr uint64_t kShare = 8, kMostPaths = 700'000, kLeastPaths = 16'384;
+constexpr uint32_t kRounds = 3;
+/// Vertices of a path that teach.
+constexpr uint32_t kVertices = 6;
+/// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
+/// training has few of, make pictures better than its paths tell.
+constexpr double kWorthwhile = 1.2;
+/// Of the cost of a vertex, in rays: shading it, and looking up the field there.
+constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
+
+/// Gathers what the bounces of a round teach, each path's in its own place.
+class BounceReader final : public HistoryReader {
+ public:
+  /// Paths of `pixels`, `samples` each from sample `first` on. `scale`: of the picture at a pixel.
+  BounceReader(std::span<const uint32_t> pixels, uint32_t first, uint32_t samples,
+               uint32_t most_depth, const GuideGrid& grid, const GuideView& guide,
+               const PictureTiles* tiles)
+      : pixels_(pixels),
+        first_(first),
+        samples_(samples),
+        most_depth_(most_depth),
+        grid_(grid),
+        guide_(guide),
+        tiles_(tiles) {
+    const size_t paths = pixels.size() * samples;
+    records_.resize(paths * kVertices);
+    dark_.resize(paths * kVertices);
+    counts_.assign(paths, 0);
+    dark_counts_.assign(paths, 0);
+    luminance_.assign(paths, 0.f);
+  }
+
+  uint32_t most() const override { return kVertices; }
+
+  void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override {
+    for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
+      const auto pixel = static_cast<size_t>(task.pixels - pixels_.data()) + slot / task.samples;
+      const size_t path = pixel * samples_ + (task.first_sample - first_) + slot % task.samples;
+      const Color<float> end = load_row<RadianceRow, float>(radiance, slot, true).sum;
+      luminance_[path] = luminance(end);
+      const float inverse_scale = tiles_ && tiles_->is_lit()
+                                      ? static_cast<float>(tiles_->inverse_scale(pixels_[pixel]))
+                                      : 1.f;
+      Color<float> throughput(1.f);
+      for (uint32_t j = 0; j < history.count(slot); ++j) {
+        const HistoryRow<float> v = history.vertex(slot, j);
+        const float arrived = luminance(throughput);
+        const float brought = luminance(end - v.radiance);
+        throughput = v.throughput;
+        const float value = brought / arrived;
+        if (j == most_depth_) break;  // which makes no bounce
+        const bool is_dead = is_black(v.throughput);
+        if (is_dead || (v.pdf > 0 && !(value > 0)))
+          dark_[path * kVertices + dark_counts_[path]++] = dark_bounce(grid_, v.p, v.axis);
+        else if (v.pdf > 0 && std::isfinite(value))
+          add(path, v, value, arrived * inverse_scale);
+      }
+    }
+  }
+
+  /// Appends the records, path by path.
+  void append_to(std::vector<TrainingRecord>& all, std::vector<uint64_t>& dark) const {
+    for (size_t path = 0; path < counts_.size(); ++path) {
+      const auto from = records_.begin() + static_cast<std::ptrdiff_t>(path * kVertices);
+      all.insert(all.end(), from, from + counts_[path]);
+      const auto first_dark = dark_.begin() + static_cast<std::ptrdiff_t>(path * kVertices);
+      dark.insert(dark.end(), first_dark, first_dark + dark_counts_[path]);
+    }
+  }
+  std::span<const float> luminances() const { return luminance_; }
+
+ private:
+  void add(size_t path, const HistoryRow<float>& v, float value, float weight) {
+    TrainingRecord& r = records_[path * kVertices + counts_[path]++];
+    const Vec2<float> at = octahedral_point<float>(v.wi);
+    const auto bin = [](float x) {
+      return std::min(static_cast<uint32_t>(x * kGuideSide), kGuideSide - 1);
+    };
+    r = {{v.p.x, v.p.y, v.p.z},
+         v.material,
+         static_cast<uint8_t>(v.axis),
+         static_cast<uint8_t>(bin(at.y) * kGuideSide + bin(at.x)),
+         value,
+         v.pdf,
+         v.bsdf_pdf,
+         0.f,
+         weight};
+    const GuidePlace<float> place = find_guide<float>(guide_, v.p, v.axis, v.material, true);
+    if (place.region != kNoGuideRegion) r.guide_pdf = guide_pdf<float>(guide_, place, v.wi, true);
+  }
+
+  std::span<const uint32_t> pixels_;
+  uint32_t first_, samples_, most_depth_;
+  const GuideGrid& grid_;
+  const GuideView& guide_;
+  const PictureTiles* tiles_;
+  std::vector<TrainingRecord> records_;  ///< kVertices of each path
+  std::vector<uint64_t> dark_;
+  std::vector<uint8_t> counts_, dark_counts_;
+  std::vector<float> luminance_;
+};
+
+/// `count` of the picture's pixels, evenly spread, in an order that keeps neighbours together.
+std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t count) {
+  if (count >= order.size()) return order;
+  std::vector<uint32_t> pixels(count);
+  for (uint64_t i = 0; i < count; ++i) pixels[i] = order[i * order.size() / count];
+  return pixels;
+}
+
+/// What the paths of a round are worth: 1 / (variance x cost), with costs in rays. Luminances are
+/// those of `samples` paths of each pixel.
+double efficiency(const PictureTiles& tiles, std::span<const uint32_t> pixels, uint32_t samples,
+                  std::span<const float> luminances, double cost) {
+  // A firefly is no measure of the others.
+  constexpr double kMost = 50;
+  std::vector<double> sums(tiles.count()), counts(tiles.count());
+  double square = 0;
+  for (size_t i = 0; i < luminances.size(); ++i) {
+    const uint32_t pixel = pixels[i / samples];
+    const double y = std::min(double{luminances[i]} * tiles.inverse_scale(pixel), kMost);
+    if (!(y > 0)) {
+      counts[tiles.of(pixel)] += 1;
+      continue;
+    }
+    square += y * y;
+    sums[tiles.of(pixel)] += y;
+    counts[tiles.of(pixel)] += 1;
+  }
+  double mean_square = 0;
+  for (size_t t = 0; t < sums.size(); ++t)
+    if (counts[t] > 0) mean_square += sums[t] * sums[t] / counts[t];
+  const double variance = square - mean_square;
+  return variance > 0 && cost > 0 ? 1 / (variance * cost) * static_cast<double>(luminances.size()) *
+                                        static_cast<double>(luminances.size())
+                                  : 0;
+}
+
+/// Cost of a round, in rays.
+double cost_of(const Integrator& integrator, uint32_t threads, bool looks_up) {
+  double cost = 0;
+  for (uint32_t i = 0; i < threads; ++i)
+    if (const Counts* c = integrator.worker(i).counts)
+      cost += static_cast<double>(c->rays + c->shadow_rays) +
+              (kShadingRays + (looks_up ? kGuidedRays : 0)) * static_cast<double>(c->records);
+  return cost;
+}
+
+}  // namespace
+
+GuideView view_of(const GuideTraining& training) {
+  GuideView view = training.field->view();
+  if (training.tiles) training.tiles->apply(view);
+  return view;
+}
+
+GuideTraining train_guide(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
+                          const std::function<bool()>& stopped) {
+  const Clock::time_point start = Clock::now();
+  GuideTraining out;
+  Settings settings = *render.settings;
+  const uint64_t pixel_count = uint64_t{settings.width} * settings.height;
+  const uint64_t budget = std::min(pixel_count * settings.spp / kShare, kMostPaths);
+  const bool learns =
+      settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
+  if (!learns || settings.max_depth == 0 || budget < kLeastPaths) return out;
+  settings.region.reset();
+  settings.crop = false;
+  settings.aovs = {};
+  settings.seed = 0x2545f491u;
+
+  const AovTables aovs(scene, settings);
+  Film film(1, 1, aovs.layout);
+  WaveContext context = render;
+  context.settings = &settings;
+  context.film = &film;
+  context.aovs = nullptr;
+  context.recorder = nullptr;
+  context.discards = true;
+  const Bounds& b = scene.bounds();
+  const GuideGrid grid({b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z});
+  auto field = std::make_unique<const GuideField>(grid);
+  const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
+  std::optional<PictureTiles> tiles;
+  std::vector<TrainingRecord> records;
+  std::vector<uint64_t> dark;
+  uint32_t first_sample = 0;
+  double alone = 0;  ///< efficiency without a field
+  for (uint32_t round = 0; round < kRounds; ++round) {
+    const uint64_t wanted = (budget << round) / ((1u << kRounds) - 1);
+    const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order.size()));
+    PassPlan plan;
+    plan.pixels = some_pixels(order, wanted);
+    plan.batches.push_back({0, plan.pixels.size(), first_sample, samples});
+    GuideView view = field->view();
+    if (tiles) tiles->apply(view);
+    BounceReader reader(plan.pixels, first_sample, samples, settings.max_depth, grid, view,
+                        tiles ? &*tiles : nullptr);
+    context.guide = &view;
+    context.histories = &reader;
+    const std::unique_ptr<Integrator> integrator =
+        make_integrator(settings.integrator, context, means.lanes, means.threads, means.wave_size);
+    PassRunner(*integrator, means.threads, means.wave_size).run(plan, stopped);
+    if (stopped()) return {};
+    first_sample += samples;
+    out.statistics.paths += plan.samples();
+    ++out.statistics.rounds;
+    if (!tiles) {
+      std::vector<uint32_t> pixels;
+      for (const uint32_t pixel : plan.pixels) pixels.insert(pixels.end(), samples, pixel);
+      tiles.emplace(settings, pixels, reader.luminances());
+    }
+    if (tiles->is_lit()) {
+      const double worth = efficiency(*tiles, plan.pixels, samples, reader.luminances(),
+                                      cost_of(*integrator, means.threads, round > 0));
+      if (round == 0)
+        alone = worth;
+      else if (alone > 0)
+        out.statistics.gain = worth / alone;
+    }
+    reader.append_to(records, dark);
+    auto next = std::make_unique<GuideField>(grid, records, scene.materials().size(), round == 0,
+                                             settings.guiding != Guiding::kOff,
+                                             size_t{settings.learn_memory_mb} << 20);
+    next->count_dark(dark);
+    field = std::move(next);
+  }
+  out.statistics.facts = field->facts();
+  out.statistics.field_bytes = field->bytes();
+  const bool pays = settings.guiding != Guiding::kAuto || out.statistics.gain >= kWorthwhile;
+  if (field->facts().regions > 0 && pays) {
+    out.field = std::move(field);
+    out.tiles = std::move(tiles);
+    out.statistics.used = true;
+  }
+  out.statistics.seconds = seconds_since(start);
+  return out;
+}
+
+}  // namespace wavecomb

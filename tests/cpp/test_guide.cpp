@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The field that guides bounces: its map of directions, tables, cells, and how it is looked up.
+#include "wavecomb/learn/guide.h"
+
+#include "bsdf_testing.h"
+#include "lane_testing.h"
+#include "wavecomb/learn/guide_field.h"
+#include "wavecomb/learn/guide_shares.h"
+#include "wavecomb/learn/guide_table.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace lane_testing;
+using bsdf_testing::kPiD;
+using chi_square::Draw;
+using chi_square::Place;
+using chi_square::Random;
+
+const GuideGrid kUnitGrid({0.f, 0.f, 0.f}, {1.f, 1.f, 1.f});
+
+/// A bounce at (x, y, z) of a surface that faces `axis`, along w.
+TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>& w,
+                      float value = 1) {
+  const Vec2<float> at = octahedral_point<float>(w);
+  const auto bin = [](float u) { return std::min(static_cast<uint32_t>(u * 16), 15u); };
+  return {{x, y, z}, 0,   axis, static_cast<uint8_t>(bin(at.y) * 16 + bin(at.x)), value, 1.f,
+          1.f,       0.f, 1.f};
+}
+
+/// Bounces all over the unit cube: those that face axis k go near the direction of axis k, more so
+/// on the right half.
+std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
+  Random random(seed);
+  std::vector<TrainingRecord> records;
+  for (uint32_t i = 0; i < count; ++i) {
+    const auto axis = static_cast<uint8_t>(random.bits() % kGuideAxes);
+    float w[3] = {random() - 0.5f, random() - 0.5f, random() - 0.5f};
+    const float x = random();
+    w[axis / 2] += (axis % 2 == 0 ? 1.f : -1.f) * (x < 0.5f ? 0.6f : 3.f);
+    records.push_back(bounce(x, random(), random(), axis, normalize(Vec3<float>{w[0], w[1], w[2]}),
+                             0.5f + random()));
+  }
+  return records;
+}
+
+TEST(Guide, OctahedralMapKeepsAreas) {
+  chi_square::Battery battery("octahedral map");
+  chi_square::Case c{
+      "sphere", bsdf_testing::direction_charts(), [](const Place&) { return 1 / (4 * kPiD); }, {}};
+  c.draw = [](Random& random, bool) {
+    const float u = random(), v = random();
+    return Draw::at(bsdf_testing::place_of(octahedral_direction(u, v)));
+  };
+  battery.run(c);
+  battery.judge();
+  Random random(3);
+  for (int i = 0; i < 20000; ++i) {
+    const float u = random(), v = random();
+    const Vec3<float> w = octahedral_direction(u, v);
+    ASSERT_NEAR(length(w), 1, 1e-5);
+    const Vec2<float> back = octahedral_point(w);
+    ASSERT_NEAR(back.x, u, 2e-3) << v;
+    ASSERT_NEAR(back.y, v, 2e-3) << u;
+  }
+  // Corners, where the map folds.
+  for (const float u : {0.f, 0.5f, kOneMinusEpsilon})
+    for (const float v : {0.f, 0.5f, kOneMinusEpsilon})
+      EXPECT_NEAR(length(octahedral_direction(u, v)), 1, 1e-5);
+}
+
+TEST(Guide, TablesHoldWhatTheyAreGiven) {
+  Random random(5);
+  for (int round = 0; round < 20; ++round) {
+    std::array<double, kGuideBins> weights{};
+    double sum = 0;
+    for (double& w : weights) {
+      w = round % 4 == 0 || random() < 0.3f ? 0 : std::pow(double{random()}, round);
+      sum += w;
+    }
+    std::array<uint32_t, kGuideWords> table;
+    write_guide_table(weights, table);
+    uint64_t all = 0;
+    for (uint32_t row = 0; row < kGuideSide; ++row) {
+      uint32_t start = 0;
+      for (uint32_t column = 0; column < kGuideSide; ++column) {
+        const uint32_t word = table[kGuideSide + row * kGuideSide + column];
+        EXPECT_EQ(word & 0xffffu, start);
+        EXPECT_GE(word >> 16, 1u);
+        start += word >> 16;
+        const double p = double(table[row] >> 16) * double(word >> 16) * 0x1p-32;
+        all += uint64_t{table[row] >> 16} * (word >> 16);
+        if (sum > 0) EXPECT_NEAR(p, weights[row * kGuideSide + column] / sum, 1e-3) << round;
+      }
+      EXPECT_EQ(start, 1u << 16);
+    }
+    EXPECT_EQ(all, uint64_t{1} << 32);
+  }
+}
+
+TEST(Guide, SamplesFollowTheirDensity) {
+  const auto records = many_bounces(60000, 1);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const GuideView view = field.view();
+  chi_square::Battery battery("guide");
+  for (const float x : {0.2f, 0.9f})
+    for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
+      const auto place = find_guide<float>(view, {x, 0.3f, 0.6f}, axis, 0, true);
+      ASSERT_TRUE(place.guided);
+      // Over the square of the map, where the density is constant in each bin.
+      chi_square::Case c{"axis " + std::to_string(axis),
+                         {{0, 1, 0, 1, kGuideSide, kGuideSide}},
+                         [=](const Place& p) {
+                           const Vec3<float> w = octahedral_direction(static_cast<float>(p.x),
+                                                                      static_cast<float>(p.y));
+                           return 4 * kPiD * double{guide_pdf<float>(view, place, w, true)};
+                         },
+                         {}};
+      c.is_smooth = false;
+      c.draw = [=](Random& random, bool) {
+        const float u = random(), v = random();
+        const Vec2<float> at = octahedral_point(sample_guide<float>(view, place, u, v, true));
+        return Draw::at({0, at.x, at.y});
+      };
+      battery.run(c);
+    }
+  battery.judge();
+}
+
+/// Where light comes from is found again: cells on the right know narrower lobes.
+TEST(Guide, CellsKnowTheirOwnLight) {
+  const auto records = many_bounces(200000, 2);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  EXPECT_EQ(field.facts().records, records.size());
+  EXPECT_GT(field.facts().cells, 64u);
+  EXPECT_GT(field.facts().guided_regions, 300u);
+  const auto pdf = [&](float x, uint32_t axis, const Vec3<float>& w) {
+    const auto place = find_guide<float>(field.view(), {x, 0.4f, 0.7f}, axis, 0, true);
+    return guide_pdf<float>(field.view(), place, w, true);
+  };
+  const Vec3<float> right = normalize(Vec3<float>{1.f, 0.1f, 0.1f}), left = -right;
+  EXPECT_GT(pdf(0.9f, 0, right), 2 * pdf(0.1f, 0, right));
+  EXPECT_GT(pdf(0.1f, 0, right), 10 * pdf(0.1f, 0, left));
+  EXPECT_GT(pdf(0.1f, 1, left), 10 * pdf(0.1f, 1, right));
+}
+
+TEST(Guide, FewBouncesLeanOnWhatIsAround) {
+  std::vector<TrainingRecord> records = many_bounces(20000, 3);
+  // A corner in which hardly anything was seen.
+  std::erase_if(records, [](const TrainingRecord& r) {
+    return r.p[0] < 0.25f && r.p[1] < 0.25f && r.p[2] < 0.25f;
+  });
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const auto place = find_guide<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
+  EXPECT_TRUE(place.guided);
+  // Outside of the bounds, and where nothing is a number.
+  for (const float x : {-5.f, 9.f, kNan, kInf})
+    find_guide<float>(field.view(), {x, x, x}, 3, 0, true);
+  const GuideField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);
+  EXPECT_EQ(empty.view().grid, nullptr);
+  EXPECT_FALSE(find_guide<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
+}
+
+/// What bounces bring in the mean counts those that bring nothing, too.
+TEST(Guide, MeansCountDarkBounces) {
+  std::vector<TrainingRecord> records;
+  for (int i = 0; i < 1000; ++i) records.push_back(bounce(0.5f, 0.5f, 0.5f, 2, {0.f, 1.f, 0.f}, 4));
+  GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const auto mean = [&] {
+    return find_guide<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true).mean;
+  };
+  EXPECT_FLOAT_EQ(mean(), 4.f);
+  const std::vector<uint64_t> dark(3000, dark_bounce(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2));
+  field.count_dark(dark);
+  EXPECT_FLOAT_EQ(mean(), 1.f);
+  // Of surfaces that face another way nothing is known.
+  field.count_dark(std::vector<uint64_t>(10, dark_bounce(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3)));
+  EXPECT_FLOAT_EQ(mean(), 1.f);
+}
+
+TEST(Guide, MemoryIsBounded) {
+  const auto records = many_bounces(100000, 4);
+  const GuideField large(kUnitGrid, records, 1, true, true, size_t{64} << 20),
+      small(kUnitGrid, records, 1, true, true, 200 << 10);
+  EXPECT_LE(small.bytes(), size_t{200} << 10);
+  EXPECT_GT(large.bytes(), 2 * small.bytes());
+  EXPECT_GT(small.facts().guided_regions, 5u);
+}
+
+/// The share whose second moment is least.
+TEST(Guide, SharesFollowMoments) {
+  ShareMoments bad, good, none;
+  Random random(8);
+  for (int i = 0; i < 4000; ++i) {
+    TrainingRecord r{};
+    r.pdf = r.bsdf_pdf = 0.3f;
+    r.guide_pdf = 3.f * random() + 2.f;
+    good.add(r, 1);  // where the light is, the field samples ten times as often
+    r.guide_pdf = 0.01f;
+    bad.add(r, 1);
+    r.guide_pdf = 0;
+    none.add(r, 1);
+  }
+  EXPECT_EQ(kBsdfShares[good.best()], kBsdfShares[0]);
+  EXPECT_EQ(kBsdfShares[bad.best()], 1.f);
+  EXPECT_EQ(none.count, 0);
+  EXPECT_EQ(kBsdfShares[none.best()], 1.f);
+  // Where the field is bad nothing is guided.
+  std::vector<TrainingRecord> records = many_bounces(50000, 9);
+  for (TrainingRecord& r : records) r.guide_pdf = 1e-3f;
+  const GuideField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
+  EXPECT_EQ(field.facts().guided_regions, 0u);
+  EXPECT_EQ(field.facts().moment_ratio, 1);
+  for (TrainingRecord& r : records) r.guide_pdf = 10.f;
+  const GuideField better(kUnitGrid, records, 1, false, true, size_t{64} << 20);
+  // Unless that is not wanted: then the field only says what bounces bring.
+  const GuideField told(kUnitGrid, records, 1, false, false, size_t{64} << 20);
+  EXPECT_EQ(told.facts().guided_regions, 0u);
+  EXPECT_EQ(told.facts().regions, better.facts().regions);
+  EXPECT_EQ(better.facts().guided_regions, better.facts().regions);
+  EXPECT_LT(better.facts().moment_ratio, 0.2);
+  EXPECT_NEAR(better.facts().guided_share, 0.75, 1e-6);
+}
+
+TEST(Guide, FacesTheirLargestComponent) {
+  EXPECT_EQ(guide_axis<float>({0.9f, 0.1f, -0.2f}), 0u);
+  EXPECT_EQ(guide_axis<float>({-0.9f, 0.1f, -0.2f}), 1u);
+  EXPECT_EQ(guide_axis<float>({0.1f, 0.8f, -0.2f}), 2u);
+  EXPECT_EQ(guide_axis<float>({0.1f, -0.8f, -0.2f}), 3u);
+  EXPECT_EQ(guide_axis<float>({0.1f, 0.2f, 0.3f}), 4u);
+  EXPECT_EQ(guide_axis<float>({0.1f, 0.2f, -0.3f}), 5u);
+}
+
+TEST(Guide, Lanes) {
+  const auto records = many_bounces(60000, 6);
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const GuideView view = field.view();
+  const auto u = padded({0.f, 0.5f, kOneMinusEpsilon, 0x1p-24f}, 2000, 0.f, kOneMinusEpsilon, 1);
+  const auto v = padded({0.5f, 0.f, kOneMinusEpsilon, 0.25f}, 2000, 0.f, kOneMinusEpsilon, 2);
+  const auto each = [&](auto component, const char* what) {
+    expect_lanes_agree(
+        u, v,
+        [&]<typename F>(const F& a, const F& b) {
+          const Vec3<F> p{a, b, F(a * b)};
+          const Vec3<F> w = octahedral_direction<F>(b, a);
+          const GuidePlace<F> place =
+              find_guide<F>(view, p, guide_axis<F>(w), UInt<F>(0u), Mask<F>(true));
+          return component.template operator()<F>(place, w, a, b);
+        },
+        what);
+  };
+  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F&,
+                       const F&) { return F(Int<F>(place.region)); },
+       "region");
+  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>& w, const F&,
+                       const F&) { return guide_pdf<F>(view, place, w, place.guided); },
+       "pdf");
+  each(
+      [&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F& a, const F& b) {
+        const Vec3<F> w = sample_guide<F>(view, place, a, b, place.guided);
+        return F(w.x + 2.f * w.y + 4.f * w.z);
+      },
+      "sample");
+}
+
+}  // namespace
+}  // namespace wavecomb

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bounces that are guided by a learned field: one picture, no bias, parts, what is said of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import wavecomb
+from wavecomb.cli import main
+from wavecomb.picture.image import read_image
+from wavecomb.scenes import write_scene
+
+_core = pytest.importorskip("wavecomb._core")
+
+SIZE = 64
+SPP = 32
+"""The fewest samples of which an eighth teaches a field."""
+WAYS: list[dict[str, Any]] = [
+    {"guiding": "on"},
+    {"guiding": "on", "roulette": "efficient"},
+    {"guiding": "off", "roulette": "efficient"},
+]
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The Cornell box as a file."""
+    path = tmp_path_factory.mktemp("guiding") / "cornell.usda"
+    write_scene("cornell", path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cornell(stage: Path) -> Any:
+    return wavecomb.load(stage).scene
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Many programs, textures, glass, a dome and a sun."""
+    path = tmp_path_factory.mktemp("guiding") / "mixed.usdc"
+    write_scene("mixed", path, triangles=20000)
+    return wavecomb.load(path).scene
+
+
+def render(scene: Any, **settings: Any) -> wavecomb.Picture:
+    return wavecomb.render(scene, **{"size": (SIZE, SIZE), "spp": SPP, **settings})
+
+
+@pytest.mark.parametrize("way", WAYS, ids=str)
+@pytest.mark.parametrize("name", ["cornell", "mixed"])
+def test_one_picture_whatever_the_schedule(
+    request: pytest.FixtureRequest, name: str, way: dict[str, Any]
+) -> None:
+    scene = request.getfixturevalue(name)
+    plain = render(scene, **way)
+    learned = plain.stats["guiding"]
+    assert learned["paths"] >= 12000
+    assert learned["regions"] > 0
+    # So few paths do not show on Mixed that guiding pays.
+    if name == "cornell":
+        assert (learned["guided_share"] > 0) == (way["guiding"] == "on")
+        assert not np.array_equal(plain.beauty, render(scene).beauty)
+    others: list[dict[str, Any]] = [
+        {"lanes": 1, "threads": 1},
+        {"wave_size": 64, "threads": 2},
+        {"policy": "random-runs", "wave_size": 1000},
+        {"policy": "material", "costs": "model", "ray_order": "morton", "materialize": "on"},
+        {"integrator": "reference"},
+        {"traversal": "single", "progressive": True},
+        {"aovs": ("all",)},
+    ]
+    for other in others:
+        same = render(scene, **way, **other)
+        assert np.array_equal(plain.beauty, same.beauty), other
+        for fact in ("bounces", "cells", "regions", "guided_regions", "guided_share"):
+            assert same.stats["guiding"][fact] == learned[fact], (other, fact)
+
+
+@pytest.mark.parametrize("way", WAYS, ids=str)
+def test_parts_are_those_of_the_whole(cornell: Any, way: dict[str, Any]) -> None:
+    whole = render(cornell, **way)
+    x0, y0, x1, y1 = box = (10, 20, 43, 50)
+    part = render(cornell, region=box, **way)
+    assert np.array_equal(part.beauty[y0:y1, x0:x1], whole.beauty[y0:y1, x0:x1])
+    crop = render(cornell, region=box, crop=True, **way)
+    assert np.array_equal(crop.beauty, whole.beauty[y0:y1, x0:x1])
+    # Other samples are guided by the same field.
+    other = render(cornell, seed=5, **way).stats["guiding"]
+    assert other["guided_share"] == whole.stats["guiding"]["guided_share"]
+
+
+def test_a_resumed_picture_is_that_which_nothing_stopped(stage: Path, tmp_path: Path) -> None:
+    def run(name: str, *arguments: str) -> Any:
+        out = tmp_path / name
+        options = ["--size", str(SIZE), str(SIZE), "--guiding", "on", "--roulette", "efficient"]
+        result = CliRunner().invoke(
+            main, ["render", str(stage), "-o", str(out), *options, *arguments]
+        )
+        assert result.exit_code == 0, result.output
+        return read_image(out)
+
+    whole = run("whole.exr", "--spp", "64")
+    state = str(tmp_path / "state.wcc")
+    run("half.exr", "--spp", "64", "--checkpoint", state)
+    assert np.array_equal(whole, run("again.exr", "--spp", "64", "--resume", state))
+
+
+@pytest.mark.parametrize("name", ["cornell", "mixed"])
+def test_is_unbiased(request: pytest.FixtureRequest, name: str) -> None:
+    """Means of pictures of many seeds meet those without, all over and by tiles of the picture."""
+    scene = request.getfixturevalue(name)
+    seeds = 12
+
+    def tiles(way: dict[str, Any], first: int) -> Any:
+        pictures = [
+            render(scene, seed=seed, filter="box", clamp_indirect=0.0, **way).beauty
+            for seed in range(first, first + seeds)
+        ]
+        return np.array(pictures).reshape(seeds, 4, SIZE // 4, 4, SIZE // 4, 3).mean((2, 4, 5))
+
+    plain = tiles({}, 100)
+    for number, way in enumerate(WAYS):
+        guided = tiles(way, 1000 * (number + 1))
+        variance = (plain.var(0, ddof=1) + guided.var(0, ddof=1)) / seeds
+        z = (guided.mean(0) - plain.mean(0)) / np.sqrt(np.maximum(variance, 1e-12))
+        # Student's t of some 20 degrees of freedom, 16 tiles, three ways and two stages: 1 %.
+        assert np.abs(z).max() < 5.2, (way, z)
+
+
+def test_short_renders_learn_nothing(cornell: Any) -> None:
+    short = render(cornell, spp=16, guiding="on", roulette="efficient")
+    assert short.stats["guiding"] is None
+    assert np.array_equal(short.beauty, render(cornell, spp=16).beauty)
+
+
+def test_memory_is_bounded(cornell: Any) -> None:
+    small = render(cornell, spp=256, guiding="on", learn_memory=1).stats["guiding"]
+    assert 0 < small["field_bytes"] <= 1 << 20
+
+
+def test_a_stage_without_light_is_rendered() -> None:
+    builder = wavecomb.SceneBuilder()
+    quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    points = np.array([[-1, -1, -3], [1, -1, -3], [1, 1, -3], [-1, 1, -3]], np.float32)
+    material = builder.add_material("diffuse", name="Wall")
+    builder.add_to_group(0, builder.add_mesh(points, quad, material=material))
+    builder.set_camera(np.eye(4), window=(-1.0, 1.0, -1.0, 1.0))
+    dark = render(builder.build(), guiding="on", roulette="efficient")
+    assert not dark.beauty.any()
+    assert dark.stats["guiding"]["regions"] == 0
+
+
+def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        main,
+        ["render", str(stage), "-o", str(tmp_path / "a.exr"), "--size", str(SIZE), str(SIZE),
+         "--spp", str(SPP), "--guiding", "on"],
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "learned from" in result.output
+    assert "of bounced light is guided" in " ".join(result.output.split())
+
+
+def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
+    """Under an even dome every direction brings as much as the material thinks."""
+    builder = wavecomb.SceneBuilder()
+    quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)
+    material = builder.add_material("diffuse", name="Floor", base_color=(0.5, 0.5, 0.5))
+    builder.add_to_group(0, builder.add_mesh(points, quad, material=material))
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1), name="Sky")
+    builder.set_camera(np.eye(4), window=(-1.0, 1.0, -1.0, 1.0))
+    scene = builder.build()
+    automatic = render(scene, guiding="auto")
+    assert not automatic.stats["guiding"]["used"]
+    assert np.array_equal(automatic.beauty, render(scene).beauty)
