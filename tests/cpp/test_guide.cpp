@@ -90,7 +90,9 @@ TEST(Guide, TablesHoldWhatTheyAreGiven) {
         start += word >> 16;
         const double p = double(table[row] >> 16) * double(word >> 16) * 0x1p-32;
         all += uint64_t{table[row] >> 16} * (word >> 16);
-        if (sum > 0) EXPECT_NEAR(p, weights[row * kGuideSide + column] / sum, 1e-3) << round;
+        if (sum > 0) {
+          EXPECT_NEAR(p, weights[row * kGuideSide + column] / sum, 1e-3) << round;
+        }
       }
       EXPECT_EQ(start, 1u << 16);
     }

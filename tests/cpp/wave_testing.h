@@ -51,6 +51,7 @@ class WaveRun {
     context_.scene.materials.energy = energy_tables(scene_->materials());
     context_.scene.lights.by_tree =
         chooses_by_tree(case_.settings.light_selection, context_.scene.lights);
+    if (context_.scene.lights.by_tree) context_.scene.lights.tree = scene_->light_tree(1).view();
     context_.accel = accel_.get();
     context_.settings = &case_.settings;
     context_.camera = &camera_;
