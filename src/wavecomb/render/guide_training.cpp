@@ -16,13 +16,13 @@ namespace wavecomb {
 namespace {
 
 /// Share of a render's samples that training may take, and its most and least paths.
-constexpr uint64_t kShare = 8, kMostPaths = 700'000, kLeastPaths = 16'384;
-constexpr uint32_t kRounds = 3;
+constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrainingPaths = 16'384;
+constexpr uint32_t kTrainingRounds = 3;
 /// Vertices of a path that teach.
-constexpr uint32_t kVertices = 6;
+constexpr uint32_t kTaughtVertices = 6;
 /// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
 /// training has few of, make pictures better than its paths tell.
-constexpr double kWorthwhile = 1.2;
+constexpr double kWorthwhileGain = 1.2;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there.
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
 
@@ -41,14 +41,14 @@ class BounceReader final : public HistoryReader {
         guide_(guide),
         tiles_(tiles) {
     const size_t paths = pixels.size() * samples;
-    records_.resize(paths * kVertices);
-    dark_.resize(paths * kVertices);
+    records_.resize(paths * kTaughtVertices);
+    dark_.resize(paths * kTaughtVertices);
     counts_.assign(paths, 0);
     dark_counts_.assign(paths, 0);
     luminance_.assign(paths, 0.f);
   }
 
-  uint32_t most() const override { return kVertices; }
+  uint32_t most() const override { return kTaughtVertices; }
 
   void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override {
     for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
@@ -69,7 +69,7 @@ class BounceReader final : public HistoryReader {
         if (j == most_depth_) break;  // which makes no bounce
         const bool is_dead = is_black(v.throughput);
         if (is_dead || (v.pdf > 0 && !(value > 0)))
-          dark_[path * kVertices + dark_counts_[path]++] = dark_bounce(grid_, v.p, v.axis);
+          dark_[path * kTaughtVertices + dark_counts_[path]++] = dark_bounce(grid_, v.p, v.axis);
         else if (v.pdf > 0 && std::isfinite(value))
           add(path, v, value, arrived * inverse_scale);
       }
@@ -79,9 +79,9 @@ class BounceReader final : public HistoryReader {
   /// Appends the records, path by path.
   void append_to(std::vector<TrainingRecord>& all, std::vector<uint64_t>& dark) const {
     for (size_t path = 0; path < counts_.size(); ++path) {
-      const auto from = records_.begin() + static_cast<std::ptrdiff_t>(path * kVertices);
+      const auto from = records_.begin() + static_cast<std::ptrdiff_t>(path * kTaughtVertices);
       all.insert(all.end(), from, from + counts_[path]);
-      const auto first_dark = dark_.begin() + static_cast<std::ptrdiff_t>(path * kVertices);
+      const auto first_dark = dark_.begin() + static_cast<std::ptrdiff_t>(path * kTaughtVertices);
       dark.insert(dark.end(), first_dark, first_dark + dark_counts_[path]);
     }
   }
@@ -89,7 +89,7 @@ class BounceReader final : public HistoryReader {
 
  private:
   void add(size_t path, const HistoryRow<float>& v, float value, float weight) {
-    TrainingRecord& r = records_[path * kVertices + counts_[path]++];
+    TrainingRecord& r = records_[path * kTaughtVertices + counts_[path]++];
     const Vec2<float> at = octahedral_point<float>(v.wi);
     const auto bin = [](float x) {
       return std::min(static_cast<uint32_t>(x * kGuideSide), kGuideSide - 1);
@@ -112,7 +112,7 @@ class BounceReader final : public HistoryReader {
   const GuideGrid& grid_;
   const GuideView& guide_;
   const PictureTiles* tiles_;
-  std::vector<TrainingRecord> records_;  ///< kVertices of each path
+  std::vector<TrainingRecord> records_;  ///< kTaughtVertices of each path
   std::vector<uint64_t> dark_;
   std::vector<uint8_t> counts_, dark_counts_;
   std::vector<float> luminance_;
@@ -178,10 +178,10 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   GuideTraining out;
   Settings settings = *render.settings;
   const uint64_t pixel_count = uint64_t{settings.width} * settings.height;
-  const uint64_t budget = std::min(pixel_count * settings.spp / kShare, kMostPaths);
+  const uint64_t budget = std::min(pixel_count * settings.spp / kTrainingShare, kMostTrainingPaths);
   const bool learns =
       settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
-  if (!learns || settings.max_depth == 0 || budget < kLeastPaths) return out;
+  if (!learns || settings.max_depth == 0 || budget < kLeastTrainingPaths) return out;
   settings.region.reset();
   settings.crop = false;
   settings.aovs = {};
@@ -204,8 +204,8 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   std::vector<uint64_t> dark;
   uint32_t first_sample = 0;
   double alone = 0;  ///< efficiency without a field
-  for (uint32_t round = 0; round < kRounds; ++round) {
-    const uint64_t wanted = (budget << round) / ((1u << kRounds) - 1);
+  for (uint32_t round = 0; round < kTrainingRounds; ++round) {
+    const uint64_t wanted = (budget << round) / ((1u << kTrainingRounds) - 1);
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order.size()));
     PassPlan plan;
     plan.pixels = some_pixels(order, wanted);
@@ -245,7 +245,7 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   }
   out.statistics.facts = field->facts();
   out.statistics.field_bytes = field->bytes();
-  const bool pays = settings.guiding != Guiding::kAuto || out.statistics.gain >= kWorthwhile;
+  const bool pays = settings.guiding != Guiding::kAuto || out.statistics.gain >= kWorthwhileGain;
   if (field->facts().regions > 0 && pays) {
     out.field = std::move(field);
     out.tiles = std::move(tiles);
