@@ -42,7 +42,7 @@ TEST(Limits, scene_counts_end_where_words_do) {
       {&SceneCounts::placed, 2147483648, "2,147,483,649 meshes in instances"},
       {&SceneCounts::placements, 4294967295, "4,294,967,296 instances of groups"},
       {&SceneCounts::steps, 268435456, "268,435,457 transforms"},
-      {&SceneCounts::lights, 67108864, "67,108,865 lights"},
+      {&SceneCounts::lights, 44739242, "44,739,243 lights"},
       {&SceneCounts::profile_values, 2147483648, "IES"},
       {&SceneCounts::link_words, 2147483648, "light links"},
   };
