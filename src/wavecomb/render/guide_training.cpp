@@ -22,9 +22,11 @@ constexpr uint32_t kTrainingRounds = 3;
 constexpr uint32_t kTaughtVertices = 6;
 /// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
 /// training has few of, make pictures better than its paths tell.
-constexpr double kWorthwhileGain = 1.2;
+constexpr double kWorthwhileGain = 1.1;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there.
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
+/// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
+constexpr double kListRay = 0.3;
 
 /// Gathers what the bounces of a round teach, each path's in its own place.
 class BounceReader final : public HistoryReader {
@@ -126,42 +128,38 @@ std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t c
   return pixels;
 }
 
-/// What the paths of a round are worth: 1 / (variance x cost), with costs in rays. Luminances are
-/// those of `samples` paths of each pixel.
+/// What the paths of a round are worth: 1 / (variance x cost), both of a path in the mean.
+/// Luminances are those of `samples` paths of each pixel, `cost` is that of all.
 double efficiency(const PictureTiles& tiles, std::span<const uint32_t> pixels, uint32_t samples,
                   std::span<const float> luminances, double cost) {
-  // A firefly is no measure of the others.
+  // Of the picture's brightness there: a firefly is no measure of the others.
   constexpr double kMost = 50;
   std::vector<double> sums(tiles.count()), counts(tiles.count());
-  double square = 0;
+  double squares = 0;
   for (size_t i = 0; i < luminances.size(); ++i) {
-    const uint32_t pixel = pixels[i / samples];
+    const uint32_t pixel = pixels[i / samples], tile = tiles.of(pixel);
     const double y = std::min(double{luminances[i]} * tiles.inverse_scale(pixel), kMost);
-    if (!(y > 0)) {
-      counts[tiles.of(pixel)] += 1;
-      continue;
-    }
-    square += y * y;
-    sums[tiles.of(pixel)] += y;
-    counts[tiles.of(pixel)] += 1;
+    counts[tile] += 1;
+    if (!(y > 0)) continue;  // false for NaN
+    squares += y * y;
+    sums[tile] += y;
   }
-  double mean_square = 0;
   for (size_t t = 0; t < sums.size(); ++t)
-    if (counts[t] > 0) mean_square += sums[t] * sums[t] / counts[t];
-  const double variance = square - mean_square;
-  return variance > 0 && cost > 0 ? 1 / (variance * cost) * static_cast<double>(luminances.size()) *
-                                        static_cast<double>(luminances.size())
-                                  : 0;
+    if (counts[t] > 0) squares -= sums[t] * sums[t] / counts[t];
+  const auto paths = static_cast<double>(luminances.size());
+  return squares > 0 && cost > 0 ? paths * paths / (squares * cost) : 0;
 }
 
-/// Cost of a round, in rays.
-double cost_of(const Integrator& integrator, uint32_t threads, bool looks_up) {
-  double cost = 0;
-  for (uint32_t i = 0; i < threads; ++i)
-    if (const Counts* c = integrator.worker(i).counts)
-      cost += static_cast<double>(c->rays + c->shadow_rays) +
-              (kShadingRays + (looks_up ? kGuidedRays : 0)) * static_cast<double>(c->records);
-  return cost;
+/// Cost of a round, in rays of a hierarchy.
+double cost_of(const Integrator& integrator, const TrainingMeans& means, bool has_list,
+               bool looks_up) {
+  double rays = 0, records = 0;
+  for (uint32_t i = 0; i < means.threads; ++i)
+    if (const Counts* c = integrator.worker(i).counts) {
+      rays += static_cast<double>(c->rays + c->shadow_rays);
+      records += static_cast<double>(c->records);
+    }
+  return (has_list ? kListRay : 1) * rays + (kShadingRays + (looks_up ? kGuidedRays : 0)) * records;
 }
 
 }  // namespace
@@ -186,6 +184,8 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   settings.crop = false;
   settings.aovs = {};
   settings.seed = 0x2545f491u;
+  // A survivor of roulette brings many times what it stands for: noise that hides what aiming wins.
+  settings.roulette = RouletteKind::kOff;
 
   const AovTables aovs(scene, settings);
   Film film(1, 1, aovs.layout);
@@ -229,8 +229,9 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
       tiles.emplace(settings, pixels, reader.luminances());
     }
     if (tiles->is_lit()) {
-      const double worth = efficiency(*tiles, plan.pixels, samples, reader.luminances(),
-                                      cost_of(*integrator, means.threads, round > 0));
+      const double worth =
+          efficiency(*tiles, plan.pixels, samples, reader.luminances(),
+                     cost_of(*integrator, means, context.accel->has_list(), round > 0));
       if (round == 0)
         alone = worth;
       else if (alone > 0)
