@@ -28,6 +28,8 @@ WAYS: dict[str, dict[str, str]] = {
     "guiding": {"guiding": "on"},
     "both": {"guiding": "on", "roulette": "efficient"},
     "auto": {"guiding": "auto", "roulette": "efficient"},
+    "lights": {"light_selection": "learned"},
+    "all": {"guiding": "on", "roulette": "efficient", "light_selection": "learned"},
 }
 
 
