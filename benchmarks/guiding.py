@@ -25,11 +25,9 @@ import wavecomb
 WAYS: dict[str, dict[str, str]] = {
     "off": {},
     "roulette": {"roulette": "efficient"},
-    "guiding": {"guiding": "on"},
-    "both": {"guiding": "on", "roulette": "efficient"},
-    "auto": {"guiding": "auto", "roulette": "efficient"},
-    "lights": {"light_selection": "learned"},
-    "all": {"guiding": "on", "roulette": "efficient", "light_selection": "learned"},
+    "guiding": {"guiding": "on", "roulette": "throughput"},
+    "both": {"guiding": "on"},
+    "auto": {"guiding": "auto"},
 }
 
 

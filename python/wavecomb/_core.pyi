@@ -485,8 +485,8 @@ class Settings:
     """Keeps errors and variances where nothing else asks. Default: False."""
     crop: bool
     """The picture is its region alone, in memory and in files. Default: False."""
-    roulette: Literal["off", "throughput", "cost-aware", "efficient"]
-    """How paths end early. Each is unbiased, but another estimate. Default: throughput."""
+    roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
+    """How paths end early. Each is unbiased, but another estimate. Default: auto."""
     roulette_depth: int
     """The first vertex at which a path may end early. Default: 2."""
     light_selection: Literal["auto", "tree", "power"]

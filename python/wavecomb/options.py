@@ -61,8 +61,8 @@ class Setting:
     def annotation(self) -> str:
         """Its type in a stub.
 
-        >>> settings()["roulette"].annotation
-        'Literal["off", "throughput", "cost-aware"]'
+        >>> settings()["light_weights"].annotation
+        'Literal["calibrated", "power"]'
         """
         if self.kind == "choice" and self.name != "policy":
             return "Literal[" + ", ".join(f'"{name}"' for name in self.choices) + "]"

@@ -197,11 +197,11 @@ TEST(Guide, SharesFollowMoments) {
     TrainingRecord r{};
     r.pdf = r.bsdf_pdf = 0.3f;
     r.guide_pdf = 3.f * random() + 2.f;
-    good.add(r, 1);  // where the light is, the field samples ten times as often
+    good.add(share_ratios(r), 1);  // where the light is, the field samples ten times as often
     r.guide_pdf = 0.01f;
-    bad.add(r, 1);
+    bad.add(share_ratios(r), 1);
     r.guide_pdf = 0;
-    none.add(r, 1);
+    none.add(share_ratios(r), 1);
   }
   EXPECT_EQ(kBsdfShares[good.best()], kBsdfShares[0]);
   EXPECT_EQ(kBsdfShares[bad.best()], 1.f);

@@ -27,8 +27,9 @@ enum class LightSelection : uint8_t { kAuto, kTree, kPower };
 /// What shares of the choice lights have: by what they bring to the picture, as a calibration finds
 /// before the first pass (render/light_calibration.h), or by power.
 enum class LightWeights : uint8_t { kCalibrated, kPower };
-/// How paths end early (integrate/steps/survive.h).
-enum class RouletteKind : uint8_t { kOff, kThroughput, kCostAware, kEfficient };
+/// How paths end early (integrate/steps/survive.h). kAuto: kEfficient where bounces are guided,
+/// else kThroughput.
+enum class RouletteKind : uint8_t { kAuto, kOff, kThroughput, kCostAware, kEfficient };
 /// Order of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
 /// Where costs of materials come from. kAuto: measured for the order of shading, the fixed model
@@ -71,7 +72,7 @@ struct Settings {
   SamplerKind sampler = SamplerKind::kSobol;
   FilterKind filter = FilterKind::kBlackmanHarris;
   std::optional<float> filter_width;  ///< full width in pixels; without: the filter's own
-  RouletteKind roulette = RouletteKind::kThroughput;
+  RouletteKind roulette = RouletteKind::kAuto;
   uint32_t roulette_depth = 2;  ///< first vertex after which a path may end
   /// Costs decide over the picture through cost-aware roulette only, and then kMeasured makes it
   /// vary.

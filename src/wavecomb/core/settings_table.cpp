@@ -153,7 +153,8 @@ std::vector<SettingInfo> work_settings() {
   return {
       choice<&S::roulette>(
           "roulette", "Roulette",
-          {{"off", "Paths end at the greatest depth only."},
+          {{"auto", "By what is expected of it where bounces are guided, else by throughput."},
+           {"off", "Paths end at the greatest depth only."},
            {"throughput", "By the light that the path still carries."},
            {"cost-aware", "By the light that it carries, over the root of what shading costs."},
            {"efficient",

@@ -31,9 +31,9 @@ struct ShadeSettings {
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
         max_depth(s.max_depth),
-        roulette(s.roulette == RouletteKind::kThroughput || s.roulette == RouletteKind::kEfficient),
+        roulette(s.roulette != RouletteKind::kOff && s.roulette != RouletteKind::kCostAware),
         cost_aware(s.roulette == RouletteKind::kCostAware),
-        efficient(s.roulette == RouletteKind::kEfficient),
+        efficient(s.roulette == RouletteKind::kEfficient || s.roulette == RouletteKind::kAuto),
         roulette_depth(s.roulette_depth),
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),

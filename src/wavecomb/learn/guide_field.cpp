@@ -63,6 +63,10 @@ class GuideFieldBuilder {
       records_.push_back(records[i]);
       codes_.push_back(code);
     }
+    if (!first) {
+      ratios_.reserve(records.size());
+      for (const TrainingRecord& r : records_) ratios_.push_back(share_ratios(r));
+    }
     weigh_materials(materials);
   }
 
@@ -102,8 +106,9 @@ class GuideFieldBuilder {
     if (first_) return;
     std::vector<ShareMoments> moments(field_.material_share_.size());
     const double cut = largest(records_);
-    for (const TrainingRecord& r : records_)
-      if (r.material < moments.size()) moments[r.material].add(r, std::min(double{r.value}, cut));
+    for (size_t i = 0; i < records_.size(); ++i)
+      if (const TrainingRecord& r = records_[i]; r.material < moments.size())
+        moments[r.material].add(ratios_[i], std::min(double{r.value}, cut));
     for (size_t m = 0; m < moments.size(); ++m)
       if (moments[m].count >= kMaterialRecords)
         field_.material_share_[m] = kBsdfShares[moments[m].best()];
@@ -122,12 +127,13 @@ class GuideFieldBuilder {
     const std::span here = std::span(records_).subspan(begin, end - begin);
     for (RegionPart& part : cell) part = {};
     const double cut = largest(here);
-    for (const TrainingRecord& r : here) {
+    for (size_t i = begin; i < end; ++i) {
+      const TrainingRecord& r = records_[i];
       RegionPart& part = cell[r.axis];
       const double value = std::min(double{r.value}, cut);
       part.density[r.bin] += value;
       part.count += 1;
-      if (!first_) part.moments.add(r, value);
+      if (!first_) part.moments.add(ratios_[i], value);
     }
     for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
       RegionPart& part = cell[axis];
@@ -246,6 +252,7 @@ class GuideFieldBuilder {
   GuideField& field_;
   bool first_, guides_;
   std::vector<TrainingRecord> records_;  ///< in the order of their codes
+  std::vector<ShareRatios> ratios_;      ///< of the same; none in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
   std::array<Cell, kGuideBits + 1> levels_;  ///< from the whole down to where divide() is

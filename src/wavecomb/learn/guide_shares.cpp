@@ -3,14 +3,14 @@
 
 namespace wavecomb {
 
-void ShareMoments::add(const TrainingRecord& r, double value) {
-  if (!(r.guide_pdf > 0)) return;
-  const double moment = value * value * double{r.pdf};
-  for (size_t i = 0; i < kBsdfShares.size(); ++i) {
-    const double a{kBsdfShares[i]};
-    sums[i] += moment / (a * double{r.bsdf_pdf} + (1 - a) * double{r.guide_pdf});
+ShareRatios share_ratios(const TrainingRecord& r) {
+  ShareRatios ratios{};
+  if (!(r.guide_pdf > 0)) return ratios;
+  for (size_t i = 0; i < ratios.size(); ++i) {
+    const float a = kBsdfShares[i];
+    ratios[i] = r.pdf / (a * r.bsdf_pdf + (1 - a) * r.guide_pdf);
   }
-  count += 1;
+  return ratios;
 }
 
 void ShareMoments::add(const ShareMoments& other, double factor) {

@@ -21,8 +21,9 @@ constexpr uint32_t kTrainingRounds = 3;
 /// Vertices of a path that teach.
 constexpr uint32_t kTaughtVertices = 6;
 /// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
-/// training has few of, make pictures better than its paths tell.
-constexpr double kWorthwhileGain = 1.1;
+/// training has few of, make pictures better than its paths tell. Training ends as soon as the
+/// gain is below that by kSureErrors standard errors.
+constexpr double kWorthwhileGain = 1.1, kSureErrors = 2;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there.
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
@@ -129,25 +130,32 @@ std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t c
 }
 
 /// What the paths of a round are worth: 1 / (variance x cost), both of a path in the mean.
+struct Worth {
+  double efficiency = 0;         ///< 0: not known
+  double relative_variance = 0;  ///< of that figure
+};
+
 /// Luminances are those of `samples` paths of each pixel, `cost` is that of all.
-double efficiency(const PictureTiles& tiles, std::span<const uint32_t> pixels, uint32_t samples,
-                  std::span<const float> luminances, double cost) {
+Worth worth_of(const PictureTiles& tiles, std::span<const uint32_t> pixels, uint32_t samples,
+               std::span<const float> luminances, double cost) {
   // Of the picture's brightness there: a firefly is no measure of the others.
   constexpr double kMost = 50;
   std::vector<double> sums(tiles.count()), counts(tiles.count());
-  double squares = 0;
+  double squares = 0, fourths = 0;
   for (size_t i = 0; i < luminances.size(); ++i) {
     const uint32_t pixel = pixels[i / samples], tile = tiles.of(pixel);
     const double y = std::min(double{luminances[i]} * tiles.inverse_scale(pixel), kMost);
     counts[tile] += 1;
     if (!(y > 0)) continue;  // false for NaN
     squares += y * y;
+    fourths += y * y * y * y;
     sums[tile] += y;
   }
   for (size_t t = 0; t < sums.size(); ++t)
     if (counts[t] > 0) squares -= sums[t] * sums[t] / counts[t];
   const auto paths = static_cast<double>(luminances.size());
-  return squares > 0 && cost > 0 ? paths * paths / (squares * cost) : 0;
+  if (!(squares > 0 && cost > 0)) return {};
+  return {paths * paths / (squares * cost), fourths / (squares * squares)};
 }
 
 /// Cost of a round, in rays of a hierarchy.
@@ -177,8 +185,9 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   Settings settings = *render.settings;
   const uint64_t pixel_count = uint64_t{settings.width} * settings.height;
   const uint64_t budget = std::min(pixel_count * settings.spp / kTrainingShare, kMostTrainingPaths);
-  const bool learns =
-      settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
+  const bool is_auto = settings.guiding == Guiding::kAuto;
+  const bool guides = settings.guiding != Guiding::kOff;
+  const bool learns = guides || settings.roulette == RouletteKind::kEfficient;
   if (!learns || settings.max_depth == 0 || budget < kLeastTrainingPaths) return out;
   settings.region.reset();
   settings.crop = false;
@@ -197,16 +206,17 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   context.discards = true;
   const Bounds& b = scene.bounds();
   const GuideGrid grid({b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z});
-  auto field = std::make_unique<const GuideField>(grid);
+  auto field = std::make_unique<GuideField>(grid);
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
   std::optional<PictureTiles> tiles;
   std::vector<TrainingRecord> records;
   std::vector<uint64_t> dark;
   uint32_t first_sample = 0;
-  double alone = 0;  ///< efficiency without a field
+  Worth alone;  ///< without a field
   for (uint32_t round = 0; round < kTrainingRounds; ++round) {
     const uint64_t wanted = (budget << round) / ((1u << kTrainingRounds) - 1);
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order.size()));
+    const bool is_first = round == 0;
     PassPlan plan;
     plan.pixels = some_pixels(order, wanted);
     plan.batches.push_back({0, plan.pixels.size(), first_sample, samples});
@@ -229,24 +239,26 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
       tiles.emplace(settings, pixels, reader.luminances());
     }
     if (tiles->is_lit()) {
-      const double worth =
-          efficiency(*tiles, plan.pixels, samples, reader.luminances(),
-                     cost_of(*integrator, means, context.accel->has_list(), round > 0));
-      if (round == 0)
+      const Worth worth =
+          worth_of(*tiles, plan.pixels, samples, reader.luminances(),
+                   cost_of(*integrator, means, context.accel->has_list(), !is_first));
+      if (is_first) {
         alone = worth;
-      else if (alone > 0)
-        out.statistics.gain = worth / alone;
+      } else if (alone.efficiency > 0) {
+        out.statistics.gain = worth.efficiency / alone.efficiency;
+        const double error = std::sqrt(worth.relative_variance + alone.relative_variance);
+        if (is_auto && out.statistics.gain * (1 + kSureErrors * error) < kWorthwhileGain) break;
+      }
     }
     reader.append_to(records, dark);
-    auto next = std::make_unique<GuideField>(grid, records, scene.materials().size(), round == 0,
-                                             settings.guiding != Guiding::kOff,
-                                             size_t{settings.learn_memory_mb} << 20);
+    auto next = std::make_unique<GuideField>(grid, records, scene.materials().size(), is_first,
+                                             guides, size_t{settings.learn_memory_mb} << 20);
     next->count_dark(dark);
     field = std::move(next);
   }
-  out.statistics.facts = field->facts();
   out.statistics.field_bytes = field->bytes();
-  const bool pays = settings.guiding != Guiding::kAuto || out.statistics.gain >= kWorthwhileGain;
+  out.statistics.facts = field->facts();
+  const bool pays = !is_auto || out.statistics.gain >= kWorthwhileGain;
   if (field->facts().regions > 0 && pays) {
     out.field = std::move(field);
     out.tiles = std::move(tiles);

@@ -193,7 +193,7 @@ def test_presets_and_reset(panel: SchedulingPanel, session: Any, qtbot: Any) -> 
     assert session.setup.light_selection == "power"
     click(panel, "reset")
     setup = session.setup
-    assert (setup.policy, setup.roulette) == ("code", "throughput")
+    assert (setup.policy, setup.roulette) == ("code", "auto")
     assert setup.light_selection == "auto"
     assert box.currentText() == "Default" and session.setup.width == 96
 
