@@ -213,6 +213,13 @@ nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
 /// Values from which it pays to let other threads of Python's go on.
 constexpr size_t kMuch = 1 << 15;
 
+/// Rows of bounds, (2, 3).
+nb::object box_of(const PointBounds& bounds) {
+  std::vector<float> box;
+  for (const auto& row : bounds) box.insert(box.end(), row.begin(), row.end());
+  return array_of(std::move(box), 3);
+}
+
 /// Corners of each face, baked points, bounds, and of quads what `split_quads` says of them; None:
 /// not plain.
 nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
@@ -246,11 +253,27 @@ nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
   }
   if (!bounds) return nb::none();
   nb::object positions = matrix ? array_of(std::move(baked), 3) : nb::none();
-  std::vector<float> box;
-  for (const auto& row : *bounds) box.insert(box.end(), row.begin(), row.end());
   nb::object quads = nb::none(), faces = nb::none();
   if (size == 4) quads = array_of(std::move(split), 3), faces = array_of(std::move(triangles), 3);
-  return nb::make_tuple(size, positions, array_of(std::move(box), 3), quads, faces);
+  return nb::make_tuple(size, positions, box_of(*bounds), quads, faces);
+}
+
+/// Points, normals and bounds of a shape under a transform; None: a point is nowhere.
+nb::object place_shape(const Array<float>& points, const Array<float>& normals,
+                       const Array<double>& matrix, const Array<double>& inverse, double limit) {
+  if (points.ndim() != 2 || points.shape(1) != 3 || normals.size() != points.size())
+    throw Error("points and normals must have the shape (n, 3)");
+  if (matrix.size() != 16 || inverse.size() != 16)
+    throw Error("a matrix must have the shape (4, 4)");
+  std::vector<float> placed(points.size()), turned(points.size());
+  bake_points({points.data(), points.size()}, std::span<const double, 16>(matrix.data(), 16),
+              placed);
+  bake_normals({normals.data(), normals.size()}, std::span<const double, 16>(inverse.data(), 16),
+               turned);
+  const std::optional<PointBounds> bounds = bounds_of(placed, limit);
+  if (!bounds) return nb::none();
+  return nb::make_tuple(array_of(std::move(placed), 3), array_of(std::move(turned), 3),
+                        box_of(*bounds));
 }
 
 /// Whether triangles have each point; None where they have all.
@@ -307,6 +330,8 @@ void bind_geometry(nb::module_& m) {
         "centre"_a, "half"_a, "pixels_per_unit"_a, "projection"_a = "perspective");
   m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
   m.def("plain_mesh", &plain_mesh, "points"_a, "counts"_a, "indices"_a, "matrix"_a = nb::none(),
+        nb::kw_only(), "limit"_a);
+  m.def("place_shape", &place_shape, "points"_a, "normals"_a, "matrix"_a, "inverse"_a,
         nb::kw_only(), "limit"_a);
   m.def("used_points", &used_points, "triangles"_a, "point_count"_a);
   m.def("clip_ears", &ears, "corners"_a, "most_steps"_a = kEarSteps);

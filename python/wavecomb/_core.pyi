@@ -824,6 +824,17 @@ def plain_mesh(
     one; their bounds (2, 3), all within the limit; of quads the corners of ``split_quads`` and the
     points (2 k, 3) that they are at."""
 
+def place_shape(
+    points: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    matrix: Any,
+    inverse: Any,
+    *,
+    limit: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None:
+    """Points and normals (n, 3) under a matrix (4, 4) for row vectors, whose inverse it is given,
+    and the bounds (2, 3) of the points; None where one is not within the limit."""
+
 def used_points(triangles: NDArray[np.uint32], point_count: int) -> NDArray[np.bool_] | None:
     """Which of the points (n,) triangles (m, 3) have; None: all."""
 

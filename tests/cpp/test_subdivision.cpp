@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/geometry/screen_size.h"
 #include "wavecomb/geometry/surface.h"
+#include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {
 namespace {
@@ -148,6 +151,70 @@ TEST(Subdivision, ManyFacesOnOneEdgeAreKeptSharp) {
   for (size_t i = 0; i < mesh.normals.size(); i += 3) {
     EXPECT_NEAR(std::hypot(mesh.normals[i], mesh.normals[i + 1], mesh.normals[i + 2]), 1.0, 1e-5);
     EXPECT_NEAR(mesh.normals[i + 2], 0.0, 1e-5);  // pages stand upright
+  }
+}
+
+/// Everything of a mesh as one list of bits.
+std::vector<uint32_t> bits_of(const SurfaceMesh& mesh) {
+  std::vector<uint32_t> out;
+  const auto add = [&](const auto& values) {
+    out.push_back(static_cast<uint32_t>(values.size()));
+    for (const auto value : values) out.push_back(std::bit_cast<uint32_t>(value));
+  };
+  add(mesh.positions), add(mesh.normals), add(mesh.uvs), add(mesh.triangles), add(mesh.faces);
+  for (const SurfaceValues& primvar : mesh.primvars) add(primvar.values);
+  return out;
+}
+
+TEST(Subdivision, ThreadsChangeNoBitOfOneMesh) {
+  // 24,576 faces, in several bands of points, faces and corners.
+  std::vector<int32_t> seams(24);
+  std::iota(seams.begin(), seams.end(), 0);
+  std::vector<float> uvs(48);
+  for (size_t i = 0; i < uvs.size(); ++i) uvs[i] = static_cast<float>(i * i % 17) / 16;
+  const std::vector<int32_t> hole = {2}, crease = {0, 1, 1, 3}, which = {-1, 0, 1, 0, 1, -1};
+  const std::vector<float> sharpness = {10.f, 2.5f};
+  const std::vector<int32_t> triangles = {0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 3}, sizes(4, 3);
+  struct Case {
+    const char* name;
+    Scheme scheme;
+    bool creased, holed, displaced;
+  };
+  for (const Case& c : {Case{"plain", Scheme::kCatmullClark, false, false, false},
+                        Case{"creases and a hole", Scheme::kCatmullClark, true, true, false},
+                        Case{"displaced", Scheme::kCatmullClark, false, true, true},
+                        Case{"bilinear", Scheme::kBilinear, false, false, false},
+                        Case{"Loop", Scheme::kLoop, false, false, false}}) {
+    SurfaceDesc desc = cube(6);
+    desc.cage.scheme = c.scheme;
+    desc.matrix = {0.7, 0.1, 0, 0, -0.1, 0.9, 0.3, 0, 0, 0.2, -1.1, 0, 1, 2, 3, 1};
+    if (c.scheme == Scheme::kLoop) {
+      desc.cage.face_sizes = sizes;
+      desc.cage.corners = triangles;
+      desc.level = 7;
+    } else {
+      desc.cage.channels.push_back({seams, 24});
+      desc.uvs = {PrimvarKind::kFaceVarying, uvs, 2, 0};
+    }
+    if (c.creased) desc.cage.crease_edges = crease, desc.cage.crease_sharpness = sharpness;
+    if (c.holed) desc.cage.holes = hole;
+    if (c.displaced) {
+      desc.displacements.resize(2);
+      desc.displacements[0].constant = 0.1f;
+      desc.displacements[1].constant = -0.03f;
+      desc.face_displacement = which;
+    }
+    desc.primvars.push_back({PrimvarKind::kVertex, desc.points, 3, 0});
+    desc.primvars.push_back({PrimvarKind::kVarying, std::span(uvs).first(8), 1, 0});
+    std::vector<uint32_t> first;
+    for (const uint32_t threads : {1u, 2u, 5u}) {
+      SurfaceMesh mesh;
+      with_threads(threads, [&] { mesh = make_surface(desc); });
+      const std::vector<uint32_t> bits = bits_of(mesh);
+      if (threads == 1) first = bits;
+      EXPECT_GT(mesh.faces.size(), 24000u) << c.name;
+      EXPECT_TRUE(bits == first) << c.name << " by " << threads << " threads";
+    }
   }
 }
 

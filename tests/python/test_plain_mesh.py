@@ -5,10 +5,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pxr import Gf
+from pxr import Gf, Usd
 
 from wavecomb import _core
-from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, extent, plain
+from wavecomb.usd.geometry.mesh_arrays import (
+    IDENTITY,
+    MeshError,
+    bake,
+    bake_normals,
+    extent,
+    place,
+    plain,
+)
+from wavecomb.usd.geometry.shapes import SHAPES, read_shape
 from wavecomb.usd.geometry.triangulate import triangulate
 
 SEED = 20
@@ -90,3 +99,23 @@ def test_points_that_no_triangle_has() -> None:
     assert _core.used_points(triangles[:1], 3) is None
     with pytest.raises(ValueError, match="a point that is not there"):
         _core.used_points(triangles, 4)
+
+
+@pytest.mark.parametrize("kind", sorted(SHAPES))
+def test_shapes_are_placed_with_the_bits_of_the_long_way(kind: str) -> None:
+    stage = Usd.Stage.CreateInMemory()
+    shape = read_shape(stage.DefinePrim("/Shape", kind), Usd.TimeCode.Default(), frozenset())
+    assert shape is not None
+    assert shape.positions.dtype == shape.normals.dtype == np.float32
+    for matrix in matrices(np.random.default_rng(SEED)):
+        positions, normals, bounds = place(shape.positions, shape.normals, matrix)
+        wanted = bake(shape.positions, matrix)
+        assert positions.tobytes() == wanted.tobytes()
+        assert normals.tobytes() == bake_normals(shape.normals, matrix).tobytes()
+        np.testing.assert_array_equal(bounds, extent(wanted))
+
+
+def test_shapes_that_are_nowhere_say_so() -> None:
+    far = Gf.Matrix4d().SetTranslate(Gf.Vec3d(0, 2e18, 0))
+    with pytest.raises(MeshError, match="absurdly far away"):
+        place(SQUARE, SQUARE, far)

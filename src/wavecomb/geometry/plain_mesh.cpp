@@ -17,6 +17,21 @@ void bake_points(std::span<const float> points, std::span<const double, 16> matr
   }
 }
 
+void bake_normals(std::span<const float> normals, std::span<const double, 16> inverse,
+                  std::span<float> out) {
+  for (size_t i = 0; i + 2 < normals.size(); i += 3) {
+    const double x = normals[i], y = normals[i + 1], z = normals[i + 2];
+    double turned[3];
+    for (size_t k = 0; k < 3; ++k)
+      turned[k] = 0.0 + std::fma(z, inverse[4 * k + 2],
+                                 std::fma(y, inverse[4 * k + 1], x * inverse[4 * k]));
+    const double length =
+        std::sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]);
+    for (size_t k = 0; k < 3; ++k)
+      out[i + k] = static_cast<float>(turned[k] / (length > 0 ? length : 1));
+  }
+}
+
 std::optional<PointBounds> bounds_of(std::span<const float> points, double limit) {
   if (points.size() < 3) return std::nullopt;
   PointBounds bounds{{{points[0], points[1], points[2]}, {points[0], points[1], points[2]}}};

@@ -21,6 +21,13 @@ using PointBounds = std::array<std::array<float, 3>, 2>;
 void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
                  std::span<float> out);
 
+/// Normals under the inverse transpose of a transform, in double precision as above, of unit
+/// length.
+///
+/// `normals`, `out`: 3 per normal. `inverse`: the transform's, 4 x 4, for row vectors.
+void bake_normals(std::span<const float> normals, std::span<const double, 16> inverse,
+                  std::span<float> out);
+
 /// The bounds of points; none where a coordinate is not finite, or `limit` or more from the origin.
 std::optional<PointBounds> bounds_of(std::span<const float> points, double limit);
 

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <span>
 
 #include "wavecomb/core/vec3.h"
 
@@ -18,6 +20,23 @@ inline Point cross_of(const Point& a, const Point& b) {
 }
 inline double length_of(const Point& a) {
   return std::sqrt(dot_of(a, a));
+}
+/// Length 1, or (0, 0, 1) for what has no direction.
+inline Point unit(const Point& p) {
+  const double square = dot_of(p, p);
+  if (!(square > 0) || !std::isfinite(square)) return {0, 0, 1};
+  return p * (1 / std::sqrt(square));
+}
+
+/// Point i of (n, 3) values.
+inline Point point_at(std::span<const float> values, size_t i) {
+  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+}
+/// The same, written.
+inline void put(std::span<float> values, size_t i, const Point& p) {
+  values[3 * i] = static_cast<float>(p.x);
+  values[3 * i + 1] = static_cast<float>(p.y);
+  values[3 * i + 2] = static_cast<float>(p.z);
 }
 
 }  // namespace wavecomb

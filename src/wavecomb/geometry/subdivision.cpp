@@ -11,6 +11,8 @@
 #include <numeric>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/geometry/limit_masks.h"
+#include "wavecomb/geometry/point.h"
 
 namespace wavecomb {
 namespace {
@@ -33,15 +35,7 @@ void catch_messages() {
   });
 }
 
-/// N floats as OpenSubdiv wants them.
-template <int N>
-struct Values {
-  float v[N];
-  void Clear() { std::fill(v, v + N, 0.f); }
-  void AddWithWeight(const Values& other, float weight) {
-    for (int i = 0; i < N; ++i) v[i] += weight * other.v[i];
-  }
-};
+using masks::Values;
 
 /// Calls f with a std::integral_constant of `width`.
 template <typename F>
@@ -93,31 +87,40 @@ Sdc::Options options_of(const Cage& cage) {
 struct Subdivision::Refiner {
   std::unique_ptr<Far::TopologyRefiner> far;
   Scheme scheme;
+  Sdc::Options options;
   bool manifold = true;
+  /// Faces of the last level that are drawn, in order, where it has holes: else all are.
+  bool has_holes = false;
+  std::vector<int> drawn;
 
   int level() const { return far->GetMaxLevel(); }
-  Far::TopologyLevel last() const { return far->GetLevel(level()); }
+  const Far::TopologyLevel& last() const { return far->GetLevel(level()); }
+  size_t vertices_of(int l) const { return static_cast<size_t>(far->GetLevel(l).GetNumVertices()); }
 
-  /// Face of the cage of every face of the last level.
-  std::vector<uint32_t> bases() const {
-    std::vector<uint32_t> base(static_cast<size_t>(far->GetLevel(0).GetNumFaces()));
-    std::iota(base.begin(), base.end(), 0u);
-    for (int l = 1; l <= level(); ++l) {
-      const Far::TopologyLevel here = far->GetLevel(l);
-      std::vector<uint32_t> next(static_cast<size_t>(here.GetNumFaces()));
-      for (size_t f = 0; f < next.size(); ++f)
-        next[f] = base[static_cast<size_t>(here.GetFaceParentFace(static_cast<int>(f)))];
-      base = std::move(next);
-    }
-    return base;
+  /// Face of the cage of a face of the last level.
+  int base_of(int face) const {
+    for (int l = level(); l > 0; --l) face = far->GetLevel(l).GetFaceParentFace(face);
+    return face;
   }
 
-  /// Calls f(face) for the faces of the last level that are drawn, in order.
+  /// Looks which faces are drawn.
+  void find_drawn() {
+    const Far::TopologyLevel& cage = far->GetLevel(0);
+    for (int f = 0; f < cage.GetNumFaces() && !has_holes; ++f) has_holes = cage.IsFaceHole(f);
+    if (!has_holes) return;
+    for (int f = 0; f < last().GetNumFaces(); ++f)
+      if (!cage.IsFaceHole(base_of(f))) drawn.push_back(f);
+  }
+  size_t drawn_count() const {
+    return has_holes ? drawn.size() : static_cast<size_t>(last().GetNumFaces());
+  }
+
+  /// Calls f(place, face) for the faces that are drawn, in bands.
   template <typename F>
-  void each_face(const std::vector<uint32_t>& base, F&& f) const {
-    const Far::TopologyLevel cage = far->GetLevel(0);
-    for (size_t i = 0; i < base.size(); ++i)
-      if (!cage.IsFaceHole(static_cast<int>(base[i]))) f(static_cast<int>(i));
+  void each_drawn(F&& f) const {
+    parallel_bands(drawn_count(), masks::kBand, [&](size_t first, size_t end) {
+      for (size_t i = first; i < end; ++i) f(i, has_holes ? drawn[i] : static_cast<int>(i));
+    });
   }
 
   /// Refines values of the cage level by level with `step(level, from, to)`, sizes by
@@ -139,7 +142,19 @@ struct Subdivision::Refiner {
     return here;
   }
 
-  size_t vertices_of(int l) const { return static_cast<size_t>(far->GetLevel(l).GetNumVertices()); }
+  /// Calls f with the scheme as a std::integral_constant.
+  template <typename F>
+  auto with_scheme(F&& f) const {
+    switch (scheme) {
+      case Scheme::kLoop:
+        return f(std::integral_constant<Sdc::SchemeType, Sdc::SCHEME_LOOP>());
+      case Scheme::kBilinear:
+        return f(std::integral_constant<Sdc::SchemeType, Sdc::SCHEME_BILINEAR>());
+      case Scheme::kCatmullClark:
+        break;
+    }
+    return f(std::integral_constant<Sdc::SchemeType, Sdc::SCHEME_CATMARK>());
+  }
 };
 
 namespace {
@@ -154,6 +169,14 @@ std::vector<float> flat(const std::vector<V>& values) {
 template <typename V>
 V* values_in(float* floats) {
   return reinterpret_cast<V*>(floats);
+}
+
+/// Unit normal of two derivatives; 0 where they nearly line up and tell nothing.
+Point normal_of(const Values<3>& by_u, const Values<3>& by_v) {
+  const Point u{by_u.v[0], by_u.v[1], by_u.v[2]}, v{by_v.v[0], by_v.v[1], by_v.v[2]};
+  const Point normal = cross_of(u, v);
+  const bool is_plane = dot_of(normal, normal) > 1e-8 * dot_of(u, u) * dot_of(v, v);
+  return is_plane ? unit(normal) : Point{0, 0, 0};
 }
 
 }  // namespace
@@ -195,6 +218,7 @@ Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   options.validateFullTopology = true;
   refiner_ = std::make_unique<Refiner>();
   refiner_->scheme = cage.scheme;
+  refiner_->options = options_of(cage);
   refiner_->far.reset(Factory::Create(desc, options));
   if (refiner_->far == nullptr)
     throw Error(last_message.empty() ? "its topology cannot be subdivided" : last_message);
@@ -206,6 +230,7 @@ Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   Far::TopologyRefiner::UniformOptions uniform(static_cast<int>(level));
   uniform.fullTopologyInLastLevel = true;
   refiner_->far->RefineUniform(uniform);
+  refiner_->find_drawn();
 }
 
 Subdivision::~Subdivision() = default;
@@ -220,55 +245,65 @@ uint32_t Subdivision::vertex_count() const {
 }
 
 RefinedFaces Subdivision::faces() const {
-  const Far::TopologyLevel last = refiner_->last();
-  const std::vector<uint32_t> base = refiner_->bases();
+  const Far::TopologyLevel& last = refiner_->last();
   RefinedFaces faces;
   faces.size = refiner_->scheme == Scheme::kLoop ? 3 : 4;
   faces.vertex_count = vertex_count();
-  faces.corners.reserve(base.size() * faces.size);
-  faces.base.reserve(base.size());
-  refiner_->each_face(base, [&](int f) {
-    const Far::ConstIndexArray points = last.GetFaceVertices(f);
-    faces.corners.insert(faces.corners.end(), points.begin(), points.end());
-    faces.base.push_back(base[static_cast<size_t>(f)]);
+  faces.corners.resize(refiner_->drawn_count() * faces.size);
+  faces.base.resize(refiner_->drawn_count());
+  refiner_->each_drawn([&](size_t place, int f) {
+    std::copy_n(last.GetFaceVertices(f).begin(), faces.size, &faces.corners[place * faces.size]);
+    faces.base[place] = static_cast<uint32_t>(refiner_->base_of(f));
   });
   if (last.GetNumFVarChannels() > 0) faces.first_values = face_varying_corners(0);
   return faces;
 }
 
 std::vector<uint32_t> Subdivision::face_varying_corners(uint32_t channel) const {
-  const Far::TopologyLevel last = refiner_->last();
-  std::vector<uint32_t> out;
-  refiner_->each_face(refiner_->bases(), [&](int f) {
+  const Far::TopologyLevel& last = refiner_->last();
+  const size_t size = refiner_->scheme == Scheme::kLoop ? 3 : 4;
+  std::vector<uint32_t> out(refiner_->drawn_count() * size);
+  refiner_->each_drawn([&](size_t place, int f) {
     const Far::ConstIndexArray values = last.GetFaceFVarValues(f, static_cast<int>(channel));
-    out.insert(out.end(), values.begin(), values.end());
+    std::copy_n(values.begin(), size, &out[place * size]);
   });
   return out;
 }
 
 std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
                                                   uint32_t& count) const {
-  const Far::TopologyLevel last = refiner_->last();
-  const std::vector<uint32_t> base = refiner_->bases();
+  const Far::TopologyLevel& last = refiner_->last();
   count = vertex_count();
-  // Where each face of the level is in `faces`.
-  std::vector<uint32_t> place(base.size(), ~0u);
-  uint32_t next = 0;
-  refiner_->each_face(base, [&](int f) { place[static_cast<size_t>(f)] = next++; });
   const auto sharp = [&](int e) {
     const Far::ConstIndexArray around = last.GetEdgeFaces(e);
     if (around.size() != 2 || last.GetEdgeSharpness(e) > 0) return true;
     // A bilinear surface has an edge wherever its cage has one.
     return refiner_->scheme == Scheme::kBilinear &&
-           base[static_cast<size_t>(around[0])] != base[static_cast<size_t>(around[1])];
+           refiner_->base_of(around[0]) != refiner_->base_of(around[1]);
   };
+  // Where sharp edges may cut a point's surroundings apart: few points, found by all threads and
+  // numbered by one, in their order.
+  const size_t points = refiner_->vertices_of(refiner_->level());
+  std::vector<std::vector<int>> cut((points + masks::kBand - 1) / masks::kBand);
+  parallel_bands(points, masks::kBand, [&](size_t first, size_t end) {
+    for (size_t i = first; i < end; ++i) {
+      const int v = static_cast<int>(i);
+      int cuts = 0;
+      for (const int e : last.GetVertexEdges(v)) cuts += sharp(e);
+      if (cuts >= 2 && last.GetVertexFaces(v).size() >= 2) cut[first / masks::kBand].push_back(v);
+    }
+  });
+  // Where each face of the level is in `faces`.
+  std::vector<uint32_t> place;
+  if (refiner_->has_holes) {
+    place.assign(static_cast<size_t>(last.GetNumFaces()), ~0u);
+    refiner_->each_drawn(
+        [&](size_t at, int f) { place[static_cast<size_t>(f)] = static_cast<uint32_t>(at); });
+  }
   std::vector<uint32_t> normals = faces.corners;
   std::vector<int> sector;
-  for (int v = 0; v < last.GetNumVertices(); ++v) {
+  const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    int cuts = 0;
-    for (const int e : edges) cuts += sharp(e);
-    if (cuts < 2 || around.size() < 2) continue;
     // Faces that share a smooth edge are in one sector: the lowest of them names it.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
@@ -280,40 +315,57 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
       std::replace(sector.begin(), sector.end(), std::max(a, b), std::min(a, b));
     }
     const Far::ConstLocalIndexArray local = last.GetVertexFaceLocalIndices(v);
-    if (std::count(sector.begin(), sector.end(), 0) == around.size()) continue;
+    if (std::count(sector.begin(), sector.end(), 0) == around.size()) return;
     for (int s = 0; s < around.size(); ++s) {
       bool used = false;
       for (int f = s; f < around.size(); ++f) {
-        const uint32_t at = place[static_cast<size_t>(around[f])];
+        const auto face = static_cast<size_t>(around[f]);
+        const uint32_t at = place.empty() ? static_cast<uint32_t>(face) : place[face];
         if (sector[static_cast<size_t>(f)] != s || at == ~0u) continue;
         normals[static_cast<size_t>(at) * faces.size + local[f]] = count;
         used = true;
       }
       count += used;
     }
-  }
+  };
+  for (const std::vector<int>& band : cut)
+    for (const int v : band) number(v);
   return normals;
 }
 
 std::vector<float> Subdivision::vertex(std::span<const float> values, uint32_t width,
-                                       std::vector<float>* tangents) const {
+                                       std::vector<float>* normals) const {
+  if (normals != nullptr && width != 3) throw Error("normals are of points");
   return with_width(width, [&](auto n) {
     using V = Values<decltype(n)::value>;
-    const Far::PrimvarRefiner refine(*refiner_->far);
-    const std::vector<V> here = refiner_->refine<V>(
-        values, [&](int l) { return refiner_->vertices_of(l); },
-        [&](int l, const V* from, V* to) { refine.Interpolate(l, from, to); });
-    std::vector<float> limit(here.size() * width);
-    const V* from = here.data();
-    V* to = values_in<V>(limit.data());
-    if (tangents == nullptr) {
-      refine.Limit(from, to);
+    return refiner_->with_scheme([&](auto scheme) {
+      constexpr Sdc::SchemeType kScheme = decltype(scheme)::value;
+      const Far::TopologyRefiner& far = *refiner_->far;
+      const std::vector<V> here = refiner_->refine<V>(
+          values, [&](int l) { return refiner_->vertices_of(l); },
+          [&](int l, const V* from, V* to) {
+            masks::refine<kScheme>(refiner_->options, far.GetLevel(l - 1), far.GetLevel(l), from,
+                                   to);
+          });
+      std::vector<float> limit(here.size() * width);
+      V* to = values_in<V>(limit.data());
+      if constexpr (sizeof(V) == 3 * sizeof(float)) {
+        if (normals != nullptr) {
+          normals->assign(limit.size(), 0.f);
+          masks::limit<kScheme, true>(refiner_->options, refiner_->last(), here.data(),
+                                      [&](int i, const V& value, const V* u, const V* v) {
+                                        to[i] = value;
+                                        if (u != nullptr)
+                                          put(*normals, static_cast<size_t>(i), normal_of(*u, *v));
+                                      });
+          return limit;
+        }
+      }
+      masks::limit<kScheme, false>(
+          refiner_->options, refiner_->last(), here.data(),
+          [&](int i, const V& value, const V*, const V*) { to[i] = value; });
       return limit;
-    }
-    tangents->resize(2 * limit.size());
-    V *u = values_in<V>(tangents->data()), *v = values_in<V>(tangents->data() + limit.size());
-    refine.Limit(from, to, u, v);
-    return limit;
+    });
   });
 }
 

@@ -24,7 +24,9 @@ struct RefinedFaces {
 
 /// A cage refined uniformly. Values are computed on the limit surface itself.
 ///
-/// Contract: immutable; one thread each, any number at once.
+/// Contract: immutable; any number of threads at once. Loops over faces and points have the threads
+/// of with_threads, and each bit is the same whatever their number; OpenSubdiv's own work is one
+/// thread's: the constructor's, and face_varying's.
 class Subdivision {
  public:
   static constexpr uint32_t kMaxLevel = 10;
@@ -48,11 +50,11 @@ class Subdivision {
   /// `count` becomes the number of normals.
   std::vector<uint32_t> normal_sectors(const RefinedFaces& faces, uint32_t& count) const;
 
-  /// Values (vertex_count, width), of the cage's points, at the limit. `tangents`, if given, gets
-  /// two derivatives of the values, (2, vertex_count, width); width 3 only.
-  /// Widths are 1 to 4.
+  /// Values (vertex_count, width), of the cage's points, at the limit. `normals`, if given, gets
+  /// the unit normals of the limit, (vertex_count, 3), 0 where its derivatives span no plane; width
+  /// 3 only. Widths are 1 to 4.
   std::vector<float> vertex(std::span<const float> values, uint32_t width,
-                            std::vector<float>* tangents = nullptr) const;
+                            std::vector<float>* normals = nullptr) const;
   /// The same, linear within each face of the cage.
   std::vector<float> varying(std::span<const float> values, uint32_t width) const;
   /// Values of a channel at the limit, addressed by face_varying_corners(channel).

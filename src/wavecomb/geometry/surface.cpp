@@ -7,27 +7,14 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/geometry/point.h"
+#include "wavecomb/scene/parallel.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb {
 namespace {
 
-Point point_at(const std::vector<float>& values, size_t i) {
-  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
-}
-
-void put(std::vector<float>& values, size_t i, const Point& p) {
-  values[3 * i] = static_cast<float>(p.x);
-  values[3 * i + 1] = static_cast<float>(p.y);
-  values[3 * i + 2] = static_cast<float>(p.z);
-}
-
-/// Length 1, or (0, 0, 1) for what has no direction.
-Point unit(const Point& p) {
-  const double square = dot_of(p, p);
-  if (!(square > 0) || !std::isfinite(square)) return {0, 0, 1};
-  return p * (1 / std::sqrt(square));
-}
+/// Points, corners or faces that one task takes.
+constexpr size_t kBand = 16384;
 
 /// A surface on its way to triangles. Corners are in the order of `faces`.
 struct Work {
@@ -39,76 +26,82 @@ struct Work {
   std::vector<uint32_t> uv_at;    ///< value of each corner; empty: no coordinates
 };
 
-/// Sums at each normal of what is at its corners: normal of the face there times twice the area of
-/// its corner.
-std::vector<double> corner_sums(const Work& work, size_t normal_count) {
-  std::vector<double> sums(3 * normal_count, 0.0);
-  const uint32_t k = work.faces.size;
-  for (size_t f = 0; f < work.faces.count(); ++f) {
-    const uint32_t* corner = &work.faces.corners[f * k];
-    for (uint32_t c = 0; c < k; ++c) {
-      const Point here = point_at(work.positions, corner[c]);
-      const Point to_next = point_at(work.positions, corner[(c + 1) % k]) - here;
-      const Point to_last = point_at(work.positions, corner[(c + k - 1) % k]) - here;
-      const Point n = cross_of(to_next, to_last);
-      double* sum = &sums[3 * size_t{work.sectors[f * k + c]}];
-      sum[0] += n.x;
-      sum[1] += n.y;
-      sum[2] += n.z;
-    }
+/// Which normals are sums over faces, as places in a list of sums; ~0: the limit's own is known.
+/// That is where `work.normals` has one that is not 0, for the points that have one normal.
+std::vector<uint32_t> sum_places(const Work& work, size_t normal_count, size_t& sum_count) {
+  const size_t known = work.normals.size() / 3, points = work.faces.vertex_count;
+  std::vector<uint32_t> places(normal_count, ~0u);
+  for (size_t c = 0; c < work.sectors.size() && normal_count > points; ++c)
+    if (work.sectors[c] >= points) places[work.faces.corners[c]] = 0;
+  sum_count = 0;
+  for (size_t i = 0; i < normal_count; ++i) {
+    const float* n = i < known ? &work.normals[3 * i] : nullptr;
+    if (n == nullptr || places[i] == 0 || (n[0] == 0 && n[1] == 0 && n[2] == 0))
+      places[i] = static_cast<uint32_t>(sum_count++);
   }
-  return sums;
+  return places;
 }
 
-/// Normals at the limit: of the derivatives (tangents) where a point has one normal and they span
-/// a plane, else of the faces in its sector.
-void set_normals(Work& work, size_t normal_count, const std::vector<float>& tangents) {
-  const std::vector<double> sums = corner_sums(work, normal_count);
+/// Sums over corners in their order: calls f(corner, first, end) for all of them, on each thread
+/// for its own range of the `count` things that are summed up.
+template <typename F>
+void each_corner(size_t corners, size_t count, F&& f) {
+  const size_t share = std::max(kBand, (count + loop_threads() - 1) / loop_threads());
+  parallel_bands(count, share, [&](size_t first, size_t end) {
+    for (size_t c = 0; c < corners; ++c) f(c, first, end);
+  });
+}
+
+/// Normals at the limit: those that `work` has where a point has one, else of the faces in its
+/// sector: the sum of the normals at its corners there, times twice the areas of the corners.
+void set_normals(Work& work, size_t normal_count) {
+  size_t sum_count = 0;
+  const std::vector<uint32_t> places = sum_places(work, normal_count, sum_count);
+  std::vector<Point> sums(sum_count, Point{0, 0, 0});
+  const uint32_t k = work.faces.size;
+  each_corner(work.sectors.size(), sum_count, [&](size_t c, size_t first, size_t end) {
+    const uint32_t place = places[work.sectors[c]];
+    if (place < first || place >= end) return;
+    const size_t face = c / k * k, at = c - face;
+    const uint32_t* corner = &work.faces.corners[face];
+    const Point here = point_at(work.positions, corner[at]);
+    const Point to_next = point_at(work.positions, corner[(at + 1) % k]) - here;
+    const Point to_last = point_at(work.positions, corner[(at + k - 1) % k]) - here;
+    sums[place] = sums[place] + cross_of(to_next, to_last);
+  });
   work.normals.resize(3 * normal_count);
-  std::vector<bool> used(work.faces.vertex_count, false);
-  std::vector<bool> split(work.faces.vertex_count, false);
-  for (size_t c = 0; c < work.sectors.size(); ++c)
-    if (work.sectors[c] >= work.faces.vertex_count) split[work.faces.corners[c]] = true;
-  for (size_t i = 0; i < normal_count; ++i) {
-    const Point sum{sums[3 * i], sums[3 * i + 1], sums[3 * i + 2]};
-    Point normal = unit(sum);
-    if (!tangents.empty() && i < work.faces.vertex_count && !split[i]) {
-      const Point u = point_at(tangents, i), v = point_at(tangents, work.faces.vertex_count + i);
-      const Point exact = cross_of(u, v);
-      // Tangents that nearly line up tell nothing.
-      if (dot_of(exact, exact) > 1e-8 * dot_of(u, u) * dot_of(v, v)) normal = unit(exact);
-    }
-    put(work.normals, i, normal);
-  }
+  parallel_bands(normal_count, kBand, [&](size_t first, size_t end) {
+    for (size_t i = first; i < end; ++i)
+      if (places[i] != ~0u) put(work.normals, i, unit(sums[places[i]]));
+  });
 }
 
 /// Moves the points along their normals.
 void displace(Work& work, const SurfaceDesc& desc) {
   const size_t points = work.faces.vertex_count;
-  std::vector<double> moves(points, 0.0), counts(points, 0.0), directions(3 * points, 0.0);
+  std::vector<double> moves(points, 0.0), counts(points, 0.0);
+  std::vector<Point> directions(points, Point{0, 0, 0});
   const uint32_t k = work.faces.size;
-  for (size_t c = 0; c < work.faces.corners.size(); ++c) {
+  each_corner(work.faces.corners.size(), points, [&](size_t c, size_t first, size_t end) {
+    const uint32_t point = work.faces.corners[c];
+    if (point < first || point >= end) return;
     const uint32_t base = work.faces.base[c / k];
     const int32_t which = desc.face_displacement.empty() ? 0 : desc.face_displacement[base];
-    const uint32_t point = work.faces.corners[c];
     counts[point] += 1;
-    const Point n = point_at(work.normals, work.sectors[c]);
-    directions[3 * point] += n.x;
-    directions[3 * point + 1] += n.y;
-    directions[3 * point + 2] += n.z;
-    if (which < 0) continue;
+    directions[point] = directions[point] + point_at(work.normals, work.sectors[c]);
+    if (which < 0) return;
     const size_t uv = work.uv_at.empty() ? 0 : 2 * size_t{work.uv_at[c]};
     const float u = work.uv_at.empty() ? 0 : work.uvs[uv];
     const float v = work.uv_at.empty() ? 0 : work.uvs[uv + 1];
     moves[point] += desc.displacements[static_cast<size_t>(which)].at(u, v);
-  }
-  for (size_t i = 0; i < points; ++i) {
-    if (counts[i] == 0) continue;
-    const double* d = &directions[3 * i];
-    const Point to{d[0], d[1], d[2]};
-    if (!(dot_of(to, to) > 0)) continue;
-    put(work.positions, i, point_at(work.positions, i) + unit(to) * (moves[i] / counts[i]));
-  }
+  });
+  parallel_bands(points, kBand, [&](size_t first, size_t end) {
+    for (size_t i = first; i < end; ++i) {
+      const Point& to = directions[i];
+      if (counts[i] == 0 || !(dot_of(to, to) > 0)) continue;
+      put(work.positions, i, point_at(work.positions, i) + unit(to) * (moves[i] / counts[i]));
+    }
+  });
 }
 
 /// Takes points and normals through desc.matrix, in double precision.
@@ -120,14 +113,18 @@ void place(Work& work, const SurfaceDesc& desc, bool& mirrored) {
   const Point cx = cross_of(y, z), cy = cross_of(z, x), cz = cross_of(x, y);
   mirrored = dot_of(x, cx) < 0;
   const double side = (mirrored ? -1 : 1) * (desc.left_handed ? -1 : 1);
-  for (size_t i = 0; i < work.positions.size() / 3; ++i) {
-    const Point p = point_at(work.positions, i);
-    put(work.positions, i, x * p.x + y * p.y + z * p.z + t);
-  }
-  for (size_t i = 0; i < work.normals.size() / 3; ++i) {
-    const Point n = point_at(work.normals, i) * side;
-    put(work.normals, i, unit(cx * n.x + cy * n.y + cz * n.z));
-  }
+  parallel_bands(work.positions.size() / 3, kBand, [&](size_t first, size_t end) {
+    for (size_t i = first; i < end; ++i) {
+      const Point p = point_at(work.positions, i);
+      put(work.positions, i, x * p.x + y * p.y + z * p.z + t);
+    }
+  });
+  parallel_bands(work.normals.size() / 3, kBand, [&](size_t first, size_t end) {
+    for (size_t i = first; i < end; ++i) {
+      const Point n = point_at(work.normals, i) * side;
+      put(work.normals, i, unit(cx * n.x + cy * n.y + cz * n.z));
+    }
+  });
 }
 
 double distance2(const std::vector<float>& positions, uint32_t a, uint32_t b) {
@@ -164,36 +161,40 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
   mesh.positions.resize(3 * point.size());
   mesh.normals.resize(3 * point.size());
   if (!work.uv_at.empty()) mesh.uvs.resize(2 * point.size());
-  for (size_t i = 0; i < point.size(); ++i) {
-    std::copy_n(&work.positions[3 * size_t{point[i]}], 3, &mesh.positions[3 * i]);
-    std::copy_n(&work.normals[3 * size_t{normal_of[i]}], 3, &mesh.normals[3 * i]);
-    if (!work.uv_at.empty()) std::copy_n(&work.uvs[2 * size_t{uv_of[i]}], 2, &mesh.uvs[2 * i]);
-  }
-  mesh.triangles.reserve(3 * (k - 2) * work.faces.count());
-  mesh.faces.reserve((k - 2) * work.faces.count());
-  const auto add = [&](size_t at, uint32_t a, uint32_t b, uint32_t c) {
-    if (reversed) std::swap(b, c);
-    for (const uint32_t corner : {a, b, c}) {
-      mesh.triangles.push_back(ids[at + corner]);
-      if (origins) origins->push_back(static_cast<uint32_t>(at + corner));
+  parallel_bands(point.size(), kBand, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      std::copy_n(&work.positions[3 * size_t{point[i]}], 3, &mesh.positions[3 * i]);
+      std::copy_n(&work.normals[3 * size_t{normal_of[i]}], 3, &mesh.normals[3 * i]);
+      if (!work.uv_at.empty()) std::copy_n(&work.uvs[2 * size_t{uv_of[i]}], 2, &mesh.uvs[2 * i]);
     }
-    mesh.faces.push_back(work.faces.base[at / k]);
+  });
+  const size_t triangles = (k - 2) * work.faces.count();
+  mesh.triangles.resize(3 * triangles);
+  mesh.faces.resize(triangles);
+  if (origins != nullptr) origins->resize(3 * triangles);
+  const auto set = [&](size_t triangle, size_t at, std::array<uint32_t, 3> of) {
+    if (reversed) std::swap(of[1], of[2]);
+    for (size_t i = 0; i < 3; ++i) {
+      mesh.triangles[3 * triangle + i] = ids[at + of[i]];
+      if (origins != nullptr) (*origins)[3 * triangle + i] = static_cast<uint32_t>(at + of[i]);
+    }
+    mesh.faces[triangle] = work.faces.base[at / k];
   };
-  for (size_t at = 0; at < corners; at += k) {
-    if (k == 3) {
-      add(at, 0, 1, 2);
-      continue;
+  parallel_bands(work.faces.count(), kBand, [&](size_t begin, size_t end) {
+    for (size_t f = begin; f < end; ++f) {
+      const size_t at = f * k;
+      if (k == 3) {
+        set(f, at, {0, 1, 2});
+        continue;
+      }
+      const uint32_t* q = &work.faces.corners[at];
+      // The shorter diagonal, where it is shorter by more than rounding.
+      const bool is_other =
+          distance2(work.positions, q[1], q[3]) < 0.98 * distance2(work.positions, q[0], q[2]);
+      set(2 * f, at, {0, 1, is_other ? 3u : 2u});
+      set(2 * f + 1, at, {is_other ? 1u : 0u, 2, 3});
     }
-    const uint32_t* q = &work.faces.corners[at];
-    // The shorter diagonal, where it is shorter by more than rounding.
-    if (distance2(work.positions, q[1], q[3]) < 0.98 * distance2(work.positions, q[0], q[2])) {
-      add(at, 0, 1, 3);
-      add(at, 1, 2, 3);
-    } else {
-      add(at, 0, 1, 2);
-      add(at, 0, 2, 3);
-    }
-  }
+  });
 }
 
 /// A primvar on the refined faces: values and the value of each corner.
@@ -291,7 +292,7 @@ Work polygons(const SurfaceDesc& desc) {
     throw Error("a face-varying primvar has the wrong number of values");
   for (const uint32_t i : work.uv_at)
     if (i >= work.uvs.size() / 2) throw Error("a texture coordinate is not there");
-  set_normals(work, work.faces.vertex_count, {});
+  set_normals(work, work.faces.vertex_count);
   return work;
 }
 
@@ -314,13 +315,12 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
   check_displacement(desc);
   SurfaceMesh mesh;
   Work work;
-  std::vector<Spread> primvars;
-  std::vector<float> tangents;
+  std::vector<Spread> primvars(desc.primvars.size());
   size_t normal_count = desc.cage.vertex_count;
   if (desc.level == 0) {
     work = polygons(desc);
-    for (const SurfacePrimvar& primvar : desc.primvars)
-      primvars.push_back(spread_polygons(primvar, work.faces));
+    for (size_t i = 0; i < primvars.size(); ++i)
+      primvars[i] = spread_polygons(desc.primvars[i], work.faces);
   } else {
     const Subdivision surface(desc.cage, desc.level);
     mesh.is_manifold = surface.is_manifold();
@@ -329,28 +329,37 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     uint32_t count = 0;
     work.sectors = surface.normal_sectors(work.faces, count);
     normal_count = count;
-    work.positions = surface.vertex(desc.points, 3, &tangents);
-    // The limit of a bilinear surface has no tangents of its own at points.
-    if (desc.cage.scheme == Scheme::kBilinear) tangents.clear();
-    Spread uvs = spread(desc.uvs, surface, work.faces);
-    work.uvs = std::move(uvs.values);
-    work.uv_at = std::move(uvs.at);
-    for (const SurfacePrimvar& primvar : desc.primvars)
-      primvars.push_back(spread(primvar, surface, work.faces));
+    // Points by all threads, texture coordinates by one of them.
+    parallel_bands(2, 1, [&](size_t task, size_t) {
+      if (task == 0) {
+        Spread uvs = spread(desc.uvs, surface, work.faces);
+        work.uvs = std::move(uvs.values);
+        work.uv_at = std::move(uvs.at);
+        return;
+      }
+      // The limit of a bilinear surface has no derivatives of its own at points.
+      const bool has_normals = desc.cage.scheme != Scheme::kBilinear;
+      work.positions = surface.vertex(desc.points, 3, has_normals ? &work.normals : nullptr);
+    });
+    parallel_bands(primvars.size(), 1, [&](size_t i, size_t) {
+      primvars[i] = spread(desc.primvars[i], surface, work.faces);
+    });
   }
   // OpenSubdiv's tables are gone by now.
-  if (desc.level > 0) set_normals(work, normal_count, tangents);
-  tangents = {};
+  if (desc.level > 0) set_normals(work, normal_count);
   if (!desc.displacements.empty()) {
     displace(work, desc);
-    set_normals(work, normal_count, {});
+    work.normals.clear();
+    set_normals(work, normal_count);
   }
   bool mirrored = false;
   place(work, desc, mirrored);
   std::vector<uint32_t> origins;
   emit(work, mirrored != desc.left_handed, mesh, primvars.empty() ? nullptr : &origins);
-  for (size_t i = 0; i < primvars.size(); ++i)
-    mesh.primvars.push_back(on_triangles(primvars[i], desc.primvars[i].width, origins, mesh));
+  mesh.primvars.resize(primvars.size());
+  parallel_bands(primvars.size(), 1, [&](size_t i, size_t) {
+    mesh.primvars[i] = on_triangles(primvars[i], desc.primvars[i].width, origins, mesh);
+  });
   return mesh;
 }
 

@@ -22,6 +22,7 @@ from wavecomb.usd.geometry.mesh_arrays import (
     bake_normals,
     check_matrix,
     extent,
+    place,
     plain,
 )
 from wavecomb.usd.geometry.normals import smooth_normals
@@ -95,15 +96,9 @@ class MeshReader:
         shape = read_shape(prim, self.time, names)
         if shape is None or len(shape.triangles) == 0:
             raise MeshError("no faces")
-        positions = bake(shape.positions, matrix)
+        positions, normals, bounds = place(shape.positions, shape.normals, matrix)
         triangles = shape.triangles[:, ::-1] if mirrored else shape.triangles
-        return MeshArrays(
-            positions,
-            np.ascontiguousarray(triangles),
-            bake_normals(shape.normals, matrix),
-            shape.uvs,
-            extent(positions),
-        )
+        return MeshArrays(positions, np.ascontiguousarray(triangles), normals, shape.uvs, bounds)
 
     def mesh(
         self,

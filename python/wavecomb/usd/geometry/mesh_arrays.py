@@ -25,6 +25,8 @@ UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
 
 _CHUNK = 1 << 18
 
+_NOWHERE = "a point is not finite or absurdly far away"
+
 
 @dataclass
 class MeshArrays:
@@ -98,6 +100,20 @@ def plain(
     return positions, bounds, topology
 
 
+def place(points: Array, normals: Array, matrix: Gf.Matrix4d) -> tuple[Array, Array, Array]:
+    """Points and normals (n, 3) of a shape under a transform, as float32, and their bounds (2, 3).
+
+    In one step, as ``plain``; the same as ``bake``, ``bake_normals`` and ``extent``.
+
+    Raises:
+        MeshError: A point is not finite or absurdly far away.
+    """
+    placed = _core.place_shape(points, normals, matrix, matrix.GetInverse(), limit=LIMIT)
+    if placed is None:
+        raise MeshError(_NOWHERE)
+    return placed
+
+
 def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
     """Normals (..., 3) under the inverse transpose of a transform, unit length."""
     linear = np.array(matrix.GetInverse())[:3, :3].T
@@ -123,5 +139,5 @@ def extent(positions: Array) -> Array:
     (a, b, c), (x, y, z) = bounds.tolist()
     # Written so that NaN fails too.
     if not (a > -LIMIT and b > -LIMIT and c > -LIMIT and x < LIMIT and y < LIMIT and z < LIMIT):
-        raise MeshError("a point is not finite or absurdly far away")
+        raise MeshError(_NOWHERE)
     return bounds
