@@ -23,7 +23,7 @@ from test_texture_limit import textured, write_image
 
 from wavecomb import farm
 from wavecomb.farm.files import read_json, write_json
-from wavecomb.farm.folder import BUSY, DONE, TODO
+from wavecomb.farm.folder import DONE, TODO
 
 pytestmark = [needs("wavecomb._core"), pytest.mark.slow]
 
@@ -67,15 +67,19 @@ def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
     return forks.wavecomb(*words, timeout=200)
 
 
-def processes_of(folder: Path) -> list[int]:
-    """Those whose command names the folder."""
+def processes_of(folder: Path, what: str = "") -> list[int]:
+    """Those whose command names the folder, and something else."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:
             words = (entry / "cmdline").read_bytes()
         except OSError:
             continue
-        if os.fsencode(folder) in words and int(entry.name) != os.getpid():
+        if (
+            os.fsencode(folder) in words
+            and what.encode() in words
+            and int(entry.name) != os.getpid()
+        ):
             found.append(int(entry.name))
     return found
 
@@ -140,41 +144,48 @@ def test_frames_of_a_stage(moving: Path, tmp_path: Path) -> None:
 
 def test_workers_are_killed(stage: Path, tmp_path: Path) -> None:
     """SIGKILL at random moments of whoever works: the picture is that of one process."""
-    options: dict[str, Any] = {"size": (64, 48), "spp": 256, "threads": 1}
-    folder = farm.submit(stage, tmp_path / "a.exr", tiles="4x3", strict=False, **options)
+    options: dict[str, Any] = {"size": (64, 48), "spp": 2000, "threads": 1}
+    folder = farm.submit(stage, tmp_path / "a.exr", tiles="2x2", strict=False, **options)
     spec = read_json(folder.path / "job.json")
     write_json(folder.path / "job.json", {**spec, "tries": 50, "every": 0.05})
-    chance = random.Random(7)
-    kills = 0
-    for _ in range(4):
+    tasks, parts, chance = folder.spec.tasks(), folder.path / "parts", random.Random(7)
+
+    def begun() -> int:
+        return sum(folder.logs(task.id).count("begins on") for task in tasks)
+
+    for turn in range(3):
+        before = begun()
         words = [sys.executable, "-m", "wavecomb", "farm", "resume", str(folder.path)]
         engine = subprocess.Popen([*words, "--on", "local:2", "--quiet"])
-        wait_for(lambda engine=engine: folder.ids(BUSY) or engine.poll() is not None)
-        for _ in range(3):
-            time.sleep(chance.uniform(0.05, 0.6))
-            mine = [pid for pid in processes_of(folder.path) if pid != engine.pid]
-            if mine and engine.poll() is None:
+        wait_for(lambda: begun() > before or engine.poll() is not None)  # noqa: B023
+        wait_for(lambda: list(parts.glob("*.ckpt")) or engine.poll() is not None)  # noqa: B023
+        time.sleep(chance.uniform(0.0, 0.4))
+        # A renderer, a worker, and last the engine alone: all that it started go with it.
+        for what in ("farm.child", "farm\0worker", "")[turn:]:
+            mine = [pid for pid in processes_of(folder.path, what) if pid != engine.pid]
+            if mine and what and engine.poll() is None:
                 os.kill(chance.choice(mine), signal.SIGKILL)
-                kills += 1
-        engine.kill()  # and all that it started go with it
+                time.sleep(chance.uniform(0.05, 0.4))
+        engine.kill()
         engine.wait()
         wait_for(lambda: not processes_of(folder.path))
-        kills += 1
     done = run("farm", "resume", folder.path, "--on", "local:2")
     assert done.returncode == 0, done.stderr
     one = forks.wavecomb(
-        "render", str(stage), "-o", str(tmp_path / "b.exr"), "--size", "64", "48", "--spp", "256",
+        "render", str(stage), "-o", str(tmp_path / "b.exr"), "--size", "64", "48", "--spp", "2000",
         "--threads", "1",
     )  # fmt: skip
     assert one.returncode == 0, one.stderr
     same(tmp_path / "a.exr", tmp_path / "b.exr")
-    assert kills >= 4 and not list((folder.path / "parts").glob("*.npz"))
+    assert os.listdir(parts) == []
+    logs = "".join(folder.logs(task.id) for task in tasks)
+    assert "its worker ended" in logs and "goes on after" in logs, "or nothing was tested"
 
 
 def test_a_stop_keeps_what_is_done(stage: Path, tmp_path: Path) -> None:
     """SIGTERM: a checkpoint, with which the next worker goes on, and no try is counted."""
     folder = farm.submit(
-        stage, tmp_path / "a.exr", size=(64, 64), spp=3000, threads=1, strict=False
+        stage, tmp_path / "a.exr", size=(64, 64), spp=1500, threads=1, strict=False
     )
     words = [sys.executable, "-m", "wavecomb", "farm", "worker", str(folder.path)]
     worker = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
@@ -283,3 +294,25 @@ def test_open_job_description(stage: Path, tmp_path: Path) -> None:
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert (tmp_path / "a.exr").exists() and farm.status(folder)["state"] == "done"
+
+
+def test_by_ssh(stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker for each host: what stands for ssh here runs the command, as its end would."""
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    ssh = programs / "ssh"
+    ssh.write_text(f'#!/bin/sh\necho "$3" >> {tmp_path}/hosts\nexec sh -c "$4"\n')
+    ssh.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
+    folder = farm.submit(
+        stage, tmp_path / "a.exr", size=(16, 16), spp=1, tiles="2x1", threads=1, strict=False
+    )
+    done = run("farm", "resume", folder.path, "--on", "ssh:one,me@two")
+    assert done.returncode == 0, done.stderr
+    assert sorted((tmp_path / "hosts").read_text().split()) == ["me@two", "one"]
+    ssh.write_text("#!/bin/sh\necho 'ssh: no such host' >&2\nexit 255\n")
+    (tmp_path / "a.exr").unlink()
+    done = run("farm", "resume", folder.path, "--on", "ssh:one")
+    assert done.returncode == 2 and done.stderr == "error: ssh: no such host\n"
+    done = run("farm", "resume", folder.path, "--on", "ssh:-oProxyCommand=x")
+    assert done.returncode == 2 and "--on ssh:-oProxy" in done.stderr

@@ -70,7 +70,7 @@ def worker_command(job: str, threads: int, tied: bool, quiet: bool, as_json: boo
         signal.signal(number, lambda number, frame: worker.stop(number))
     if tied:
         end_with_parent()
-        threading.Thread(target=_end_with_stdin, daemon=True).start()
+        threading.Thread(target=_end_with_stdin, args=(worker,), daemon=True).start()
     done = worker.run()
     if as_json:
         click.echo(say({"worker": worker.name, **done}))
@@ -78,10 +78,10 @@ def worker_command(job: str, threads: int, tied: bool, quiet: bool, as_json: boo
         raise click.exceptions.Exit(128 + worker.stopped)
 
 
-def _end_with_stdin() -> None:
-    """Ends this process, and so its child, when whoever started it is no more."""
+def _end_with_stdin(worker: Any) -> None:
+    """Stops a worker when whoever started it wants that, or is no more."""
     sys.stdin.buffer.read()
-    os._exit(3)
+    worker.stop(signal.SIGTERM)
 
 
 @farm_command.command("status")
@@ -186,18 +186,17 @@ def resume_command(job: str, engine: str, threads: int, quiet: bool, as_json: bo
 def _go_on(folder: Any, engine: str, *, threads: int = 0, quiet: bool, as_json: bool) -> None:
     from wavecomb.farm.checking import repair
     from wavecomb.farm.folder import say
-    from wavecomb.farm.local import parse_engine, threads_of_each
+    from wavecomb.farm.local import parse_engine
 
-    kind, workers = parse_engine(engine)
-    if kind == "none":
+    who = parse_engine(engine)
+    if who.kind == "none":
         again = repair(folder)
         (folder.path / "cancel").unlink(missing_ok=True)
         told = {"job": str(folder.path), "again": [task.id for task in again]}
         click.echo(say(told) if as_json else f"{len(again)} tasks are to be done again")
         return
-    workers = max(1, workers)
     wanted = threads or int(folder.spec.shots[0].settings.get("threads") or 0)
-    run_local(folder, workers, threads_of_each(workers, wanted), as_json=as_json, quiet=quiet)
+    run_local(folder, who, wanted, as_json=as_json, quiet=quiet)
 
 
 @farm_command.command("assemble")

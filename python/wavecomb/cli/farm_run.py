@@ -15,14 +15,17 @@ from wavecomb.run.progress import progress_console
 
 if TYPE_CHECKING:
     from wavecomb.farm.folder import Folder
+    from wavecomb.farm.local import Engine
 
 _SHOW_S = 1.0
 
 
 def run_local(
-    folder: Folder, workers: int, threads: int, *, as_json: bool = False, quiet: bool = False
+    folder: Folder, engine: Engine, threads: int, *, as_json: bool = False, quiet: bool = False
 ) -> None:
-    """Works until nothing is left to do, and says what came of it.
+    """Has an engine work until nothing is left to do, and says what came of it.
+
+    ``threads``: of each worker; 0: as is best.
 
     Raises:
         WavecombError: Tasks failed, or no worker may work on the job.
@@ -34,19 +37,20 @@ def run_local(
 
     if not (as_json or quiet):
         tasks = sum(folder.counts().values())
-        click.echo(f"job {folder.path}: {tasks} tasks for {workers} x {threads} threads")
-    engine = Local(folder, workers, threads)
+        many = f"{engine.count} workers" if engine.count > 1 else "a worker"
+        click.echo(f"job {folder.path}: {tasks} tasks for {many}")
+    local = Local(folder, engine.commands(folder, threads))
     started = time.monotonic()
     with _shown(folder, quiet or as_json) as look:
-        engine.run(look)
+        local.run(look)
     state = status(folder, tasks=False)
     if as_json:
         click.echo(say(state))
-    if engine.stopped is not None:
+    if local.stopped is not None:
         click.echo(
             f"stopped: {_pictures(state)}; `wavecomb farm resume {folder.path}` goes on", err=True
         )
-        raise click.exceptions.Exit(128 + engine.stopped)
+        raise click.exceptions.Exit(128 + local.stopped)
     failed = state["failed"]
     if failed:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
@@ -55,7 +59,7 @@ def run_local(
             f"(`wavecomb farm status {folder.path}` names all)"
         )
     if state["state"] != "done":
-        why = engine.errors[0] if engine.errors else f"{_pictures(state)}, and nobody works on it"
+        why = local.errors[0] if local.errors else f"{_pictures(state)}, and nobody works on it"
         raise WavecombError(why)
     if not (as_json or quiet):
         from wavecomb.run.progress import time_text

@@ -37,9 +37,10 @@ if TYPE_CHECKING:
     "--on",
     "engine",
     default="local",
-    metavar="local[:N]|none",
-    help="Who renders: N workers on this machine, until all is done, or whoever runs `wavecomb "
-    "farm worker`.  [default: local: one worker on all cores]",
+    metavar="local[:N]|ssh:HOSTS|none",
+    help="Who renders: N workers on this machine, or one on each of HOSTS, with commas between "
+    "them, until all is done; or whoever runs `wavecomb farm worker`.  "
+    "[default: local: one worker on all cores]",
 )
 @click.option(
     "--tiles",
@@ -99,11 +100,11 @@ def submit_command(
     keeps what is done, and `wavecomb farm resume` goes on. docs/farm.md says more.
     """
     from wavecomb.farm.assets import ask_assets
-    from wavecomb.farm.local import parse_engine, threads_of_each
+    from wavecomb.farm.local import parse_engine
     from wavecomb.farm.submitting import complete, create, default_folder
     from wavecomb.farm.tiling import parse_tiles
 
-    kind, workers = parse_engine(engine)
+    who = parse_engine(engine)
     cut = parse_tiles(tiles)
     every = options["every"]
     options["every"] = None
@@ -119,16 +120,15 @@ def submit_command(
         prepared, asked, every=every or 120.0, tries=tries, lease_s=lease, hang_s=hang,
         strict=strict, isa=isa,
     )  # fmt: skip
-    local = max(1, workers)
-    spec = complete(spec, tiles=cut, workers=0 if kind == "none" else local, chunk=chunk)
+    spec = complete(spec, tiles=cut, workers=who.count, chunk=chunk)
     assets = ask_assets(asked.stage, _stage_words(asked.source)) if strict else None
     path = job or default_folder(asked.output, asked.stage, asked.output_dir)
     folder = create(spec, path, assets)
     threads = int(spec.shots[0].settings.get("threads") or 0)
-    if kind == "none":
+    if who.kind == "none":
         _say_folder(folder, as_json)
         return
-    run_local(folder, local, threads_of_each(local, threads), as_json=as_json, quiet=asked.quiet)
+    run_local(folder, who, threads, as_json=as_json, quiet=asked.quiet)
 
 
 def _check_options(asked: Asked) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.folder import Folder
-from wavecomb.farm.local import Local, threads_of_each
+from wavecomb.farm.local import Engine, Local
 from wavecomb.farm.spec import Spec
 from wavecomb.farm.submitting import complete, create, default_folder, new_id, shot_of
 from wavecomb.farm.tiling import parse_tiles
@@ -139,7 +139,7 @@ def run(
 
     folder = job if isinstance(job, Folder) else Folder(job)
     wanted = threads or int(folder.spec.shots[0].settings.get("threads") or 0)
-    engine = Local(folder, workers, threads_of_each(workers, wanted))
+    engine = Local(folder, Engine("local", workers).commands(folder, wanted))
     engine.run(progress)
     if engine.stopped is not None:
         raise KeyboardInterrupt

@@ -40,7 +40,8 @@ def repair(folder: Folder) -> list[Task]:
         Tasks that are to be done again.
     """
     spec = folder.spec
-    take_back(folder)
+    # Who goes on with a job whose engine was killed does not pay for it with tries.
+    take_back(folder, counts=False)
     done, again = folder.ids(DONE), []
     known = done.union(*(folder.ids(state) for state in ("busy", TODO, FAILED)))
     for picture in range(len(spec.pictures)):

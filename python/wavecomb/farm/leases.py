@@ -146,12 +146,13 @@ def workers(folder: Folder) -> list[Worker]:
     return found
 
 
-def take_back(folder: Folder, now: float | None = None) -> list[Entry]:
-    """Takes tasks from workers that are no more, or gave no sign for too long; each was a try.
+def take_back(folder: Folder, now: float | None = None, *, counts: bool = True) -> list[Entry]:
+    """Takes tasks from workers that are no more, or gave no sign for too long.
 
     Args:
         folder: The job's.
         now: The clock of its file system; None: only those that are known to be no more.
+        counts: Whether each was a try.
     """
     held = [entry for entry in folder.entries(BUSY) if entry.worker]
     if not held:
@@ -168,6 +169,8 @@ def take_back(folder: Folder, now: float | None = None) -> list[Entry]:
             why = f"its worker gave no sign of life for {now - worker.seen:.0f} s"
         else:
             continue
-        if folder.fail(entry, why):
+        if not counts:
+            folder.log(entry.task, f"taken from {entry.worker}: {why}")
+        if folder.fail(entry, why) if counts else folder.give_back(entry):
             taken.append(entry)
     return taken
