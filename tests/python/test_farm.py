@@ -26,6 +26,7 @@ from wavecomb.farm.part import DamagedPart, NarrowBorder, load_part
 from wavecomb.farm.rendering import Renderer
 from wavecomb.farm.spec import Spec, Task
 from wavecomb.farm.tiling import border, choose_tiles, grown, looks, most_looks, tiles_of
+from wavecomb.picture.image import read_layers
 from wavecomb.run.aovs import names
 
 pytestmark = needs("wavecomb._core")
@@ -207,6 +208,20 @@ def test_a_border_that_was_too_narrow(
     same(tmp_path / "a.exr", tmp_path / "whole.exr")
 
 
+@needs("pyoidn")
+def test_denoised_once_when_it_is_whole(stage: Path, tmp_path: Path) -> None:
+    folder = job(stage, tmp_path, denoise=True, png=str(tmp_path / "a.png"))
+    work(folder)
+    whole = wavecomb.render(
+        stage, size=(40, 24), spp=4, aovs=["albedo", "normal", "guide_albedo", "guide_normal"]
+    ).with_denoised(threads=1)
+    layers = read_layers(tmp_path / "a.exr")
+    assert whole.denoised is not None and "guide_albedo" not in layers
+    assert layers["denoised"].tobytes() == whole.denoised.tobytes()
+    whole.save(tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
 def test_a_tile_holds_its_own_pixels(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path, size=(400, 400), spp=1, tiles="4x4")
     renderer = Renderer(folder, threads=1)
@@ -274,3 +289,18 @@ def test_a_job_says_what_it_is(stage: Path, tmp_path: Path) -> None:
     with pytest.raises(WavecombError, match="x: is damaged"):
         Spec.of({**spec.as_json(), "pictures": 3}, "x")
     assert dataclasses.replace(spec, tiles=(100, 1)).tile_count(0) == 40
+
+
+def test_a_page_that_needs_nothing_else(stage: Path, tmp_path: Path) -> None:
+    """Valid, names what failed in full, and loads itself anew while work goes on."""
+    html5lib = pytest.importorskip("html5lib")
+    from wavecomb.farm.page import page
+
+    folder = job(stage, tmp_path)
+    mine = folder.claim(folder.entries(TODO)[2], "w")
+    assert mine is not None and folder.fail(mine, "a <b> & c", is_final=True)
+    text = page(status(folder), 3)
+    html5lib.HTMLParser(strict=True).parse(text)
+    assert "a &lt;b&gt; &amp; c" in text and 'http-equiv="refresh"' in text
+    assert text.count('class="todo"') == 5 and text.count('class="failed"') == 1
+    assert "http://" not in text and "https://" not in text and "<script" not in text

@@ -47,13 +47,13 @@ def dependencies(
         for name in (file, session_layer):
             if name is not None:
                 found.update(dict.fromkeys(_all(str(name))))
-        missing = dict.fromkeys(_unopened(stage))
+        missing: dict[str, None] = {}
         for prim in _prims(stage):
             for attribute in prim.GetAuthoredAttributes():
                 for value in _values(attribute):
                     _add(found, missing, value, attribute)
     for warning in report.warnings:
-        if warning.what.startswith("MaterialX file"):
+        if warning.what.startswith(("MaterialX file", "cannot open layer")):
             missing[warning.line()] = None
     files = {os.path.abspath(path) for path in map(_outer, found) if path and os.path.isfile(path)}
     return Dependencies(tuple(sorted(files)), tuple(sorted(missing)))
@@ -120,15 +120,6 @@ def _all(file: str) -> Iterator[str]:
         return
     yield from (_outer(layer.realPath) for layer in layers)
     yield from (_outer(str(asset)) for asset in assets)
-
-
-def _unopened(stage: Usd.Stage) -> Iterator[str]:
-    """Layers that composition asked for in vain; ``mtlx.tell`` says it of MaterialX files."""
-    for error in stage.GetCompositionErrors():
-        path = getattr(error, "resolvedAssetPath", "") or getattr(error, "assetPath", "")
-        path = path or getattr(error, "layerPath", "")
-        if path and not path.rstrip("]").endswith(".mtlx"):
-            yield f"layer {path} cannot be opened: {error.rootSite.path}"
 
 
 def _outer(path: str) -> str:
