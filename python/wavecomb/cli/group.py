@@ -18,7 +18,7 @@ ERROR = 2
 INTERRUPTED = 130
 
 
-NAMES = ("render", "view", "info", "scene", "compare", "merge", "bench")
+NAMES = ("render", "view", "info", "scene", "compare", "merge", "farm", "bench")
 """The commands, in the order of the help; ``wavecomb.cli.NAME`` has ``NAME_command``."""
 
 

@@ -89,6 +89,15 @@ def tell(stage: Usd.Stage, report: LoadReport) -> None:
         report.warn(f"{ABSENT}: files left out", str(error.rootSite.path))
 
 
+def translated_files() -> list[str]:
+    """MaterialX files that any stage of this process brought in."""
+    if "wavecomb.usd.materialx.references" not in sys.modules:
+        return []
+    from wavecomb.usd.materialx import references
+
+    return references.translated_files()
+
+
 def model_of(identifier: str) -> str:
     """The shading model of a shader id such as ``ND_standard_surface_surfaceshader``, or ''."""
     return next((name for name in MODELS if identifier.startswith(f"ND_{name}")), "")

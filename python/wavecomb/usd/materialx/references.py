@@ -48,6 +48,11 @@ _translations: dict[str, _Translation] = {}
 _lock = threading.Lock()
 
 
+def translated_files() -> list[str]:
+    """Files that were translated."""
+    return [file for file, one in _translations.items() if one.layer is not None]
+
+
 def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage see the MaterialX files that its layers name.
 

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Works on a job with processes of this machine, and shows how far it is."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from wavecomb.errors import WavecombError
+from wavecomb.run.progress import progress_console
+
+if TYPE_CHECKING:
+    from wavecomb.farm.folder import Folder
+    from wavecomb.farm.local import Engine
+
+_SHOW_S = 1.0
+
+
+def run_local(
+    folder: Folder, engine: Engine, threads: int, *, as_json: bool = False, quiet: bool = False
+) -> None:
+    """Has an engine work until nothing is left to do, and says what came of it.
+
+    ``threads``: of each worker; 0: as is best.
+
+    Raises:
+        WavecombError: Tasks failed, or no worker may work on the job.
+        click.exceptions.Exit: Somebody stopped it.
+    """
+    from wavecomb.farm.folder import say
+    from wavecomb.farm.local import Local
+    from wavecomb.farm.state import status
+
+    if not (as_json or quiet):
+        tasks = sum(folder.counts().values())
+        many = f"{engine.count} workers" if engine.count > 1 else "a worker"
+        click.echo(f"job {folder.path}: {tasks} tasks for {many}")
+    local = Local(folder, engine.commands(folder, threads))
+    started = time.monotonic()
+    with _shown(folder, quiet or as_json) as look:
+        local.run(look)
+    state = status(folder, tasks=False)
+    if as_json:
+        click.echo(say(state))
+    if local.stopped is not None:
+        click.echo(
+            f"stopped: {_pictures(state)}; `wavecomb farm resume {folder.path}` goes on", err=True
+        )
+        raise click.exceptions.Exit(128 + local.stopped)
+    failed = state["failed"]
+    if failed:
+        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        raise WavecombError(
+            f"{_pictures(state)}; failed: {failed[0]['title']}: {failed[0]['error']}{more} "
+            f"(`wavecomb farm status {folder.path}` names all)"
+        )
+    if state["state"] != "done":
+        why = local.errors[0] if local.errors else f"{_pictures(state)}, and nobody works on it"
+        raise WavecombError(why)
+    if not (as_json or quiet):
+        from wavecomb.run.progress import time_text
+
+        click.echo(f"{_pictures(state)} in {time_text(time.monotonic() - started)}")
+
+
+def _pictures(state: dict[str, Any]) -> str:
+    pictures = state["pictures"]
+    return f"{pictures['done']} of {pictures['all']} pictures are written"
+
+
+@contextlib.contextmanager
+def _shown(folder: Folder, silent: bool) -> Any:
+    """Gives what shows the progress of a job when it is called: a bar, where there is a console."""
+    console = None if silent else progress_console()
+    if console is None:
+        yield lambda: None
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    with Progress(
+        TextColumn("tasks"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[figures]}"),
+        console=console,
+        transient=True,
+    ) as bar:
+        yield _looker(folder, bar)
+
+
+def _looker(folder: Folder, bar: Any) -> Callable[[], None]:
+    from wavecomb.farm.folder import BUSY, DONE, FAILED
+
+    task, due = bar.add_task("", total=None, figures=""), [0.0]
+
+    def look() -> None:
+        if time.monotonic() < due[0]:
+            return
+        due[0] = time.monotonic() + _SHOW_S
+        counts = folder.counts()
+        failed = f", {counts[FAILED]} failed" if counts[FAILED] else ""
+        bar.update(
+            task,
+            completed=counts[DONE],
+            total=sum(counts.values()),
+            figures=f"{counts[DONE]} done, {counts[BUSY]} at work{failed}",
+        )
+
+    return look

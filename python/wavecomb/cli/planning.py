@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a command that renders was asked for, checked before anything is rendered."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.cli.aovs import AovOptions
+from wavecomb.cli.frames import check_frames
+from wavecomb.cli.job import Job, Names, purpose_at
+from wavecomb.cli.options import StageOptions
+from wavecomb.cli.products import Plan, plan_products
+from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.cli.reporting import Reporter, make_reporter
+from wavecomb.options import settings as known_settings
+from wavecomb.run import aovs as aov_names
+
+if TYPE_CHECKING:
+    from wavecomb.run.checkpoint import Checkpoint
+    from wavecomb.usd.stage.choice import RenderChoice
+
+Peek = Callable[[StageOptions, str], "tuple[list[RenderChoice], Any]"]
+"""What the stage's render settings ask for, as ``StageOptions.peek`` gives it."""
+
+
+@dataclass
+class Asked:
+    """Arguments of a command that renders.
+
+    Attributes:
+        stage: A file.
+        output: -o.
+        output_dir: --output-dir.
+        png: --png.
+        stats_file: --stats.
+        size: --size.
+        spp: --spp.
+        exposure: --exposure.
+        tone_map: --tone-map.
+        quiet: --quiet.
+        costs: --costs.
+        frames: --frames.
+        skip_existing: --skip-existing.
+        film_memory: --film-memory.
+        source: Options of the stage.
+        purpose: Options of ``purpose_options``.
+        layers: Options of ``aov_options``.
+        chosen: Settings that were given.
+    """
+
+    stage: str
+    output: str | None
+    output_dir: str | None
+    png: str | None
+    stats_file: str | None
+    size: tuple[int, int] | None
+    spp: int | None
+    exposure: float
+    tone_map: Any
+    quiet: bool
+    costs: str | None
+    frames: str | None
+    skip_existing: bool
+    film_memory: float | None
+    source: StageOptions
+    purpose: PurposeOptions
+    layers: AovOptions
+    chosen: dict[str, Any]
+
+    @classmethod
+    def take(cls, options: dict[str, Any]) -> Asked:
+        """Of a command's arguments, all of them."""
+        source = StageOptions.take(options)
+        purpose = PurposeOptions.take(options)
+        layers = AovOptions.take(options)
+        own = {
+            name: options.pop(name)
+            for name in (
+                "stage", "output", "output_dir", "png", "stats_file", "size", "spp", "exposure",
+                "tone_map", "quiet", "costs", "frames", "skip_existing", "film_memory",
+            )
+        }  # fmt: skip
+        chosen = {name: value for name, value in options.items() if value is not None}
+        return cls(source=source, purpose=purpose, layers=layers, chosen=chosen, **own)
+
+    @property
+    def costs_file(self) -> str | None:
+        """A file of costs that is read and written; None: there is none."""
+        sources = known_settings()["costs"].choices
+        return self.costs if self.costs is not None and self.costs not in sources else None
+
+    def written(self) -> tuple[str | None, ...]:
+        """Files that are written, with places for the frame."""
+        own = (self.output, self.png, self.stats_file, self.costs_file)
+        return (*own, self.purpose.preview, self.purpose.checkpoint_file)
+
+
+@dataclass
+class Prepared:
+    """What is to be rendered.
+
+    Attributes:
+        source: Options of the stage, those of a checkpoint included.
+        resumed: The checkpoint to go on from.
+        jobs: A plan, its frames and its job for each product.
+        opened: Held until the stage is loaded, so that its layers are read once.
+        reporter: Of all jobs.
+    """
+
+    source: StageOptions
+    resumed: Checkpoint | None
+    jobs: list[tuple[Plan, tuple[float, ...] | None, Job]]
+    opened: Any
+    reporter: Reporter
+
+
+def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
+    """Checks all that can be known to fail.
+
+    Raises:
+        WavecombError: Something is no good; one line says what.
+    """
+    from wavecomb.run.bands import band_rows
+    from wavecomb.run.settings import keeps_error
+
+    purpose, layers, source = asked.purpose, asked.layers, asked.source
+
+    def checked(names: Names, plan: Plan | None = None) -> tuple[float, ...] | None:
+        """The frames of a sequence; what can be known to fail fails here."""
+        numbers = check_frames(asked.frames, asked.skip_existing, source, names, purpose)
+        for frame in (None,) if numbers is None else numbers:
+            here = names if frame is None else names.at(frame)
+            if plan is not None:
+                plan.check_place(here)
+            at_frame = purpose if frame is None else purpose_at(purpose, frame)
+            _check_outputs(asked.stage, here, at_frame, asked.costs_file)
+        return numbers
+
+    if asked.output is not None:
+        checked(Names(asked.output, asked.png, asked.stats_file))
+    if purpose.denoise:
+        from wavecomb.picture.denoise import check_denoiser
+
+        check_denoiser()
+    resumed = purpose.load()
+    chosen = dict(asked.chosen)
+    if asked.costs is not None and asked.costs_file is None:
+        chosen["costs"] = asked.costs
+    profile = _read_costs(asked.costs_file)
+    chosen |= purpose.settings(asked.spp, resumed)
+    if asked.size is not None:
+        chosen["width"], chosen["height"] = asked.size
+    if resumed is not None:
+        chosen = {**resumed.settings, **chosen}
+        source = source.completed(resumed.source)
+    kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
+    before = None if resumed is None else resumed.aovs
+    choices, opened = peek(source, asked.stage)
+    plans = plan_products(
+        choices, asked.output, asked.png, asked.stats_file, purpose, asked.frames, asked.output_dir
+    )
+    reporter = make_reporter(purpose.progress, asked.quiet)
+
+    def fits(settings: Any, aovs: Any) -> None:
+        band_rows(settings, aovs, asked.film_memory, whole=purpose.whole, tile=layers.tile)
+
+    def job_of(plan: Plan, numbers: tuple[float, ...] | None) -> Job:
+        aovs = plan.aovs(layers, before)
+        guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
+        settings = plan.settings(
+            chosen, aov_names.with_guides(aovs, guides), resumed is not None, fits
+        )
+        shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
+        further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
+        layers.check(plan.names.output, (*aovs, *further))
+        if layers.split:
+            plan.check_split((*aovs, *further), numbers)
+        return Job(
+            asked.stage, settings, aovs, profile, layers, reporter, asked.exposure,
+            asked.tone_map, asked.film_memory,
+        )  # fmt: skip
+
+    # All is checked before the first is rendered.
+    all_numbers = [checked(plan.names, plan) for plan in plans]
+    jobs = [
+        (plan, numbers, job_of(plan, numbers))
+        for plan, numbers in zip(plans, all_numbers, strict=True)
+    ]
+    return Prepared(source, resumed, jobs, opened, reporter)
+
+
+def _check_outputs(
+    stage: str, names: Names, purpose: PurposeOptions, costs_file: str | None
+) -> None:
+    """Everything that can be known to fail before the work begins."""
+    from wavecomb.errors import WavecombError
+    from wavecomb.picture.files import check_writable
+
+    outputs = [
+        (names.output, "-o", ".exr"),
+        (names.png, "--png", ".png"),
+        (names.stats, "--stats", None),
+        (costs_file, "--costs", None),
+        (purpose.preview, "--preview", ".png"),
+        (purpose.checkpoint_file, "--checkpoint", None),
+    ]
+    for name, option, ending in outputs:
+        if name is not None and ending is not None and not name.lower().endswith(ending):
+            raise WavecombError(f"{option} {name}: the name must end in {ending}")
+        if option == "--costs" and name is not None and not name.lower().endswith(".json"):
+            sources = known_settings()["costs"].choices
+            raise WavecombError(
+                f"--costs {name}: must be one of {', '.join(sources)}, "
+                "or a file whose name ends in .json"
+            )
+    seen = {os.path.realpath(stage): "the stage"}
+    for name, option, _ in outputs:
+        if name is None:
+            continue
+        other = seen.setdefault(os.path.realpath(name), option)
+        if other != option:
+            raise WavecombError(f"{option} {name}: is the same file as {other}")
+        check_writable(name)
+
+
+def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
+    """The profile to start from, if there is one yet."""
+    if costs_file is None or not os.path.exists(costs_file):
+        return None
+    from wavecomb.run.costs import load_costs
+
+    return load_costs(costs_file)

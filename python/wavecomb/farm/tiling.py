@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How pictures are cut into tiles: pixels, never samples."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from wavecomb.errors import WavecombError
+
+Rectangle = tuple[int, int, int, int]
+"""x0, y0, x1, y1 in pixels of the whole picture, the end excluded."""
+
+LEAST_EDGE = 64
+"""Of tiles that are chosen by themselves, in pixels."""
+TILES_OF_A_WORKER = 4
+"""Of a picture that is shared out: so many that nobody waits long for the last."""
+_CHECK_SAMPLES = 16
+"""Of the core's looks at errors (render/pass_plan.cpp)."""
+_REACH = 4
+"""Pixels that one look at errors reaches: a mean over two to each side, and marks that spread by
+two more."""
+_WINDOW = 2
+"""Pixels to each side that the layer of errors is a mean of."""
+
+
+def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
+    """A region cut into columns and rows, row by row; as even as whole pixels are.
+
+    >>> tiles_of((0, 0, 10, 4), (3, 1))
+    [(0, 0, 3, 4), (3, 0, 6, 4), (6, 0, 10, 4)]
+    """
+    x0, y0, x1, y1 = region
+    columns, rows = min(tiles[0], x1 - x0), min(tiles[1], y1 - y0)
+    xs = [x0 + (x1 - x0) * i // columns for i in range(columns + 1)]
+    ys = [y0 + (y1 - y0) * i // rows for i in range(rows + 1)]
+    return [(xs[i], ys[k], xs[i + 1], ys[k + 1]) for k in range(rows) for i in range(columns)]
+
+
+def parse_tiles(text: str) -> tuple[int, int] | None:
+    """Columns and rows of "4x3"; None: of "auto".
+
+    Raises:
+        WavecombError: It is neither.
+    """
+    if text == "auto":
+        return None
+    match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
+    if match is None or not (int(match[1]) and int(match[2])):
+        raise WavecombError(f"--tiles {text}: must be auto, or columns x rows such as 4x3")
+    return int(match[1]), int(match[2])
+
+
+def choose_tiles(
+    regions: list[Rectangle], pictures: int, workers: int, whole: bool
+) -> tuple[int, int]:
+    """Tiles of each picture where nobody said.
+
+    Whole pictures, where there are two or more for each worker: nothing is assembled then.
+
+    Args:
+        regions: Of the pictures, each size once.
+        pictures: How many there are.
+        workers: That are expected.
+        whole: Whether cutting costs more than it brings: errors are looked at, or a field of light
+            is learned for each tile.
+    """
+    if workers < 2 or whole or pictures >= 2 * workers:
+        return 1, 1
+    width = min(x1 - x0 for x0, _, x1, _ in regions)
+    height = min(y1 - y0 for _, y0, _, y1 in regions)
+    wanted = TILES_OF_A_WORKER * workers
+    columns = max(1, min(width // LEAST_EDGE, round((wanted * width / height) ** 0.5)))
+    rows = max(1, min(height // LEAST_EDGE, -(-wanted // columns)))
+    return columns, rows
+
+
+def looks(settings: Mapping[str, Any]) -> int:
+    """How often an adaptive render looks at errors before its pixels have all samples.
+
+    >>> looks({"spp": 64, "min_spp": 16})
+    3
+    """
+    spp = int(settings["spp"])
+    done = max(_CHECK_SAMPLES, -(-int(settings["min_spp"]) // _CHECK_SAMPLES) * _CHECK_SAMPLES)
+    count = 0
+    while done < spp:
+        count += 1
+        step = max(_CHECK_SAMPLES, (1 << (done.bit_length() - 1)) // 4)
+        done = (done // step + 1) * step
+    return count
+
+
+def most_looks(settings: Mapping[str, Any]) -> int:
+    """Looks that the border of an adaptive tile allows for.
+
+    Four more than there are before the last samples: pixels that go on late take further ones.
+    """
+    return looks(settings) + 4
+
+
+def border(settings: Mapping[str, Any], count: int) -> int:
+    """Pixels that are rendered around an adaptive tile, so that ``count`` looks see the picture.
+
+    What a look at errors decides of a pixel depends on pixels up to 4 away, so what is beyond a
+    border of 4 pixels for each look cannot have reached the tile; the layer of errors is a mean
+    over two pixels more. Renders without errors need none.
+    """
+    if settings.get("adaptive"):
+        return _REACH * count + _WINDOW
+    return _WINDOW if settings.get("error") else 0
+
+
+def grown(tile: Rectangle, border: int, region: Rectangle) -> Rectangle:
+    """A tile with a border, as far as there is a picture."""
+    x0, y0, x1, y1 = tile
+    return (
+        max(region[0], x0 - border), max(region[1], y0 - border),
+        min(region[2], x1 + border), min(region[3], y1 + border),
+    )  # fmt: skip

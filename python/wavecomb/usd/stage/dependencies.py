@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All files that a stage resolves to, and those that it names and that are not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Ar, Sdf, Tf, Usd, UsdUtils
+
+from wavecomb.usd import mtlx
+from wavecomb.usd.looks.texture import UDIM, asset_file, tile_files
+from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.opening import open_stage
+from wavecomb.usd.stage.report import LoadReport
+
+
+@dataclass(frozen=True)
+class Dependencies:
+    """What a stage needs.
+
+    Attributes:
+        files: Absolute names of files that are there: layers in any variant, textures and tiles of
+            them, profiles, images that MaterialX files name.
+        missing: Lines on what the composed stage names and is not there.
+    """
+
+    files: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def dependencies(
+    file: Path, variants: Mapping[str, str] | None = None, session_layer: Path | None = None
+) -> Dependencies:
+    """What a stage needs, with these variants.
+
+    Raises:
+        WavecombError: It cannot be opened.
+    """
+    report = LoadReport()
+    with captured(report):
+        stage = open_stage(file, variants, session_layer=session_layer)
+        mtlx.tell(stage, report)
+        found: dict[str, None] = dict.fromkeys(_layers(stage))
+        for name in (file, session_layer):
+            if name is not None:
+                found.update(dict.fromkeys(_all(str(name))))
+        missing: dict[str, None] = {}
+        for prim in _prims(stage):
+            for attribute in prim.GetAuthoredAttributes():
+                for value in _values(attribute):
+                    _add(found, missing, value, attribute)
+    for warning in report.warnings:
+        if warning.what.startswith(("MaterialX file", "cannot open layer")):
+            missing[warning.line()] = None
+    files = {os.path.abspath(path) for path in map(_outer, found) if path and os.path.isfile(path)}
+    return Dependencies(tuple(sorted(files)), tuple(sorted(missing)))
+
+
+def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    """All prims that are drawn or used, those of prototypes once."""
+    predicate = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
+    yield from Usd.PrimRange(stage.GetPseudoRoot(), predicate)
+    for prototype in stage.GetPrototypes():
+        yield from Usd.PrimRange(prototype, predicate)
+
+
+def _values(attribute: Usd.Attribute) -> Iterator[Sdf.AssetPath]:
+    """All files that an attribute ever names."""
+    kind = attribute.GetTypeName()
+    if kind not in (Sdf.ValueTypeNames.Asset, Sdf.ValueTypeNames.AssetArray):
+        return
+    for time in (Usd.TimeCode.Default(), *attribute.GetTimeSamples()):
+        value = attribute.Get(time)
+        values: Iterable[Sdf.AssetPath] = (
+            [value] if isinstance(value, Sdf.AssetPath) else value or ()
+        )
+        yield from (one for one in values if one.path)
+
+
+def _add(
+    found: dict[str, None],
+    missing: dict[str, None],
+    value: Sdf.AssetPath,
+    attribute: Usd.Attribute,
+) -> None:
+    """Takes a file of an attribute into one of the lists."""
+    if UDIM in value.path:
+        tiles = [path for _, path in tile_files(asset_file(value, attribute))]
+        found.update(dict.fromkeys(tiles))
+        if not tiles:
+            missing[f"no tile of {value.path} is there: {attribute.GetPath()}"] = None
+        return
+    path = _outer(value.resolvedPath or asset_file(value, attribute))
+    if path and os.path.isfile(path):
+        found[path] = None
+    elif not _is_library(value.path):
+        missing[f"file {value.path} is not there: {attribute.GetPath()}"] = None
+
+
+def _is_library(path: str) -> bool:
+    """Whether a name is of a shader's source, which nothing reads."""
+    return path.endswith((".osl", ".oso", ".glslfx", ".args"))
+
+
+def _layers(stage: Usd.Stage) -> Iterator[str]:
+    for layer in stage.GetUsedLayers(True):
+        if layer.realPath:
+            yield _outer(layer.realPath)
+    yield from map(_outer, mtlx.translated_files())
+
+
+def _all(file: str) -> Iterator[str]:
+    """Files that layers name, in variants that are not selected, too."""
+    try:
+        layers, assets, _ = UsdUtils.ComputeAllDependencies(file)
+    except (Tf.ErrorException, RuntimeError):
+        return
+    yield from (_outer(layer.realPath) for layer in layers)
+    yield from (_outer(str(asset)) for asset in assets)
+
+
+def _outer(path: str) -> str:
+    """The file, of one in a package the package."""
+    return Ar.SplitPackageRelativePathOuter(path)[0] if Ar.IsPackageRelativePath(path) else path
