@@ -146,6 +146,27 @@ def workers(folder: Folder) -> list[Worker]:
     return found
 
 
+def look_s(lease_s: float, living: int) -> float:
+    """Seconds between two looks of one worker for tasks of others that are no more.
+
+    A look reads a file of each worker. Eight workers look eight times a lease each; more look less
+    often, so that what the disk is asked grows with their number and not with its square.
+
+    >>> look_s(60.0, 4), look_s(60.0, 80)
+    (7.5, 75.0)
+    """
+    return max(0.5, lease_s / 8) * max(1.0, living / 8)
+
+
+def living(folder: Folder, now: float) -> int:
+    """How many workers gave a sign of life within a lease."""
+    with os.scandir(folder.path / "workers") as files:
+        return sum(
+            file.name.endswith(".json") and file.stat().st_mtime > now - folder.spec.lease_s
+            for file in files
+        )
+
+
 def take_back(folder: Folder, now: float | None = None, *, counts: bool = True) -> list[Entry]:
     """Takes tasks from workers that are no more, or gave no sign for too long.
 

@@ -8,6 +8,7 @@ child is started. The worker itself loads neither USD nor the renderer, so littl
 from __future__ import annotations
 
 import contextlib
+import random
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -17,7 +18,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.farm.child_process import Child, ChildDied
 from wavecomb.farm.choosing import Chooser
 from wavecomb.farm.folder import DONE, Entry, Folder
-from wavecomb.farm.leases import Beat, take_back
+from wavecomb.farm.leases import Beat, living, look_s, take_back
 from wavecomb.farm.machine_class import refusal
 from wavecomb.farm.spec import Task
 
@@ -104,9 +105,14 @@ class Worker:
         self._beat.give()
         if time.monotonic() < self._next_look:
             return
-        self._next_look = time.monotonic() + max(0.5, self._folder.spec.lease_s / 8)
+        lease = self._folder.spec.lease_s
+        self._next_look = time.monotonic() + look_s(lease, 1)
         with contextlib.suppress(OSError):
-            for entry in take_back(self._folder, self._beat.now()):
+            now = self._beat.now()
+            # By chance, so that workers that were started together do not look together.
+            wait = look_s(lease, living(self._folder, now)) * random.uniform(0.75, 1.25)
+            self._next_look = time.monotonic() + wait
+            for entry in take_back(self._folder, now):
                 self._say(f"{self._folder.spec.title(entry.task)}: taken from {entry.worker}")
 
     def _do(self, entry: Entry) -> str:
