@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wavecomb.farm.leases import BEAT_S, look_s
+from wavecomb.farm.leases import look_s
 
 
 @dataclass
@@ -109,7 +109,6 @@ def simulate(times: np.ndarray, workers: int, farm: Farm, rng: np.random.Generat
     out.calls = {
         "renames": takes + len(times),
         "listings": takes + out.makespan / look * workers,
-        "signs of life": out.makespan / BEAT_S * workers,
         # Each look reads what each worker says of itself, and when.
         "files read": out.makespan / look * workers**2,
     }

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from farm_jobs import same
 from parts import needs
-from test_texture_limit import textured, write_image
+from test_texture_limit import MOVING_CAMERA, textured, write_image
 
 from wavecomb import farm
 from wavecomb.farm.files import read_json, write_json
@@ -45,18 +45,7 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("moving")
     noise = np.random.default_rng(3)
     write_image(folder / "a.png", noise.integers(0, 256, (64, 64, 3), np.uint8))
-    text = (
-        "#usda 1.0\n"
-        + textured("M", "a.png", 1)
-        + """def DistantLight "Sun" {}
-    def Camera "C" {
-        float focalLength = 20
-        float horizontalAperture = 20
-        double3 xformOp:translate.timeSamples = {1: (0, 0, 0), 4: (0, 0, -0.5)}
-        uniform token[] xformOpOrder = ["xformOp:translate"]
-    }
-    """
-    )
+    text = "#usda 1.0\n" + textured("M", "a.png", 1) + MOVING_CAMERA
     path = folder / "stage.usda"
     path.write_text(text)
     return path

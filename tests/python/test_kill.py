@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from parts import needs
-from test_texture_limit import textured, write_image
+from test_texture_limit import MOVING_CAMERA, textured, write_image
 
 from wavecomb.picture.image import read_layers
 from wavecomb.run.checkpoint import load_checkpoint
@@ -47,17 +47,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
         at = f"({i % 3 - 1.5}, {i // 3 - 1.5}, -3)\n"
         text += textured(f"M{i}", f"{i}.png", 1).replace("(0, 0, -1)\n", at)
     path = folder / "stage.usda"
-    path.write_text(
-        text
-        + """def DistantLight "Sun" {}
-    def Camera "C" {
-        float focalLength = 20
-        float horizontalAperture = 20
-        double3 xformOp:translate.timeSamples = {1: (0, 0, 0), 4: (0, 0, -0.5)}
-        uniform token[] xformOpOrder = ["xformOp:translate"]
-    }
-    """
-    )
+    path.write_text(text + MOVING_CAMERA)
     return path
 
 

@@ -28,6 +28,17 @@ def write_image(path, pixels):
     out.close()
 
 
+MOVING_CAMERA = """def DistantLight "Sun" {}
+    def Camera "C" {
+        float focalLength = 20
+        float horizontalAperture = 20
+        double3 xformOp:translate.timeSamples = {1: (0, 0, 0), 4: (0, 0, -0.5)}
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+    """
+"""A sun, and a camera that looks along -Z and moves over four frames."""
+
+
 def textured(name, file, distance):
     """A unit square with a texture, some way off along -Z."""
     return f"""def Material "{name}Mat" {{

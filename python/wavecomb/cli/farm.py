@@ -57,9 +57,9 @@ def worker_command(job: str, threads: int, tied: bool, quiet: bool, as_json: boo
     Starts as many as there are machines. Ctrl-C and SIGTERM keep what was done of the task at hand
     in a checkpoint, with which another worker goes on.
     """
-    from wavecomb.farm.child import end_with_parent
     from wavecomb.farm.folder import Folder, say
     from wavecomb.farm.worker import Worker
+    from wavecomb.run.parents import end_with_parent
 
     def tell(line: str) -> None:
         if not (quiet or as_json):

@@ -9,7 +9,6 @@ stdin.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
 import os
 import queue
@@ -20,7 +19,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-_PR_SET_PDEATHSIG = 1
+from wavecomb.run.parents import end_with_parent
+
 _SHOW_S = 0.5
 
 
@@ -43,12 +43,6 @@ def main(words: list[str]) -> None:
         return
     while True:
         worker.do(json.loads(tasks.get()))
-
-
-def end_with_parent() -> None:
-    """Has the kernel kill this process when its parent is no more."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 class Channel:

@@ -206,7 +206,7 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   context.discards = true;
   const Bounds& b = scene.bounds();
   const GuideGrid grid({b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z});
-  auto field = std::make_unique<GuideField>(grid);
+  auto field = std::make_unique<const GuideField>(grid);
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
   std::optional<PictureTiles> tiles;
   std::vector<TrainingRecord> records;

@@ -8,7 +8,6 @@ goes to a whole group, comes to it once.
 
 from __future__ import annotations
 
-import ctypes
 import io
 import os
 import signal
@@ -20,6 +19,7 @@ from typing import Any
 from wavecomb.run.isolate import box, trail
 from wavecomb.run.isolate.broker import Broker, Client
 from wavecomb.run.isolate.memory import limit_of
+from wavecomb.run.parents import end_with_parent
 
 _PASSED_ON = (
     signal.SIGINT,
@@ -30,7 +30,6 @@ _PASSED_ON = (
     signal.SIGUSR2,
 )
 _WATCHED = {*_PASSED_ON, signal.SIGTSTP, signal.SIGCONT, signal.SIGCHLD}
-_PR_SET_PDEATHSIG = 1
 CHATTER = (
     "libpng ",
     "failed call to posix_madvise",
@@ -96,7 +95,7 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
     os.setpgid(0, 0)
     # Of a group that is not the terminal's: writing there must not stop it.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    end_with_parent()
     if os.getppid() != parent:
         os._exit(2)
     trail.follow(page)
