@@ -104,6 +104,20 @@ def test_all_files_are_listed(folder: Path) -> None:
         assert name in missing
 
 
+def test_files_of_other_stages_are_not_listed(folder: Path) -> None:
+    """A process keeps what it translated: each stage has its own of it."""
+    (folder / "other.mtlx").write_text(LOOK.replace("b.png", "a.png"))
+    (folder / "one.usda").write_text(
+        '#usda 1.0\ndef "Looks" (references = @other.mtlx@</MaterialX>) {}\n'
+    )
+    first, second = (
+        {Path(one["path"]).name for one in list_assets(str(folder / name))["files"]}
+        for name in ("one.usda", "s.usda")
+    )
+    assert first == {"one.usda", "other.mtlx", "a.png"}
+    assert second == THERE
+
+
 def test_the_command_lists_them(folder: Path) -> None:
     words = ["farm", "assets", str(folder / "s.usda")]
     done = forks.wavecomb(*words, "--json", "--variant", "/V{x}=two")

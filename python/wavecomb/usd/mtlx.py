@@ -89,13 +89,13 @@ def tell(stage: Usd.Stage, report: LoadReport) -> None:
         report.warn(f"{ABSENT}: files left out", str(error.rootSite.path))
 
 
-def translated_files() -> list[str]:
-    """MaterialX files that any stage of this process brought in."""
+def translated_files(stage: Usd.Stage) -> list[str]:
+    """MaterialX files that a stage brought in."""
     if "wavecomb.usd.materialx.references" not in sys.modules:
         return []
     from wavecomb.usd.materialx import references
 
-    return references.translated_files()
+    return references.translated_files(stage)
 
 
 def model_of(identifier: str) -> str:

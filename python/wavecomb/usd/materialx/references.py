@@ -48,9 +48,17 @@ _translations: dict[str, _Translation] = {}
 _lock = threading.Lock()
 
 
-def translated_files() -> list[str]:
-    """Files that were translated."""
-    return [file for file, one in _translations.items() if one.layer is not None]
+def translated_files(stage: Usd.Stage) -> list[str]:
+    """Files that a stage sees translated, or that its layers name elsewhere (in other variants)."""
+    layers = stage.GetUsedLayers(True)
+    named = {layer.identifier for layer in layers}
+    for layer in layers:
+        named.update(layer.GetCompositionAssetDependencies())
+    return [
+        file
+        for file, one in _translations.items()
+        if one.layer is not None and one.layer.identifier in named
+    ]
 
 
 def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:

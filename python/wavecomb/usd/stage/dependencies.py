@@ -109,7 +109,7 @@ def _layers(stage: Usd.Stage) -> Iterator[str]:
     for layer in stage.GetUsedLayers(True):
         if layer.realPath:
             yield _outer(layer.realPath)
-    yield from map(_outer, mtlx.translated_files())
+    yield from map(_outer, mtlx.translated_files(stage))
 
 
 def _all(file: str) -> Iterator[str]:
