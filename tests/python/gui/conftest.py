@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Windows without a screen. QT_QPA_PLATFORM chooses another platform than offscreen."""
 
+import gc
 import os
 
 import pytest
@@ -10,6 +11,36 @@ os.environ.setdefault("QT_LOGGING_RULES", "qt.qpa.*=false")
 
 pytest.importorskip("PySide6.QtWidgets", reason="the window needs the extra gui")
 pytest.importorskip("pytestqt", reason="tests of the window need pytest-qt")
+
+
+@pytest.fixture(scope="session")
+def _modules():
+    """What is imported is no garbage: the collector need not look at it after every test."""
+    import wavecomb.gui.main_window  # noqa: F401
+
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(autouse=True)
+def _collected(qapp, _modules):
+    """What a test leaves behind is destroyed after it, on the window's thread.
+
+    Tests make objects of Qt's with no window round them. Automatic collection would destroy those
+    that are in cycles on any thread that makes an object, in a later test, which may never end
+    (docs/decisions/window-threads.md). That nothing of the window's own is so is for
+    test_threads.py to show, in processes of their own in which all threads collect.
+    """
+    from PySide6.QtCore import QCoreApplication, QEvent
+
+    if os.environ.get("WAVECOMB_ALONE"):
+        yield
+        return
+    gc.disable()
+    yield
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    gc.collect()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")
