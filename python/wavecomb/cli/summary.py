@@ -91,6 +91,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         elif learned["guided_share"] > 0:
             line += f"; {_percent(learned['guided_share'])} of bounced light is guided"
         lines.append(line)
+    elif settings.get("guiding") == "auto":
+        lines.append("not guided: too few samples to find out whether that pays")
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
         line = f"{stats['passes']} passes, {mean:.3g} samples a pixel"

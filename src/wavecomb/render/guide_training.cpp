@@ -17,7 +17,15 @@ namespace {
 
 /// Share of a render's samples that training may take, and its most and least paths.
 constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrainingPaths = 16'384;
+/// Of Guiding::kAuto: the two rounds that decide, three sevenths of it, are to cost a twentieth of
+/// the render, and a path of theirs costs some three times one of the picture's. Fewer paths would
+/// decide wrongly (docs/guiding.md).
+constexpr uint64_t kAutoShare = 30, kLeastAutoPaths = 250'000;
+/// Paths that a thread teaches in a second of a render with a time limit: what a slow one does.
+constexpr double kTaughtInSecond = 50'000;
 constexpr uint32_t kTrainingRounds = 3;
+/// Paths whose vertices are kept at once: some 20 MB.
+constexpr size_t kPathsAtOnce = 65'536;
 /// Vertices of a path that teach.
 constexpr uint32_t kTaughtVertices = 6;
 /// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
@@ -28,6 +36,19 @@ constexpr double kWorthwhileGain = 1.1, kSureErrors = 2;
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
 constexpr double kListRay = 0.3;
+
+/// Paths that training may take; 0: too few to learn from.
+uint64_t training_paths(const Settings& settings, uint32_t threads) {
+  const bool is_auto = settings.guiding == Guiding::kAuto;
+  const uint64_t samples = uint64_t{settings.width} * settings.height * settings.spp;
+  uint64_t paths = std::min(samples / (is_auto ? kAutoShare : kTrainingShare), kMostTrainingPaths);
+  // A limit of time is a render's only measure where it has more samples than it can take.
+  if (settings.time_limit > 0) {
+    const double taught = double{settings.time_limit} * threads * kTaughtInSecond / kTrainingShare;
+    paths = std::min(paths, static_cast<uint64_t>(std::min(taught, 1e9)));
+  }
+  return paths >= (is_auto ? kLeastAutoPaths : kLeastTrainingPaths) ? paths : 0;
+}
 
 /// Gathers what the bounces of a round teach, each path's in its own place.
 class BounceReader final : public HistoryReader {
@@ -158,6 +179,38 @@ Worth worth_of(const PictureTiles& tiles, std::span<const uint32_t> pixels, uint
   return {paths * paths / (squares * cost), fourths / (squares * squares)};
 }
 
+/// What the paths of training have taught, path by path.
+struct Lessons {
+  std::vector<TrainingRecord> records;
+  std::vector<uint64_t> dark;
+  std::vector<float> luminances;  ///< of the paths of the last round
+};
+
+/// Runs `samples` paths of each of `pixels` from sample `first` on with the field of `context`,
+/// some at a time, and adds what they taught.
+void teach(WaveContext& context, Integrator& integrator, const TrainingMeans& means,
+           std::span<const uint32_t> pixels, uint32_t first, uint32_t samples,
+           const GuideGrid& grid, const PictureTiles* tiles, Lessons& lessons,
+           const std::function<bool()>& stopped) {
+  PassRunner runner(integrator, means.threads, means.wave_size);
+  const size_t step = std::max<size_t>(1, kPathsAtOnce / samples);
+  lessons.luminances.clear();
+  for (size_t at = 0; at < pixels.size() && !stopped(); at += step) {
+    const auto some = pixels.subspan(at, std::min(step, pixels.size() - at));
+    PassPlan plan;
+    plan.pixels.assign(some.begin(), some.end());
+    plan.batches.push_back({0, plan.pixels.size(), first, samples});
+    BounceReader reader(plan.pixels, first, samples, context.settings->max_depth, grid,
+                        *context.guide, tiles);
+    context.histories = &reader;
+    runner.run(plan, stopped);
+    reader.append_to(lessons.records, lessons.dark);
+    const auto brought = reader.luminances();
+    lessons.luminances.insert(lessons.luminances.end(), brought.begin(), brought.end());
+  }
+  context.histories = nullptr;
+}
+
 /// Cost of a round, in rays of a hierarchy.
 double cost_of(const Integrator& integrator, const TrainingMeans& means, bool has_list,
                bool looks_up) {
@@ -183,12 +236,11 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   const Clock::time_point start = Clock::now();
   GuideTraining out;
   Settings settings = *render.settings;
-  const uint64_t pixel_count = uint64_t{settings.width} * settings.height;
-  const uint64_t budget = std::min(pixel_count * settings.spp / kTrainingShare, kMostTrainingPaths);
+  const uint64_t budget = training_paths(settings, means.threads);
   const bool is_auto = settings.guiding == Guiding::kAuto;
   const bool guides = settings.guiding != Guiding::kOff;
   const bool learns = guides || settings.roulette == RouletteKind::kEfficient;
-  if (!learns || settings.max_depth == 0 || budget < kLeastTrainingPaths) return out;
+  if (!learns || settings.max_depth == 0 || budget == 0) return out;
   settings.region.reset();
   settings.crop = false;
   settings.aovs = {};
@@ -209,38 +261,33 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   auto field = std::make_unique<const GuideField>(grid);
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
   std::optional<PictureTiles> tiles;
-  std::vector<TrainingRecord> records;
-  std::vector<uint64_t> dark;
+  Lessons lessons;
   uint32_t first_sample = 0;
   Worth alone;  ///< without a field
   for (uint32_t round = 0; round < kTrainingRounds; ++round) {
     const uint64_t wanted = (budget << round) / ((1u << kTrainingRounds) - 1);
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order.size()));
+    const std::vector<uint32_t> pixels = some_pixels(order, wanted);
     const bool is_first = round == 0;
-    PassPlan plan;
-    plan.pixels = some_pixels(order, wanted);
-    plan.batches.push_back({0, plan.pixels.size(), first_sample, samples});
     GuideView view = field->view();
     if (tiles) tiles->apply(view);
-    BounceReader reader(plan.pixels, first_sample, samples, settings.max_depth, grid, view,
-                        tiles ? &*tiles : nullptr);
     context.guide = &view;
-    context.histories = &reader;
     const std::unique_ptr<Integrator> integrator =
         make_integrator(settings.integrator, context, means.lanes, means.threads, means.wave_size);
-    PassRunner(*integrator, means.threads, means.wave_size).run(plan, stopped);
+    teach(context, *integrator, means, pixels, first_sample, samples, grid,
+          tiles ? &*tiles : nullptr, lessons, stopped);
     if (stopped()) return {};
     first_sample += samples;
-    out.statistics.paths += plan.samples();
+    out.statistics.paths += lessons.luminances.size();
     ++out.statistics.rounds;
     if (!tiles) {
-      std::vector<uint32_t> pixels;
-      for (const uint32_t pixel : plan.pixels) pixels.insert(pixels.end(), samples, pixel);
-      tiles.emplace(settings, pixels, reader.luminances());
+      std::vector<uint32_t> of_paths;
+      for (const uint32_t pixel : pixels) of_paths.insert(of_paths.end(), samples, pixel);
+      tiles.emplace(settings, of_paths, lessons.luminances);
     }
     if (tiles->is_lit()) {
       const Worth worth =
-          worth_of(*tiles, plan.pixels, samples, reader.luminances(),
+          worth_of(*tiles, pixels, samples, lessons.luminances,
                    cost_of(*integrator, means, context.accel->has_list(), !is_first));
       if (is_first) {
         alone = worth;
@@ -250,10 +297,10 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
         if (is_auto && out.statistics.gain * (1 + kSureErrors * error) < kWorthwhileGain) break;
       }
     }
-    reader.append_to(records, dark);
-    auto next = std::make_unique<GuideField>(grid, records, scene.materials().size(), is_first,
-                                             guides, size_t{settings.learn_memory_mb} << 20);
-    next->count_dark(dark);
+    auto next =
+        std::make_unique<GuideField>(grid, lessons.records, scene.materials().size(), is_first,
+                                     guides, size_t{settings.learn_memory_mb} << 20);
+    next->count_dark(lessons.dark);
     field = std::move(next);
   }
   out.statistics.field_bytes = field->bytes();
