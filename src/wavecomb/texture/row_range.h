@@ -28,17 +28,22 @@ class RowRange {
     std::fill(high_, high_ + kRow, std::numeric_limits<Value>::lowest());
   }
 
-  /// `n` values, kRow at most, and what they are stored as.
+  /// `n` values, at least C and kRow at most, and what they are stored as.
   void note(const float* values, const T* codes, size_t n) {
     const Value* noted;
     if constexpr (kByCode)
       noted = codes;
     else
       noted = values;
-    if (n == kRow)
-      note_all(noted, kRow);  // as a loop of a known length
-    else
-      note_all(noted, n);
+    // Copies, which alias nothing: the loops are of a known length, and become a few comparisons.
+    Value all[kRow];
+    if (n == kRow) {
+      std::copy_n(noted, kRow, all);
+    } else {
+      for (size_t i = 0; i < kRow; ++i) all[i] = noted[i < n ? i : i % C];
+    }
+    for (size_t i = 0; i < kRow; ++i) low_[i] = std::min(low_[i], all[i]);
+    for (size_t i = 0; i < kRow; ++i) high_[i] = std::max(high_[i], all[i]);
   }
 
   /// Adds the range of what was stored to `totals`: encode(value, channel) is what a value is
@@ -52,20 +57,12 @@ class RowRange {
         return decode(T(encode(value, c)), c);
     };
     for (size_t i = 0; i < kRow; ++i) {
-      if (low_[i] > high_[i]) continue;  // of a row that is narrower
       totals.low[i % C] = std::min(totals.low[i % C], stored(low_[i], i % C));
       totals.high[i % C] = std::max(totals.high[i % C], stored(high_[i], i % C));
     }
   }
 
  private:
-  void note_all(const Value* values, size_t n) {
-    for (size_t i = 0; i < n; ++i) {
-      low_[i] = std::min(low_[i], values[i]);
-      high_[i] = std::max(high_[i], values[i]);
-    }
-  }
-
   Value low_[kRow], high_[kRow];
 };
 
