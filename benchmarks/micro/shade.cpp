@@ -11,16 +11,77 @@ namespace {
 using namespace scene_testing;
 
 constexpr uint32_t kRecords = 4096;
-constexpr uint32_t kEdge = 1024;  // of the texture
+constexpr uint32_t kEdge = 1024;  // of the textures
+
+/// What is asked of a program beside its constants: textures (1: the base colour; 4: roughness, a
+/// metallic map of zeros and an opacity map of ones, too; 5: roughness, metallic, specular colour
+/// and normal), and a layer. `odd`: one texel of maps that say nothing says something.
+struct Look {
+  const char* name;
+  uint32_t textures;
+  void (*edit)(Material&) = nullptr;
+  bool odd = false;
+};
+constexpr Look kLooks[] = {
+    {"", 0},
+    {"/textured", 1},
+    {"/silent", 4},
+    {"/silent:but-a-texel", 4, nullptr, true},
+    {"/textures:5", 5},
+    {"/coat", 0, [](Material& m) { m.clearcoat = 1; }},
+    {"/coat/textures:5", 5, [](Material& m) { m.clearcoat = 1; }},
+    {"/glow", 0, [](Material& m) { m.emission = {1, 1, 1}; }},
+    {"/glass", 0,
+     [](Material& m) {
+       m.opacity = 0.2f;
+       m.openpbr.transmission_weight = 0.8f;
+     }},
+};
+
+/// An image of bytes as files have them.
+TextureUse image(SceneBuilder& b, uint32_t channels, bool srgb, float low, float high) {
+  std::vector<uint8_t> bytes;
+  for (const float x : random_texels(kEdge * kEdge * channels, low, high, channels))
+    bytes.push_back(static_cast<uint8_t>(x * 255.f));
+  return use(b.add_texture({"image", bytes.data(), kEdge, kEdge, channels, TexelFormat::kU8, srgb,
+                            Wrap::kRepeat, Wrap::kRepeat}));
+}
+
+/// An image that is the same all over, but for a texel where it is `odd`.
+TextureUse silent(SceneBuilder& b, uint8_t value, bool odd) {
+  std::vector<uint8_t> bytes(size_t{kEdge} * kEdge, value);
+  if (odd) bytes.back() = 127;
+  return use(b.add_texture({"silent", bytes.data(), kEdge, kEdge, 1, TexelFormat::kU8, false,
+                            Wrap::kRepeat, Wrap::kRepeat}));
+}
 
 /// A sphere of one material under a lamp.
-ScenePtr make_scene(ProgramId program, bool textured) {
+ScenePtr make_scene(ProgramId program, const Look& look) {
   SceneBuilder b;
   Material material = make_material(program, {0.6f, 0.5f, 0.4f}, 0.4f);
+  const auto at = [&](Input input) -> TextureUse& {
+    return material.textures[static_cast<size_t>(input)];
+  };
   if (program == ProgramId::kEmissive) material.emission = {1, 1, 1};
-  if (textured)
-    material.textures[static_cast<size_t>(Input::kBaseColor)] =
+  if (look.textures == 1)
+    at(Input::kBaseColor) =
         use(add_texture(b, kEdge, kEdge, 3, random_texels(kEdge * kEdge * 3, 0.2f, 0.8f, 1)));
+  if (look.textures >= 4) {
+    at(Input::kBaseColor) = image(b, 3, true, 0.2f, 0.8f);
+    at(Input::kRoughness) = image(b, 1, false, 0.2f, 0.8f);
+  }
+  if (look.textures == 4) {
+    at(Input::kMetallic) = silent(b, 0, look.odd);
+    at(Input::kOpacity) = silent(b, 255, look.odd);
+  }
+  if (look.textures == 5) {
+    at(Input::kMetallic) = image(b, 1, false, 0.f, 1.f);
+    at(Input::kSpecularColor) = image(b, 3, true, 0.5f, 1.f);
+    TextureUse& normal = at(Input::kNormal) = image(b, 3, false, 0.4f, 0.6f);
+    normal.scale = {2, 2, 2, 1};
+    normal.bias = {-1, -1, -0.1f, 0};
+  }
+  if (look.edit) look.edit(material);
   const uint32_t id = b.add_material(material);
   b.add_to_group(0, b.add_mesh(make_mesh(sphere(32, true), id)));
   Light light = make_light(LightKind::kRect, {12, 11, 9}, translate(0, 3, 0) * rotate(0, -90));
@@ -30,8 +91,8 @@ ScenePtr make_scene(ProgramId program, bool textured) {
 }
 
 template <size_t W>
-void shade(benchmark::State& state, ProgramId program, bool textured, float fill) {
-  const ScenePtr scene = make_scene(program, textured);
+void shade(benchmark::State& state, ProgramId program, const Look& look, float fill) {
+  const ScenePtr scene = make_scene(program, look);
   CalibrationHits hits = find_calibration_hits(*scene).front();
   hits.count = kRecords;
   hits.fill = fill;
@@ -42,18 +103,25 @@ void shade(benchmark::State& state, ProgramId program, bool textured, float fill
   count_items(state, "record", kRecords);
 }
 
+/// Whether a program has what a look asks for.
+bool has(ProgramId program, const Look& look) {
+  const bool layered = program == ProgramId::kPrincipled || program == ProgramId::kOpenPbr;
+  // Emission is read from no base colour.
+  if (program == ProgramId::kEmissive) return look.textures == 0 && !look.edit;
+  return layered || (look.textures <= 1 && !look.edit);
+}
+
 const bool registered = [] {
   for (uint32_t p = 0; p < kProgramCount; ++p)
-    for (const bool textured : {false, true})
+    for (const Look& look : kLooks)
       for (const float fill : {1.f, 0.35f})
         for_each_width([&]<size_t W>() {
           const auto program = static_cast<ProgramId>(p);
-          // Emission is read from no base colour; a lone lane is always full.
-          if ((textured && program == ProgramId::kEmissive) || (fill < 1 && W == 1)) return;
-          const std::string name = "shade/" + std::string(kProgramNames[p]) +
-                                   (textured ? "/textured" : "") +
+          // A lone lane is always full.
+          if (!has(program, look) || (fill < 1 && W == 1)) return;
+          const std::string name = "shade/" + std::string(kProgramNames[p]) + look.name +
                                    (fill < 1 ? "/full:35%" : "/full:100%") + lanes_label(W);
-          benchmark::RegisterBenchmark(name.c_str(), shade<W>, program, textured, fill)
+          benchmark::RegisterBenchmark(name.c_str(), shade<W>, program, look, fill)
               ->UseManualTime()
               ->Unit(benchmark::kMicrosecond);
         });

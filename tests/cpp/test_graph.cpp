@@ -88,7 +88,8 @@ class GraphTest : public ::testing::Test {
     materials[2].graph = materials[2].opacity_graph = materials[2].emission_graph = 1;
     materials[2].presence = true;
     materials[3].graph = 0;
-    materials_ = std::make_unique<SceneMaterials>(std::move(materials), graphs);
+    materials_ = std::make_unique<SceneMaterials>(std::move(materials), graphs,
+                                                  std::span<const TexturePtr>());
     view_.materials = materials_->records.data();
     view_.uses = materials_->uses.data();
     view_.textures = &texture_->view();

@@ -12,7 +12,7 @@ using namespace scene_testing;
 using namespace wave_testing;
 
 std::string variant_of(const Material& m, const GraphSet& graphs = {}) {
-  return kVariants[least_variant(m.program, parts_of(m, graphs))].name;
+  return kVariants[least_variant(m.program, parts_of(m, graphs, {}))].name;
 }
 
 /// A material of a program, changed.

@@ -15,7 +15,7 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   std::vector<uint8_t> filtered(geometry.meshes.size(), 0);
   if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
   if (scene.view().lights.links.members || !scene.view().has_presence) return filtered;
-  const auto needs = [&](uint32_t m) { return scene.materials()[m].needs_presence(); };
+  const auto needs = [&](uint32_t m) { return scene.material_part()->shaded[m].needs_presence(); };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),
                                      [&](const InstanceRecord& i) { return needs(i.material); });

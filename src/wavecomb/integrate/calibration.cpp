@@ -49,7 +49,7 @@ std::vector<CalibrationHits> find_calibration_hits(const Scene& scene) {
 std::vector<MaterialTraits> material_traits(const Scene& scene) {
   std::vector<MaterialTraits> traits;
   const SceneView view = scene.view();
-  for (const Material& material : scene.materials()) {
+  for (const Material& material : scene.material_part()->shaded) {
     MaterialTraits t;
     t.program = view.material_variant[traits.size()];
     t.graph = material.graph;
@@ -71,7 +71,7 @@ CostSnapshot model_costs(const Scene& scene) {
   CostSnapshot costs;
   costs.texture_ns.assign(scene.textures().size(), kTextureNs);
   float sum = 0;
-  for (const Material& material : scene.materials()) {
+  for (const Material& material : scene.material_part()->shaded) {
     float ns = info_of(material.program).model_ns;
     for (const TextureUse& use : material.textures)
       if (use.texture != kNoTexture) ns += kTextureNs;

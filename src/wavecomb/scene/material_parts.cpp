@@ -3,38 +3,43 @@
 
 #include <algorithm>
 
-#include "wavecomb/graph/parameters.h"
+#include "wavecomb/scene/graph_ranges.h"
 
 namespace wavecomb {
 
-uint32_t parts_of(const Material& m, const GraphSet& graphs) {
-  const auto varies = [&](const char* parameter) {
-    return graphs.drives(m.graph, graph_parameter(parameter));
+uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const TexturePtr> textures) {
+  const DrivenRanges driven = driven_ranges(graphs, m.graph, textures);
+  // What a graph drives takes the place of a texture, and that the place of a constant.
+  const auto may_pass = [&](const char* parameter, float limit, bool otherwise) {
+    const auto& range = driven[graph_parameter(parameter)];
+    return range ? range->low < limit || range->high > limit : otherwise;
   };
-  const auto above_0 = [&](Input input, const char* parameter, float constant) {
-    return constant != 0 || m.has_texture(input) || varies(parameter);
+  const auto above_0 = [&](const char* parameter, bool otherwise) {
+    return may_pass(parameter, 0, otherwise);
+  };
+  const auto shown = [&](Input input, float constant) {
+    return constant != 0 || m.has_texture(input);
   };
   uint32_t parts = 0;
-  const auto add = [&parts](Part part, bool shown) { parts |= shown ? part : 0u; };
+  const auto add = [&parts](Part part, bool is_shown) { parts |= is_shown ? part : 0u; };
   add(kVaries, m.graph != kNoGraph ||
                    std::any_of(m.textures.begin(), m.textures.end(),
                                [](const TextureUse& u) { return u.texture != kNoTexture; }));
   add(kGlows, m.emits());
-  add(kMetals, m.specular_workflow || above_0(Input::kMetallic, "metallic", m.metallic));
-  add(kCoats, above_0(Input::kClearcoat, "clearcoat", m.clearcoat));
+  add(kMetals, m.specular_workflow || above_0("metallic", shown(Input::kMetallic, m.metallic)));
+  add(kCoats, above_0("clearcoat", shown(Input::kClearcoat, m.clearcoat)));
   if (m.program == ProgramId::kPrincipled) {
     // What is presence is none of the BSDF's.
     const bool is_presence = m.opacity_threshold > 0 || (m.presence && m.needs_presence());
-    add(kPasses, !is_presence && (m.opacity != 1 || m.opacity_varies()));
+    add(kPasses, !is_presence && may_pass("opacity", 1, m.opacity != 1 || m.opacity_varies()));
   }
   if (m.program == ProgramId::kOpenPbr) {
     const OpenPbr& o = m.openpbr;
-    add(kPasses, o.transmission_weight != 0 || varies("transmission_weight"));
-    add(kBacks, o.thin_walled && (o.subsurface_weight != 0 || varies("subsurface_weight")));
-    add(kFuzzes, o.fuzz_weight != 0 || varies("fuzz_weight"));
-    add(kFilms, o.film_weight != 0 || varies("film_weight"));
-    add(kBrushes,
-        o.anisotropy != 0 || o.rotation != 0 || varies("anisotropy") || varies("rotation"));
+    add(kPasses, above_0("transmission_weight", o.transmission_weight != 0));
+    add(kBacks, o.thin_walled && above_0("subsurface_weight", o.subsurface_weight != 0));
+    add(kFuzzes, above_0("fuzz_weight", o.fuzz_weight != 0));
+    add(kFilms, above_0("film_weight", o.film_weight != 0));
+    add(kBrushes, above_0("anisotropy", o.anisotropy != 0) || above_0("rotation", o.rotation != 0));
   }
   return parts;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 #include "wavecomb/scene/material_data.h"
@@ -61,8 +62,10 @@ constexpr ProgramId program_of(uint32_t variant) {
   return program_id(kVariants[variant].program);
 }
 
-/// Parts that a material may show, whatever its textures and graphs give.
-uint32_t parts_of(const Material& material, const GraphSet& graphs);
+/// Parts that a settled material (settled_material.h) may show: whatever its textures give, and its
+/// graphs within their ranges (graph_ranges.h), which may read `textures`.
+uint32_t parts_of(const Material& material, const GraphSet& graphs,
+                  std::span<const TexturePtr> textures);
 
 /// The cheapest variant of a program that has all of these parts.
 uint32_t least_variant(ProgramId program, uint32_t parts);

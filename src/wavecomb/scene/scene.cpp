@@ -121,7 +121,8 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
       shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
-    new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs);
+    new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs,
+                                                           geometry_->textures);
   }
   std::shared_ptr<const SceneTangents> new_tangents = tangents_;
   if (new_materials->wants_tangents != materials_->wants_tangents)
@@ -183,17 +184,17 @@ SceneBytes Scene::bytes() const {
   const auto of = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   const SceneGeometry& g = *geometry_;
   const LightSet& set = lights_->set;
-  b.records =
-      of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
-         g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
-         g.instance_motions, g.attribute_records, g.mesh_attributes) +
-      of(materials_->materials, materials_->records, materials_->uses, materials_->programs,
-         materials_->openpbr, materials_->graphs->programs, materials_->graphs->ops,
-         materials_->graphs->constants, materials_->graphs->images, materials_->graphs->outputs) +
-      of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
-         set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
-         set.ies, set.ies_numbers) +
-      lights_->tree_bytes() + g.names.bytes();
+  b.records = of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
+                 g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
+                 g.instance_motions, g.attribute_records, g.mesh_attributes) +
+              of(materials_->materials, materials_->shaded, materials_->records, materials_->uses,
+                 materials_->programs, materials_->openpbr, materials_->graphs->programs,
+                 materials_->graphs->ops, materials_->graphs->constants, materials_->graphs->images,
+                 materials_->graphs->outputs) +
+              of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records,
+                 set.triangles, set.triangle_uvs, set.pick_bins, set.powers, set.portals,
+                 set.portal_groups, set.shapings, set.ies, set.ies_numbers) +
+              lights_->tree_bytes() + g.names.bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;
 }

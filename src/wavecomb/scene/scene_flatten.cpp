@@ -172,7 +172,8 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   with_threads(threads_, [&] {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
-        std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})));
+        std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})),
+        geometry->textures);
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
     tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);

@@ -62,7 +62,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
   const Mesh& mesh = *source.mesh;
   const uint32_t material = material_of(mesh, *source.instance, face);
   EmissiveTriangle t{};
-  const Material& m = materials.materials[material];
+  const Material& m = materials.shaded[material];
   t.mesh_light = source.mesh_light;
   t.instance = source.instance_id;
   t.mesh = source.mesh_id;
@@ -100,7 +100,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   std::vector<EmissiveMesh> sources;
   size_t triangle_count = 0;
   const auto emits = [&](uint32_t material) {
-    return can_aim_at(materials.materials[material], *materials.graphs);
+    return can_aim_at(materials.shaded[material], *materials.graphs);
   };
   const Affine identity{};
   std::vector<PlacedMeshLight> placed;

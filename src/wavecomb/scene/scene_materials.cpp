@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/core/denormals.h"
 #include "wavecomb/graph/parameters.h"
 #include "wavecomb/scene/material_parts.h"
 #include "wavecomb/scene/scene_parts.h"
+#include "wavecomb/scene/settled_material.h"
 
 namespace wavecomb {
 namespace {
@@ -105,11 +107,14 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 
 }  // namespace
 
-SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_)
+SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_,
+                               std::span<const TexturePtr> textures)
     : materials(std::move(all)), graphs(std::move(programs_)) {
+  const DenormalsOff denormals_off;  // as kernels have it
+  for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
   const bool has_own = std::ranges::any_of(
       materials, [](const Material& m) { return info_of(m.program).own_count() > 0; });
-  for (const Material& m : materials) {
+  for (const Material& m : shaded) {
     records.push_back(make_material_record(m, *graphs));
     if (has_own) own.push_back(make_own_record(m));
     if (m.program == ProgramId::kOpenPbr) {
@@ -118,7 +123,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     }
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
-    variants.push_back(least_variant(m.program, parts_of(m, *graphs)));
+    variants.push_back(least_variant(m.program, parts_of(m, *graphs, textures)));
     wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();

@@ -115,9 +115,12 @@ struct SceneGeometry {
 
 /// Materials, and as lanes read them.
 struct SceneMaterials {
-  SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs);
+  /// `textures`: those of the scene, which materials and graphs read.
+  SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
+                 std::span<const TexturePtr> textures);
 
-  std::vector<Material> materials;
+  std::vector<Material> materials;  ///< as they were told
+  std::vector<Material> shaded;     ///< the same, settled (settled_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;

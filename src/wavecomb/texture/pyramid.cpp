@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "wavecomb/texture/half.h"
+#include "wavecomb/texture/row_range.h"
 #include "wavecomb/texture/srgb.h"
 
 namespace wavecomb {
@@ -87,13 +88,17 @@ class Pyramid {
     });
     for (uint32_t n = band_top_ + 1; n < view_.level_count; ++n) {
       std::vector<float> next(row_size(n) * view_.levels[n].height);
-      shrink(n, image, next, for_each);
+      shrink(n, image, next, for_each, totals);
       image.swap(next);
     }
     PyramidTotals total;
     for (const PyramidTotals& row : totals) {
-      for (uint32_t c = 0; c < 4; ++c) total.sum[c] += row.sum[c];
       total.nonfinite += row.nonfinite;
+      for (uint32_t c = 0; c < 4; ++c) {
+        total.sum[c] += row.sum[c];
+        total.low[c] = std::min(total.low[c], row.low[c]);
+        total.high[c] = std::max(total.high[c], row.high[c]);
+      }
     }
     return total;
   }
@@ -138,7 +143,7 @@ class Pyramid {
                 std::vector<PyramidTotals>& totals) {
     if (level == 0) {
       totals[y] = read_row(y, out);
-      store_row(0, y, out);
+      store_row(0, y, out, totals[y]);
       for (size_t i = 0; i < row_size(0); i += channels_)
         for (uint32_t c = 0; c < channels_; ++c) totals[y].sum[c] += double{out[i + c]};
       return;
@@ -156,12 +161,12 @@ class Pyramid {
     } else {
       average_rows<4>(a, b, width, out);
     }
-    store_row(level, y, out);
+    store_row(level, y, out, totals[size_t{y} << level]);
   }
 
   /// Level n of the one before, which is `image`, or the caller's pixels where n is 1.
   void shrink(uint32_t n, std::vector<float>& image, std::vector<float>& next,
-              const ForEach& for_each) {
+              const ForEach& for_each, std::vector<PyramidTotals>& totals) {
     const auto rows = make_boxes(view_.levels[n - 1].height, view_.levels[n].height);
     for_each(rows.size(), [&](size_t y) {
       float* to = &next[y * row_size(n)];
@@ -172,7 +177,7 @@ class Pyramid {
         const float* row = n == 1 ? pixels.data() : &image[from * row_size(n - 1)];
         add_row(columns_[n - 1], channels_, rows[y].weights[j], row, to);
       }
-      store_row(n, static_cast<uint32_t>(y), to);
+      store_row(n, static_cast<uint32_t>(y), to, totals[y]);
     });
   }
 
@@ -234,45 +239,55 @@ class Pyramid {
 
   // ---- the storage ----
 
-  void store_row(uint32_t level, uint32_t y, const float* row) {
+  /// Stores a row, and notes in `totals` between what its values are.
+  void store_row(uint32_t level, uint32_t y, const float* row, PyramidTotals& totals) {
     switch (view_.format) {
       case TexelFormat::kU8:
         if (!view_.srgb) {
-          store_tiles<uint8_t>(level, y, row, [](float v, size_t) {
+          store_tiles<uint8_t>(level, y, row, totals, [](float v, size_t) {
             return static_cast<uint8_t>(std::clamp(v, 0.f, 1.f) * 255.f + 0.5f);
           });
         } else {
-          store_tiles<uint8_t>(level, y, row, [](float v, size_t channel) {
+          store_tiles<uint8_t>(level, y, row, totals, [](float v, size_t channel) {
             return channel == 3 ? static_cast<uint8_t>(std::clamp(v, 0.f, 1.f) * 255.f + 0.5f)
                                 : linear_to_srgb(v);
           });
         }
         return;
       case TexelFormat::kF16:
-        return store_tiles<uint16_t>(level, y, row,
+        return store_tiles<uint16_t>(level, y, row, totals,
                                      [](float v, size_t) { return float_to_half(v); });
       case TexelFormat::kF32:
-        return store_tiles<float>(level, y, row, [](float v, size_t) { return v; });
+        return store_tiles<float>(level, y, row, totals, [](float v, size_t) { return v; });
     }
   }
 
   template <typename T, typename Encode>
-  void store_tiles(uint32_t level, uint32_t y, const float* row, const Encode& encode) {
+  void store_tiles(uint32_t level, uint32_t y, const float* row, PyramidTotals& totals,
+                   const Encode& encode) {
     if (channels_ == 1)
-      store_texels<T, 1>(level, y, row, encode);
+      store_texels<T, 1>(level, y, row, totals, encode);
     else
-      store_texels<T, 4>(level, y, row, encode);
+      store_texels<T, 4>(level, y, row, totals, encode);
   }
 
   template <typename T, uint32_t C, typename Encode>
-  void store_texels(uint32_t level, uint32_t y, const float* row, const Encode& encode) {
+  void store_texels(uint32_t level, uint32_t y, const float* row, PyramidTotals& totals,
+                    const Encode& encode) {
+    constexpr size_t kRow = kTile * C;
+    RowRange<T, C, kRow> range;
     const TextureLevel& at = view_.levels[level];
-    for (uint32_t x = 0; x < at.width; x += kTile, row += kTile * C) {
-      T codes[kTile * C];
+    for (uint32_t x = 0; x < at.width; x += kTile, row += kRow) {
+      T codes[kRow];
       const size_t n = size_t{std::min(kTile, at.width - x)} * C;
       for (size_t i = 0; i < n; ++i) codes[i] = encode(row[i], i % C);
       std::memcpy(storage_ + texel_index(at, x, y) * (C * sizeof(T)), codes, n * sizeof(T));
+      range.note(row, codes, n);
     }
+    range.add_to(totals, encode, [&](T code, size_t c) {
+      return decode_value(reinterpret_cast<const std::byte*>(&code), view_.format,
+                          view_.srgb && c < 3);
+    });
   }
 
   const TextureDesc& desc_;

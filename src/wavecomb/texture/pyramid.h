@@ -2,18 +2,25 @@
 /// Makes the mip levels of a texture.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
 
-/// What there is to know of the finest level.
+/// What there is to know of a pyramid, by stored channel.
 struct PyramidTotals {
-  double sum[4] = {0, 0, 0, 0};  ///< of its values, by stored channel
-  uint64_t nonfinite = 0;        ///< values that were infinite or NaN and read as 0
+  double sum[4] = {0, 0, 0, 0};  ///< of the values of the finest level
+  uint64_t nonfinite = 0;        ///< of those, how many were infinite or NaN and read as 0
+  /// Of the linear values of all levels, as they are stored.
+  std::array<float, 4> low{kNothing, kNothing, kNothing, kNothing};
+  std::array<float, 4> high{-kNothing, -kNothing, -kNothing, -kNothing};
+
+  static constexpr float kNothing = std::numeric_limits<float>::infinity();
 };
 
 /// Bytes of one value.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <new>
 
 #include "wavecomb/core/error.h"
@@ -35,7 +36,50 @@ void check(const TextureDesc& desc) {
   if (!desc.data) throw Error(where + "has no data");
 }
 
+/// What lookups may give of texels of [low, high].
+///
+/// A filter takes a + (b - a) t up to three times, t in [0, 1]. Where all texels are the same that
+/// is exact; else each step is off by its two roundings, at most. No step leads past 0: where a and
+/// b are at least 0, b - a is at least -a when rounded, too, and so is its product with t.
+TexelRange filtered(const TexelRange& texels) {
+  constexpr float kRoundings = 1e-6f;
+  TexelRange range = texels;
+  for (size_t c = 0; c < 4; ++c) {
+    float &low = range.low[c], &high = range.high[c];
+    if (low == high) continue;
+    const float more = kRoundings * std::max(std::abs(low), std::abs(high));
+    low = low >= 0 ? std::max(low - more, 0.f) : low - more;
+    high = high <= 0 ? std::min(high + more, 0.f) : high + more;
+  }
+  return range;
+}
+
+/// What lookups may give of the texels that a pyramid has.
+TexelRange range_of(const TextureView& view, const PyramidTotals& totals) {
+  TexelRange range{{0, 0, 0, 1}, {0, 0, 0, 1}};
+  for (size_t c = 0; c < view.channels; ++c) {
+    range.low[c] = totals.low[c];
+    range.high[c] = totals.high[c];
+  }
+  for (size_t c = 1; c < 3 && view.channels == 1; ++c) {
+    range.low[c] = range.low[0];
+    range.high[c] = range.high[0];
+  }
+  if (!view.has_alpha) range.low[3] = range.high[3] = 1;
+  const float alpha = view.has_alpha ? 0.f : 1.f;
+  if (view.wrap_s == Wrap::kBlack || view.wrap_t == Wrap::kBlack)
+    range.add({{0, 0, 0, alpha}, {0, 0, 0, alpha}});
+  return filtered(range);
+}
+
 }  // namespace
+
+void TexelRange::add(const TexelRange& other) {
+  for (size_t c = 0; c < 4; ++c) {
+    low[c] = std::min(low[c], other.low[c]);
+    high[c] = std::max(high[c], other.high[c]);
+  }
+}
 
 uint64_t lay_out(const TextureDesc& desc, TextureView& view) {
   constexpr uint32_t kTile = TextureView::kTile;
@@ -96,6 +140,7 @@ Texture::Texture(const TextureDesc& desc, const ForEach& for_each, std::shared_p
   for (uint32_t c = 0; c < view_.channels; ++c)
     mean_[c] = static_cast<float>(totals.sum[c] / count);
   if (view_.channels == 1) mean_[1] = mean_[2] = mean_[0];
+  range_ = range_of(view_, totals);
 }
 
 namespace {
@@ -131,6 +176,7 @@ Texture::Texture(std::string name,
       throw Error(where + "tile " + std::to_string(number) + " is no plain texture");
     tile_set_->views[i] = &tile->view();
     for (size_t c = 0; c < 4; ++c) sum[c] += tile->mean()[c];
+    range_.add(tile->range());
   }
   for (size_t c = 0; c < 4; ++c) mean_[c] = sum[c] / static_cast<float>(tiles_.size());
   view_.tiles = tile_set_.get();

@@ -69,6 +69,14 @@ struct TileSet {
   std::array<const TextureView*, kCount> views{};
 };
 
+/// What lookups may give, by channel (linear r, g, b, alpha): low <= value <= high.
+struct TexelRange {
+  std::array<float, 4> low, high;
+  bool operator==(const TexelRange&) const = default;
+  /// Makes it as wide as to have `other` in it.
+  void add(const TexelRange& other);
+};
+
 /// Linear r, g, b, a of the texel in column x, row y (0: top) of a level. For tools and tests;
 /// slow.
 std::array<float, 4> texel_at(const TextureView& view, uint32_t level, uint32_t x, uint32_t y);
@@ -113,6 +121,10 @@ class Texture {
   size_t spanned_bytes() const;
   /// Mean of the finest level in linear light (r, g, b, a).
   const float* mean() const { return mean_; }
+  /// Of all lookups, whatever their place, footprint and filter: of the texels of all levels, as
+  /// they are stored, and of black where that is beyond the image. Filters round, so that a range
+  /// that is no single value is a little wider than its texels; it never passes 0, though.
+  const TexelRange& range() const { return range_; }
   /// Values of the finest level that were infinite or NaN and read as 0.
   uint64_t nonfinite_count() const { return nonfinite_count_; }
   /// That keeps the levels; null: they are in memory.
@@ -133,6 +145,7 @@ class Texture {
   size_t bytes_ = 0;
   uint64_t nonfinite_count_ = 0;
   float mean_[4] = {0, 0, 0, 1};
+  TexelRange range_{{0, 0, 0, 1}, {0, 0, 0, 1}};
 };
 
 /// Scenes may share textures.
