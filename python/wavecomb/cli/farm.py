@@ -8,14 +8,16 @@ import os
 import signal
 import sys
 import threading
+import time
 from typing import Any
 
 import click
 
-from wavecomb.cli.farm_run import run_local
+from wavecomb.cli.farm_run import PAGE, run_local, served
 from wavecomb.cli.farm_submit import submit_command
 from wavecomb.cli.options import examples, isolation_options
 from wavecomb.errors import WavecombError
+from wavecomb.run.progress import Interrupt
 
 JOB = click.argument("job", type=click.Path(), metavar="JOB")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="For programs.")
@@ -89,7 +91,10 @@ def _end_with_stdin(worker: Any) -> None:
 @AS_JSON
 @click.option("--html", type=click.Path(), metavar="FILE.html",
               help="Writes a page that can be looked at without anything else.")  # fmt: skip
-def status_command(job: str, as_json: bool, html: str | None) -> None:
+@click.option("--serve", is_flag=False, flag_value="0", default=None, metavar="[PORT]",
+              help="Serves the page of `farm submit --page`, to this machine alone, until "
+              "Ctrl-C.")  # fmt: skip
+def status_command(job: str, as_json: bool, html: str | None, serve: str | None) -> None:
     """Say where JOB stands: pictures, tasks, workers, time left, what failed and why."""
     from wavecomb.farm.folder import Folder, say
     from wavecomb.farm.state import lines, status
@@ -101,6 +106,10 @@ def status_command(job: str, as_json: bool, html: str | None) -> None:
 
         write_page(html, state)
     click.echo(say(state) if as_json else "\n".join(lines(state)))
+    if serve is not None:
+        with Interrupt() as interrupt, served(folder, serve, err=as_json):
+            while not interrupt.requested:
+                time.sleep(0.1)
 
 
 @farm_command.command("logs")
@@ -131,10 +140,11 @@ def logs_command(job: str, name: str | None, as_json: bool) -> None:
 @JOB
 @click.argument("tasks", nargs=-1, metavar="[TASK ...]")
 @ON
+@PAGE
 @click.option("--quiet", is_flag=True, help="Only errors.")
 @AS_JSON
 def retry_command(
-    job: str, tasks: tuple[str, ...], engine: str, quiet: bool, as_json: bool
+    job: str, tasks: tuple[str, ...], engine: str, page: str | None, quiet: bool, as_json: bool
 ) -> None:
     """Have tasks of JOB done again that failed, by default all, and work on it."""
     from wavecomb.farm.checking import retry
@@ -145,7 +155,7 @@ def retry_command(
     again = retry(folder, [Task.of(task) for task in tasks] or None)
     if not again:
         raise WavecombError(f"{job}: no task failed")
-    _go_on(folder, engine, quiet=quiet, as_json=as_json)
+    _go_on(folder, engine, page=page, quiet=quiet, as_json=as_json)
 
 
 @farm_command.command("cancel")
@@ -171,19 +181,24 @@ def cancel_command(job: str, as_json: bool) -> None:
 @ON
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
               help="Of each worker.  [default: as the job says, else its share]")  # fmt: skip
+@PAGE
 @click.option("--quiet", is_flag=True, help="Only errors.")
 @AS_JSON
-def resume_command(job: str, engine: str, threads: int, quiet: bool, as_json: bool) -> None:
+def resume_command(
+    job: str, engine: str, threads: int, page: str | None, quiet: bool, as_json: bool
+) -> None:
     """Go on with JOB: render what is missing, and nothing else.
 
     A picture or tile that is said to be done and is not there is rendered again.
     """
     from wavecomb.farm.folder import Folder
 
-    _go_on(Folder(job), engine, threads=threads, quiet=quiet, as_json=as_json)
+    _go_on(Folder(job), engine, threads=threads, page=page, quiet=quiet, as_json=as_json)
 
 
-def _go_on(folder: Any, engine: str, *, threads: int = 0, quiet: bool, as_json: bool) -> None:
+def _go_on(
+    folder: Any, engine: str, *, threads: int = 0, page: str | None, quiet: bool, as_json: bool
+) -> None:
     from wavecomb.farm.checking import repair
     from wavecomb.farm.folder import say
     from wavecomb.farm.local import parse_engine
@@ -196,7 +211,7 @@ def _go_on(folder: Any, engine: str, *, threads: int = 0, quiet: bool, as_json: 
         click.echo(say(told) if as_json else f"{len(again)} tasks are to be done again")
         return
     wanted = threads or int(folder.spec.shots[0].settings.get("threads") or 0)
-    run_local(folder, who, wanted, as_json=as_json, quiet=quiet)
+    run_local(folder, who, wanted, page=page, as_json=as_json, quiet=quiet)
 
 
 @farm_command.command("assemble")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,12 +20,48 @@ if TYPE_CHECKING:
 _SHOW_S = 1.0
 
 
+PAGE = click.option(
+    "--page", is_flag=False, flag_value="0", default=None, metavar="[PORT]",
+    help="Serves a page, to this machine alone, that shows tiles as they arrive, the picture so "
+    "far, workers and logs.",
+)  # fmt: skip
+
+
+@contextlib.contextmanager
+def served(folder: Folder, page: str | None, *, err: bool = False) -> Iterator[None]:
+    """Serves the page of a job meanwhile, and says where; None: it does not.
+
+    Raises:
+        WavecombError: It cannot, or is asked to serve others.
+    """
+    if page is None:
+        yield
+        return
+    from wavecomb.farm.server import Server, parse_address
+
+    with Server(folder, *parse_address(page)) as server:
+        click.echo(f"page {server.url}", err=err)
+        yield
+
+
 def run_local(
-    folder: Folder, engine: Engine, threads: int, *, as_json: bool = False, quiet: bool = False
+    folder: Folder,
+    engine: Engine,
+    threads: int,
+    *,
+    page: str | None = None,
+    as_json: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Has an engine work until nothing is left to do, and says what came of it.
 
-    ``threads``: of each worker; 0: as is best.
+    Args:
+        folder: The job's.
+        engine: Who works.
+        threads: Of each worker; 0: as is best.
+        page: As of ``served``; its address goes to standard error where a program reads the rest.
+        as_json: For programs.
+        quiet: Only errors.
 
     Raises:
         WavecombError: Tasks failed, or no worker may work on the job.
@@ -41,7 +77,7 @@ def run_local(
         click.echo(f"job {folder.path}: {tasks} tasks for {many}")
     local = Local(folder, engine.commands(folder, threads))
     started = time.monotonic()
-    with _shown(folder, quiet or as_json) as look:
+    with served(folder, page, err=as_json), _shown(folder, quiet or as_json) as look:
         local.run(look)
     state = status(folder, tasks=False)
     if as_json:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.farm_run import run_local
+from wavecomb.cli.farm_run import PAGE, run_local
 from wavecomb.cli.frames import frame_options
 from wavecomb.cli.options import StageOptions, examples, stage_options
 from wavecomb.cli.planning import Asked, Prepared, prepare
@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     help="Library that all workers use (x86-64-v3 ...): machines of several kinds are one class "
     "then, if their probe pictures agree.",
 )
+@PAGE
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 @picture_options
 def submit_command(
@@ -91,6 +92,7 @@ def submit_command(
     hang: float,
     strict: bool,
     isa: str | None,
+    page: str | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -101,10 +103,13 @@ def submit_command(
     """
     from wavecomb.farm.assets import ask_assets
     from wavecomb.farm.local import parse_engine
+    from wavecomb.farm.server import parse_address
     from wavecomb.farm.submitting import complete, create, default_folder
     from wavecomb.farm.tiling import parse_tiles
 
     who = parse_engine(engine)
+    if page is not None:
+        parse_address(page)
     cut = parse_tiles(tiles)
     every = options["every"]
     options["every"] = None
@@ -128,7 +133,7 @@ def submit_command(
     if who.kind == "none":
         _say_folder(folder, as_json)
         return
-    run_local(folder, who, threads, as_json=as_json, quiet=asked.quiet)
+    run_local(folder, who, threads, page=page, as_json=as_json, quiet=asked.quiet)
 
 
 def _check_options(asked: Asked) -> None:

@@ -158,6 +158,10 @@ class Spec:
         """The tasks of a picture's tiles."""
         return [Task(picture, f"{number:04d}") for number in range(self.tile_count(picture))]
 
+    def last_of(self, picture: int) -> Task:
+        """The task that writes a picture's files."""
+        return Task(picture, JOIN if self.is_tiled else "0000")
+
     def tile_count(self, picture: int) -> int:
         """How many tiles a picture has: no more columns and rows than pixels."""
         x0, y0, x1, y1 = self.shots[self.pictures[picture][0]].region
@@ -216,7 +220,7 @@ class Spec:
                 f"{value.get('version')}; this is {version()}, which reads format {FORMAT}"
             )
         try:
-            given = {one.name: value[one.name] for one in fields(cls)}
+            given = {one.name: value[one.name] for one in fields(cls) if one.name in value}
             shots = tuple(Shot(**{**one, "aovs": tuple(one["aovs"])}) for one in given["shots"])
             pictures = tuple(
                 (int(shot), None if frame is None else float(frame))
