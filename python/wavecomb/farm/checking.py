@@ -10,6 +10,7 @@ from wavecomb.farm.folder import DONE, FAILED, TODO, Entry, Folder
 from wavecomb.farm.leases import take_back
 from wavecomb.farm.part import DamagedPart, load_part
 from wavecomb.farm.spec import Task
+from wavecomb.farm.sweeping import sweep
 
 
 def damaged_tiles(folder: Folder, picture: int) -> list[Task]:
@@ -58,6 +59,7 @@ def repair(folder: Folder) -> list[Task]:
                 with contextlib.suppress(FileExistsError):
                     (folder.path / TODO / Entry(task, 1).name).touch(exist_ok=False)
                     again.append(task)
+    sweep(folder)
     return sorted(dict.fromkeys(again), key=lambda task: task.id)
 
 
