@@ -51,7 +51,7 @@ def changed(folder: Folder, **fields: Any) -> Folder:
 def one_process(stage: Path, folder: Path, size: tuple[int, int], spp: int) -> Path:
     """The picture of one process."""
     words = ["--size", *map(str, size), "--spp", str(spp), "--threads", "1"]
-    one = forks.wavecomb("render", stage, "-o", folder / "one.exr", *words)
+    one = forks.wavecomb("render", stage, "-o", folder / "one.exr", *words, timeout=400)
     assert one.returncode == 0, one.stderr
     return folder / "one.exr"
 
@@ -95,7 +95,7 @@ def kill(stage: Path, place: Path, *, engines: int, kills: int, spp: int) -> Non
             engine.kill()
             engine.wait(30)
         wait_for(lambda: not processes_of(folder.path))
-    done = forks.wavecomb("farm", "resume", folder.path, "--on", "local:2", timeout=200)
+    done = forks.wavecomb("farm", "resume", folder.path, "--on", "local:2", timeout=400)
     assert done.returncode == 0, done.stderr
     same(place / "a.exr", one_process(stage, place, (64, 48), spp))
     assert os.listdir(parts) == [] and not left_behind(place)
@@ -113,7 +113,7 @@ def test_workers_are_killed(stage: Path, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_workers_are_killed_often(stage: Path, tmp_path: Path) -> None:
     """20 workers and renderers, 5 engines."""
-    kill(stage, tmp_path, engines=5, kills=20, spp=12000)
+    kill(stage, tmp_path, engines=5, kills=20, spp=6000)
 
 
 # ---- slow ----------------------------------------------------------------------------------------
@@ -195,7 +195,7 @@ def throttle(pid: int, over: threading.Event) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["hangs", "slow"])
+@pytest.mark.parametrize("kind", ["hangs", pytest.param("slow", marks=pytest.mark.long)])
 def test_a_worker_that_is_slow(stage: Path, tmp_path: Path, kind: str) -> None:
     """Its task is done elsewhere; nothing is lost, done twice or torn, also when it wakes up."""
     options: dict[str, Any] = {"size": (64, 64), "spp": 300, "threads": 1}

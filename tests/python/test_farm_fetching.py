@@ -91,7 +91,7 @@ def render(stage: Path, output: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("boxed", ["0", "1"])
+@pytest.mark.parametrize("boxed", [pytest.param("0", marks=pytest.mark.long), "1"])
 def test_copies(share: Path, tmp_path: Path, boxed: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A worker that lacks all files renders the same bits from copies, also in a sandbox."""
     cache, out = tmp_path / "cache", tmp_path / "out"
@@ -118,19 +118,16 @@ def test_copies(share: Path, tmp_path: Path, boxed: str, monkeypatch: pytest.Mon
     damaged = store_name(job.path / "files", job.assets()[0]["sha256"])
     damaged.write_bytes(b"x")
     (out / "a.exr").unlink()
-    assert forks.wavecomb("farm", "resume", job.path).returncode == 0
-    if boxed == "0":
-        (out / "a.exr").unlink()
-        monkeypatch.setenv("WAVECOMB_CACHE", str(tmp_path / "other"))
-        done = forks.wavecomb("farm", "resume", job.path)
-        assert done.returncode == 2 and damaged.name in done.stderr, done.stderr
-        assert "or is damaged" in done.stderr and done.stderr.count("\n") == 1
-        refused = forks.wavecomb(*words[:4], tmp_path / "b.exr", "--no-strict", "--assets", "copy")
-        assert refused.returncode == 2
+    assert forks.wavecomb("farm", "resume", job.path, "--quiet").returncode == 0
+    (out / "a.exr").unlink()
+    monkeypatch.setenv("WAVECOMB_CACHE", str(tmp_path / "other"))
+    done = forks.wavecomb("farm", "resume", job.path)
+    assert done.returncode == 2 and damaged.name in done.stderr, done.stderr
+    assert "or is damaged" in done.stderr and done.stderr.count("\n") == 1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("of", ["job", "worker"])
+@pytest.mark.parametrize("of", [pytest.param("job", marks=pytest.mark.long), "worker"])
 def test_maps(share: Path, tmp_path: Path, of: str) -> None:
     """The same share under another name: stage, all that it names, and the pictures."""
     one = render(share / "stage.usda", tmp_path / "one.exr")

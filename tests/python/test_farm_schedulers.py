@@ -139,7 +139,7 @@ def cluster(place: Path, tls: Path | None = None, workers: int = 2) -> Iterator[
 
 
 @DASK
-@pytest.mark.slow
+@pytest.mark.long
 def test_by_dask(stage: Path, tmp_path: Path) -> None:
     """A worker on each of the cluster; the bits of one process; no process is left."""
     folder = made(stage, tmp_path)
@@ -197,15 +197,26 @@ def test_by_dask_with_certificates(stage: Path, tmp_path: Path) -> None:
         assert client.returncode == 130 and "stopped: " in said, said
         wait_for(lambda: not processes_of(folder.path, "farm\0worker"), 30)
         assert not folder.ids(BUSY) and not (folder.path / "cancel").exists()
-        # A client that goes away: workers go on without it.
-        client = subprocess.Popen([sys.executable, "-m", "wavecomb", *words(tls)])
+        done = forks.wavecomb(*words(tls), timeout=150)
+        assert done.returncode == 0, done.stderr
+    same(tmp_path / "a.exr", one_process(stage, tmp_path, 2000))
+
+
+@DASK
+@pytest.mark.long
+def test_a_client_that_goes_away(stage: Path, tmp_path: Path) -> None:
+    """Its workers go on without it."""
+    folder = made(stage, tmp_path, 2000)
+    words = [sys.executable, "-m", "wavecomb", "farm", "resume", str(folder.path), "--quiet"]
+    with cluster(tmp_path) as address:
+        client = subprocess.Popen([*words, "--on", f"dask:{address}"])
         try:
             wait_for(lambda: folder.ids(BUSY) or client.poll() is not None)
         finally:
             client.kill()
             client.wait(10)
         wait_for(lambda: farm.status(folder)["state"] == "done", 120)
-    wait_for(lambda: not processes_of(folder.path), 30)
+        wait_for(lambda: not processes_of(folder.path), 30)
     same(tmp_path / "a.exr", one_process(stage, tmp_path, 2000))
 
 
