@@ -125,6 +125,8 @@ def submit_command(
     who = chosen_engine(engine, tls_ca, tls_cert, tls_key)
     if page is not None:
         parse_address(page)
+        if who.kind == "none":
+            raise WavecombError("--page: is for who works here; `wavecomb farm status --serve`")
     cut = parse_tiles(tiles)
     every = options["every"]
     options["every"] = None
