@@ -20,10 +20,12 @@ from farm_jobs import left_behind, processes_of, same, wait_for, work
 from parts import needs, not_here
 
 from wavecomb import farm
+from wavecomb.errors import WavecombError
 from wavecomb.farm.copies import Copies
 from wavecomb.farm.files import read_json, write_json
 from wavecomb.farm.folder import BUSY, DONE, TODO, Folder, ShareLost
 from wavecomb.farm.leases import Beat
+from wavecomb.farm.patience import Patience
 from wavecomb.farm.rendering import Renderer, Stopped
 from wavecomb.farm.sweeping import owner_of, sweep
 from wavecomb.picture import files
@@ -372,3 +374,26 @@ def test_leftovers(stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert left_behind(tmp_path) == left, "another machine's may be at work"
     work(folder)
     assert np.isfinite(os.path.getsize(tmp_path / "a.exr"))
+
+
+def test_patience(stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a disk that is there and fails, or that does not come back, it has an end."""
+    folder = farm.submit(stage, tmp_path / "a.exr", size=(8, 8), spp=1, strict=False)
+    monkeypatch.setattr("time.sleep", lambda seconds: None)
+    waits = Patience(folder, "w", lambda: False, lambda line: None)
+
+    def fails() -> bool:
+        raise OSError("the disk says no")
+
+    for _ in range(2):
+        for _ in range(5):
+            waits.bear(OSError("once"))
+        waits.calm()
+    with pytest.raises(WavecombError, match="w: the disk says no"):
+        waits.insist(fails)
+    monkeypatch.setattr("wavecomb.farm.patience.LOST_S", 0.05)
+    folder.path.rename(tmp_path / "away")
+    with pytest.raises(WavecombError, match=r"a\.farm was not there for 0 s"):
+        waits.insist(lambda: folder.put_back(DONE, folder.spec.tasks()[0]))
+    stopped = Patience(folder, "w", lambda: True, lambda line: None)
+    assert not stopped.insist(lambda: folder.put_back(DONE, folder.spec.tasks()[0]))

@@ -21,6 +21,7 @@ from wavecomb.farm.copies import Copies
 from wavecomb.farm.folder import BUSY, DONE, Entry, Folder, ShareLost
 from wavecomb.farm.leases import Beat, living, look_s, take_back
 from wavecomb.farm.machine_class import refusal
+from wavecomb.farm.patience import Patience
 from wavecomb.farm.spec import Task
 from wavecomb.farm.sweeping import sweep
 
@@ -30,14 +31,10 @@ GRACE_S = 30.0
 """For a child that is asked to stop."""
 START_S = 120.0
 """For a child to load the renderer."""
-LOST_S = 600.0
-"""For a job's folder that is not there to come back."""
 _LOOK_S = 1.0
 """Between two looks whether another did the task at hand."""
 _LEAST_PATIENCE_S = 30.0
 """For tasks that are nowhere."""
-_MOST_TROUBLES = 5
-"""Errors of the disk one after another."""
 _MOST_FULL = 6
 """Times one after another that there was no room: 63 seconds in all."""
 _MOST_CRASHES = 5
@@ -68,7 +65,8 @@ class Worker:
         self._copies = Copies(folder, self.name, self._beat.now)
         self._next_look = 0.0
         self._idle_since: float | None = None
-        self._troubles = self._full = 0
+        self._full = 0
+        self._patience = Patience(folder, self.name, self._is_stopped, say)
         self._log = (folder.path / "logs" / f"{self.name}.log").open("ab")
         self.stopped: int | None = None
         """The signal that stopped it."""
@@ -92,8 +90,9 @@ class Worker:
                 try:
                     if not self._step(done):
                         break
+                    self._patience.calm()
                 except OSError as error:
-                    self._bear(error)
+                    self._patience.bear(error)
             else:
                 why = "it was stopped"
         except BaseException as error:
@@ -150,37 +149,6 @@ class Worker:
                 f"`wavecomb farm resume {self._folder.path}` mends that"
             )
 
-    def _bear(self, error: OSError) -> None:
-        """Waits where the job's disk is gone; raises WavecombError where it does not come back."""
-        if self._folder.is_there():
-            self._troubles += 1
-            if self._troubles > _MOST_TROUBLES:
-                raise WavecombError(f"{self.name}: {error}") from None
-            time.sleep(1.0)
-            return
-        until = time.monotonic() + LOST_S
-        self._say(f"{self._folder.path}: is not there; waiting for it")
-        while not self._folder.is_there():
-            if self._is_stopped():
-                return
-            if time.monotonic() > until:
-                raise WavecombError(
-                    f"{self.name}: {self._folder.path} was not there for {LOST_S:.0f} s"
-                ) from None
-            time.sleep(IDLE_S)
-
-    def _insist(self, act: Callable[[], bool]) -> bool:
-        """Says something of a task, again and again while the disk is gone."""
-        while True:
-            try:
-                done = act()
-                self._troubles = 0
-                return done
-            except OSError as error:
-                self._bear(error)
-                if self._is_stopped() and not self._folder.is_there():
-                    return False
-
     def stop(self, number: int) -> None:
         """Has it stop as soon as can be; what was done of its task is kept."""
         self.stopped = number
@@ -233,7 +201,7 @@ class Worker:
         except ChildDied as error:
             self._child, why = None, str(error)
             if not copy:
-                self._insist(lambda: self._folder.fail(entry, why))
+                self._patience.insist(lambda: self._folder.fail(entry, why))
             self._say(f"{title}: {why}")
             return "failed"
         finally:
@@ -242,7 +210,7 @@ class Worker:
 
     def _give_back(self, entry: Entry, copy: bool) -> None:
         if not copy:
-            self._insist(lambda: self._folder.give_back(entry))
+            self._patience.insist(lambda: self._folder.give_back(entry))
 
     def _settle(self, entry: Entry, end: Mapping[str, Any], title: str, copy: bool) -> str:
         """Writes down how a task ended."""
@@ -252,7 +220,7 @@ class Worker:
             result["ended"] = time.time()
             finish = self._folder.finish_copy if copy else self._folder.finish
             told = entry.task if copy else entry
-            if not self._insist(lambda: finish(told, result)):  # type: ignore[arg-type]
+            if not self._patience.insist(lambda: finish(told, result)):  # type: ignore[arg-type]
                 return "given back"  # another has it, and will come to the same
             self._folder.log(entry.task, f"done in {result['wall_s']:.2f} s")
             self._say(f"{title}: {result['wall_s']:.2f} s")
@@ -270,7 +238,7 @@ class Worker:
         if end.get("damaged"):
             self._render_again(entry.task)
         final = bool(end.get("final"))
-        self._insist(lambda: self._folder.fail(entry, end["error"], is_final=final))
+        self._patience.insist(lambda: self._folder.fail(entry, end["error"], is_final=final))
         self._say(f"{title}: {end['error']}")
         return "failed"
 
