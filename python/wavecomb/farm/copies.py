@@ -12,13 +12,17 @@ import statistics
 import time
 from collections.abc import Callable
 
+from wavecomb.errors import WavecombError
+from wavecomb.farm.files import read_json
 from wavecomb.farm.folder import BUSY, DONE, Entry, Folder
-from wavecomb.farm.leases import gone, workers
+from wavecomb.farm.leases import gone, living
 from wavecomb.farm.spec import Task
 
 LEAST_S = 5.0
 """That a task has to take before another begins it, too: starting has its price."""
 _LOOK_S = 1.0
+_FRESH_S = 20.0
+"""So long the usual time is good."""
 _LAST = 64
 """Tasks whose times tell enough."""
 
@@ -32,14 +36,17 @@ class Copies:
         self._worker = worker
         self._clock = clock
         self._tried: set[tuple[Task, int]] = set()
-        self._next = 0.0
+        self._next = self._usual_until = 0.0
+        self._usual: float | None = None
 
     def next(self) -> Entry | None:
         """A task of another, begun as a copy; None: there is none that is worth it."""
         factor = self._folder.spec.slow
         if not factor or time.monotonic() < self._next:
             return None
-        self._next = time.monotonic() + _LOOK_S
+        now = self._clock()
+        # Where many wait each looks less often, so that the disk is not asked by the square.
+        self._next = time.monotonic() + _LOOK_S * max(1.0, living(self._folder, now) / 8)
         held = [
             entry
             for entry in self._folder.entries(BUSY)
@@ -50,9 +57,8 @@ class Copies:
         usual = self._usual_s()
         if usual is None:
             return None
-        now, shares = self._clock(), self._shares()
         for entry in held:
-            if self._is_slow(entry, now, usual, factor, shares.get(entry.worker)):
+            if self._is_slow(entry, now, usual, factor):
                 mine = self._begin(entry)
                 if mine is not None:
                     return mine
@@ -65,24 +71,27 @@ class Copies:
 
     def _usual_s(self) -> float | None:
         """Seconds that a task takes, the median of some; None: none is done."""
+        if time.monotonic() < self._usual_until:
+            return self._usual
         names = sorted(self._folder.ids(DONE))[-_LAST:]
         took = [self._folder.result(Task.of(name)).get("wall_s") for name in names]
         known = [float(seconds) for seconds in took if seconds is not None]
-        return statistics.median(known) if known else None
+        self._usual = statistics.median(known) if known else None
+        self._usual_until = time.monotonic() + (_FRESH_S if known else 0.0)
+        return self._usual
 
-    def _shares(self) -> dict[str, float]:
-        """Of their tasks what workers have done."""
-        found = {}
-        for worker in workers(self._folder):
-            progress = worker.facts.get("progress") or {}
+    def _share(self, worker: str) -> float | None:
+        """What a worker has done of its task; None: nobody knows."""
+        try:
+            facts = read_json(self._folder.path / "workers" / f"{worker}.json")
+            progress = facts.get("progress") or {}
             done, total = progress.get("samples_done"), progress.get("samples_total")
-            if progress.get("task") == worker.facts.get("task") and done and total:
-                found[worker.name] = done / total
-        return found
+            mine = progress.get("task") == facts.get("task")
+            return done / total if mine and done and total else None
+        except (OSError, WavecombError, AttributeError, TypeError):
+            return None
 
-    def _is_slow(
-        self, entry: Entry, now: float, usual: float, factor: float, share: float | None
-    ) -> bool:
+    def _is_slow(self, entry: Entry, now: float, usual: float, factor: float) -> bool:
         try:
             begun = (self._folder.path / BUSY / entry.name).stat().st_mtime
         except OSError:
@@ -90,6 +99,7 @@ class Copies:
         took = now - begun
         if took < max(LEAST_S, factor * usual):
             return False
+        share = self._share(entry.worker)
         # One that is nearly done needs no help.
         return share is None or took * (1.0 - share) / share > usual
 
@@ -110,13 +120,11 @@ class Copies:
 
     def _others(self, task: Task) -> list[str]:
         """Workers that have a copy of a task."""
-        found = []
-        for file in (self._folder.path / "copies").iterdir():
-            other = Entry.of(file.name)
-            if other is None or other.task != task or other.worker == self._worker:
-                continue
-            if other.worker in gone(self._folder, self._clock()):
-                self.end(other)
-            else:
-                found.append(other.worker)
-        return found
+        files = (self._folder.path / "copies").iterdir()
+        copies = [one for one in (Entry.of(file.name) for file in files) if one is not None]
+        copies = [one for one in copies if one.task == task and one.worker != self._worker]
+        ended = gone(self._folder, self._clock()) if copies else set()
+        for one in copies:
+            if one.worker in ended:
+                self.end(one)
+        return [one.worker for one in copies if one.worker not in ended]
