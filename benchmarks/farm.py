@@ -2,6 +2,10 @@
 """What a farm costs: a picture in tiles by N workers against one process with N threads.
 
 python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --rounds 3
+
+With --frames N the camera moves over N frames, and all pictures are compared, bit for bit:
+
+python benchmarks/farm.py out/mixed.usdc --size 1200 800 --spp 64 --workers 4 --rounds 1 --frames 48
 """
 
 from __future__ import annotations
@@ -44,6 +48,35 @@ def small_tasks(stage: Path, count: int) -> tuple[float, float]:
         return wall / columns**2, cpu / columns**2
 
 
+def moving(stage: Path, place: Path, frames: int) -> Path:
+    """The stage with a camera that goes sideways, a step for each frame."""
+    from pxr import Gf, Sdf, Usd, UsdGeom
+
+    file = place / "moving.usda"
+    layer = Sdf.Layer.CreateNew(str(file))
+    layer.subLayerPaths.append(str(stage.resolve()))
+    layer.defaultPrim = Sdf.Layer.FindOrOpen(str(stage)).defaultPrim
+    animated = Usd.Stage.Open(layer)
+    camera = next(prim for prim in animated.Traverse() if prim.IsA(UsdGeom.Camera))
+    step = UsdGeom.Xformable(camera).AddTranslateOp(opSuffix="sideways")
+    for frame in range(1, frames + 1):
+        step.Set(Gf.Vec3d(0.01 * (frame - 1), 0, 0), frame)
+    layer.Save()
+    return file
+
+
+def differing(place: Path, frames: int) -> int:
+    """Frames whose two pictures are not the same bits."""
+    found = 0
+    for frame in range(1, frames + 1):
+        files = [place / f"{name}.{frame:04d}.exr" for name in "ab"]
+        done = subprocess.run(
+            [*COMMAND, "compare", *files], capture_output=True, text=True, check=False
+        )
+        found += "equal, bit for bit" not in done.stdout
+    return found
+
+
 def main() -> None:
     """Prints JSON; pairs are of the wall and of the processor."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -54,21 +87,28 @@ def main() -> None:
     parser.add_argument("--tiles", default="auto")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--tasks", type=int, default=0, help="small tasks to time, too")
+    parser.add_argument("--frames", type=int, default=0, help="of a camera that moves")
     asked = parser.parse_args()
     picture = ["--size", *asked.size, "--spp", asked.spp, "--quiet"]
     rounds = []
     for _ in range(asked.rounds):
         with tempfile.TemporaryDirectory() as place:
-            one = timed("render", asked.stage, "-o", Path(place, "a.exr"), *picture,
+            stage, name, words = asked.stage, "", list(picture)
+            if asked.frames:
+                stage, name = moving(asked.stage, Path(place), asked.frames), ".####"
+                words += ["--frames", f"1-{asked.frames}"]
+            one = timed("render", stage, "-o", Path(place, f"a{name}.exr"), *words,
                         "--threads", asked.workers)  # fmt: skip
-            many = timed("farm", "submit", asked.stage, "-o", Path(place, "b.exr"), *picture,
+            many = timed("farm", "submit", stage, "-o", Path(place, f"b{name}.exr"), *words,
                          "--threads", 1, "--tiles", asked.tiles,
                          "--on", f"local:{asked.workers}")  # fmt: skip
             ratios = [b / a for a, b in zip(one, many, strict=True)]
             rounds.append({"one_s": one, "farm_s": many, "ratios": ratios})
+            if asked.frames:
+                rounds[-1]["frames_that_differ"] = differing(Path(place), asked.frames)
     out = {
         "stage": asked.stage.name, "size": asked.size, "spp": asked.spp, "workers": asked.workers,
-        "rounds": rounds,
+        "frames": asked.frames, "rounds": rounds,
         "ratios": [statistics.median(one["ratios"][i] for one in rounds) for i in range(2)],
     }  # fmt: skip
     if asked.tasks:

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,3 +44,34 @@ def same(one: Path, two: Path, but: tuple[str, ...] = TIMES) -> None:
     assert texts[0].keys() == texts[1].keys()
     for key, text in texts[0].items():
         assert text == texts[1][key], key
+
+
+def processes_of(folder: Path, what: str = "") -> list[int]:
+    """Those whose command names the folder, and something else."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (entry / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if (
+            os.fsencode(folder) in words
+            and what.encode() in words
+            and int(entry.name) != os.getpid()
+        ):
+            found.append(int(entry.name))
+    return found
+
+
+def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
+    """What a function gives as soon as that is something."""
+    until = time.monotonic() + seconds
+    while not (found := what()):
+        assert time.monotonic() < until, "it never happened"
+        time.sleep(0.02)
+    return found
+
+
+def left_behind(folder: Path) -> list[Path]:
+    """Temporary files below a folder."""
+    return [file for file in folder.rglob(".*") if ".part" in file.name]

@@ -5,24 +5,19 @@ from __future__ import annotations
 
 import json
 import os
-import random
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import forks
 import numpy as np
 import pytest
-from farm_jobs import same
+from farm_jobs import processes_of, same, wait_for
 from parts import needs
 from test_texture_limit import MOVING_CAMERA, textured, write_image
 
 from wavecomb import farm
-from wavecomb.farm.files import read_json, write_json
+from wavecomb.farm.files import write_json
 from wavecomb.farm.folder import DONE, TODO
 
 pytestmark = [needs("wavecomb._core"), pytest.mark.slow]
@@ -54,31 +49,6 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
     """The command, and how it ends."""
     return forks.wavecomb(*words, timeout=200)
-
-
-def processes_of(folder: Path, what: str = "") -> list[int]:
-    """Those whose command names the folder, and something else."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            words = (entry / "cmdline").read_bytes()
-        except OSError:
-            continue
-        if (
-            os.fsencode(folder) in words
-            and what.encode() in words
-            and int(entry.name) != os.getpid()
-        ):
-            found.append(int(entry.name))
-    return found
-
-
-def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
-    until = time.monotonic() + seconds
-    while not (found := what()):
-        assert time.monotonic() < until, "it never happened"
-        time.sleep(0.02)
-    return found
 
 
 def test_one_picture_by_two_workers(stage: Path, tmp_path: Path) -> None:
@@ -129,46 +99,6 @@ def test_frames_of_a_stage(moving: Path, tmp_path: Path) -> None:
         assert (
             json.loads((tmp_path / f"a.{frame:02}.json").read_text())["counts"]["samples"] == 6144
         )
-
-
-def test_workers_are_killed(stage: Path, tmp_path: Path) -> None:
-    """SIGKILL at random moments of whoever works: the picture is that of one process."""
-    options: dict[str, Any] = {"size": (64, 48), "spp": 2000, "threads": 1}
-    folder = farm.submit(stage, tmp_path / "a.exr", tiles="2x2", strict=False, **options)
-    spec = read_json(folder.path / "job.json")
-    write_json(folder.path / "job.json", {**spec, "tries": 50, "every": 0.05})
-    tasks, parts, chance = folder.spec.tasks(), folder.path / "parts", random.Random(7)
-
-    def begun() -> int:
-        return sum(folder.logs(task.id).count("begins on") for task in tasks)
-
-    for turn in range(3):
-        before = begun()
-        words = [sys.executable, "-m", "wavecomb", "farm", "resume", str(folder.path)]
-        engine = subprocess.Popen([*words, "--on", "local:2", "--quiet"])
-        wait_for(lambda: begun() > before or engine.poll() is not None)  # noqa: B023
-        wait_for(lambda: list(parts.glob("*.ckpt")) or engine.poll() is not None)  # noqa: B023
-        time.sleep(chance.uniform(0.0, 0.4))
-        # A renderer, a worker, and last the engine alone: all that it started go with it.
-        for what in ("farm.child", "farm\0worker", "")[turn:]:
-            mine = [pid for pid in processes_of(folder.path, what) if pid != engine.pid]
-            if mine and what and engine.poll() is None:
-                os.kill(chance.choice(mine), signal.SIGKILL)
-                time.sleep(chance.uniform(0.05, 0.4))
-        engine.kill()
-        engine.wait()
-        wait_for(lambda: not processes_of(folder.path))
-    done = run("farm", "resume", folder.path, "--on", "local:2")
-    assert done.returncode == 0, done.stderr
-    one = forks.wavecomb(
-        "render", str(stage), "-o", str(tmp_path / "b.exr"), "--size", "64", "48", "--spp", "2000",
-        "--threads", "1",
-    )  # fmt: skip
-    assert one.returncode == 0, one.stderr
-    same(tmp_path / "a.exr", tmp_path / "b.exr")
-    assert os.listdir(parts) == []
-    logs = "".join(folder.logs(task.id) for task in tasks)
-    assert "its worker ended" in logs and "goes on after" in logs, "or nothing was tested"
 
 
 def test_a_stop_keeps_what_is_done(stage: Path, tmp_path: Path) -> None:

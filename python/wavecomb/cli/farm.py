@@ -3,26 +3,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
-import sys
 import threading
-from typing import Any
+import time
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.farm_run import run_local
+from wavecomb.cli.farm_run import PAGE, chosen_engine, engine_options, run_local, served
 from wavecomb.cli.farm_submit import submit_command
 from wavecomb.cli.options import examples, isolation_options
 from wavecomb.errors import WavecombError
+from wavecomb.run.progress import Interrupt
+
+if TYPE_CHECKING:
+    from wavecomb.farm.engines import Engine
 
 JOB = click.argument("job", type=click.Path(), metavar="JOB")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="For programs.")
-ON = click.option(
-    "--on", "engine", default="local", metavar="local[:N]|none",
-    help="Who renders.  [default: local: one worker on all cores]",
-)  # fmt: skip
 
 
 @click.group(
@@ -48,16 +49,23 @@ farm_command.add_command(submit_command)
 @JOB
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
               help="Of the renderer.  [default: as the job says, else all]")  # fmt: skip
+@click.option(
+    "--map", "maps", multiple=True, metavar="FROM=TO",
+    help="A folder of the job, its stage or its pictures, that lies elsewhere here.",
+)  # fmt: skip
 @click.option("--tied", is_flag=True, hidden=True, help="Ends when its stdin does.")
 @click.option("--quiet", is_flag=True, help="Only errors.")
 @AS_JSON
-def worker_command(job: str, threads: int, tied: bool, quiet: bool, as_json: bool) -> None:
+def worker_command(
+    job: str, threads: int, maps: tuple[str, ...], tied: bool, quiet: bool, as_json: bool
+) -> None:
     """Work on JOB until nothing is left to do.
 
     Starts as many as there are machines. Ctrl-C and SIGTERM keep what was done of the task at hand
     in a checkpoint, with which another worker goes on.
     """
     from wavecomb.farm.folder import Folder, say
+    from wavecomb.farm.maps import parse_maps, set_own
     from wavecomb.farm.worker import Worker
     from wavecomb.run.parents import end_with_parent
 
@@ -65,6 +73,8 @@ def worker_command(job: str, threads: int, tied: bool, quiet: bool, as_json: boo
         if not (quiet or as_json):
             click.echo(line)
 
+    if maps:
+        set_own(parse_maps(maps))
     worker = Worker(Folder(job), threads=threads, say=tell)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: worker.stop(number))
@@ -80,7 +90,10 @@ def worker_command(job: str, threads: int, tied: bool, quiet: bool, as_json: boo
 
 def _end_with_stdin(worker: Any) -> None:
     """Stops a worker when whoever started it wants that, or is no more."""
-    sys.stdin.buffer.read()
+    # Not by sys.stdin, whose lock this thread would hold when Python ends, which aborts it.
+    with contextlib.suppress(OSError):
+        while os.read(0, 1 << 10):
+            pass
     worker.stop(signal.SIGTERM)
 
 
@@ -89,7 +102,10 @@ def _end_with_stdin(worker: Any) -> None:
 @AS_JSON
 @click.option("--html", type=click.Path(), metavar="FILE.html",
               help="Writes a page that can be looked at without anything else.")  # fmt: skip
-def status_command(job: str, as_json: bool, html: str | None) -> None:
+@click.option("--serve", is_flag=False, flag_value="0", default=None, metavar="[PORT]",
+              help="Serves the page of `farm submit --page`, to this machine alone, until "
+              "Ctrl-C.")  # fmt: skip
+def status_command(job: str, as_json: bool, html: str | None, serve: str | None) -> None:
     """Say where JOB stands: pictures, tasks, workers, time left, what failed and why."""
     from wavecomb.farm.folder import Folder, say
     from wavecomb.farm.state import lines, status
@@ -101,6 +117,10 @@ def status_command(job: str, as_json: bool, html: str | None) -> None:
 
         write_page(html, state)
     click.echo(say(state) if as_json else "\n".join(lines(state)))
+    if serve is not None:
+        with Interrupt() as interrupt, served(folder, serve, err=as_json):
+            while not interrupt.requested:
+                time.sleep(0.1)
 
 
 @farm_command.command("logs")
@@ -130,22 +150,31 @@ def logs_command(job: str, name: str | None, as_json: bool) -> None:
 @farm_command.command("retry")
 @JOB
 @click.argument("tasks", nargs=-1, metavar="[TASK ...]")
-@ON
+@engine_options
+@PAGE
 @click.option("--quiet", is_flag=True, help="Only errors.")
 @AS_JSON
 def retry_command(
-    job: str, tasks: tuple[str, ...], engine: str, quiet: bool, as_json: bool
+    job: str,
+    tasks: tuple[str, ...],
+    engine: str,
+    tls_ca: str | None,
+    tls_cert: str | None,
+    tls_key: str | None,
+    page: str | None,
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Have tasks of JOB done again that failed, by default all, and work on it."""
     from wavecomb.farm.checking import retry
     from wavecomb.farm.folder import Folder
     from wavecomb.farm.spec import Task
 
-    folder = Folder(job)
+    folder, who = Folder(job), chosen_engine(engine, tls_ca, tls_cert, tls_key)
     again = retry(folder, [Task.of(task) for task in tasks] or None)
     if not again:
         raise WavecombError(f"{job}: no task failed")
-    _go_on(folder, engine, quiet=quiet, as_json=as_json)
+    _go_on(folder, who, page=page, quiet=quiet, as_json=as_json)
 
 
 @farm_command.command("cancel")
@@ -168,27 +197,39 @@ def cancel_command(job: str, as_json: bool) -> None:
 
 @farm_command.command("resume")
 @JOB
-@ON
+@engine_options
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
               help="Of each worker.  [default: as the job says, else its share]")  # fmt: skip
+@PAGE
 @click.option("--quiet", is_flag=True, help="Only errors.")
 @AS_JSON
-def resume_command(job: str, engine: str, threads: int, quiet: bool, as_json: bool) -> None:
+def resume_command(
+    job: str,
+    engine: str,
+    tls_ca: str | None,
+    tls_cert: str | None,
+    tls_key: str | None,
+    threads: int,
+    page: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
     """Go on with JOB: render what is missing, and nothing else.
 
     A picture or tile that is said to be done and is not there is rendered again.
     """
     from wavecomb.farm.folder import Folder
 
-    _go_on(Folder(job), engine, threads=threads, quiet=quiet, as_json=as_json)
+    who = chosen_engine(engine, tls_ca, tls_cert, tls_key)
+    _go_on(Folder(job), who, threads=threads, page=page, quiet=quiet, as_json=as_json)
 
 
-def _go_on(folder: Any, engine: str, *, threads: int = 0, quiet: bool, as_json: bool) -> None:
+def _go_on(
+    folder: Any, who: Engine, *, threads: int = 0, page: str | None, quiet: bool, as_json: bool
+) -> None:
     from wavecomb.farm.checking import repair
     from wavecomb.farm.folder import say
-    from wavecomb.farm.local import parse_engine
 
-    who = parse_engine(engine)
     if who.kind == "none":
         again = repair(folder)
         (folder.path / "cancel").unlink(missing_ok=True)
@@ -196,7 +237,7 @@ def _go_on(folder: Any, engine: str, *, threads: int = 0, quiet: bool, as_json: 
         click.echo(say(told) if as_json else f"{len(again)} tasks are to be done again")
         return
     wanted = threads or int(folder.spec.shots[0].settings.get("threads") or 0)
-    run_local(folder, who, wanted, as_json=as_json, quiet=quiet)
+    run_local(folder, who, wanted, page=page, as_json=as_json, quiet=quiet)
 
 
 @farm_command.command("assemble")
@@ -278,3 +319,28 @@ def export_command(job: str, openjd: str | None, slurm: str | None, workers: int
         if name is not None:
             write(name, folder, workers)
             click.echo(f"wrote {name}")
+
+
+@farm_command.command(
+    "certificates",
+    epilog=examples(
+        "wavecomb farm certificates tls",
+        "dask scheduler --tls-ca-file tls/ca.pem --tls-cert tls/scheduler.pem "
+        "--tls-key tls/scheduler.key --protocol tls",
+        "wavecomb farm submit shot.usd -o shot.exr --on dask:tls://HOST:8786 "
+        "--tls-ca tls/ca.pem --tls-cert tls/client.pem --tls-key tls/client.key",
+    ),
+)
+@click.argument("folder", type=click.Path(), metavar="FOLDER")
+@click.option("--days", type=click.IntRange(1, 3650), default=30, metavar="N",
+              help="That they are good for.  [default: 30]")  # fmt: skip
+def certificates_command(folder: str, days: int) -> None:
+    """Make certificates in FOLDER for a Dask scheduler, its workers and clients.
+
+    Who has none of them cannot talk to the scheduler; who has one runs code on its machines, so
+    keys are readable by their owner alone. The key that signed them is kept nowhere.
+    """
+    from wavecomb.farm.certificates import make_certificates
+
+    for path in make_certificates(folder, days):
+        click.echo(f"wrote {path}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.farm_run import run_local
+from wavecomb.cli.farm_run import PAGE, chosen_engine, engine_options, run_local
 from wavecomb.cli.frames import frame_options
 from wavecomb.cli.options import StageOptions, examples, stage_options
 from wavecomb.cli.planning import Asked, Prepared, prepare
@@ -33,15 +33,7 @@ if TYPE_CHECKING:
 )
 @stage_options
 @frame_options
-@click.option(
-    "--on",
-    "engine",
-    default="local",
-    metavar="local[:N]|ssh:HOSTS|none",
-    help="Who renders: N workers on this machine, or one on each of HOSTS, with commas between "
-    "them, until all is done; or whoever runs `wavecomb farm worker`.  "
-    "[default: local: one worker on all cores]",
-)
+@engine_options
 @click.option(
     "--tiles",
     default="auto",
@@ -69,28 +61,53 @@ if TYPE_CHECKING:
     help="A render that says nothing for so long is ended.  [default: 1800]",
 )  # fmt: skip
 @click.option(
+    "--slow", type=Real(0), default=3.0, metavar="X",
+    help="A task that takes X times as long as others is begun elsewhere, too, where nothing else "
+    "is left to do; 0: never.  [default: 3]",
+)  # fmt: skip
+@click.option(
     "--strict/--no-strict",
     default=True,
     help="Whether a texture or layer that is missing is an error.  [default: strict]",
 )
+@click.option(
+    "--assets",
+    type=click.Choice(["shared", "copy"]),
+    default="shared",
+    help="Whether workers see the files of the stage, or those that lack them get copies through "
+    "the job's folder.  [default: shared]",
+)
+@click.option(
+    "--map", "maps", multiple=True, metavar="FROM=TO",
+    help="A folder that lies elsewhere for workers that do not have it: of the stage and all files "
+    "that it names, and of the pictures.",
+)  # fmt: skip
 @click.option(
     "--isa",
     metavar="NAME",
     help="Library that all workers use (x86-64-v3 ...): machines of several kinds are one class "
     "then, if their probe pictures agree.",
 )
+@PAGE
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 @picture_options
 def submit_command(
     engine: str,
+    tls_ca: str | None,
+    tls_cert: str | None,
+    tls_key: str | None,
     tiles: str,
     chunk: int | None,
     job: str | None,
     tries: int,
     lease: float,
     hang: float,
+    slow: float,
     strict: bool,
+    assets: str,
+    maps: tuple[str, ...],
     isa: str | None,
+    page: str | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -100,11 +117,16 @@ def submit_command(
     keeps what is done, and `wavecomb farm resume` goes on. docs/farm.md says more.
     """
     from wavecomb.farm.assets import ask_assets
-    from wavecomb.farm.local import parse_engine
+    from wavecomb.farm.maps import parse_maps
+    from wavecomb.farm.server import parse_address
     from wavecomb.farm.submitting import complete, create, default_folder
     from wavecomb.farm.tiling import parse_tiles
 
-    who = parse_engine(engine)
+    who = chosen_engine(engine, tls_ca, tls_cert, tls_key)
+    if page is not None:
+        parse_address(page)
+        if who.kind == "none":
+            raise WavecombError("--page: is for who works here; `wavecomb farm status --serve`")
     cut = parse_tiles(tiles)
     every = options["every"]
     options["every"] = None
@@ -118,17 +140,17 @@ def submit_command(
     prepared = prepare(asked, _peek)
     spec = _spec(
         prepared, asked, every=every or 120.0, tries=tries, lease_s=lease, hang_s=hang,
-        strict=strict, isa=isa,
+        slow=slow, strict=strict, assets=assets, maps=parse_maps(maps), isa=isa,
     )  # fmt: skip
     spec = complete(spec, tiles=cut, workers=who.count, chunk=chunk)
-    assets = ask_assets(asked.stage, _stage_words(asked.source)) if strict else None
+    listed = ask_assets(asked.stage, _stage_words(asked.source)) if strict else None
     path = job or default_folder(asked.output, asked.stage, asked.output_dir)
-    folder = create(spec, path, assets)
+    folder = create(spec, path, listed)
     threads = int(spec.shots[0].settings.get("threads") or 0)
     if who.kind == "none":
         _say_folder(folder, as_json)
         return
-    run_local(folder, who, threads, as_json=as_json, quiet=asked.quiet)
+    run_local(folder, who, threads, page=page, as_json=as_json, quiet=asked.quiet)
 
 
 def _check_options(asked: Asked) -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
+from wavecomb.farm.engines import Engine
 from wavecomb.farm.folder import Folder
-from wavecomb.farm.local import Engine, Local
+from wavecomb.farm.maps import parse_maps
 from wavecomb.farm.spec import Spec
 from wavecomb.farm.submitting import complete, create, default_folder, new_id, shot_of
 from wavecomb.farm.tiling import parse_tiles
@@ -35,6 +36,8 @@ def submit(
     denoise: bool = False,
     file: dict[str, Any] | None = None,
     strict: bool = True,
+    assets: str = "shared",
+    maps: Iterable[str] = (),
     **options: Any,
 ) -> Folder:
     """Writes the folder of a job. ``run``, or `wavecomb farm worker`, works on it.
@@ -55,6 +58,8 @@ def submit(
         denoise: Whether pictures get the layer ``denoised``.
         file: half, compression, tile and split of ``Picture.save``.
         strict: Whether a file that is missing is an error.
+        assets: "shared", or "copy": workers that lack files of the stage get them from the folder.
+        maps: "FROM=TO": folders that lie elsewhere for workers that do not have them.
         **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
 
     >>> job = submit("shot.usd", "shot.exr", tiles="8x4", spp=256)  # doctest: +SKIP
@@ -98,10 +103,13 @@ def submit(
         id=new_id(), stage=stage, folder=os.getcwd(), shots=(shot,),
         pictures=tuple((0, frame if number is None else number) for number in numbers),
         file=file or {}, denoise=denoise, costs=profile, strict=strict, command=("wavecomb.farm",),
+        assets=assets, maps=parse_maps(maps),
     )  # fmt: skip
     spec = complete(spec, tiles=parse_tiles(tiles), workers=workers, chunk=chunk)
-    assets = ask_assets(stage, _words(loading)) if strict else None
-    return create(spec, os.fspath(job or default_folder(name, stage)), assets)
+    if assets not in ("shared", "copy"):
+        raise WavecombError(f"assets: must be shared or copy, not {assets}")
+    listed = ask_assets(stage, _words(loading)) if strict else None
+    return create(spec, os.fspath(job or default_folder(name, stage)), listed)
 
 
 def _words(loading: dict[str, Any]) -> list[str]:
@@ -139,7 +147,7 @@ def run(
 
     folder = job if isinstance(job, Folder) else Folder(job)
     wanted = threads or int(folder.spec.shots[0].settings.get("threads") or 0)
-    engine = Local(folder, Engine("local", workers).commands(folder, wanted))
+    engine = Engine("local", workers).runner(folder, wanted)
     engine.run(progress)
     if engine.stopped is not None:
         raise KeyboardInterrupt

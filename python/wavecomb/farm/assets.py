@@ -8,13 +8,15 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
 
 _MOST_NAMED = 3
+_LIST_S = 4 * 3600.0
+"""For all files of a stage to be read."""
 
 
 def list_assets(
@@ -59,7 +61,15 @@ def ask_assets(stage: str, options: Sequence[str]) -> dict[str, Any]:
         WavecombError: The stage cannot be opened.
     """
     words = [sys.executable, "-m", "wavecomb", "farm", "assets", stage, "--json", *options]
-    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    try:
+        done = subprocess.run(
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_LIST_S
+        )
+    except subprocess.TimeoutExpired:
+        raise WavecombError(
+            f"{stage}: its files were not listed within {_LIST_S / 3600:.0f} hours (--no-strict "
+            "goes on without)"
+        ) from None
     if done.returncode:
         said = done.stderr.strip().splitlines()
         raise WavecombError((said[-1] if said else "no word").removeprefix("error: "))
@@ -67,20 +77,26 @@ def ask_assets(stage: str, options: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def differences(files: Sequence[Mapping[str, Any]], folder: str) -> list[str]:
+def differences(
+    files: Sequence[Mapping[str, Any]],
+    place: Callable[[str], str],
+    hash_of: Callable[[str], str] = file_hash,
+) -> list[str]:
     """Files of a job that are not on this machine, or are others there: a line each, a few of them.
 
     Args:
         files: Of ``list_assets``.
-        folder: That relative names count from.
+        place: Where a file lies here.
+        hash_of: SHA-256 of a file.
     """
     found: list[str] = []
     for one in files:
-        path = os.path.join(folder, one["path"])
+        path = place(one["path"])
+        name = one["path"] if path == one["path"] else f"{one['path']} ({path})"
         try:
-            if os.path.getsize(path) != one["bytes"] or file_hash(path) != one["sha256"]:
-                found.append(f"{one['path']} is not what it was when the job was submitted")
+            if os.path.getsize(path) != one["bytes"] or hash_of(path) != one["sha256"]:
+                found.append(f"{name} is not what it was when the job was submitted")
         except OSError as error:
-            found.append(f"{one['path']} is not on this machine: {error.strerror}")
+            found.append(f"{name} is not on this machine: {error.strerror}")
     more = len(found) - _MOST_NAMED
     return found[:_MOST_NAMED] + [f"and {more} more files"] * (more > 0)

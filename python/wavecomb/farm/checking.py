@@ -9,7 +9,8 @@ import os
 from wavecomb.farm.folder import DONE, FAILED, TODO, Entry, Folder
 from wavecomb.farm.leases import take_back
 from wavecomb.farm.part import DamagedPart, load_part
-from wavecomb.farm.spec import JOIN, Task
+from wavecomb.farm.spec import Task
+from wavecomb.farm.sweeping import sweep
 
 
 def damaged_tiles(folder: Folder, picture: int) -> list[Task]:
@@ -46,7 +47,7 @@ def repair(folder: Folder) -> list[Task]:
     known = done.union(*(folder.ids(state) for state in ("busy", TODO, FAILED)))
     for picture in range(len(spec.pictures)):
         tiles = spec.parts_of(picture)
-        last = Task(picture, JOIN) if spec.is_tiled else tiles[0]
+        last = spec.last_of(picture)
         if last.id in done:
             if is_written(folder, picture):
                 continue
@@ -58,6 +59,7 @@ def repair(folder: Folder) -> list[Task]:
                 with contextlib.suppress(FileExistsError):
                     (folder.path / TODO / Entry(task, 1).name).touch(exist_ok=False)
                     again.append(task)
+    sweep(folder)
     return sorted(dict.fromkeys(again), key=lambda task: task.id)
 
 

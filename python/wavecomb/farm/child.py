@@ -25,24 +25,27 @@ _SHOW_S = 0.5
 
 
 def main(words: list[str]) -> None:
-    """``words``: the job's folder, and threads (0: as the job says)."""
+    """``words``: the job's folder, threads (0: as the job says), and the worker's name."""
     end_with_parent()
     channel = _take_stdout()
-    stop = threading.Event()
-    signal.signal(signal.SIGTERM, lambda number, frame: stop.set())
+    told = _Told()
+    signal.signal(signal.SIGTERM, lambda number, frame: told.stop.set())
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    tasks: queue.Queue[str] = queue.Queue()
-    threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
+    threading.Thread(target=told.listen, daemon=True).start()
     from wavecomb.errors import WavecombError
+    from wavecomb.farm.sweeping import owner_of
+    from wavecomb.picture import files
     from wavecomb.run.faults import describe
 
+    files.owner = owner_of(words[2])
     try:
-        worker = _Worker(words[0], int(words[1]), channel, stop)
-    except WavecombError as error:
-        channel.send("refused", error=describe(error))
-        return
+        worker = _Worker(words[0], int(words[1]), channel, told)
+    except (OSError, WavecombError) as error:
+        lost = not os.path.exists(os.path.join(words[0], "job.json"))
+        channel.send("refused", error=describe(error), lost=lost)
+        os._exit(2)  # the other thread holds the lock of stdin, which Python would wait for
     while True:
-        worker.do(json.loads(tasks.get()))
+        worker.do(told.next())
 
 
 class Channel:
@@ -68,10 +71,42 @@ def _take_stdout() -> Channel:
     return channel
 
 
-def _listen(tasks: queue.Queue[str]) -> None:
-    for line in sys.stdin:
-        tasks.put(line)
-    os._exit(3)
+class _Told:
+    """What the worker wants.
+
+    Attributes:
+        stop: Set when the task is to end, with a checkpoint.
+    """
+
+    def __init__(self) -> None:
+        self.stop = threading.Event()
+        self._tasks: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._number = 0
+        self._dropped = -1
+
+    def listen(self) -> None:
+        """Reads on; this process ends with the worker, and so with what it says."""
+        for line in sys.stdin:
+            told = json.loads(line)
+            if "drop" in told:
+                self._dropped = int(told["drop"])
+            else:
+                self._tasks.put(told)
+        os._exit(3)
+
+    def next(self) -> dict[str, Any]:
+        """A task; waits for it."""
+        told = self._tasks.get()
+        self._number = int(told["number"])
+        return told
+
+    def is_dropped(self) -> bool:
+        """Whether another did the task."""
+        return self._dropped == self._number
+
+    def is_stopped(self) -> bool:
+        """Whether the task is to end."""
+        return self.stop.is_set() or self.is_dropped()
 
 
 class _Shown:
@@ -103,31 +138,32 @@ class _Shown:
 class _Worker:
     """Does what it is told."""
 
-    def __init__(self, path: str, threads: int, channel: Channel, stop: threading.Event) -> None:
-        from wavecomb.farm.assets import differences
+    def __init__(self, path: str, threads: int, channel: Channel, told: _Told) -> None:
+        from wavecomb.farm.at_hand import files_at_hand
         from wavecomb.farm.folder import Folder
         from wavecomb.farm.machine_class import machine_class
         from wavecomb.farm.rendering import Renderer
 
         folder = Folder(path)
-        self._channel, self._stop, self._folder = channel, stop, folder
+        self._channel, self._folder = channel, folder
         with contextlib.suppress(OSError):
-            os.chdir(folder.spec.folder)
+            os.chdir(folder.spec.place(folder.spec.folder))
         shown = _Shown(channel)
         self._renderer = Renderer(
             folder,
             threads=threads,
             reporter=shown,
             loading=shown.loading,
-            is_stopped=stop.is_set,
+            is_stopped=told.is_stopped,
+            is_dropped=told.is_dropped,
             log=lambda line: channel.send("said", line=line),
         )
         channel.send("class", **machine_class())
-        others = differences(folder.assets(), folder.spec.folder) if folder.spec.strict else []
-        channel.send("ready", problems=others)
+        channel.send("ready", problems=files_at_hand(folder))
 
     def do(self, told: Mapping[str, Any]) -> None:
         """A task. Every end is told; of a crash the worker hears by itself."""
+        from wavecomb.farm.files import is_full
         from wavecomb.farm.part import DamagedPart
         from wavecomb.farm.rendering import Absent, Stopped
         from wavecomb.farm.spec import Task
@@ -135,7 +171,7 @@ class _Worker:
 
         started = time.perf_counter()
         try:
-            result = self._renderer.do(Task.of(told["task"]))
+            result = self._renderer.do(Task.of(told["task"]), copy=bool(told.get("copy")))
         except Stopped:
             self._channel.send("stopped")
         except DamagedPart as error:
@@ -145,9 +181,18 @@ class _Worker:
                 import traceback
 
                 traceback.print_exc()
-            self._channel.send("failed", error=describe(error), final=isinstance(error, Absent))
+            self._channel.send(
+                "failed", error=describe(error), final=isinstance(error, Absent),
+                full=is_full(error, self._places(told["task"])),
+            )  # fmt: skip
         else:
             self._channel.send("done", result={**result, "wall_s": time.perf_counter() - started})
+
+    def _places(self, task: str) -> list[str]:
+        """Folders that a task writes to."""
+        spec = self._folder.spec
+        names = spec.names(int(task.partition(".")[0])).values()
+        return [str(self._folder.path), *(os.path.dirname(spec.place(name)) for name in names)]
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ from typing import IO, Any
 
 from wavecomb.farm.folder import Folder
 
+_DIE_S = 10.0
+
 
 class ChildDied(Exception):
     """The child is no more, or was ended since it was silent."""
@@ -29,12 +31,14 @@ class Child:
         problems: Files that are not here, or are others.
     """
 
-    def __init__(self, folder: Folder, threads: int, log: IO[bytes], isa: str | None) -> None:
+    def __init__(
+        self, folder: Folder, threads: int, worker: str, log: IO[bytes], isa: str | None
+    ) -> None:
         environment = dict(os.environ)
         if isa is not None:
             environment["WAVECOMB_ISA"] = isa
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "wavecomb.farm.child", str(folder.path), str(threads)],
+            [sys.executable, "-m", "wavecomb.farm.child", str(folder.path), str(threads), worker],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
@@ -48,6 +52,7 @@ class Child:
         self._selector.register(self._out, selectors.EVENT_READ)
         self._rest = b""
         self._heard = time.monotonic()
+        self._number = 0
         self.facts: dict[str, Any] = {}
         self.problems: list[str] = []
 
@@ -56,9 +61,17 @@ class Child:
         """Since it last said something."""
         return time.monotonic() - self._heard
 
-    def tell(self, value: Mapping[str, Any]) -> None:
-        """A line. Raises ChildDied."""
+    def begin(self, task: str, *, copy: bool) -> None:
+        """Has it do a task. Raises ChildDied."""
+        self._number += 1
         self._heard = time.monotonic()
+        self._tell({"task": task, "copy": copy, "number": self._number})
+
+    def drop(self) -> None:
+        """Has it end its task, of which nothing is to be kept. Raises ChildDied."""
+        self._tell({"drop": self._number})
+
+    def _tell(self, value: Mapping[str, Any]) -> None:
         try:
             self._in.write(json.dumps(dict(value)).encode() + b"\n")
             self._in.flush()
@@ -98,7 +111,9 @@ class Child:
         """Kills it."""
         if self._process.poll() is None:
             self._process.kill()
-            self._process.wait()
+            # One that hangs in the kernel, on a share that is gone, dies when that lets it.
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_DIE_S)
         self._selector.close()
         with contextlib.suppress(OSError):
             self._in.close()

@@ -4,12 +4,15 @@
     job.json        what the job is
     class.json      machines that may work on it (classes.py); the first worker writes it
     assets.json     files that its stage needs, with their hashes
+    files/          these files, where they travel with the job
+    hashes/HOST.json    what a machine knows of its files
     todo/TASK.TRY            tasks to be done
     busy/TASK.TRY.WORKER     tasks that a worker has
     done/TASK, failed/TASK   tasks that are done, or failed too often
     results/TASK.json        what came of a task
     logs/TASK.log, logs/WORKER.log
     workers/WORKER.json      who works, touched every few seconds
+    copies/TASK.TRY.WORKER   tasks of slow workers that another has begun, too
     parts/                   tiles and checkpoints
     cancel                   whoever works is to stop
 
@@ -26,7 +29,7 @@ import os
 import shutil
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +40,11 @@ from wavecomb.farm.spec import Spec, Task
 
 TODO, BUSY, DONE, FAILED = "todo", "busy", "done", "failed"
 STATES = (TODO, BUSY, DONE, FAILED)
-_FOLDERS = (*STATES, "results", "logs", "workers", "parts")
+_FOLDERS = (*STATES, "copies", "results", "logs", "workers", "parts")
+
+
+class ShareLost(OSError):
+    """The folder is not there at the moment: what was to be said of a task is to be said later."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +102,20 @@ class Folder:
         self.spec = Spec.of(read_json(file), str(file))
 
     @classmethod
-    def create(cls, path: str | os.PathLike[str], spec: Spec, files: Mapping[str, Any]) -> Folder:
+    def create(
+        cls,
+        path: str | os.PathLike[str],
+        spec: Spec,
+        files: Mapping[str, Any],
+        fill: Callable[[Path], object] = lambda path: None,
+    ) -> Folder:
         """Makes the folder, whole or not at all.
 
         Args:
             path: That is not there yet.
             spec: The job.
             files: Further files: name -> JSON.
+            fill: Writes what else belongs into it.
 
         Raises:
             WavecombError: Something is there.
@@ -122,6 +136,7 @@ class Folder:
                 (part / TODO / Entry(task, 1).name).touch()
             for name, value in files.items():
                 write_json(part / name, value)
+            fill(part)
             write_json(part / "job.json", spec.as_json())
             os.rename(part, target)
         finally:
@@ -155,6 +170,10 @@ class Folder:
             entry.task.is_join and entry.task.picture in failed for entry in self.entries(TODO)
         )
 
+    def is_there(self) -> bool:
+        """Whether the folder can be seen: a share may be gone for a while."""
+        return (self.path / "job.json").exists()
+
     def is_cancelled(self) -> bool:
         """Whether whoever works is to stop."""
         return (self.path / "cancel").exists()
@@ -180,12 +199,53 @@ class Folder:
     def claim(self, entry: Entry, worker: str) -> Entry | None:
         """Takes a task; None: another was quicker."""
         mine = Entry(entry.task, entry.attempt, worker)
-        return mine if self._move(TODO, entry.name, BUSY, mine.name) else None
+        if not self._move(TODO, entry.name, BUSY, mine.name):
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(self.path / BUSY / mine.name)  # when it was begun
+        return mine
 
     def finish(self, mine: Entry, result: Mapping[str, Any]) -> bool:
         """Says that a task is done; False: it was taken away, and counts for another."""
-        write_json(self.path / "results" / f"{mine.task.id}.json", dict(result))
-        return self._move(BUSY, mine.name, DONE, mine.task.id)
+        if not self._move(BUSY, mine.name, DONE, mine.task.id):
+            return False
+        self._done(mine.task, result)
+        return True
+
+    def finish_copy(self, task: Task, result: Mapping[str, Any]) -> bool:
+        """Says that a task is done that another has, or had; False: that one was quicker."""
+        for state in (BUSY, TODO, BUSY):
+            for entry in self.entries(state):
+                if entry.task == task and self._move(state, entry.name, DONE, task.id):
+                    self._done(task, result)
+                    return True
+        if self._move(FAILED, task.id, DONE, task.id):
+            self._done(task, result)
+            return True
+        return False
+
+    def _done(self, task: Task, result: Mapping[str, Any]) -> None:
+        """What is known of a task that is done; what nobody needs any more goes."""
+        with contextlib.suppress(OSError):
+            write_json(self.path / "results" / f"{task.id}.json", dict(result))
+        with contextlib.suppress(OSError):
+            self.checkpoint(task).unlink()
+        if task.is_join:
+            self.remove_parts(task.picture)
+
+    def remove_parts(self, picture: int) -> None:
+        """Removes the tiles of a picture."""
+        for part in self.spec.parts_of(picture):
+            with contextlib.suppress(OSError):
+                self.part(part).unlink()
+
+    def has(self, mine: Entry) -> bool:
+        """Whether a task is still that of its worker; True where nobody can tell now."""
+        return (self.path / BUSY / mine.name).exists() or not self.is_there()
+
+    def is_done(self, task: Task) -> bool:
+        """Whether somebody did a task."""
+        return (self.path / DONE / task.id).exists()
 
     def give_back(self, mine: Entry) -> bool:
         """Lets another go on with it; that is no try of the task."""
@@ -203,7 +263,8 @@ class Folder:
         self.log(mine.task, text)
         if is_final or mine.attempt >= self.spec.tries:
             result = {"error": error, "tries": mine.attempt, "worker": mine.worker}
-            write_json(self.path / "results" / f"{mine.task.id}.json", result)
+            with contextlib.suppress(OSError):
+                write_json(self.path / "results" / f"{mine.task.id}.json", result)
             return self._move(BUSY, mine.name, FAILED, mine.task.id)
         return self._move(BUSY, mine.name, TODO, Entry(mine.task, mine.attempt + 1).name)
 
@@ -217,6 +278,8 @@ class Folder:
         try:
             os.rename(self.path / state / name, self.path / to / new)
         except FileNotFoundError:
+            if not self.is_there():
+                raise ShareLost(f"{self.path}: is not there") from None
             return False
         return True
 

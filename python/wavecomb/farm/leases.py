@@ -104,9 +104,10 @@ class Beat:
         return self._file.stat().st_mtime
 
     def note(self, **facts: Any) -> None:
-        """Adds to what is known of the worker."""
+        """Adds to what is known of the worker, as far as there is a disk to write to."""
         self._facts |= facts
-        write_json(self._file, self._facts)
+        with contextlib.suppress(OSError):
+            write_json(self._file, self._facts)
 
     def end(self, why: str) -> None:
         """Says that the worker is no more."""
@@ -167,6 +168,23 @@ def living(folder: Folder, now: float) -> int:
         )
 
 
+def _why_gone(worker: Worker | None, now: float | None, lease_s: float) -> str:
+    """Why a worker does not count any more; empty: it does."""
+    if worker is None:
+        return "its worker is not known"
+    if worker.has_ended:
+        return "its worker ended"
+    if now is not None and now - worker.seen > lease_s:
+        return f"its worker gave no sign of life for {now - worker.seen:.0f} s"
+    return ""
+
+
+def gone(folder: Folder, now: float | None = None) -> set[str]:
+    """Names of workers of a job that are no more; ``now`` as of ``take_back``."""
+    lease = folder.spec.lease_s
+    return {one.name for one in workers(folder) if _why_gone(one, now, lease)}
+
+
 def take_back(folder: Folder, now: float | None = None, *, counts: bool = True) -> list[Entry]:
     """Takes tasks from workers that are no more, or gave no sign for too long.
 
@@ -181,14 +199,8 @@ def take_back(folder: Folder, now: float | None = None, *, counts: bool = True) 
     known = {worker.name: worker for worker in workers(folder)}
     taken = []
     for entry in held:
-        worker = known.get(entry.worker)
-        if worker is None:
-            why = "its worker is not known"
-        elif worker.has_ended:
-            why = "its worker ended"
-        elif now is not None and now - worker.seen > folder.spec.lease_s:
-            why = f"its worker gave no sign of life for {now - worker.seen:.0f} s"
-        else:
+        why = _why_gone(known.get(entry.worker), now, folder.spec.lease_s)
+        if not why:
             continue
         if not counts:
             folder.log(entry.task, f"taken from {entry.worker}: {why}")

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from wavecomb.farm.files import create_json, read_json
+from wavecomb.farm.files import read_json, write_json
 from wavecomb.farm.folder import Folder
 from wavecomb.version import version
 
@@ -104,7 +104,7 @@ def refusal(folder: Folder, mine: Mapping[str, Any], worker: str) -> str | None:
     """
     file = folder.path / "class.json"
     if not file.exists():
-        create_json(file, dict(mine), worker)
+        write_json(file, dict(mine), only_new=True)
     wanted = read_json(file)
     for key, word in _WORDS.items():
         if mine.get(key) != wanted.get(key):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assemble import assemble
+from wavecomb.farm.at_hand import stage_place
 from wavecomb.farm.files import read_json, write_json
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.output import write_picture
@@ -36,7 +37,7 @@ _MORE_LOOKS = 4
 
 
 class Stopped(Exception):
-    """Somebody wants the task to end; a checkpoint holds what was done."""
+    """Somebody wants the task to end; a checkpoint holds what was done, unless another did it."""
 
 
 class Absent(WavecombError):
@@ -52,6 +53,7 @@ class _OnStop(CheckpointSink):
     def __init__(
         self,
         is_stopped: Callable[[], bool],
+        is_dropped: Callable[[], bool],
         path: str | os.PathLike[str],
         every: float,
         header: Callable[[], Mapping[str, Any]],
@@ -59,10 +61,13 @@ class _OnStop(CheckpointSink):
     ) -> None:
         super().__init__(path, every, {}, seconds)
         self._is_stopped = is_stopped
+        self._is_dropped = is_dropped
         self._make_header = header
 
     def take(self, snapshot: Snapshot) -> str | None:
-        """Writes the file, unless the render is done."""
+        """Writes the file, unless the render is done, or another's."""
+        if self._is_dropped():
+            return None
         return None if snapshot.finished and not self._is_stopped() else super().take(snapshot)
 
     def write(self, snapshot: Snapshot) -> None:
@@ -82,6 +87,7 @@ class Renderer:
         reporter: Reporter | None = None,
         loading: Callable[[int, int], None] | None = None,
         is_stopped: Callable[[], bool] = lambda: False,
+        is_dropped: Callable[[], bool] = lambda: False,
         log: Callable[[str], None] = lambda line: None,
     ) -> None:
         """Opens nothing yet.
@@ -92,6 +98,7 @@ class Renderer:
             reporter: Shows progress.
             loading: Called while a stage is read.
             is_stopped: Whether a task is to end early.
+            is_dropped: Whether nobody wants what was done of it.
             log: Gets warnings.
         """
         self._folder = folder
@@ -100,6 +107,7 @@ class Renderer:
         self._reporter = reporter
         self._loading = loading
         self._is_stopped = is_stopped
+        self._is_dropped = is_dropped
         self._log = log
         self._open: tuple[int, Frames] | None = None
         self._loaded: tuple[tuple[int, float | None], LoadedStage] | None = None
@@ -111,18 +119,22 @@ class Renderer:
             self._open[1].close()
         self._open = self._loaded = None
 
-    def do(self, task: Task) -> dict[str, Any]:
+    def do(self, task: Task, *, copy: bool = False) -> dict[str, Any]:
         """Does a task; gives what came of it, for its result.
 
+        Args:
+            task: The task.
+            copy: Whether it is another's, too, whose checkpoint stays as it is.
+
         Raises:
-            Stopped: It was to end early.
+            Stopped: It was to end early, or another did it meanwhile.
             Absent: A file is missing.
             WavecombError: It failed.
         """
         if task.is_join:
             picture = self._assemble(task.picture)
+            self._check_wanted(task)
             files = write_picture(self._spec, task.picture, picture, self._threads)
-            self._remove_parts(task.picture)
             with contextlib.suppress(OSError):
                 self._looks_file(task.picture).unlink()
             return {"files": files}
@@ -130,7 +142,8 @@ class Renderer:
         tile = self._spec.rectangles(task.picture)[int(task.part)]
         settings, rendered, looks = self._settings(task.picture, shot, tile)
         check_memory(settings, shot.aovs)
-        picture, frames = self._render(task, shot, settings)
+        picture, frames = self._render(task, shot, settings, copy)
+        self._check_wanted(task)
         if not self._spec.is_tiled:
             files = write_picture(self._spec, task.picture, picture, settings.threads)
         else:
@@ -139,26 +152,28 @@ class Renderer:
                 rendered=rendered, looks=looks, empty=self._empty(task, shot, frames, picture),
             )  # fmt: skip
             files = []
-        with contextlib.suppress(OSError):
-            self._folder.checkpoint(task).unlink()
+            if self._folder.is_done(self._spec.last_of(task.picture)):
+                # Another did it, and the picture is there: nobody else would remove the tile.
+                with contextlib.suppress(OSError):
+                    self._folder.part(task).unlink()
         counts = picture.stats["counts"]
         return {
             "files": files, "samples": counts["samples"], "rays": counts["rays"],
             "seconds": picture.stats["seconds"], "peak_rss_bytes": picture.stats["peak_rss_bytes"],
         }  # fmt: skip
 
+    def _check_wanted(self, task: Task) -> None:
+        """Raises Stopped where another did a task meanwhile: what it wrote stays as it is."""
+        if self._is_dropped() or self._folder.is_done(task):
+            raise Stopped
+
     def _assemble(self, picture: int) -> Picture:
         try:
             return assemble(self._folder, picture)
         except NarrowBorder as error:
             write_json(self._looks_file(picture), error.passes + _MORE_LOOKS)
-            self._remove_parts(picture)
+            self._folder.remove_parts(picture)
             raise
-
-    def _remove_parts(self, picture: int) -> None:
-        for part in self._spec.parts_of(picture):
-            with contextlib.suppress(OSError):
-                self._folder.part(part).unlink()
 
     def _looks_file(self, picture: int) -> Path:
         """Says how many looks borders have to allow for, where that turned out."""
@@ -184,7 +199,9 @@ class Renderer:
         rendered = grown(tile, border(shot.settings, looks), shot.region)
         return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, looks
 
-    def _render(self, task: Task, shot: Shot, settings: Settings) -> tuple[Picture, Frames]:
+    def _render(
+        self, task: Task, shot: Shot, settings: Settings, copy: bool
+    ) -> tuple[Picture, Frames]:
         frames = self._frames(task, settings.threads)
         loaded = self._load(frames, task, shot)
         if "light_groups" in shot.aovs:
@@ -197,9 +214,10 @@ class Renderer:
         before, seconds, sinks = self._checkpoint(task, header), 0.0, []
         if before is not None:
             seconds = before.seconds
-        if not (shot.is_adaptive and self._spec.is_tiled):  # whose passes are counted
+        if not (copy or (shot.is_adaptive and self._spec.is_tiled)):  # whose passes are counted
             file = self._folder.checkpoint(task)
-            sinks.append(_OnStop(self._is_stopped, file, self._spec.every, header, seconds))
+            every, dropped = self._spec.every, self._is_dropped
+            sinks.append(_OnStop(self._is_stopped, dropped, file, every, header, seconds))
         watcher = Watcher(
             sinks, reporter=self._reporter, is_stopped=self._is_stopped, warn=self._log
         )
@@ -226,8 +244,10 @@ class Renderer:
         index = self._spec.pictures[task.picture][0]
         if self._open is None or self._open[0] != index:
             self.close()
-            stage = self._spec.place(self._spec.stage)
+            stage = stage_place(self._folder, self._spec.stage)
             options = _loading(self._spec.shots[index].loading)
+            if options.get("session_layer"):
+                options["session_layer"] = stage_place(self._folder, options["session_layer"])
             self._open = index, Frames(stage, threads=threads, **options)
         return self._open[1]
 

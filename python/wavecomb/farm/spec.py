@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from wavecomb.errors import WavecombError
+from wavecomb.farm.maps import Pair, here, place
 from wavecomb.farm.tiling import Rectangle, tiles_of
 from wavecomb.run.frame_names import fill, frame_text
 from wavecomb.version import version
@@ -109,7 +110,11 @@ class Spec:
         every: Seconds between checkpoints of a task.
         lease_s: A worker that gave no sign for so long has lost its task.
         hang_s: A render that said nothing for so long is ended.
+        slow: A task that takes so many times as long as others is begun elsewhere, too, where
+            nothing else is left to do; 0: never.
         strict: Whether a file that is missing fails a picture.
+        assets: "shared": workers see the stage's files; "copy": those that lack them fetch them.
+        maps: Folders that lie elsewhere, where they are not found under their first name.
         isa: Library that workers are to use; None: that of the first worker.
         command: The words that made it.
         version: Of Wavecomb.
@@ -131,7 +136,10 @@ class Spec:
     every: float = 120.0
     lease_s: float = 60.0
     hang_s: float = 1800.0
+    slow: float = 3.0
     strict: bool = True
+    assets: str = "shared"
+    maps: tuple[Pair, ...] = ()
     isa: str | None = None
     command: tuple[str, ...] = ()
     version: str = field(default_factory=version)
@@ -158,6 +166,10 @@ class Spec:
         """The tasks of a picture's tiles."""
         return [Task(picture, f"{number:04d}") for number in range(self.tile_count(picture))]
 
+    def last_of(self, picture: int) -> Task:
+        """The task that writes a picture's files."""
+        return Task(picture, JOIN if self.is_tiled else "0000")
+
     def tile_count(self, picture: int) -> int:
         """How many tiles a picture has: no more columns and rows than pixels."""
         x0, y0, x1, y1 = self.shots[self.pictures[picture][0]].region
@@ -183,8 +195,8 @@ class Spec:
         }
 
     def place(self, name: str) -> str:
-        """A file of the job from anywhere."""
-        return os.path.join(self.folder, name)
+        """Where a file of the job lies on this machine."""
+        return place(os.path.join(self.folder, name), here(self.maps))
 
     def title(self, task: Task) -> str:
         """A task for people.
@@ -216,7 +228,7 @@ class Spec:
                 f"{value.get('version')}; this is {version()}, which reads format {FORMAT}"
             )
         try:
-            given = {one.name: value[one.name] for one in fields(cls)}
+            given = {one.name: value[one.name] for one in fields(cls) if one.name in value}
             shots = tuple(Shot(**{**one, "aovs": tuple(one["aovs"])}) for one in given["shots"])
             pictures = tuple(
                 (int(shot), None if frame is None else float(frame))
@@ -226,6 +238,7 @@ class Spec:
             given |= {
                 "shots": shots, "pictures": pictures, "tiles": (int(columns), int(rows)),
                 "command": tuple(given["command"]),
+                "maps": tuple((str(named), str(lies)) for named, lies in given.get("maps", ())),
             }  # fmt: skip
             return cls(**given)
         except (KeyError, TypeError, ValueError) as error:

@@ -38,7 +38,8 @@ def status(folder: Folder, *, tasks: bool = True) -> dict[str, Any]:
         "state": _state(folder, counts, bool(working)), "tasks": counts,
         "pictures": {"all": len(pictures), "done": sum(p["state"] == "done" for p in pictures)},
         "seconds_left": _left(folder, counts, len(working)),
-        "workers": [_worker(worker.name, worker.facts, now - worker.seen) for worker in working],
+        "workers": (told := [_worker(w.name, w.facts, now - w.seen) for w in working]),
+        "samples_per_s": sum(worker["samples_per_s"] or 0.0 for worker in told),
         "failed": failed,
     }  # fmt: skip
     if tasks:
@@ -72,7 +73,7 @@ def _pictures(folder: Folder, ids: dict[str, set[str]]) -> list[dict[str, Any]]:
     for picture in range(len(spec.pictures)):
         tiles = spec.parts_of(picture)
         states = [where.get(task.id, TODO) for task in tiles]
-        last = where.get(Task(picture, "join").id, TODO) if spec.is_tiled else states[0]
+        last = where.get(spec.last_of(picture).id, TODO)
         if last == DONE:
             states = [DONE] * len(states)
         found = (*states, last)
@@ -91,11 +92,12 @@ def _pictures(folder: Folder, ids: dict[str, set[str]]) -> list[dict[str, Any]]:
 def _worker(name: str, facts: dict[str, Any], age: float) -> dict[str, Any]:
     progress = facts.get("progress") or {}
     done, total = progress.get("samples_done"), progress.get("samples_total")
-    mine = progress.get("task") == facts.get("task")
+    seconds, mine = progress.get("seconds"), progress.get("task") == facts.get("task")
     return {
         "name": name, "host": facts.get("host"), "task": facts.get("task"),
         "title": facts.get("title"), "seen_s": round(max(0.0, age), 1),
         "share": done / total if mine and done is not None and total else None,
+        "samples_per_s": done / seconds if mine and done and seconds else None,
     }  # fmt: skip
 
 

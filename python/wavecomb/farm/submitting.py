@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from wavecomb.errors import WavecombError
+from wavecomb.farm.fetching import pack
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.refusals import check_reproducible, check_tiles, is_better_whole, needs_whole
 from wavecomb.farm.spec import MAX_TASKS, Shot, Spec
@@ -96,7 +97,12 @@ def create(
     if spec.strict and missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         raise WavecombError(f"{stage or spec.stage}: {missing[0]}{more} (--no-strict goes on)")
-    return Folder.create(path, spec, {} if assets is None else {"assets.json": dict(assets)})
+    files = {} if assets is None else {"assets.json": dict(assets)}
+    if spec.assets != "copy":
+        return Folder.create(path, spec, files)
+    if assets is None:
+        raise WavecombError("--assets copy: needs to know all files: leave out --no-strict")
+    return Folder.create(path, spec, files, lambda folder: pack(folder, assets["files"]))
 
 
 def shot_of(

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
@@ -337,6 +338,26 @@ class MainWindow(QMainWindow):
     def show_about(self) -> None:
         """Versions."""
         self._open_dialog(make_about(self))
+
+    def send_to_farm(self) -> None:
+        """Asks for a file and workers, and watches the job."""
+        from wavecomb.gui.farm_dialog import FarmDialog
+
+        path = self.session.path
+        if path is None:
+            self.message.show_error("there is no stage: open one first")
+            return
+        self._open_dialog(FarmDialog(self._farm_job, str(path.with_suffix(".exr")), self))
+
+    def _farm_job(self, output: str) -> dict[str, Any]:
+        """What is shown, for a farm: the stage, or its edits saved beside the picture.
+
+        Raises:
+            WavecombError: There is no stage, or its edits cannot be saved.
+        """
+        from wavecomb.gui.farm_job import describe
+
+        return describe(self.session, self.scene.edits.edits, output)
 
     def _open_dialog(self, dialog: QWidget) -> None:
         if self._dialog is not None:

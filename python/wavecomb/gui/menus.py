@@ -18,7 +18,8 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("&Edit", ("undo", "redo")),
     (
         "&Render",
-        ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise"),
+        ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise",
+         "-", "farm"),
     ),
     (
         "&Camera",
@@ -99,6 +100,10 @@ def entries(window: Window) -> list[Entry]:
         Entry(
             "denoise", "&Denoise on, off", window.render_bar.denoise.toggle, ["Shift+D"],
             "By Open Image Denoise",
+        ),
+        Entry(
+            "farm", "Send to a &farm\u2026", window.send_to_farm, [],
+            "Render the stage with its edits in a job for many workers, and watch it",
         ),
         Entry("frame", "&Frame selected", viewport.frame_selected, ["F"], local=True),
         Entry("frame_all", "Frame &all", viewport.frame_all, ["Home", "A"], local=True),

@@ -30,6 +30,9 @@ class Publisher(Protocol):
 
 
 publisher: Publisher | None = None
+owner: str = ""
+"""Of temporary names, beside the number of the process, where processes of several machines write
+to one folder: ``remove_leftovers`` leaves such files alone."""
 
 
 def _publisher_of(target: Path) -> Publisher | None:
@@ -65,7 +68,7 @@ def _prefix(target: Path) -> str:
 
 def _part(target: Path) -> Path:
     """The temporary name: hidden, in the same folder, with the same ending, of this process."""
-    return target.with_name(f"{_prefix(target)}{os.getpid()}.part{target.suffix}")
+    return target.with_name(f"{_prefix(target)}{owner}{os.getpid()}.part{target.suffix}")
 
 
 def reason(error: OSError) -> str:

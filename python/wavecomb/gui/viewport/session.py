@@ -277,6 +277,11 @@ class Session(QObject):
         """A movement has ended."""
         self._lives.settle()
 
+    @property
+    def source(self) -> Source | None:
+        """What is read, and how; None: nothing is open."""
+        return None if self._request is None else self._request.source
+
     def use_camera(self, path: str | None) -> None:
         """Looks through a camera prim; None: a free camera where the view is now."""
         if self.pose is None:

@@ -13,6 +13,7 @@ from xml.parsers import expat
 from pxr import Ar, UsdShade
 
 from wavecomb.usd.materialx.library import library
+from wavecomb.usd.stage import path_maps
 
 MAX_DEPTH = 64
 """Elements inside of each other; MaterialX reads them with as many calls inside of each other."""
@@ -166,7 +167,7 @@ def resolve(name: str, anchor: str) -> str:
 def beside(name: str, anchor: str) -> str:
     """What a name in a file means: relative to that file unless it is absolute."""
     if os.path.isabs(name) or "://" in name:
-        return name
+        return path_maps.mapped(name, path_maps.maps())
     if Ar.IsPackageRelativePath(anchor):
         package, inner = Ar.SplitPackageRelativePathInner(anchor)
         inner = posixpath.normpath(posixpath.join(posixpath.dirname(inner), name))

@@ -15,6 +15,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.isolate import patience, trail
 from wavecomb.usd import mtlx
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.stage import path_maps
 from wavecomb.usd.stage.diagnostics import captured, commentary
 from wavecomb.usd.stage.population import populate
 from wavecomb.usd.stage.report import LoadReport
@@ -114,6 +115,7 @@ def _layers(
             root = Sdf.Layer.FindOrOpen(str(file))
             if not root:
                 raise WavecombError(f"{file}: cannot be read as USD")
+            path_maps.change_layers((root, session))
             yield root, session
     except Tf.ErrorException as error:
         raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
