@@ -48,7 +48,14 @@ def run_row(
     varied = ("threads", "lanes", "wave_size", "roulette", "ray_order")
     key = [row["renderer"], *(f"{name}-{row[name]}" for name in varied)]
     config = ".".join(
-        [row["experiment"], row["stage"], *key, f"spp-{row['spp']}", f"policy-{row['policy']}"]
+        [
+            row["experiment"],
+            row["stage"],
+            *([row["case"]] if row.get("case") else []),
+            *key,
+            f"spp-{row['spp']}",
+            f"policy-{row['policy']}",
+        ]
     )
     return {
         **row,
@@ -94,6 +101,10 @@ def runs_of(
     return rows
 
 
+CASE_ERRORS = {"off": 0.02, "aimed": 0.01}
+"""relMSE of the experiment `parts`, by case."""
+
+
 def policy_rows(**more: Any) -> list[dict[str, Any]]:
     """Two stages and two widths, all policies, with the factors of ``POLICY_FACTORS``."""
 
@@ -122,6 +133,11 @@ def everything() -> list[dict[str, Any]]:
         experiment="ablation",
         repetitions=4,
     )
+    for case, error in CASE_ERRORS.items():
+        rows += runs_of(
+            {"case": [case]}, lambda case: 1.0, experiment="parts", repetitions=4, noise=0.0,
+            shake=0.0, rel_mse=error, time_limit=5.0,
+        )  # fmt: skip
     for factor, values in {"threads": [1, 2, 4], "wave_size": [64, 1024, 16384, 262144]}.items():
         for value in values:
             rows += runs_of(

@@ -65,7 +65,7 @@ def test_our_suites_are_sound(name: str) -> None:
     suite = load_suite(find_suite(name))
     configs = configurations(suite, LIMITS)
     assert configs and suite.title
-    assert suite.repetitions >= (3 if name == "paper" else 16)
+    assert suite.repetitions >= {"paper": 3, "learning": 5, "learning-reduced": 5}.get(name, 16)
     from wavecomb import _core
 
     for settings in {json.dumps(c.settings): c.settings for c in configs}.values():
@@ -84,6 +84,11 @@ def test_suites_are_as_large_as_they_should_be() -> None:
 
     assert count("ablation", "factorial") == 2 * (2 * 3 * 8 * 3 * 5)
     assert count("paper", "orders") == 2 * 2 * 4 * 4
+    parts = ("light_weights", "allocate", "roulette", "guiding")
+    learning = configurations(load_suite(find_suite("learning")), LIMITS)
+    of = {c.case: tuple(c.settings[part] for part in parts) for c in learning}
+    assert len(of) == len(set(of.values())) == 1 + 4 + 6 + 1 + 2, "alone, in pairs, all, and auto"
+    assert {c.case for c in learning if c.settings["time_limit"] == 5} == set(of)
     assert len(load_suite(find_suite("scenes")).stages) >= 12
 
 
@@ -118,6 +123,12 @@ def test_variants_of_a_renderer_share_a_golden_picture() -> None:
         ('policy = ["none", "oracle"]', 'policy = "none"', "vary.policy: give a list"),
         ('policy = ["none", "oracle"]', "stage.x = [1]", "x: a generated stage has no such option"),
         ('policy = ["none", "oracle"]', 'stage.texture_mb = ["L9"]', "like 'L2' or '4*L3'"),
+        ("[experiment.vary]", '[[experiment.case]]\nname = "a b"\n[experiment.vary]', "case.name"),
+        (
+            "[experiment.vary]",
+            '[[experiment.case]]\nname = "a"\n[[experiment.case]]\nname = "a"\n[experiment.vary]',
+            "case.name: two cases have the same",
+        ),
     ],
 )
 def test_bad_suites_are_named(tmp_path: Path, old: str, new: str, says: str) -> None:

@@ -102,6 +102,15 @@ def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
 
 
 @pytest.mark.slow
+def test_cases_are_compared_with_off(folder: Path) -> None:
+    """By error, time and efficiency, at the same limit of time."""
+    text = (folder.parent / "docs" / "made-up.md").read_text(encoding="utf-8")
+    rows = [line.split("|") for line in text.splitlines() if re.search(r"\| aimed +\|", line)]
+    found = [[float(cell.split()[0]) for cell in row[3:6]] for row in rows if "more" in row[-2]]
+    assert found == [[0.5, 1.0, 2.0]], rows
+    assert "parts-cases-efficiency" in text
+
+
 def test_viewers(tree: ElementTree.Element) -> None:
     viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]
     assert len(viewers) == 2

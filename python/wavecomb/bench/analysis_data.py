@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SETTINGS = (
-    *("experiment", "stage", "renderer", "width", "height", "spp", "threads", "lanes"),
+    *("experiment", "stage", "renderer", "width", "height", "spp", "time_limit", "case"),
+    *("threads", "lanes"),
     *("wave_size", "policy", "roulette", "ray_order", "shadow_order", "max_depth"),
     *("factor", "factor_value"),
 )
@@ -34,6 +35,7 @@ BASELINES = {
     "ray_order": "slot",
     "shadow_order": "slot",
     "renderer": "wavecomb",
+    "case": "off",
 }
 """What a level is compared with; of numbers it is the least."""
 
@@ -175,6 +177,7 @@ def label(cell: dict[str, Any], varying: Sequence[str]) -> str:
     words = {
         "lanes": lambda v: f"{v:.0f} lane{'s' if v != 1 else ''}",
         "spp": lambda v: f"{v:.0f} spp",
+        "time_limit": lambda v: f"{v:g} s",
         "threads": lambda v: f"{v:.0f} thread{'s' if v != 1 else ''}",
         "wave_size": lambda v: f"waves of {short_count(v)}",
         "width": lambda v: f"{v:.0f} wide",

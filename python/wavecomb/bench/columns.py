@@ -62,6 +62,7 @@ _KEYS = (
         ("stage", "", "Name of the stage; with its parameters where a factor changes it."),
         ("renderer", "", "wavecomb, or a peer: mitsuba-scalar, mitsuba-llvm, cycles."),
         ("config", "", "Short name of everything that was chosen; equal for all repetitions."),
+        ("case", "", "Name of the settings that change together; else empty."),
     ),
     *_of(
         "integer",
@@ -70,11 +71,12 @@ _KEYS = (
         ("seed", "", "Of the picture."),
         ("width", "pixels", "Of the picture."),
         ("height", "pixels", "Of the picture."),
-        ("spp", "", "Samples per pixel."),
+        ("spp", "", "Samples per pixel; with a time limit, the most."),
         ("threads", "", "As used."),
         ("lanes", "", "SIMD width, as used."),
         ("wave_size", "paths", "As used."),
     ),
+    *_of("number", ("time_limit", "s", "That rendering may take; else empty.")),
     *_of(
         "text",
         ("policy", "", "Order of shading: docs/scheduling.md; oracles: docs/bench.md."),

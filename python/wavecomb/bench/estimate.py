@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import tempfile
 from collections import defaultdict
@@ -61,7 +62,9 @@ class Estimator:
         lanes = int(settings["lanes"])
         rate = self.rate.get(lanes) or statistics.fmean(self.rate.values())
         samples = width * height * int(settings["spp"])
-        return self.start_s + _load_s(config) + samples / (rate * max(1, int(settings["threads"])))
+        render_s = samples / (rate * max(1, int(settings["threads"])))
+        limit_s = float(settings.get("time_limit", 0)) or math.inf
+        return self.start_s + _load_s(config) + min(render_s, limit_s)
 
 
 def _load_s(config: Config) -> float:

@@ -53,6 +53,7 @@ class Config:
         stage: Name of the stage, with the options that are varied.
         source: Where the stage comes from.
         settings: Settings of the render; policy may be "oracle".
+        case: Name of the case, or "".
         factor: Name of the factor of a scaling curve, or "".
         factor_value: Its value, or None.
         images: As in ``Experiment``.
@@ -65,6 +66,7 @@ class Config:
     stage: str
     source: StageSource
     settings: dict[str, Any]
+    case: str
     factor: str
     factor_value: float | None
     images: str
@@ -171,7 +173,8 @@ def _of_experiment(
         source, name = _varied_stage(suite.stages[stage], stage, varied)
         parts = [experiment.name, name]
         parts += [] if renderer == WAVECOMB else [renderer]
-        parts += [_case_name(case, number)] if len(experiment.cases) > 1 else []
+        title = experiment.case_names[number]
+        parts += [title or _case_name(case, number)] if len(experiment.cases) > 1 else []
         parts += [f"{key}-{value}" for key, value in varied.items() if "." not in key]
         factor = experiment.factor
         value = varied.get(factor, varied.get(f"stage.{factor}"))
@@ -183,6 +186,7 @@ def _of_experiment(
                 stage=name,
                 source=source,
                 settings=settings,
+                case=title,
                 factor=factor,
                 factor_value=float(value) if isinstance(value, (int, float)) else None,
                 images=experiment.images,

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from wavecomb.bench import figures_runs
+from wavecomb.bench.analysis_data import BASELINES
 from wavecomb.bench.analysis_ratios import means, ratios
 from wavecomb.bench.columns import COUNTER_COLUMNS
 from wavecomb.bench.report_html import key_of, paragraph
@@ -36,6 +37,7 @@ def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
         policies(out, name, ours)
     elif ours["ray_order"].nunique() > 1:
         _levels(out, name, ours, "ray_order", "order of rays")
+    _cases(out, name, ours)
     _curves(out, name, runs)
     out.draw(figures_runs.error_over_time(runs, f"{key_of(name)}-error"))
     _errors(out, name, runs)
@@ -61,6 +63,27 @@ def _levels(out: Writer, name: str, runs: pd.DataFrame, factor: str, words: str)
         main, f"{key_of(name)}-{key_of(factor)}", f"Render time by {words}", "render time", factor
     )
     out.draw(drawn)
+
+
+def _cases(out: Writer, name: str, runs: pd.DataFrame) -> None:
+    """Named settings that change together, each compared with those that are named "off"."""
+    if BASELINES["case"] not in set(runs["case"]) or runs["case"].nunique() < 2:
+        return
+    metrics = {
+        text: ratios(runs, "case", column, ignore=("roulette",))
+        for text, column in (
+            ("relMSE", "rel_mse"),
+            ("render", "render_s"),
+            ("efficiency", "efficiency"),
+        )
+        if runs[column].notna().any()
+    }
+    main = next(reversed(metrics.values()))
+    title = f"Ratio of means to {BASELINES['case']}"
+    out.rows(len(main), title, ratio_table(title, metrics, "with"))
+    for text, table in metrics.items():
+        key = f"{key_of(name)}-cases-{key_of(text)}"
+        out.draw(figures_runs.ratio_figure(table, key, f"{name}: {text}", text, "case"))
 
 
 def _renderers(out: Writer, name: str, runs: pd.DataFrame) -> None:

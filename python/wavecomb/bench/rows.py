@@ -36,6 +36,8 @@ def run_row(suite: Suite, run: Run, order: int, answer: Mapping[str, Any]) -> di
         "width": width,
         "height": height,
         "spp": settings["spp"],
+        "time_limit": settings.get("time_limit"),
+        "case": config.case,
         "factor": config.factor,
         "factor_value": config.factor_value,
         "status": answer["status"],

@@ -33,9 +33,7 @@ SUITES = Path(__file__).parent / "suites"
 DEFAULT_REPETITIONS = 16
 IMAGES = ("none", "first", "all")
 
-_NOT_OF_SUITES = (
-    "width", "height", "seed", "adaptive", "noise", "min_spp", "time_limit", "error", "progressive",
-)  # fmt: skip
+_NOT_OF_SUITES = ("width", "height", "seed", "adaptive", "noise", "min_spp", "error", "progressive")
 
 
 @cache
@@ -177,6 +175,10 @@ def _experiment(table: Table, stages: Mapping[str, StageSource]) -> Experiment:
         for stage in chosen:
             if not stages[stage].scene:
                 raise table.error(f"vary.stage.{key}", f"stage {stage} is a file: has no options")
+    cases = [dict(entry) for entry in table.list_of_tables("case")] or [{}]
+    case_names = tuple(_case_name(table, entry.pop("name", "")) for entry in cases)
+    if len(set(case_names) - {""}) < sum(name != "" for name in case_names):
+        raise table.error("case.name", "two cases have the same; give each its own")
     factor = table.take("factor", str, "")
     if factor and factor not in vary and factor not in stage_vary:
         raise table.error("factor", f"{factor!r} is not varied; name a key of vary")
@@ -187,8 +189,8 @@ def _experiment(table: Table, stages: Mapping[str, StageSource]) -> Experiment:
         settings=_settings(table, "settings", table.take("settings", dict, {})),
         vary=vary,
         stage_vary=stage_vary,
-        cases=tuple(_settings(table, "case", entry) for entry in table.list_of_tables("case"))
-        or ({},),
+        cases=tuple(_settings(table, "case", entry) for entry in cases),
+        case_names=case_names,
         skip=tuple(_settings(table, "skip", entry) for entry in table.list_of_tables("skip")),
         factor=factor,
         images=table.choice("images", "none", IMAGES),
@@ -196,6 +198,12 @@ def _experiment(table: Table, stages: Mapping[str, StageSource]) -> Experiment:
     )
     table.end()
     return experiment
+
+
+def _case_name(table: Table, name: Any) -> str:
+    if not isinstance(name, str) or not all(c.isalnum() or c in "-_+" for c in name):
+        raise table.error("case.name", "give a name of letters, digits, -, _ and +")
+    return name
 
 
 def _settings(table: Table, where: str, values: Mapping[str, Any]) -> dict[str, Any]:

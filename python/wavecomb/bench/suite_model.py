@@ -41,6 +41,8 @@ class Experiment:
         vary: Setting -> values; all combinations are run.
         stage_vary: Option of the stage -> values, likewise.
         cases: Settings that change together; each is combined with all of ``vary``.
+        case_names: Of the cases, in their order; "": it has none. Cases that have names are
+            compared with the one that is named "off".
         skip: Combinations to leave out: those that agree with all keys of one entry.
         factor: The key of ``vary`` or ``stage_vary`` that a scaling curve is drawn over, or "".
         images: Which repetitions keep their picture: "none", "first" or "all".
@@ -54,6 +56,7 @@ class Experiment:
     vary: dict[str, list[Any]] = field(default_factory=dict)
     stage_vary: dict[str, list[Any]] = field(default_factory=dict)
     cases: tuple[dict[str, Any], ...] = ({},)
+    case_names: tuple[str, ...] = ("",)
     skip: tuple[dict[str, Any], ...] = ()
     factor: str = ""
     images: str = "none"

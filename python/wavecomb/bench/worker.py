@@ -19,6 +19,7 @@ import contextlib
 import json
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -66,18 +67,27 @@ def run(job: Job) -> dict[str, Any]:
     found: dict[str, Any] = {
         "stats": plain(picture.stats),
         "costs": picture.costs,
-        **plain(judge_picture(picture.beauty, spp, job.get("golden"))),
+        **plain(judge_picture(picture.beauty, _mean_spp(picture.stats), job.get("golden"))),
     }
     if job.get("image"):
         _save(Path(job["image"]), picture.beauty)
     return found
 
 
-def judge_picture(beauty: Any, spp: int, golden: dict[str, Any] | None) -> dict[str, Any]:
+def _mean_spp(stats: Mapping[str, Any]) -> float:
+    """Samples of a pixel in the mean: not what was asked for, where time is limited."""
+    from wavecomb.run.stats import rendered_pixels
+
+    return float(stats["counts"]["samples"]) / rendered_pixels(stats["settings"])
+
+
+def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dict[str, Any]:
     """Digest of the picture, and its error against the converged one.
 
     The golden picture has noise of its own, 1 / golden spp of what one sample has; so a measured
-    squared error is too large by the factor 1 + spp / golden spp, and is divided by it.
+    squared error is too large by the factor 1 + spp / golden spp, and is divided by it. Of samples
+    that are better than the golden picture's, which nothing was learned for, this takes off too
+    little.
     """
     import hashlib
 

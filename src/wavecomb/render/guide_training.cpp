@@ -28,10 +28,10 @@ constexpr uint32_t kTrainingRounds = 3;
 constexpr size_t kPathsAtOnce = 65'536;
 /// Vertices of a path that teach.
 constexpr uint32_t kTaughtVertices = 6;
-/// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
-/// training has few of, make pictures better than its paths tell. Training ends as soon as the
-/// gain is below that by kSureErrors standard errors.
-constexpr double kWorthwhileGain = 1.1, kSureErrors = 2;
+/// Of Guiding::kAuto: efficiency to rounds without a field that is worth it, since the picture has
+/// the better field of all rounds. Training ends as soon as the gain is below that by kSureErrors
+/// standard errors.
+constexpr double kWorthwhileGain = 1.0, kSureErrors = 2;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there.
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
