@@ -6,6 +6,8 @@ python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --r
 With --frames N the camera moves over N frames, and all pictures are compared, bit for bit:
 
 python benchmarks/farm.py out/mixed.usdc --size 1200 800 --spp 64 --workers 4 --rounds 1 --frames 48
+
+--way says how: with all AOVs, adaptive to a pixel error, or with a learned field.
 """
 
 from __future__ import annotations
@@ -21,6 +23,18 @@ import time
 from pathlib import Path
 
 COMMAND = [sys.executable, "-m", "wavecomb"]
+AOVS = (
+    *("albedo", "normal", "depth", "position", "uv", "material_id", "instance_id", "crypto"),
+    *("emission", "direct", "indirect", "light_groups", "guide_albedo", "guide_normal"),
+    *("samples", "error", "variance"),
+)
+"""All but cost, which is of the clock."""
+WAYS = {
+    "plain": [],
+    "aovs": [word for name in AOVS for word in ("--aov", name)],
+    "adaptive": ["--adaptive", "0.05"],
+    "learned": ["--guiding", "on"],
+}
 
 
 def cpu_s() -> float:
@@ -66,14 +80,16 @@ def moving(stage: Path, place: Path, frames: int) -> Path:
 
 
 def differing(place: Path, frames: int) -> int:
-    """Frames whose two pictures are not the same bits."""
+    """Frames of whose two pictures any layer is not the same bits."""
+    from wavecomb.picture.image import read_layers
+
     found = 0
     for frame in range(1, frames + 1):
-        files = [place / f"{name}.{frame:04d}.exr" for name in "ab"]
-        done = subprocess.run(
-            [*COMMAND, "compare", *files], capture_output=True, text=True, check=False
+        one, many = (
+            {layer: values.tobytes() for layer, values in read_layers(file).items()}
+            for file in (place / f"{name}.{frame:04d}.exr" for name in "ab")
         )
-        found += "equal, bit for bit" not in done.stdout
+        found += one != many
     return found
 
 
@@ -85,11 +101,12 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--tiles", default="auto")
+    parser.add_argument("--way", choices=WAYS, default="plain")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--tasks", type=int, default=0, help="small tasks to time, too")
     parser.add_argument("--frames", type=int, default=0, help="of a camera that moves")
     asked = parser.parse_args()
-    picture = ["--size", *asked.size, "--spp", asked.spp, "--quiet"]
+    picture = ["--size", *asked.size, "--spp", asked.spp, "--quiet", *WAYS[asked.way]]
     rounds = []
     for _ in range(asked.rounds):
         with tempfile.TemporaryDirectory() as place:
@@ -108,7 +125,7 @@ def main() -> None:
                 rounds[-1]["frames_that_differ"] = differing(Path(place), asked.frames)
     out = {
         "stage": asked.stage.name, "size": asked.size, "spp": asked.spp, "workers": asked.workers,
-        "frames": asked.frames, "rounds": rounds,
+        "frames": asked.frames, "way": asked.way, "rounds": rounds,
         "ratios": [statistics.median(one["ratios"][i] for one in rounds) for i in range(2)],
     }  # fmt: skip
     if asked.tasks:

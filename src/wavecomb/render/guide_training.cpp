@@ -20,7 +20,7 @@ constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrain
 /// Of Guiding::kAuto: the two rounds that decide, three sevenths of it, are to cost a twentieth of
 /// the render, and a path of theirs costs some three times one of the picture's. Fewer paths would
 /// decide wrongly (docs/guiding.md).
-constexpr uint64_t kAutoShare = 30, kLeastAutoPaths = 250'000;
+constexpr uint64_t kAutoShare = 30, kLeastAutoPaths = 500'000;
 /// Paths that a thread teaches in a second of a render with a time limit: what a slow one does.
 constexpr double kTaughtInSecond = 50'000;
 constexpr uint32_t kTrainingRounds = 3;
@@ -28,10 +28,10 @@ constexpr uint32_t kTrainingRounds = 3;
 constexpr size_t kPathsAtOnce = 65'536;
 /// Vertices of a path that teach.
 constexpr uint32_t kTaughtVertices = 6;
-/// Of Guiding::kAuto: efficiency to rounds without a field that is worth it, since the picture has
-/// the better field of all rounds. Training ends as soon as the gain is below that by kSureErrors
-/// standard errors.
-constexpr double kWorthwhileGain = 1.0, kSureErrors = 2;
+/// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
+/// training has few of, make pictures better than its paths tell. Training ends as soon as the
+/// gain is below that by kSureErrors standard errors.
+constexpr double kWorthwhileGain = 1.15, kSureErrors = 2;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there.
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
