@@ -193,4 +193,4 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     assert learned["rounds"] == 2 and not learned["used"], "it is sure before the last of three"
     limited = {**part, "spp": 2**20, "threads": 2}
     assert render(cornell, time_limit=5.0, **limited).stats["guiding"] is None
-    assert render(cornell, time_limit=60.0, **limited).stats["guiding"]["paths"] > 500_000
+    assert render(cornell, time_limit=60.0, **limited).stats["guiding"]["paths"] > 250_000
