@@ -2,6 +2,7 @@
 /// Textures and graphs of known ranges, and the variant that a material gets with them.
 #pragma once
 
+#include "graph_ops.h"
 #include "wave_testing.h"
 #include "wavecomb/scene/graph_ranges.h"
 #include "wavecomb/scene/material_parts.h"
@@ -52,21 +53,7 @@ inline std::vector<TexturePtr> make_textures(bool bad = false) {
           texture_of(half, 1)};
 }
 
-inline GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_list<uint16_t> from,
-                  uint8_t steps = 0, uint16_t number = 0) {
-  GraphOp o{};
-  o.code = static_cast<uint8_t>(code);
-  o.width = width;
-  o.steps = steps;
-  o.to = to;
-  std::copy(from.begin(), from.end(), o.from);
-  o.number = number;
-  return o;
-}
 inline constexpr uint16_t kConstant = kGraphConstant;
-inline uint16_t output(const char* name) {
-  return static_cast<uint16_t>(graph_parameter(name));
-}
 
 /// A graph that drives `parameter` by image `image`, and all components of it.
 inline Graph image_graph(const char* parameter, uint32_t image) {

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "graph_ops.h"
 #include "lane_testing.h"
 #include "wavecomb/material/openpbr_params.h"
 #include "wavecomb/scene/triangle_means.h"
@@ -16,20 +17,6 @@ namespace {
 
 constexpr uint32_t kAllInputs = (1u << kInputCount) - 1;
 
-GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_list<uint16_t> from,
-           uint8_t steps = 0, uint16_t number = 0) {
-  GraphOp o{};
-  o.code = static_cast<uint8_t>(code);
-  o.width = width;
-  o.steps = steps;
-  o.to = to;
-  std::copy(from.begin(), from.end(), o.from);
-  o.number = number;
-  return o;
-}
-uint16_t output(const char* name, uint32_t component = 0) {
-  return static_cast<uint16_t>(graph_parameter(name) + component);
-}
 constexpr uint16_t kUvInput = static_cast<uint16_t>(GraphInput::kUv);
 constexpr uint16_t kFirstConstant = kGraphConstant;
 
