@@ -98,7 +98,7 @@ nb::object guiding_dict(const GuideStatistics& s) {
   d["guided_share"] = s.facts.guided_share;
   d["moment_ratio"] = s.facts.moment_ratio;
   d["field_bytes"] = s.field_bytes;
-  d["gain"] = s.gain;
+  d["gain"] = s.gain > 0 ? nb::cast(s.gain) : nb::none();
   d["used"] = s.used;
   return d;
 }

@@ -178,7 +178,7 @@ def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
     builder.set_camera(np.eye(4), window=(-1.0, 1.0, -1.0, 1.0))
     scene = builder.build()
     # Training is of the whole picture, the render of a part of it.
-    part: dict[str, Any] = {"spp": 4096, "region": (20, 40, 28, 44)}
+    part: dict[str, Any] = {"spp": 5000, "region": (20, 40, 28, 44)}
     automatic = render(scene, guiding="auto", **part)
     assert not automatic.stats["guiding"]["used"]
     assert np.array_equal(automatic.beauty, render(scene, **part).beauty)
@@ -187,10 +187,10 @@ def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
 def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     """Of samples, and of seconds where those are the measure: 5 of them are too few to find out."""
     part: dict[str, Any] = {"guiding": "auto", "region": (0, 0, 1, 1)}
-    assert render(cornell, spp=3600, **part).stats["guiding"] is None
-    learned = render(cornell, spp=3800, **part).stats["guiding"]
-    assert learned["paths"] <= 64 * 64 * 3800 / 30
-    assert learned["rounds"] == 2 and not learned["used"], "it is sure before the last of three"
+    assert render(cornell, spp=4800, **part).stats["guiding"] is None
+    learned = render(cornell, spp=4900, **part).stats["guiding"]
+    assert learned["paths"] <= 64 * 64 * 4900 / 100
+    assert 0.5 < learned["gain"] < 1.2 and not learned["used"]
     limited = {**part, "spp": 2**20, "threads": 2}
     assert render(cornell, time_limit=5.0, **limited).stats["guiding"] is None
     assert render(cornell, time_limit=60.0, **limited).stats["guiding"]["paths"] > 250_000

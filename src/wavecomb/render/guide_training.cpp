@@ -2,7 +2,9 @@
 #include "wavecomb/render/guide_training.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "wavecomb/core/clock.h"
@@ -17,23 +19,28 @@ namespace {
 
 /// Share of a render's samples that training may take, and its most and least paths.
 constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrainingPaths = 16'384;
-/// Of Guiding::kAuto: the two rounds that decide, three sevenths of it, are to cost a twentieth of
-/// the render, and a path of theirs costs some three times one of the picture's. Fewer paths would
-/// decide wrongly (docs/guiding.md).
-constexpr uint64_t kAutoShare = 30, kLeastAutoPaths = 500'000;
-/// Paths that a thread teaches in a second of a render with a time limit: what a slow one does.
-constexpr double kTaughtInSecond = 50'000;
+/// Of Guiding::kAuto, so that what it costs to find out is a twentieth of the render at most: a
+/// path that teaches costs some three times one of the picture.
+constexpr uint64_t kAutoShare = 100, kLeastAutoPaths = 200'000;
+/// Paths that a thread teaches in a second, and the shares of a time limit that may go to them.
+constexpr double kTaughtInSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 20;
+/// Of Guiding::kAuto: some pixels are rendered with and without the field, twice each with so many
+/// samples, which Sobol's points and roulette are in as they are in the picture.
+constexpr uint64_t kTrialPixels = 4096;
+constexpr uint32_t kTrialSamples = 16;
+constexpr std::array<uint32_t, 2> kTrialSeeds = {0x6c078965u, 0x9908b0dfu};
+/// Share of those pixels that differ most and do not count: fireflies tell too little of the
+/// others.
+constexpr double kUncounted = 0.005;
+/// Efficiency to the same without the field that is worth it.
+constexpr double kWorthwhileGain = 1.2;
 constexpr uint32_t kTrainingRounds = 3;
 /// Paths whose vertices are kept at once: some 20 MB.
 constexpr size_t kPathsAtOnce = 65'536;
 /// Vertices of a path that teach.
 constexpr uint32_t kTaughtVertices = 6;
-/// Of Guiding::kAuto: efficiency to rounds without a field that is worth it. Sobol's points, which
-/// training has few of, make pictures better than its paths tell. Training ends as soon as the
-/// gain is below that by kSureErrors standard errors.
-constexpr double kWorthwhileGain = 1.15, kSureErrors = 2;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there.
-constexpr double kShadingRays = 0.7, kGuidedRays = 0.3;
+constexpr double kShadingRays = 0.7, kGuidedRays = 0.9;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
 constexpr double kListRay = 0.3;
 
@@ -44,7 +51,8 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
   uint64_t paths = std::min(samples / (is_auto ? kAutoShare : kTrainingShare), kMostTrainingPaths);
   // A limit of time is a render's only measure where it has more samples than it can take.
   if (settings.time_limit > 0) {
-    const double taught = double{settings.time_limit} * threads * kTaughtInSecond / kTrainingShare;
+    const double taught = double{settings.time_limit} * threads * kTaughtInSecond /
+                          (is_auto ? kAutoTimeShare : kTimeShare);
     paths = std::min(paths, static_cast<uint64_t>(std::min(taught, 1e9)));
   }
   return paths >= (is_auto ? kLeastAutoPaths : kLeastTrainingPaths) ? paths : 0;
@@ -150,35 +158,6 @@ std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t c
   return pixels;
 }
 
-/// What the paths of a round are worth: 1 / (variance x cost), both of a path in the mean.
-struct Worth {
-  double efficiency = 0;         ///< 0: not known
-  double relative_variance = 0;  ///< of that figure
-};
-
-/// Luminances are those of `samples` paths of each pixel, `cost` is that of all.
-Worth worth_of(const PictureTiles& tiles, std::span<const uint32_t> pixels, uint32_t samples,
-               std::span<const float> luminances, double cost) {
-  // Of the picture's brightness there: a firefly is no measure of the others.
-  constexpr double kMost = 50;
-  std::vector<double> sums(tiles.count()), counts(tiles.count());
-  double squares = 0, fourths = 0;
-  for (size_t i = 0; i < luminances.size(); ++i) {
-    const uint32_t pixel = pixels[i / samples], tile = tiles.of(pixel);
-    const double y = std::min(double{luminances[i]} * tiles.inverse_scale(pixel), kMost);
-    counts[tile] += 1;
-    if (!(y > 0)) continue;  // false for NaN
-    squares += y * y;
-    fourths += y * y * y * y;
-    sums[tile] += y;
-  }
-  for (size_t t = 0; t < sums.size(); ++t)
-    if (counts[t] > 0) squares -= sums[t] * sums[t] / counts[t];
-  const auto paths = static_cast<double>(luminances.size());
-  if (!(squares > 0 && cost > 0)) return {};
-  return {paths * paths / (squares * cost), fourths / (squares * squares)};
-}
-
 /// What the paths of training have taught, path by path.
 struct Lessons {
   std::vector<TrainingRecord> records;
@@ -200,8 +179,9 @@ void teach(WaveContext& context, Integrator& integrator, const TrainingMeans& me
     PassPlan plan;
     plan.pixels.assign(some.begin(), some.end());
     plan.batches.push_back({0, plan.pixels.size(), first, samples});
+    const GuideView none;
     BounceReader reader(plan.pixels, first, samples, context.settings->max_depth, grid,
-                        *context.guide, tiles);
+                        context.guide ? *context.guide : none, tiles);
     context.histories = &reader;
     runner.run(plan, stopped);
     reader.append_to(lessons.records, lessons.dark);
@@ -221,6 +201,46 @@ double cost_of(const Integrator& integrator, const TrainingMeans& means, bool ha
       records += static_cast<double>(c->records);
     }
   return (has_list ? kListRay : 1) * rays + (kShadingRays + (looks_up ? kGuidedRays : 0)) * records;
+}
+
+/// What pictures of some pixels are like.
+struct Trial {
+  double error = 0;  ///< mean squared difference of two, relative to the picture there
+  double cost = 0;   ///< of both, in rays of a hierarchy
+};
+
+/// Renders kTrialSamples of each of `pixels` twice, as `settings` say but for the seed.
+Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
+              const TrainingMeans& means, std::span<const uint32_t> pixels,
+              const PictureTiles& tiles, const GuideGrid& grid,
+              const std::function<bool()>& stopped) {
+  Trial trial;
+  std::vector<double> differences(pixels.size());
+  context.settings = &settings;
+  context.guide = guide;
+  for (const uint32_t seed : kTrialSeeds) {
+    settings.seed = seed;
+    const std::unique_ptr<Integrator> integrator =
+        make_integrator(settings.integrator, context, means.lanes, means.threads, means.wave_size);
+    Lessons lessons;
+    teach(context, *integrator, means, pixels, 0, kTrialSamples, grid, nullptr, lessons, stopped);
+    if (stopped()) return {};
+    trial.cost += cost_of(*integrator, means, context.accel->has_list(), guide != nullptr);
+    const double sign = seed == kTrialSeeds[0] ? 1 : -1;
+    for (size_t i = 0; i < pixels.size(); ++i)
+      for (uint32_t s = 0; s < kTrialSamples; ++s)
+        differences[i] += sign * double{lessons.luminances[i * kTrialSamples + s]};
+  }
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    const double d = differences[i] * tiles.inverse_scale(pixels[i]) / kTrialSamples;
+    differences[i] = std::isfinite(d) ? d * d : 0;
+  }
+  std::sort(differences.begin(), differences.end());
+  const auto counted =
+      static_cast<std::ptrdiff_t>(static_cast<double>(differences.size()) * (1 - kUncounted));
+  trial.error = std::accumulate(differences.begin(), differences.begin() + counted, 0.0) /
+                static_cast<double>(std::max<std::ptrdiff_t>(counted, 1));
+  return trial;
 }
 
 }  // namespace
@@ -244,6 +264,7 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   settings.region.reset();
   settings.crop = false;
   settings.aovs = {};
+  const Settings trial_settings = settings;
   settings.seed = 0x2545f491u;
   // A survivor of roulette brings many times what it stands for: noise that hides what aiming wins.
   settings.roulette = RouletteKind::kOff;
@@ -263,7 +284,6 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   std::optional<PictureTiles> tiles;
   Lessons lessons;
   uint32_t first_sample = 0;
-  Worth alone;  ///< without a field
   for (uint32_t round = 0; round < kTrainingRounds; ++round) {
     const uint64_t wanted = (budget << round) / ((1u << kTrainingRounds) - 1);
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order.size()));
@@ -285,18 +305,6 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
       for (const uint32_t pixel : pixels) of_paths.insert(of_paths.end(), samples, pixel);
       tiles.emplace(settings, of_paths, lessons.luminances);
     }
-    if (tiles->is_lit()) {
-      const Worth worth =
-          worth_of(*tiles, pixels, samples, lessons.luminances,
-                   cost_of(*integrator, means, context.accel->has_list(), !is_first));
-      if (is_first) {
-        alone = worth;
-      } else if (alone.efficiency > 0) {
-        out.statistics.gain = worth.efficiency / alone.efficiency;
-        const double error = std::sqrt(worth.relative_variance + alone.relative_variance);
-        if (is_auto && out.statistics.gain * (1 + kSureErrors * error) < kWorthwhileGain) break;
-      }
-    }
     auto next =
         std::make_unique<GuideField>(grid, lessons.records, scene.materials().size(), is_first,
                                      guides, size_t{settings.learn_memory_mb} << 20);
@@ -305,11 +313,24 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   }
   out.statistics.field_bytes = field->bytes();
   out.statistics.facts = field->facts();
-  const bool pays = !is_auto || out.statistics.gain >= kWorthwhileGain;
-  if (field->facts().regions > 0 && pays) {
+  bool pays = field->facts().regions > 0;
+  if (is_auto && pays && tiles->is_lit()) {
+    const std::vector<uint32_t> pixels = some_pixels(order, kTrialPixels);
+    GuideView view = field->view();
+    tiles->apply(view);
+    const auto trial = [&](const GuideView* guide) {
+      return try_out(context, trial_settings, guide, means, pixels, *tiles, grid, stopped);
+    };
+    const Trial without = trial(nullptr), with = trial(&view);
+    if (stopped()) return {};
+    if (with.error * with.cost > 0)
+      out.statistics.gain = without.error * without.cost / (with.error * with.cost);
+    pays = out.statistics.gain >= kWorthwhileGain;
+  }
+  out.statistics.used = pays;
+  if (pays) {
     out.field = std::move(field);
     out.tiles = std::move(tiles);
-    out.statistics.used = true;
   }
   out.statistics.seconds = seconds_since(start);
   return out;

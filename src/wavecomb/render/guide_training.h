@@ -24,7 +24,7 @@ struct GuideStatistics {
   uint64_t paths = 0;  ///< that taught; 0: nothing was learned
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;
-  /// Efficiency of its last round to the first, which knew of no field; 0: not known.
+  /// Of Guiding::kAuto: efficiency of some pixels with the field to the same without; 0: not known.
   double gain = 0;
   bool used = false;  ///< whether the picture is guided, or its roulette told, by the field
   double seconds = 0;
