@@ -167,6 +167,25 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
     assert "of bounced light is guided" in " ".join(result.output.split())
 
 
+@pytest.mark.slow
+def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
+    """Where light comes through a door it pays; the reference integrator finds that, too."""
+    write_scene("room", tmp_path / "room.usdc", plain=True)
+    scene = wavecomb.load(tmp_path / "room.usdc").scene
+    part: dict[str, Any] = {
+        **{"size": (480, 320), "spp": 132, "region": (100, 100, 104, 102), "guiding": "auto"}
+    }
+    first = wavecomb.render(scene, **part)
+    assert first.stats["guiding"]["used"]
+    for way in (
+        {"threads": 1, "lanes": 4, "wave_size": 64, "policy": "none"},
+        {"integrator": "reference"},
+    ):
+        other = wavecomb.render(scene, **part, **way)
+        assert other.stats["guiding"]["gain"] == first.stats["guiding"]["gain"], way
+        assert other.beauty.tobytes() == first.beauty.tobytes(), way
+
+
 def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
     """Under an even dome every direction brings as much as the material thinks."""
     builder = wavecomb.SceneBuilder()

@@ -165,33 +165,7 @@ struct Lessons {
   std::vector<float> luminances;  ///< of the paths of the last round
 };
 
-/// Runs `samples` paths of each of `pixels` from sample `first` on with the field of `context`,
-/// some at a time, and adds what they taught.
-void teach(WaveContext& context, Integrator& integrator, const TrainingMeans& means,
-           std::span<const uint32_t> pixels, uint32_t first, uint32_t samples,
-           const GuideGrid& grid, const PictureTiles* tiles, Lessons& lessons,
-           const std::function<bool()>& stopped) {
-  PassRunner runner(integrator, means.threads, means.wave_size);
-  const size_t step = std::max<size_t>(1, kPathsAtOnce / samples);
-  lessons.luminances.clear();
-  for (size_t at = 0; at < pixels.size() && !stopped(); at += step) {
-    const auto some = pixels.subspan(at, std::min(step, pixels.size() - at));
-    PassPlan plan;
-    plan.pixels.assign(some.begin(), some.end());
-    plan.batches.push_back({0, plan.pixels.size(), first, samples});
-    const GuideView none;
-    BounceReader reader(plan.pixels, first, samples, context.settings->max_depth, grid,
-                        context.guide ? *context.guide : none, tiles);
-    context.histories = &reader;
-    runner.run(plan, stopped);
-    reader.append_to(lessons.records, lessons.dark);
-    const auto brought = reader.luminances();
-    lessons.luminances.insert(lessons.luminances.end(), brought.begin(), brought.end());
-  }
-  context.histories = nullptr;
-}
-
-/// Cost of a round, in rays of a hierarchy.
+/// Cost of what an integrator has done, in rays of a hierarchy.
 double cost_of(const Integrator& integrator, const TrainingMeans& means, bool has_list,
                bool looks_up) {
   double rays = 0, records = 0;
@@ -201,6 +175,39 @@ double cost_of(const Integrator& integrator, const TrainingMeans& means, bool ha
       records += static_cast<double>(c->records);
     }
   return (has_list ? kListRay : 1) * rays + (kShadingRays + (looks_up ? kGuidedRays : 0)) * records;
+}
+
+/// Runs `samples` paths of each of `pixels` from sample `first` on with the field of `context`,
+/// some at a time, and adds what they taught. Gives what they cost, in rays of a hierarchy.
+double teach(WaveContext context, const TrainingMeans& means, std::span<const uint32_t> pixels,
+             uint32_t first, uint32_t samples, const GuideGrid& grid, const PictureTiles* tiles,
+             Lessons& lessons, const std::function<bool()>& stopped) {
+  const GuideView none;
+  const auto reader_of = [&](std::span<const uint32_t> some) {
+    return BounceReader(some, first, samples, context.settings->max_depth, grid,
+                        context.guide ? *context.guide : none, tiles);
+  };
+  // Integrators keep vertices where somebody reads them when they are made.
+  BounceReader nobody = reader_of({});
+  context.histories = &nobody;
+  const std::unique_ptr<Integrator> integrator = make_integrator(
+      context.settings->integrator, context, means.lanes, means.threads, means.wave_size);
+  PassRunner runner(*integrator, means.threads, means.wave_size);
+  const size_t step = std::max<size_t>(1, kPathsAtOnce / samples);
+  lessons.luminances.clear();
+  for (size_t at = 0; at < pixels.size() && !stopped(); at += step) {
+    const auto some = pixels.subspan(at, std::min(step, pixels.size() - at));
+    PassPlan plan;
+    plan.pixels.assign(some.begin(), some.end());
+    plan.batches.push_back({0, plan.pixels.size(), first, samples});
+    BounceReader reader = reader_of(plan.pixels);
+    context.histories = &reader;
+    runner.run(plan, stopped);
+    reader.append_to(lessons.records, lessons.dark);
+    const auto brought = reader.luminances();
+    lessons.luminances.insert(lessons.luminances.end(), brought.begin(), brought.end());
+  }
+  return cost_of(*integrator, means, context.accel->has_list(), context.guide != nullptr);
 }
 
 /// What pictures of some pixels are like.
@@ -220,12 +227,9 @@ Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
   context.guide = guide;
   for (const uint32_t seed : kTrialSeeds) {
     settings.seed = seed;
-    const std::unique_ptr<Integrator> integrator =
-        make_integrator(settings.integrator, context, means.lanes, means.threads, means.wave_size);
     Lessons lessons;
-    teach(context, *integrator, means, pixels, 0, kTrialSamples, grid, nullptr, lessons, stopped);
+    trial.cost += teach(context, means, pixels, 0, kTrialSamples, grid, nullptr, lessons, stopped);
     if (stopped()) return {};
-    trial.cost += cost_of(*integrator, means, context.accel->has_list(), guide != nullptr);
     const double sign = seed == kTrialSeeds[0] ? 1 : -1;
     for (size_t i = 0; i < pixels.size(); ++i)
       for (uint32_t s = 0; s < kTrialSamples; ++s)
@@ -292,10 +296,8 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
     GuideView view = field->view();
     if (tiles) tiles->apply(view);
     context.guide = &view;
-    const std::unique_ptr<Integrator> integrator =
-        make_integrator(settings.integrator, context, means.lanes, means.threads, means.wave_size);
-    teach(context, *integrator, means, pixels, first_sample, samples, grid,
-          tiles ? &*tiles : nullptr, lessons, stopped);
+    teach(context, means, pixels, first_sample, samples, grid, tiles ? &*tiles : nullptr, lessons,
+          stopped);
     if (stopped()) return {};
     first_sample += samples;
     out.statistics.paths += lessons.luminances.size();
