@@ -19,6 +19,7 @@ DEFAULTS: dict[str, Any] = {
     **{"wave_size": 4096, "policy": "none", "roulette": "throughput", "ray_order": "slot"},
     **{"shadow_order": "slot", "max_depth": 6, "status": "ok", "load_average": 0.4},
     **{"noisy": False, "spin_s": 0.05, "picture_sha256": "0" * 64},
+    **{"case": "", "time_limit": None},
 }
 POLICY_FACTORS = {
     **{"none": 1.0, "program": 0.6, "material": 0.58, "texture": 0.61},

@@ -65,7 +65,7 @@ def test_our_suites_are_sound(name: str) -> None:
     suite = load_suite(find_suite(name))
     configs = configurations(suite, LIMITS)
     assert configs and suite.title
-    assert suite.repetitions >= {"paper": 3, "learning": 5, "learning-reduced": 5}.get(name, 16)
+    assert suite.repetitions >= {"paper": 3, "learning": 5}.get(name, 16)
     from wavecomb import _core
 
     for settings in {json.dumps(c.settings): c.settings for c in configs}.values():
