@@ -17,6 +17,15 @@ TIMES = ("wavecomb:render_seconds", "DateTime")
 """Of a header: what no two renders share."""
 
 
+def cornell_in(folder: Path) -> Path:
+    """The Cornell box, as a file in a folder."""
+    from wavecomb.scenes import write_scene
+
+    path = folder / "cornell.usdc"
+    write_scene("cornell", path)
+    return path
+
+
 def work(folder: Folder, worker: str = "me") -> list[dict[str, Any]]:
     """Does all tasks of a job in this process; what came of them."""
     renderer, results = Renderer(folder, threads=1), []

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from farm_jobs import same, work
+from farm_jobs import cornell_in, same, work
 from parts import needs
 
 import wavecomb
@@ -34,11 +34,7 @@ pytestmark = needs("wavecomb._core")
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wavecomb.scenes import write_scene
-
-    path = tmp_path_factory.mktemp("farm") / "cornell.usdc"
-    write_scene("cornell", path)
-    return path
+    return cornell_in(tmp_path_factory.mktemp("farm"))
 
 
 def job(stage: Path, folder: Path, **options: Any) -> Folder:

@@ -16,7 +16,7 @@ from typing import Any
 import forks
 import numpy as np
 import pytest
-from farm_jobs import left_behind, processes_of, same, wait_for, work
+from farm_jobs import cornell_in, left_behind, processes_of, same, wait_for, work
 from parts import needs, not_here
 
 from wavecomb import farm
@@ -37,11 +37,7 @@ WAVECOMB = [sys.executable, "-m", "wavecomb"]
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wavecomb.scenes import write_scene
-
-    path = tmp_path_factory.mktemp("farm") / "cornell.usdc"
-    write_scene("cornell", path)
-    return path
+    return cornell_in(tmp_path_factory.mktemp("farm"))
 
 
 def changed(folder: Folder, **fields: Any) -> Folder:

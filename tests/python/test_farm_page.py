@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 import forks
 import numpy as np
 import pytest
-from farm_jobs import work
+from farm_jobs import cornell_in, work
 from parts import needs
 
 from wavecomb import farm
@@ -33,11 +33,7 @@ pytestmark = needs("wavecomb._core")
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wavecomb.scenes import write_scene
-
-    path = tmp_path_factory.mktemp("farm") / "cornell.usdc"
-    write_scene("cornell", path)
-    return path
+    return cornell_in(tmp_path_factory.mktemp("farm"))
 
 
 @pytest.fixture

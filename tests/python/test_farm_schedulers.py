@@ -15,7 +15,7 @@ from pathlib import Path
 
 import forks
 import pytest
-from farm_jobs import processes_of, same, wait_for
+from farm_jobs import cornell_in, processes_of, same, wait_for
 from parts import needs
 
 from wavecomb import farm
@@ -32,11 +32,7 @@ DASK = needs("distributed", "cryptography")
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wavecomb.scenes import write_scene
-
-    path = tmp_path_factory.mktemp("farm") / "cornell.usdc"
-    write_scene("cornell", path)
-    return path
+    return cornell_in(tmp_path_factory.mktemp("farm"))
 
 
 def made(stage: Path, place: Path, spp: int = 4) -> Folder:

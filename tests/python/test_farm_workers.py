@@ -12,7 +12,7 @@ from pathlib import Path
 import forks
 import numpy as np
 import pytest
-from farm_jobs import processes_of, same, wait_for
+from farm_jobs import cornell_in, processes_of, same, wait_for
 from parts import needs
 from test_texture_limit import MOVING_CAMERA, textured, write_image
 
@@ -27,11 +27,7 @@ SMALL = ("--size", "48", "32", "--spp", "4", "--threads", "1")
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wavecomb.scenes import write_scene
-
-    path = tmp_path_factory.mktemp("farm") / "cornell.usdc"
-    write_scene("cornell", path)
-    return path
+    return cornell_in(tmp_path_factory.mktemp("farm"))
 
 
 @pytest.fixture(scope="module")
