@@ -61,6 +61,20 @@ class RecordingBuilder(Recorded):
         self.meshes.append(Mesh(positions, indices, normals, uvs, face_materials, material, name))
         return number
 
+    def make_surfaces(self, descriptions: list[dict[str, Any]], threads: int = 0) -> list[Any]:
+        """Refines subdivision surfaces; what comes of it is added as any mesh."""
+        return self._native.make_surfaces(descriptions, threads)
+
+    def replace_mesh(self, mesh: int, *arrays: Any, **options: Any) -> None:
+        """Gives a kept mesh other arrays."""
+        self._native.replace_mesh(mesh, *arrays, **options)
+        old = self.meshes[mesh]
+        names = ("normals", "uvs", "face_materials")
+        given = [options.get(name) for name in names]
+        self.meshes[mesh] = Mesh(
+            *arrays[:2], *given, options.get("material", old.material), old.name
+        )
+
     def add_group(self, name: str = "", root: str = "") -> int:
         """Keeps an empty group."""
         self.groups.append(Group())
