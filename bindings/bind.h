@@ -11,6 +11,7 @@
 void bind_threads(nanobind::module_& m);
 void bind_scene(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
+void bind_volumes(nanobind::module_& m);
 void bind_graphs(nanobind::module_& m);
 void bind_lights(nanobind::module_& m);
 void bind_camera(nanobind::module_& m);
@@ -21,9 +22,10 @@ void bind_render(nanobind::module_& m);
 void bind_renderer(nanobind::module_& m);
 
 /// The parts of class SceneBuilder that add textures and materials; meshes, curves, points and
-/// instances.
+/// instances; volumes.
 void def_materials(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_meshes(nanobind::class_<wavecomb::SceneBuilder>& builder);
+void def_volumes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 
 /// A texture use as SceneBuilder.add_material takes it.
 wavecomb::TextureUse texture_use(const nanobind::dict& d);

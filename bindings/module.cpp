@@ -13,6 +13,7 @@ NB_MODULE(_core, m) {
   // those who render; the list would also name other modules' objects.
   nb::set_leak_warnings(false);
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
+  bind_volumes(m);
   bind_scene(m);
   bind_threads(m);
   bind_geometry(m);

@@ -76,6 +76,12 @@ void bind_scene(nb::module_& m) {
       .def_prop_ro("points", &Scene::points)
       .def_prop_ro("mesh_count", [](const Scene& s) { return s.meshes().size(); })
       .def_prop_ro("instance_count", [](const Scene& s) { return s.instances().size(); })
+      .def_prop_ro("volumes",
+                   [](const Scene& s) {
+                     std::vector<std::string> out;
+                     for (const Volume& volume : s.volumes()) out.push_back(volume.name);
+                     return out;
+                   })
       .def_prop_ro("light_count", [](const Scene& s) { return s.lights().size(); })
       .def_prop_ro("lights",
                    [](const Scene& s) {
@@ -150,4 +156,5 @@ void bind_scene(nb::module_& m) {
       .def("build", &SceneBuilder::build, nb::call_guard<nb::gil_scoped_release>());
   def_materials(builder);
   def_meshes(builder);
+  def_volumes(builder);
 }

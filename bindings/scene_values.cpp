@@ -259,7 +259,7 @@ nb::list material_rows() {
 
 nb::list program_rows() {
   nb::list rows;
-  for (uint32_t id = 0; id < kProgramCount; ++id) {
+  for (uint32_t id = 0; id < kSurfaceProgramCount; ++id) {
     const ProgramReads reads = reads_of(static_cast<ProgramId>(id));
     nb::list inputs;
     for (uint32_t i = 0; i < kInputCount; ++i)

@@ -191,6 +191,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   memory["meshes"] = s.scene_bytes.meshes;
   memory["textures"] = s.scene_bytes.textures;
   memory["records"] = s.scene_bytes.records;
+  memory["volumes"] = s.scene_bytes.volumes;
   d["memory_bytes"] = memory;
   d["texture_store"] = nb::none();
   if (s.texture_store) d["texture_store"] = texture_store_dict(*s.texture_store);

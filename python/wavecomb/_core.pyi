@@ -16,6 +16,36 @@ INHERIT_MATERIAL: int
 class Error(ValueError):
     """Bad input; one line that names the object and says what to do."""
 
+class VolumeGrid:
+    """Voxels in bricks of 8 x 8 x 8, and where they are.
+
+    Args:
+        origins: (n, 3): index of the first voxel of each brick; multiples of 8, each once.
+        values: float16 or float32, (n, 8, 8, 8) or (n, 8, 8, 8, 3): ``values[b, i, j, k]`` is
+            voxel ``origins[b] + (i, j, k)``. A voxel's value is that at its index; between them it
+            is linear in x, y and z.
+        index_to_object: (4, 4), from indices to the volume's own space, as USD has it (rows).
+        background: Where there is no brick.
+        name: For messages.
+
+    Raises Error for values that are negative or not finite, bricks that are doubled or not at
+    multiples of 8, and grids too large to be numbered.
+    """
+
+    def __init__(
+        self,
+        origins: NDArray[np.int32],
+        values: NDArray[Any],
+        index_to_object: NDArray[Any],
+        background: float = 0.0,
+        name: str = "",
+    ) -> None: ...
+    @property
+    def bricks(self) -> int:
+        """Those that are kept: with a border, and without those that are background."""
+    @property
+    def bytes(self) -> int: ...
+
 class Scene:
     """An immutable scene."""
 
@@ -34,6 +64,9 @@ class Scene:
         """Meshes, and prims of curves and points."""
     @property
     def instance_count(self) -> int: ...
+    @property
+    def volumes(self) -> list[str]:
+        """Names of the volumes."""
     @property
     def light_count(self) -> int: ...
     @property
@@ -381,6 +414,25 @@ class SceneBuilder:
     def add_geometry_set(self, rules: dict[str, str]) -> int:
         """A set for lights, by the rules of a UsdCollectionMembershipQuery: prim paths to
         exclude, explicit or expand."""
+    def add_volume(
+        self,
+        to_world: NDArray[Any],
+        *,
+        density: VolumeGrid | None = None,
+        color: VolumeGrid | None = None,
+        emission_grid: VolumeGrid | None = None,
+        bounds: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None,
+        extinction: tuple[float, float, float] = (1, 1, 1),
+        albedo: tuple[float, float, float] = (0.5, 0.5, 0.5),
+        emission: tuple[float, float, float] = (0, 0, 0),
+        anisotropy: float = 0,
+        name: str = "",
+    ) -> int:
+        """A volume: extinction * density per unit of world length, of which albedo * color is
+        scattered by Henyey and Greenstein's phase function of mean cosine ``anisotropy``, and
+        radiance emission * emission_grid (or * density) per unit of world length. Without a density
+        grid it is 1 all over the box ``bounds``, of the volume's own space. ``to_world``: (4, 4),
+        rows. Volumes may overlap. Raises Error that names the volume."""
     def add_ies(
         self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]
     ) -> int:

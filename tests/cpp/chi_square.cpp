@@ -30,7 +30,7 @@ constexpr size_t kMostFine = 1024, kLeastFine = 16, kCoarse = 32;
 /// Leaves of a cell, where samples are many and where they are few.
 constexpr size_t kManyLeaves = 8, kFewLeaves = 3;
 /// Batteries of the whole program: the correction is for as many.
-constexpr size_t kBatteries = 24;
+constexpr size_t kBatteries = 25;
 
 /// Cells that all count the same: what falls in them, and what should.
 struct Counts {

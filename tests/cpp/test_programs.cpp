@@ -22,7 +22,7 @@ using namespace program_cases;
 using Vec = Vec3<float>;
 
 TEST(Programs, TableFindsEachProgram) {
-  for (uint32_t i = 0; i < kProgramCount; ++i) {
+  for (uint32_t i = 0; i < kSurfaceProgramCount; ++i) {
     int visits = 0;
     visit_program<float>(static_cast<ProgramId>(i), [&]<typename Bsdf>() {
       EXPECT_EQ(static_cast<uint32_t>(Bsdf::kProgram), i);
@@ -369,7 +369,7 @@ void expect_packet_equals_scalar(ProgramId id) {
 }
 
 TEST(Programs, PacketEqualsScalarBitForBit) {
-  for (uint32_t i = 0; i < kProgramCount; ++i) {
+  for (uint32_t i = 0; i < kSurfaceProgramCount; ++i) {
     const auto id = static_cast<ProgramId>(i);
     expect_packet_equals_scalar<4>(id);
     expect_packet_equals_scalar<8>(id);
@@ -397,9 +397,9 @@ P with_parts(P p, ProgramId program, uint32_t parts) {
 template <uint32_t kVariant>
 void expect_variant_equals_program() {
   constexpr ProgramId kId = program_of(kVariant);
-  using Full = Program<kId, float>;
-  using Least = VariantBsdf<kVariant, float>;
-  if constexpr (!std::is_same_v<Full, Least>) {
+  if constexpr (kVariant >= kProgramCount) {  // or it is the program
+    using Full = Program<kId, float>;
+    using Least = VariantBsdf<kVariant, float>;
     std::mt19937 rng(500 + kVariant);
     for (int round = 0; round < 20000; ++round) {
       const Inputs in = random_inputs(rng);
@@ -424,7 +424,7 @@ TEST(Programs, VariantsEqualTheirProgramsBitForBit) {
 
 TEST(Programs, NoInputGivesNonsense) {
   std::mt19937 rng(77);
-  for (uint32_t id = 0; id < kProgramCount; ++id)
+  for (uint32_t id = 0; id < kSurfaceProgramCount; ++id)
     for (int round = 0; round < 60000; ++round) {
       const Inputs in = random_inputs(rng);
       visit_program<float>(static_cast<ProgramId>(id), [&]<typename Bsdf>() {

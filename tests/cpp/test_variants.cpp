@@ -101,7 +101,8 @@ ScenePtr all_variants() {
   SceneBuilder b;
   const uint32_t picture = add_texture(b, 8, 8, 3, random_texels(64 * 3, 0.1f, 0.9f, 1));
   std::vector<uint32_t> ids;
-  for (uint32_t v = 0; v < kVariantCount; ++v)
+  for (uint32_t v = 0; v < kVariantCount; ++v) {
+    if (static_cast<uint32_t>(program_of(v)) >= kSurfaceProgramCount) continue;
     for (const float roughness : {0.f, 0.4f}) {
       Material m = make_material(program_of(v), {0.7f, 0.5f, 0.4f}, roughness);
       const uint32_t parts = kVariants[v].parts;
@@ -112,6 +113,7 @@ ScenePtr all_variants() {
       if ((parts & kPasses) != 0) m.opacity = 0.6f, m.openpbr.transmission_weight = 0.4f;
       ids.push_back(b.add_material(m));
     }
+  }
   for (size_t i = 0; i < ids.size(); ++i) {
     MeshData ball = sphere(8, true);
     const float x = static_cast<float>(i % 6) - 2.5f, y = static_cast<float>(i / 6) - 1.5f;
@@ -130,7 +132,7 @@ TEST(Variants, NoVariantShowsInThePicture) {
   std::set<uint32_t> there;
   for (size_t m = 0; m < scene->materials().size(); ++m)
     there.insert(scene->view().material_variant[m]);
-  EXPECT_EQ(there.size(), kVariantCount) << "some variant is never chosen";
+  EXPECT_EQ(there.size(), kVariantCount - kMediumProgramCount) << "some variant is never chosen";
 
   Settings s;
   s.width = size_for_build(40, 4);

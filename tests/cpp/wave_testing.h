@@ -7,6 +7,7 @@
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/energy_tables.h"
+#include "wavecomb/render/lane_kernels.h"
 #include "wavecomb/render/pixel_order.h"
 #include "wavecomb/scene/light_tree.h"
 
@@ -131,6 +132,8 @@ class WaveRun {
 
  private:
   void run(const WaveTask& task) {
+    if (case_.lanes != kReferenceLanes && context_.scene.volumes.count > 0)
+      return lane_kernels(case_.lanes).run_in_volumes(*wave_, context_, task);
     switch (case_.lanes) {
       case kReferenceLanes:
         return reference_->run(0, task);

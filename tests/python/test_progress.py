@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -16,7 +17,13 @@ from fake_core import install
 
 from wavecomb.cli import main
 from wavecomb.picture.image import read_image
-from wavecomb.run.progress import Interrupt, ProgressBar, ProgressLines, speed
+from wavecomb.run.progress import (
+    Interrupt,
+    ProgressBar,
+    ProgressLines,
+    keep_interrupts,
+    speed,
+)
 
 
 def status(done: int, **other: Any) -> dict[str, Any]:
@@ -193,3 +200,19 @@ main(sys.argv[1:])
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
     assert (done.returncode, done.stderr.strip()) == (130, "stopped")
     assert not (tmp_path / "a.exr").exists()
+
+
+def test_a_lost_interrupt_is_heeded_by_the_next_who_asks() -> None:
+    """A library that prints exceptions and goes on does not lose a Ctrl-C."""
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        keep_interrupts()
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+        with Interrupt() as interrupt:
+            assert interrupt.signal == signal.SIGINT
+        with Interrupt() as interrupt:
+            assert not interrupt.requested
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -13,7 +13,7 @@ from parts import not_here
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
-OLD = {"claims", "limit", "noise_target", "peers", "peers-dragon"}
+OLD = {"claims", "noise_target", "peers", "peers-dragon"}
 """Of fewer than five rounds, or from before their commands were kept; README says so."""
 
 
@@ -65,5 +65,5 @@ def test_pages_quote_the_command(path: Path) -> None:
 def test_readme_says_which_figures_are_old() -> None:
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     (said,) = (line for line in page.splitlines() if line.startswith("Rows of "))
-    for name in ("peers", "claims", "limits"):
+    for name in ("peers", "claims"):
         assert name in said

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from wavecomb.run.faults import describe
+from wavecomb.run.progress import keep_interrupts
 
 ERROR = 2
 INTERRUPTED = 130
@@ -55,6 +56,7 @@ class Commands(click.Group):
             return super().main(args, prog_name, complete_var, False, **extra)
         if not sys.warnoptions and not os.environ.get("WAVECOMB_DEBUG"):
             warnings.simplefilter("ignore")  # Python's own are for developers
+        keep_interrupts()
         try:
             code = super().main(args, prog_name, complete_var, False, **extra)
         except click.ClickException as error:

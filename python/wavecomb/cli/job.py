@@ -241,9 +241,12 @@ class Job:
                     files.add(picture)
                     if result.cancelled:
                         break
+                empty: Picture | None = None
                 while files.rows < height:
                     left = min(rows, height - files.rows)
-                    files.add(without_samples(stopped_part, self.settings, left))
+                    if empty is None or len(empty.beauty) != left:
+                        empty = without_samples(stopped_part, self.settings, left)
+                    files.add(empty)
         _warn_of_broken(broken)
         stats = sum_stats(parts, settings)
         stopped = (interrupt.signal or signal.SIGINT) if stats["cancelled"] else None

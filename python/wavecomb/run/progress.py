@@ -66,6 +66,26 @@ def speed(status: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+_earlier: list[int] = []
+"""The Ctrl-C that ``keep_interrupts`` saw, if any."""
+
+
+def keep_interrupts() -> None:
+    """From now on a Ctrl-C that nobody heeds is heeded by the next ``Interrupt``.
+
+    ``KeyboardInterrupt`` is lost where it is raised in a callback of a library that prints
+    exceptions and goes on. For programs that such an exception ends: commands, not a window.
+    """
+
+    def note(number: int, frame: FrameType | None) -> None:
+        _earlier.append(number)
+        signal.default_int_handler(number, frame)
+
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, note)
+
+
 class Interrupt:
     """While it is entered, the first Ctrl-C or SIGTERM is only noted; the next acts as always.
 
@@ -86,6 +106,8 @@ class Interrupt:
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._before[number] = signal.signal(number, self._note)
+            if _earlier:
+                self._note(_earlier.pop(), None)
         return self
 
     def __exit__(

@@ -3,13 +3,16 @@
 /// that scenes without any run kernels that know of none. It has
 ///
 ///   static constexpr bool kAny;            whether there is anything; if not, Programs is all else
+///   static constexpr bool kShines;         whether it may send out light; if so, it has
+///     bool shines() const;                   whether it does
+///     Color<F> emission(const Passage<F>&, const Mask<F>& active) const;    radiance on the way
 ///   template <typename F> using Programs;  what may be met, surfaces included: ProgramList
 ///   template <typename F> Flight<F> fly(const Passage<F>&, const Mask<F>& active) const;
 ///   template <typename F> Color<F> transmittance(const Passage<F>&, const Mask<F>& active) const;
 ///
 /// A program of its own shades what happens on the way (BsdfTraits::kOnSurface is false).
 ///
-/// Contract: both functions give a lane what its own passage says, whatever the others are, and
+/// Contract: all functions give a lane what its own passage says, whatever the others are, and
 /// draw from VertexSet::kFlight and kShadow alone, so that no schedule shows.
 #pragma once
 
@@ -41,7 +44,7 @@ struct Flight {
 
 /// Nothing between surfaces.
 struct NoMedia {
-  static constexpr bool kAny = false;
+  static constexpr bool kAny = false, kShines = false;
   template <typename F>
   using Programs = wavecomb::Programs<F>;
 };

@@ -97,6 +97,13 @@ class PathTracer {
       Hit hit = intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
       if constexpr (Media::kAny) {
+        if constexpr (Media::kShines)
+          if (media_.shines())
+            add(kNoLight,
+                clean<F>(path.throughput *
+                             media_.template emission<F>(
+                                 {settings_.sampler, key, depth, path.o, path.dir, hit.t}, true),
+                         clamp_limit(settings_, depth)));
         const Flight<F> flight =
             media_.template fly<F>({settings_.sampler, key, depth, path.o, path.dir, hit.t}, true);
         path.throughput = path.throughput * flight.weight;

@@ -33,9 +33,17 @@ constexpr auto batch_kernels(ProgramList<Bsdf...>) {
     kernels[v] = kernels[static_cast<size_t>(program_of(v))];
   return kernels;
 }
+template <size_t kVariant, typename F>
+constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
+  // Whatever lies between surfaces is not plain.
+  if constexpr (static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount)
+    return &shade_batch<VariantBsdf<kVariant, F>, F, kPlain>;
+  else
+    return nullptr;
+}
 template <typename F, size_t... kVariant>
 constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
-  return BatchKernels<F>{&shade_batch<VariantBsdf<kVariant, F>, F, kPlain>...};
+  return BatchKernels<F>{plain_batch_kernel<kVariant, F>()...};
 }
 template <typename F, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {

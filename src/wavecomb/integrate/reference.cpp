@@ -3,6 +3,7 @@
 
 #include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/shared_kernels.h"
+#include "wavecomb/medium/volumes.h"
 
 namespace wavecomb {
 
@@ -20,7 +21,11 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 }
 
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
-  trace_task(context_, *workers_[i], task, NoMedia());
+  const VolumeView& volumes = context_.scene.volumes;
+  if (volumes.count > 0)
+    trace_task(context_, *workers_[i], task, Volumes(volumes));
+  else
+    trace_task(context_, *workers_[i], task, NoMedia());
 }
 
 void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,

@@ -121,6 +121,10 @@ struct Wave {
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
 
+/// The same through the volumes of the scene, where it has any (medium/).
+template <size_t W>
+void run_wave_in_volumes(Wave& wave, const WaveContext& context, const WaveTask& task);
+
 /// Shades synthetic hits of one material with kernels of `W` lanes and returns the time, in
 /// nanoseconds.
 template <size_t W>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The names of all programs, in the order of ProgramId. Who includes this knows that there are
+/// The names of all programs of surfaces, in the order of ProgramId. Who includes this knows that there are
 /// programs, and nothing of what they are: a change in one of them compiles none of his units.
 #pragma once
 
@@ -40,7 +40,7 @@ using Programs = decltype(detail::list_behind(
                     WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
 #undef WAVECOMB_PROGRAM
                 >()));
-static_assert(Programs<float>::kSize == kProgramCount);
+static_assert(Programs<float>::kSize == kSurfaceProgramCount);
 
 namespace detail {
 template <typename Wanted, typename... Bsdf>
@@ -53,11 +53,20 @@ template <size_t I, typename... Bsdf>
 std::tuple_element_t<I, std::tuple<Bsdf...>> program_at(ProgramList<Bsdf...>);
 }  // namespace detail
 
+namespace detail {
+template <typename Last, typename... Bsdf>
+ProgramList<Bsdf..., Last> list_before(ProgramList<Bsdf...>);
+}  // namespace detail
+
+/// `List` with one program more.
+template <typename List, typename Last>
+using AppendedProgram = decltype(detail::list_before<Last>(List{}));
+
 /// The id of a program: what it says itself where it is none of the list.
 template <typename Bsdf, typename F>
 constexpr size_t id_of() {
   constexpr size_t kPlace = detail::place_of<Bsdf>(Programs<F>{});
-  if constexpr (kPlace < kProgramCount)
+  if constexpr (kPlace < kSurfaceProgramCount)
     return kPlace;
   else
     return static_cast<size_t>(Bsdf::kProgram);

@@ -14,19 +14,19 @@ LaneKernels lane_kernels(uint32_t lanes) {
   switch (lanes) {
 #ifdef WAVECOMB_HAS_LANES_1
     case 1:
-      return {&run_wave<1>, &time_material<1>};
+      return {&run_wave<1>, &run_wave_in_volumes<1>, &time_material<1>};
 #endif
 #ifdef WAVECOMB_HAS_LANES_4
     case 4:
-      return {&run_wave<4>, &time_material<4>};
+      return {&run_wave<4>, &run_wave_in_volumes<4>, &time_material<4>};
 #endif
 #ifdef WAVECOMB_HAS_LANES_8
     case 8:
-      return {&run_wave<8>, &time_material<8>};
+      return {&run_wave<8>, &run_wave_in_volumes<8>, &time_material<8>};
 #endif
 #ifdef WAVECOMB_HAS_LANES_16
     case 16:
-      return {&run_wave<16>, &time_material<16>};
+      return {&run_wave<16>, &run_wave_in_volumes<16>, &time_material<16>};
 #endif
     default:
       return {};
@@ -54,8 +54,10 @@ std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveConte
                                             uint32_t lanes, uint32_t threads, uint32_t wave_size) {
   if (kind == IntegratorKind::kReference)
     return std::make_unique<ReferenceIntegrator>(context, threads);
-  return std::make_unique<WaveIntegrator>(context, lane_kernels(lanes).run, lanes, threads,
-                                          wave_size);
+  const LaneKernels kernels = lane_kernels(lanes);
+  return std::make_unique<WaveIntegrator>(
+      context, context.scene.volumes.count > 0 ? kernels.run_in_volumes : kernels.run, lanes,
+      threads, wave_size);
 }
 
 const char* library_name() {

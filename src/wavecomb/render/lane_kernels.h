@@ -13,7 +13,9 @@ namespace wavecomb {
 
 /// The kernels of one width.
 struct LaneKernels {
-  void (*run)(Wave&, const WaveContext&, const WaveTask&) = nullptr;
+  using RunWave = void (*)(Wave&, const WaveContext&, const WaveTask&);
+  RunWave run = nullptr;
+  RunWave run_in_volumes = nullptr;
   double (*time_material)(Wave&, const WaveContext&, const CalibrationHits&) = nullptr;
 };
 

@@ -93,6 +93,17 @@ uint64_t hash_geometry(const Scene& scene) {
     for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
       h.add(scene.geometry()->steps[i.motion.first + k].affine());
   }
+  for (const Volume& v : scene.volumes()) {
+    h.add(v.box[0], v.box[1], v.to_world, v.extinction, v.albedo, v.emission, v.anisotropy);
+    for (const VolumeField* field : {&v.density, &v.color, &v.glow}) {
+      if (!field->grid) continue;
+      const GridView grid = field->grid->view();
+      h.add(field->index_to_object, grid.components, grid.background, grid.is_half ? 1u : 0u);
+      for (const int32_t x : field->grid->first_voxel()) h.add(x);
+      h.add_array(std::span<const uint32_t>(field->grid->table()));
+      h.add_array(std::span<const uint32_t>(field->grid->voxel_words()));
+    }
+  }
   return h.value();
 }
 

@@ -43,7 +43,7 @@ struct Variant {
 /// Each program with all of its parts comes first, in the order of ProgramId.
 inline constexpr Variant kVariants[] = {
 #define WAVECOMB_PROGRAM(name, ...) {#name, #name, kAllParts},
-    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
 #undef WAVECOMB_PROGRAM
 #define WAVECOMB_VARIANT(name, program, parts) {#name, #program, parts},
         WAVECOMB_VARIANTS(WAVECOMB_VARIANT)

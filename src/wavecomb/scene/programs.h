@@ -38,9 +38,13 @@ struct ProgramParameter {
   P(principled, Principled, true, 110) \
   P(openpbr, OpenPbr, true, 300)
 
+/// Likewise the programs of what lies between surfaces (integrate/media.h). No mesh can wear them,
+/// and each stands in the room of what it is for.
+#define WAVECOMB_MEDIUM_PROGRAMS(M) M(volume, Volume, false, 150)
+
 enum class ProgramId : uint8_t {
 #define WAVECOMB_PROGRAM(name, Class, ...) k##Class,
-  WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+  WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
 #undef WAVECOMB_PROGRAM
 };
 
@@ -59,15 +63,20 @@ struct ProgramInfo {
 /// By ProgramId.
 inline constexpr ProgramInfo kPrograms[] = {
 #define WAVECOMB_PROGRAM(name, Class, emits, ns, ...) {#name, emits, ns, {{__VA_ARGS__}}},
-    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
 #undef WAVECOMB_PROGRAM
 };
 inline constexpr const char* kProgramNames[] = {
 #define WAVECOMB_PROGRAM(name, ...) #name,
-    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
 #undef WAVECOMB_PROGRAM
 };
 inline constexpr uint32_t kProgramCount = sizeof(kPrograms) / sizeof(ProgramInfo);
+#define WAVECOMB_PROGRAM(...) +1
+inline constexpr uint32_t kMediumProgramCount = 0 WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM);
+#undef WAVECOMB_PROGRAM
+/// Programs of surfaces, which come first.
+inline constexpr uint32_t kSurfaceProgramCount = kProgramCount - kMediumProgramCount;
 
 constexpr const ProgramInfo& info_of(ProgramId program) {
   return kPrograms[static_cast<size_t>(program)];

@@ -2,6 +2,7 @@
 #include "wavecomb/scene/scene.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "wavecomb/core/error.h"
@@ -85,6 +86,10 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.motion = {geometry_->mesh_motions.data(),
               geometry_->instance_motions.empty() ? nullptr : geometry_->instance_motions.data(),
               geometry_->steps.data()};
+  v.volumes = {geometry_->volume_records.data(),
+               static_cast<uint32_t>(geometry_->volume_records.size()),
+               geometry_->first_volume_material,
+               std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
   v.has_motion = geometry_->moves();
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -104,6 +109,10 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   for (const auto& [id, material] : edit.materials) {
     if (id >= materials().size()) throw_unknown("material", id, materials().size());
     check_material(material, textures().size(), materials_->graphs->programs.size());
+    for (const ProgramId program : {material.program, materials()[id].program})
+      if (static_cast<uint32_t>(program) >= kSurfaceProgramCount)
+        throw Error(quoted("material", material.name) +
+                    " is what paths meet in a volume; it cannot be edited");
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());
@@ -195,6 +204,10 @@ SceneBytes Scene::bytes() const {
                  set.triangles, set.triangle_uvs, set.pick_bins, set.powers, set.portals,
                  set.portal_groups, set.shapings, set.ies, set.ies_numbers) +
               lights_->tree_bytes() + g.names.bytes();
+  std::set<const VolumeGrid*> grids;
+  for (const Volume& volume : g.volumes)
+    for (const VolumeField* field : {&volume.density, &volume.color, &volume.glow})
+      if (field->grid && grids.insert(field->grid.get()).second) b.volumes += field->grid->bytes();
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;
 }

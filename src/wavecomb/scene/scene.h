@@ -13,6 +13,7 @@
 #include "wavecomb/scene/camera.h"
 #include "wavecomb/scene/mesh_tangents.h"
 #include "wavecomb/scene/scene_parts.h"
+#include "wavecomb/scene/volume.h"
 
 namespace wavecomb {
 
@@ -31,6 +32,7 @@ struct SceneView {
   MaterialView materials;
   LightView lights;
   MotionView motion;
+  VolumeView volumes;
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;
@@ -45,6 +47,7 @@ struct SceneBytes {
   uint64_t meshes = 0;
   uint64_t textures = 0;  ///< all mip levels, or what of them a store has in memory
   uint64_t records = 0;   ///< instances, materials, lights
+  uint64_t volumes = 0;   ///< grids
 };
 
 /// What is to be other in a scene: values that take the place of those there.
@@ -74,6 +77,7 @@ class Scene {
   /// What keeps the textures within a limit: of the first that has a store; null: none has.
   const TileStore* texture_store() const;
   const std::vector<Light>& lights() const { return lights_->lights; }
+  const std::vector<Volume>& volumes() const { return geometry_->volumes; }
   /// Names of light groups; the first is kOtherLights.
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
   /// Index into light_groups() of every light that kernels know, triangles last.
@@ -188,6 +192,8 @@ class SceneBuilder {
   uint32_t add_mesh_light(Light light);
   /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
   uint32_t light_group(const std::string& name);
+  /// A volume, which fills space in the world, whatever surfaces there are. Volumes may overlap.
+  uint32_t add_volume(Volume volume);
   void set_camera(const Camera& camera);
 
   /// Checks everything that spans objects (cycles of groups, singular transforms, materials) and
@@ -227,6 +233,7 @@ class SceneBuilder {
   std::vector<IesProfile> profiles_;
   std::vector<GeometrySet> sets_;
   std::vector<Light> lights_, mesh_lights_;
+  std::vector<Volume> volumes_;
   std::vector<std::string> light_groups_{kOtherLights};
   std::vector<std::string> attribute_names_;
   std::unordered_map<std::string, uint32_t> attribute_ids_;

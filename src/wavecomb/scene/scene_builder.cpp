@@ -70,6 +70,9 @@ uint32_t SceneBuilder::add_graph(const Graph& graph) {
 
 uint32_t SceneBuilder::add_material(Material material) {
   check_material(material, textures_.size(), graphs_.programs.size());
+  if (static_cast<uint32_t>(material.program) >= kSurfaceProgramCount)
+    throw Error(quoted("material", material.name) + " has program '" +
+                info_of(material.program).name + "', which no surface can wear; choose another");
   const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
                      material.emission.z > 0 || material.has_texture(Input::kEmission);
   if (glows && !material.emits())
@@ -177,6 +180,15 @@ uint32_t SceneBuilder::add_mesh_light(Light light) {
   check_mesh_light(light, {textures_.size(), profiles_.size(), sets_.size()});
   mesh_lights_.push_back(std::move(light));
   return static_cast<uint32_t>(mesh_lights_.size() - 1);
+}
+
+uint32_t SceneBuilder::add_volume(Volume volume) {
+  check_volume(volume);
+  volumes_.push_back(std::move(volume));
+  if (volumes_.size() > kMostVolumes)
+    throw Error("more than " + with_commas(kMostVolumes) + " volumes, " +
+                quoted("volume", volumes_.back().name) + " among them; put some into one grid");
+  return static_cast<uint32_t>(volumes_.size() - 1);
 }
 
 void SceneBuilder::set_camera(const Camera& camera) {

@@ -125,7 +125,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
                         " instances have a singular transform and were left out");
 
   SceneCounts counts{.meshes = meshes_.size(),
-                     .materials = materials_.size() + 1,
+                     .materials = materials_.size() + 1 + volumes_.size(),
                      .instances = geometry->instances.size(),
                      .placed = groups_[0].meshes.size(),
                      .placements = geometry->placements.size(),
@@ -142,6 +142,14 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   fallback.program = ProgramId::kDiffuse;
   fallback.base_color = {0.5f, 0.5f, 0.5f};
   materials_.push_back(fallback);
+  // And what paths meet in volumes, one each.
+  geometry->first_volume_material = grey + 1;
+  for (const Volume& volume : volumes_) {
+    Material inside;
+    inside.name = volume.name;
+    inside.program = ProgramId::kVolume;
+    materials_.push_back(inside);
+  }
   for (const Mesh& mesh : meshes_) {
     const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
     if (bad(mesh.material) ||
@@ -162,6 +170,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->profiles = std::move(profiles_);
   geometry->sets = std::move(sets_);
   geometry->mesh_lights = std::move(mesh_lights_);
+  geometry->volumes = std::move(volumes_);
   geometry->light_groups = std::move(light_groups_);
   geometry->attribute_names = std::move(attribute_names_);
   geometry->names = std::move(names_);

@@ -18,6 +18,7 @@
 #include "wavecomb/scene/mesh.h"
 #include "wavecomb/scene/motion.h"
 #include "wavecomb/scene/names.h"
+#include "wavecomb/scene/volume.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
@@ -78,6 +79,7 @@ struct SceneGeometry {
   std::vector<IesProfile> profiles;
   std::vector<GeometrySet> sets;
   std::vector<Light> mesh_lights;  ///< Mesh::mesh_light
+  std::vector<Volume> volumes;
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;
@@ -93,7 +95,9 @@ struct SceneGeometry {
   std::vector<AttributeRecord> attribute_records;  ///< AttributeView::records
   std::vector<uint32_t> mesh_attributes;           ///< AttributeView::of_mesh; empty: none has any
   std::vector<MeshMotion> mesh_motions;
-  std::vector<MatrixStep> steps;            ///< of all instances that move
+  std::vector<MatrixStep> steps;  ///< of all instances that move
+  std::vector<VolumeRecord> volume_records;
+  uint32_t first_volume_material = 0;       ///< VolumeView::first_material
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
   bool moves() const { return mesh_motions.size() > 1 || !steps.empty(); }
   AttributeView attributes() const {

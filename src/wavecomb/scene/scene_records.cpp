@@ -132,6 +132,10 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     geometry.instance_records.push_back(r);
     add_placed(geometry.bounds, bounds[i.group], i, geometry.steps);
   }
+  for (const Volume& volume : geometry.volumes) {
+    geometry.volume_records.push_back(make_volume_record(volume));
+    for (const Vec3<float>& corner : volume_corners(volume)) geometry.bounds.add(corner);
+  }
   if (geometry.bounds.empty()) return;
   const Bounds& b = geometry.bounds;
   const Vec3<float> d = b.hi - (b.lo + b.hi) * 0.5f;

@@ -43,6 +43,17 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (any(wanted)) {
       path = load_row<PathRow, F>(wave.pool.paths, slot, wanted);
       if constexpr (Media::kAny) {
+        if constexpr (Media::kShines)
+          if (media.shines()) {
+            const Color<F> c = clean<F>(
+                path.throughput * media.template emission<F>(
+                                      {settings.sampler, path.key, depth, o, d, t}, active),
+                clamp_limit(settings, depth));
+            const Mask<F> bright = active & not_(is_black(c));
+            add_radiance<F>(wave.pool.radiance, slot, c, bright);
+            if (wave.aovs.wants_groups())
+              wave.aovs.add<F>(slot, wave.aovs.group_of<F>(U(kNoLight), bright), c, bright);
+          }
         flight = media.template fly<F>({settings.sampler, path.key, depth, o, d, t}, active);
         flight.stopped = active & flight.stopped;
         t = select(flight.stopped, flight.t, t);

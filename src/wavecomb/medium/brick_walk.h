@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A straight way through the cells of a grid, one after the other.
+#pragma once
+
+#include "wavecomb/medium/grid_lookup.h"
+
+namespace wavecomb {
+
+/// Lanes walk through one grid, each along its own ray, cell by cell (Amanatides and Woo, "A Fast
+/// Voxel Traversal Algorithm", 1987). Lengths are those of the world.
+template <typename F>
+class BrickWalk {
+  using U = UInt<F>;
+
+ public:
+  /// The part of o + x d, 0 < x < `most`, that is in the grid's table.
+  BrickWalk(const PlacedGrid& placed, const Vec3<F>& o, const Vec3<F>& d, const F& most,
+            const Mask<F>& active)
+      : grid_(placed.grid),
+        o_(bricks_point<F>(placed.to_bricks, o)),
+        d_(bricks_vector<F>(placed.to_bricks, d)) {
+    const F* const from[3] = {&o_.x, &o_.y, &o_.z};
+    const F* const along[3] = {&d_.x, &d_.y, &d_.z};
+    F enter(0.f);
+    end_ = most;
+    on_ = active;
+    for (int k = 0; k < 3; ++k) {
+      const auto size = static_cast<float>(grid_.size[k]);
+      const Mask<F> moves = *along[k] != F(0.f);
+      inverse_[k] = F(1.f) / select(moves, *along[k], F(1.f));
+      const F a = (F(0.f) - *from[k]) * inverse_[k], b = (F(size) - *from[k]) * inverse_[k];
+      enter = select(moves, max(enter, min(a, b)), enter);
+      end_ = select(moves, min(end_, max(a, b)), end_);
+      on_ = on_ & (moves | ((*from[k] >= F(0.f)) & (*from[k] < F(size))));
+    }
+    on_ = on_ & (enter < end_);
+    x_ = enter;
+    for (int k = 0; k < 3; ++k) {
+      const F at = select(on_, fma(*along[k], enter, *from[k]), F(0.f));
+      const F cell = clamp(floor(at), F(0.f), F(static_cast<float>(grid_.size[k]) - 1.f));
+      cell_[k] = cell;
+      forth_[k] = *along[k] > F(0.f);
+      moves_[k] = *along[k] != F(0.f);
+      next_[k] = crossing(k);
+    }
+  }
+
+  /// Lanes that are still on their way.
+  const Mask<F>& on() const { return on_; }
+  /// Where they are, and where they leave their cell or end.
+  const F& x() const { return x_; }
+  F leave() const { return max(x_, min(min(next_[0], next_[1]), min(next_[2], end_))); }
+  /// The greatest value that the grid gives in the cell.
+  F most() const {
+    if (!grid_.most) return F(1.f);
+    const auto at = [&](int k) { return U(to_int<F>(cell_[k])); };
+    return gather<F>(grid_.most, at(0) + grid_.size[0] * (at(1) + grid_.size[1] * at(2)), on_);
+  }
+  /// The point of the grid's space at `x`.
+  Vec3<F> at(const F& x) const { return fma(d_, x, o_); }
+
+  /// `lanes` stop within their cell.
+  void move_to(const F& x, const Mask<F>& lanes) { x_ = select(lanes, x, x_); }
+  void stop(const Mask<F>& lanes) { on_ = on_ & not_(lanes); }
+  /// `lanes` go into the next cell.
+  void next_cell(Mask<F> lanes) {
+    const F leaves = leave();
+    x_ = select(lanes, leaves, x_);
+    Mask<F> wants = lanes & on_;
+    on_ = on_ & (not_(lanes) | (leaves < end_));
+    for (int k = 0; k < 3; ++k) {
+      const Mask<F> crosses = wants & (next_[k] <= leaves);
+      wants = wants & not_(crosses);
+      cell_[k] = select(crosses, F(cell_[k] + select(forth_[k], F(1.f), F(-1.f))), cell_[k]);
+      const auto last = static_cast<float>(grid_.size[k]) - 1.f;
+      on_ = on_ & not_(crosses & ((cell_[k] < F(0.f)) | (cell_[k] > F(last))));
+      next_[k] = select(crosses, crossing(k), next_[k]);
+    }
+  }
+
+ private:
+  /// Where the ray leaves its cell along axis k.
+  F crossing(int k) const {
+    const F* const from[3] = {&o_.x, &o_.y, &o_.z};
+    const F face = cell_[k] + select(forth_[k], F(1.f), F(0.f));
+    return select(moves_[k], F((face - *from[k]) * inverse_[k]), F(kInfinity));
+  }
+
+  const GridView& grid_;
+  Vec3<F> o_, d_;
+  F inverse_[3], cell_[3], next_[3];
+  Mask<F> forth_[3], moves_[3];
+  F x_, end_;
+  Mask<F> on_;
+};
+
+}  // namespace wavecomb

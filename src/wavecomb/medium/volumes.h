@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What lies between surfaces: the volumes of a scene.
+#pragma once
+
+#include "wavecomb/integrate/media.h"
+#include "wavecomb/material/program_list.h"
+#include "wavecomb/medium/tracking.h"
+
+namespace wavecomb {
+
+template <typename F>
+class VolumeBsdf;
+
+/// What integrate/media.h asks for.
+class Volumes {
+ public:
+  static constexpr bool kAny = true, kShines = true;
+  template <typename F>
+  using Programs = AppendedProgram<wavecomb::Programs<F>, VolumeBsdf<F>>;
+
+  explicit Volumes(const VolumeView& volumes) : volumes_(volumes) {}
+
+  template <typename F>
+  Flight<F> fly(const Passage<F>& p, const Mask<F>& active) const {
+    return fly_through<F>(volumes_, p, active);
+  }
+
+  template <typename F>
+  Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
+    return transmittance_through<F>(volumes_, way_seed<F>(p, VertexSet::kShadow), p.o, p.d, p.t,
+                                    active);
+  }
+
+  bool shines() const { return volumes_.emits; }
+  template <typename F>
+  Color<F> emission(const Passage<F>& p, const Mask<F>& active) const {
+    Color<F> sum(F(0.f));
+    const UInt<F> way = way_seed<F>(p, VertexSet::kFlight);
+    for (uint32_t i = 0; i < volumes_.count; ++i)
+      if (volumes_.volumes[i].emits) sum += emission_of<F>(volumes_, i, way, p.o, p.d, p.t, active);
+    return sum;
+  }
+
+ private:
+  const VolumeView volumes_;
+};
+
+}  // namespace wavecomb

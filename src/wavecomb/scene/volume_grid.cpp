@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+/// VolumeGrid: bricks as files have them become bricks with a border and a table.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/scene/parallel.h"
+#include "wavecomb/scene/scene_limits.h"
+#include "wavecomb/scene/volume.h"
+#include "wavecomb/texture/half.h"
+
+namespace wavecomb {
+namespace {
+
+constexpr size_t kInner = size_t{kBrickEdge} * kBrickEdge * kBrickEdge;
+
+size_t brick_words(uint32_t components, bool is_half) {
+  const size_t values = size_t{kBrickVoxels} * components;
+  return is_half ? (values + 1) / 2 : values;
+}
+
+/// The bricks that came in, by cell.
+class Source {
+ public:
+  Source(const GridBricks& b, const std::array<int32_t, 3>& first,
+         const std::array<uint32_t, 3>& size)
+      : b_(b), size_(size), at_(size_t{size[0]} * size[1] * size[2], kNoBrick) {
+    for (size_t i = 0; i < b.origins.size() / 3; ++i) {
+      size_t cell = 0, stride = 1;
+      for (int k = 0; k < 3; ++k) {
+        cell += stride * static_cast<size_t>((b.origins[3 * i + k] - first[k]) / 8);
+        stride *= size[k];
+      }
+      if (at_[cell] != kNoBrick)
+        throw Error("grid '" + b.name + "' has two bricks at one place; leave one out");
+      at_[cell] = static_cast<uint32_t>(i);
+    }
+  }
+  /// Component c of a voxel, counted from the table's first.
+  float value(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
+    const uint32_t cell[3] = {x / kBrickEdge, y / kBrickEdge, z / kBrickEdge};
+    if (cell[0] >= size_[0] || cell[1] >= size_[1] || cell[2] >= size_[2]) return b_.background;
+    const uint32_t brick = at_[cell[0] + size_t{size_[0]} * (cell[1] + size_t{size_[1]} * cell[2])];
+    if (brick == kNoBrick) return b_.background;
+    const size_t voxel =
+        ((x % kBrickEdge) * kBrickEdge + y % kBrickEdge) * kBrickEdge + z % kBrickEdge;
+    const size_t i = (size_t{brick} * kInner + voxel) * b_.components + c;
+    return b_.halves.empty() ? b_.floats[i] : half_to_float<float>(uint32_t{b_.halves[i]});
+  }
+
+ private:
+  const GridBricks& b_;
+  std::array<uint32_t, 3> size_;
+  std::vector<uint32_t> at_;
+};
+
+void check_values(const GridBricks& b) {
+  const auto check = [&](const auto& values, const auto& as_float) {
+    const bool good = std::all_of(values.begin(), values.end(), [&](auto v) {
+      const float x = as_float(v);
+      return x >= 0 && x <= std::numeric_limits<float>::max();
+    });
+    if (!good)
+      throw Error("grid '" + b.name +
+                  "' has values that are negative or not finite; mend the file");
+  };
+  check(b.floats, [](float x) { return x; });
+  check(b.halves, [](uint16_t x) { return half_to_float<float>(uint32_t{x}); });
+  if (!(b.background >= 0 && b.background <= std::numeric_limits<float>::max()))
+    throw Error("grid '" + b.name + "' has a background that is negative or not finite; mend it");
+}
+
+}  // namespace
+
+size_t VolumeGrid::words_per_brick() const {
+  return brick_words(components_, is_half_);
+}
+
+VolumeGrid::VolumeGrid(const GridBricks& b)
+    : components_(b.components), is_half_(!b.halves.empty()), background_(b.background) {
+  const size_t count = b.origins.size() / 3;
+  const std::string name = "grid '" + b.name + "'";
+  if (b.components != 1 && b.components != 3)
+    throw Error(name + " has " + std::to_string(b.components) + " components; it must be 1 or 3");
+  if (count == 0) throw Error(name + " has no voxels; leave it out");
+  if (b.origins.size() % 3 != 0 ||
+      b.floats.size() + b.halves.size() != count * kInner * b.components)
+    throw Error(name + " has not 8 x 8 x 8 voxels for each brick");
+  check_values(b);
+  std::array<int64_t, 3> lo{}, hi{};
+  for (size_t i = 0; i < b.origins.size(); ++i) {
+    const int64_t x = b.origins[i];
+    if (x % kBrickEdge != 0 || std::abs(x) > (int64_t{1} << 24))
+      throw Error(name + " has bricks that are not at multiples of 8, or beyond 2^24");
+    const size_t k = i % 3;
+    lo[k] = i < 3 ? x : std::min(lo[k], x);
+    hi[k] = i < 3 ? x : std::max(hi[k], x);
+  }
+  uint64_t cells = 1;
+  for (size_t k = 0; k < 3; ++k) {
+    // One cell more below: what lies between its last voxels and the first ones there.
+    first_[k] = static_cast<int32_t>(lo[k]) - static_cast<int32_t>(kBrickEdge);
+    size_[k] = static_cast<uint32_t>((hi[k] - first_[k]) / kBrickEdge + 1);
+    cells *= size_[k];
+  }
+  if (cells >= kGatherWords / 4)
+    throw Error(name + " spans " + with_commas(cells) + " bricks of 8^3 voxels, more than the " +
+                with_commas(kGatherWords / 4) + " that can be numbered; crop or resample it");
+  const Source source(b, first_, size_);
+  table_.assign(cells, kNoBrick);
+  most_.assign(cells, background_);
+  const size_t words = words_per_brick();
+
+  // Which cells have anything, and their greatest value; then their voxels.
+  const auto fill = [&](size_t cell, uint32_t* out) {
+    const auto x0 = static_cast<uint32_t>(cell % size_[0]) * kBrickEdge;
+    const auto y0 = static_cast<uint32_t>(cell / size_[0] % size_[1]) * kBrickEdge;
+    const auto z0 = static_cast<uint32_t>(cell / size_[0] / size_[1]) * kBrickEdge;
+    float most = background_;
+    bool differs = false;
+    size_t i = 0;
+    for (uint32_t z = 0; z < kBrickRow; ++z)
+      for (uint32_t y = 0; y < kBrickRow; ++y)
+        for (uint32_t x = 0; x < kBrickRow; ++x)
+          for (uint32_t c = 0; c < components_; ++c, ++i) {
+            const float value = source.value(x0 + x, y0 + y, z0 + z, c);
+            most = std::max(most, value);
+            differs = differs || value != background_;
+            if (!out) continue;
+            if (is_half_)
+              out[i / 2] |= uint32_t{float_to_half(value)} << (i % 2 * 16);
+            else
+              out[i] = float_bits<float>(value);
+          }
+    if (!out && differs) {
+      table_[cell] = 0;
+      most_[cell] = most;
+    }
+  };
+  parallel_for(size_[2], [&](size_t z) {
+    const size_t layer = size_t{size_[0]} * size_[1];
+    for (size_t cell = z * layer; cell < (z + 1) * layer; ++cell) fill(cell, nullptr);
+  });
+  std::vector<size_t> filled;
+  for (size_t cell = 0; cell < cells; ++cell)
+    if (table_[cell] != kNoBrick) {
+      table_[cell] = static_cast<uint32_t>(filled.size());
+      filled.push_back(cell);
+    }
+  const uint64_t values = uint64_t{filled.size()} * kBrickVoxels * components_;
+  if (values >= kGatherWords)
+    throw Error(name + " has " + with_commas(values) + " voxels in its bricks, more than the " +
+                with_commas(kGatherWords) + " that can be numbered; crop or resample it");
+  voxel_words_.assign(filled.size() * words, 0);
+  parallel_for(filled.size(), [&](size_t i) { fill(filled[i], voxel_words_.data() + i * words); });
+  greatest_ = *std::max_element(most_.begin(), most_.end());
+}
+
+GridView VolumeGrid::view() const {
+  GridView v;
+  v.table = table_.data();
+  v.most = most_.data();
+  v.voxels = voxel_words_.data();
+  std::copy(size_.begin(), size_.end(), v.size);
+  v.components = components_;
+  v.is_half = is_half_;
+  v.background = background_;
+  return v;
+}
+
+size_t VolumeGrid::bytes() const {
+  return 4 * (table_.size() + most_.size() + voxel_words_.size());
+}
+
+}  // namespace wavecomb
