@@ -79,7 +79,8 @@ struct Fog {
   ///   stopped at x:  sigma exp(-sigma x) / mean_c(sigma_c exp(-sigma_c x))
   ///   not before t:  exp(-sigma t) / mean_c(exp(-sigma_c t))
   template <typename F>
-  Flight<F> fly(const Passage<F>& p, const Mask<F>& /*active*/) const {
+  Flight<F> fly(const Passage<F>& p, const Color<F>& /*throughput*/,
+                const Mask<F>& /*active*/) const {
     const Sample4<F> r = sample_4d<F>(p.sampler, p.key, vertex_set(VertexSet::kFlight, p.depth));
     const F sigma = select(r.x < 1.f / 3, F(extinction.x),
                            select(r.x < 2.f / 3, F(extinction.y), F(extinction.z)));

@@ -191,7 +191,7 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
                             [&](const SampleKey<float>& key) {
                               const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, t};
                               return transmittance_through<float>(
-                                  r.view, way_seed<float>(p, VertexSet::kShadow), o, d, t, true);
+                                  r.view, Way<float>(p, VertexSet::kShadow), o, d, t, true);
                             }),
                    {std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])}, c.name);
     }
@@ -204,7 +204,7 @@ TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
     const Records r(c.volumes);
     const auto flight = [&](const SampleKey<float>& key, float t) {
       return fly_through<float>(r.view, Passage<float>{SamplerKind::kIndependent, key, 1, o, d, t},
-                                true);
+                                {0.5f, 0.2f, 0.3f}, true);
     };
     for (const float t : {1.7f, 2.2f, kInf}) {
       const auto depth = c.depth(std::min(double{t}, 10.0));
@@ -265,8 +265,8 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
                             [&](const SampleKey<float>& key) {
                               return emission_of<float>(
                                   r.view, 0,
-                                  way_seed<float>({SamplerKind::kIndependent, key, 1, o, d, t},
-                                                  VertexSet::kFlight),
+                                  Way<float>({SamplerKind::kIndependent, key, 1, o, d, t},
+                                             VertexSet::kFlight),
                                   o, d, t, true);
                             }),
                    expected, c.name);

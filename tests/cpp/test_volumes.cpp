@@ -69,7 +69,7 @@ TEST(Volumes, AreOnePicture) {
   EXPECT_GT(mean_of(expected).mean, 0.01);
   for (const uint32_t lanes : lane_widths())
     for (const uint32_t wave_size : {48u, 4096u})
-      for (const std::string& policy : {"none", "program", "material"}) {
+      for (const char* policy : {"none", "program", "material"}) {
         s.policy = policy;
         s.materialize = wave_size == 48 ? Materialize::kOff : Materialize::kOn;
         WaveRun run(scene, {s, lanes, accel->native_width()}, accel);

@@ -7,8 +7,9 @@
 ///     bool shines() const;                   whether it does
 ///     Color<F> emission(const Passage<F>&, const Mask<F>& active) const;    radiance on the way
 ///   template <typename F> using Programs;  what may be met, surfaces included: ProgramList
-///   template <typename F> Flight<F> fly(const Passage<F>&, const Mask<F>& active) const;
-///   template <typename F> Color<F> transmittance(const Passage<F>&, const Mask<F>& active) const;
+///   template <typename F> Flight<F> fly(const Passage<F>&, const Color<F>& throughput, const
+///   Mask<F>& active) const; template <typename F> Color<F> transmittance(const Passage<F>&, const
+///   Mask<F>& active) const;
 ///
 /// A program of its own shades what happens on the way (BsdfTraits::kOnSurface is false).
 ///

@@ -104,8 +104,8 @@ class PathTracer {
                              media_.template emission<F>(
                                  {settings_.sampler, key, depth, path.o, path.dir, hit.t}, true),
                          clamp_limit(settings_, depth)));
-        const Flight<F> flight =
-            media_.template fly<F>({settings_.sampler, key, depth, path.o, path.dir, hit.t}, true);
+        const Flight<F> flight = media_.template fly<F>(
+            {settings_.sampler, key, depth, path.o, path.dir, hit.t}, path.throughput, true);
         path.throughput = path.throughput * flight.weight;
         if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
       }

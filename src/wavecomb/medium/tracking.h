@@ -19,26 +19,37 @@
 
 namespace wavecomb {
 
+/// What a way draws from: the numbers of its vertex set, of which the first volume takes some as
+/// they are, well spread over a pixel's samples, and a seed for all others.
+template <typename F>
+struct Way {
+  Sample4<F> r;
+  UInt<F> seed;
+
+  Way(const Passage<F>& p, VertexSet set)
+      : r(sample_4d<F>(p.sampler, p.key, vertex_set(set, p.depth))),
+        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(p.key.pixel_hash, p.key.sample)) {}
+  /// Another one with numbers of its own.
+  Way branch(uint32_t number) const {
+    Way other = *this;
+    other.seed = hash_u32<UInt<F>>(seed, UInt<F>(0x2545f491u + number));
+    return other;
+  }
+};
+
 /// Numbers of a way through one volume, one after the other. Each lane counts its own.
 template <typename F>
 struct CollisionNumbers {
   UInt<F> seed, count{0u};
 
-  CollisionNumbers(const UInt<F>& way, uint32_t volume)
-      : seed(hash_u32<UInt<F>>(way, UInt<F>(0x9c8f2d3bu + volume))) {}
+  CollisionNumbers(const Way<F>& way, uint32_t volume)
+      : seed(hash_u32<UInt<F>>(way.seed, UInt<F>(0x9c8f2d3bu + volume))) {}
   F next(const Mask<F>& lanes) {
     const F number = unit_float<F>(hash_u32<UInt<F>>(seed, count));
     count = select(Mask<UInt<F>>(lanes), UInt<F>(count + 1u), count);
     return number;
   }
 };
-
-/// What a way draws from.
-template <typename F>
-inline UInt<F> way_seed(const Passage<F>& p, VertexSet set) {
-  return float_bits<F>(sample_4d<F>(p.sampler, p.key, vertex_set(set, p.depth)).x) ^
-         hash_u32<UInt<F>>(p.key.pixel_hash, p.key.sample);
-}
 
 namespace detail {
 
@@ -48,13 +59,13 @@ namespace detail {
 template <typename F, typename Collide>
 inline void each_collision(const PlacedGrid& placed, float scale, const Vec3<F>& o,
                            const Vec3<F>& d, const F& most, const Mask<F>& active,
-                           CollisionNumbers<F>& numbers, const Collide& collide) {
+                           CollisionNumbers<F>& numbers, const F* first, const Collide& collide) {
   if (scale <= 0) return;
   BrickWalk<F> walk(placed, o, d, most, active);
   // Optical depth that is left until the next collision.
-  const auto depth = [&](const Mask<F>& lanes) { return F(-log(F(1.f - numbers.next(lanes)))); };
+  const auto depth = [](const F& number) { return F(-log(F(1.f - number))); };
   if (none(walk.on())) return;
-  F left = depth(walk.on());
+  F left = depth(first ? *first : numbers.next(walk.on()));
   while (any(walk.on())) {
     const F majorant = walk.most() * scale;
     const F leave = walk.leave();
@@ -64,7 +75,7 @@ inline void each_collision(const PlacedGrid& placed, float scale, const Vec3<F>&
     if (any(collides)) {
       const F x = min(F(walk.x() + left / select(collides, majorant, F(1.f))), leave);
       walk.move_to(x, collides);
-      const F again = depth(collides);
+      const F again = depth(numbers.next(collides));
       left = select(collides, again, F(left - here));
       walk.stop(collide(collides, x, walk.at(x), majorant));
     } else {
@@ -87,7 +98,7 @@ struct Collision {
 
 /// Lanes fly through `v` until they collide or have come to `most`. Channel `hero` decides in each.
 template <typename F>
-inline Collision<F> fly_through(const VolumeRecord& v, uint32_t index, const UInt<F>& way,
+inline Collision<F> fly_through(const VolumeRecord& v, uint32_t index, const Way<F>& way,
                                 const UInt<F>& hero, const Vec3<F>& o, const Vec3<F>& d,
                                 const F& most, const Mask<F>& active) {
   using U = UInt<F>;
@@ -96,7 +107,7 @@ inline Collision<F> fly_through(const VolumeRecord& v, uint32_t index, const UIn
   const F of_hero = select(hero == U(0u), F(v.extinction[0]),
                            select(hero == U(1u), F(v.extinction[1]), F(v.extinction[2])));
   detail::each_collision<F>(
-      v.density, v.most_extinction, o, d, most, active, numbers,
+      v.density, v.most_extinction, o, d, most, active, numbers, index == 0 ? &way.r.z : nullptr,
       [&](const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant) {
         const F density = grid_value<F>(v.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
         const F real = min(F(density * of_hero), F(1.f));
@@ -117,18 +128,20 @@ inline Collision<F> fly_through(const VolumeRecord& v, uint32_t index, const UIn
   return out;
 }
 
-/// A free flight through all volumes. The path meets the volume's material where it stops; its
-/// weight is, by channel c with the probabilities p of what happened,
-///   p_c / mean over channels of p
-/// since each channel decides in a third of the flights (Wilkie et al., "Hero Wavelength Spectral
-/// Sampling", 2014).
+/// A free flight through all volumes. The path meets the volume's material where it stops. Each
+/// channel decides in so many flights as it has of the path's throughput T (hero wavelengths,
+/// Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). So the weight is, with the
+/// probabilities p_c of what happened,
+///   p_c sum(T) / sum over channels k of T_k p_k
+/// which leaves sum(T) as it was, however often the path is scattered.
 template <typename F>
 inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
-                             const Mask<F>& active) {
+                             const Color<F>& throughput, const Mask<F>& active) {
   using U = UInt<F>;
-  const U way = way_seed<F>(p, VertexSet::kFlight);
-  const F u = unit_float<F>(hash_u32<U>(way, U(0x51ed270bu))) * 3.f;
-  const U hero = select(u < 1.f, U(0u), select(u < 2.f, U(1u), U(2u)));
+  const Way<F> way(p, VertexSet::kFlight);
+  const F sum = throughput.x + throughput.y + throughput.z, u = way.r.y * sum;
+  const U hero =
+      select(u < throughput.x, U(0u), select(u < F(throughput.x + throughput.y), U(1u), U(2u)));
   Flight<F> f{Mask<F>(false), p.t, U(0u), Color<F>(F(1.f))};
   bool is_grey = true;
   for (uint32_t i = 0; i < volumes.count; ++i) {
@@ -154,15 +167,15 @@ inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
       f.weight *= fly_through<F>(volumes.volumes[i], i, way, hero, p.o, p.d, until, active).ratio;
     }
   }
-  const F mean = (f.weight.x + f.weight.y + f.weight.z) * (1.f / 3.f);
-  f.weight = f.weight * F(F(1.f) / select(mean > 0.f, mean, F(1.f)));
+  const F shares = dot(f.weight, throughput);
+  f.weight = f.weight * F(sum / select(shares > 0.f, shares, F(1.f)));
   return f;
 }
 
 /// Transmittance of p.o + x p.d, 0 < x < `most`, by ratio tracking (Novak, Selle and Jarosz,
 /// "Residual Ratio Tracking", 2014, eq. 9), which ends at random where little is left.
 template <typename F>
-inline Color<F> transmittance_through(const VolumeView& volumes, const UInt<F>& way,
+inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
                                       const Vec3<F>& o, const Vec3<F>& d, const F& most,
                                       const Mask<F>& active) {
   constexpr float kLittle = 0.1f;
@@ -172,7 +185,7 @@ inline Color<F> transmittance_through(const VolumeView& volumes, const UInt<F>& 
     const VolumeRecord& v = volumes.volumes[i];
     CollisionNumbers<F> numbers(way, i);
     detail::each_collision<F>(
-        v.density, v.most_extinction, o, d, most, on, numbers,
+        v.density, v.most_extinction, o, d, most, on, numbers, i == 0 ? &way.r.z : nullptr,
         [&](const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant) {
           const F density =
               grid_value<F>(v.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
@@ -196,7 +209,7 @@ inline Color<F> transmittance_through(const VolumeView& volumes, const UInt<F>& 
 /// Radiance that one volume sends along a way, by a point of it with density proportional to the
 /// grid's greatest values of its cells, and the transmittance of all volumes up to there.
 template <typename F>
-inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const UInt<F>& way,
+inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& way,
                             const Vec3<F>& o, const Vec3<F>& d, const F& most,
                             const Mask<F>& active) {
   const VolumeRecord& v = volumes.volumes[index];
@@ -212,8 +225,8 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const UIn
   });
   const Mask<F> shines = active & (total > 0.f);
   if (none(shines)) return Color<F>(F(0.f));
-  CollisionNumbers<F> numbers(way, index + 0x10000u);
-  const F wanted = numbers.next(shines) * total;
+  CollisionNumbers<F> numbers(way.branch(kMostVolumes), index);
+  const F wanted = (index == 0 ? way.r.w : numbers.next(shines)) * total;
   F before(0.f), x(0.f), greatest(0.f);
   Vec3<F> p(F(0.f));
   each_cell([&](const BrickWalk<F>& walk, const F& share) {
@@ -229,8 +242,7 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const UIn
   const Color<F> value = grid_color<F>(v.glow.grid, p, shines);
   const F weight = total / select(shines & (greatest > 0.f), greatest, F(1.f));
   const Color<F> emission{F(v.emission[0]), F(v.emission[1]), F(v.emission[2])};
-  const Color<F> through = transmittance_through<F>(
-      volumes, hash_u32<UInt<F>>(way, UInt<F>(0x2545f491u + index)), o, d, x, shines);
+  const Color<F> through = transmittance_through<F>(volumes, way.branch(index), o, d, x, shines);
   return select<F>(shines, value * emission * weight * through, Color<F>(F(0.f)));
 }
 

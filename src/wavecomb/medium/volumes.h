@@ -5,11 +5,9 @@
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/material/program_list.h"
 #include "wavecomb/medium/tracking.h"
+#include "wavecomb/medium/volume_bsdf.h"
 
 namespace wavecomb {
-
-template <typename F>
-class VolumeBsdf;
 
 /// What integrate/media.h asks for.
 class Volumes {
@@ -21,21 +19,20 @@ class Volumes {
   explicit Volumes(const VolumeView& volumes) : volumes_(volumes) {}
 
   template <typename F>
-  Flight<F> fly(const Passage<F>& p, const Mask<F>& active) const {
-    return fly_through<F>(volumes_, p, active);
+  Flight<F> fly(const Passage<F>& p, const Color<F>& throughput, const Mask<F>& active) const {
+    return fly_through<F>(volumes_, p, throughput, active);
   }
 
   template <typename F>
   Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
-    return transmittance_through<F>(volumes_, way_seed<F>(p, VertexSet::kShadow), p.o, p.d, p.t,
-                                    active);
+    return transmittance_through<F>(volumes_, Way<F>(p, VertexSet::kShadow), p.o, p.d, p.t, active);
   }
 
   bool shines() const { return volumes_.emits; }
   template <typename F>
   Color<F> emission(const Passage<F>& p, const Mask<F>& active) const {
     Color<F> sum(F(0.f));
-    const UInt<F> way = way_seed<F>(p, VertexSet::kFlight);
+    const Way<F> way(p, VertexSet::kFlight);
     for (uint32_t i = 0; i < volumes_.count; ++i)
       if (volumes_.volumes[i].emits) sum += emission_of<F>(volumes_, i, way, p.o, p.d, p.t, active);
     return sum;
