@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The names of all programs of surfaces, in the order of ProgramId. Who includes this knows that there are
-/// programs, and nothing of what they are: a change in one of them compiles none of his units.
+/// The names of all programs of surfaces, in the order of ProgramId. Who includes this knows that
+/// there are programs, and nothing of what they are: a change in one of them compiles none of his
+/// units.
 #pragma once
 
 #include <cstddef>
