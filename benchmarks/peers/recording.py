@@ -18,22 +18,25 @@ from wavecomb.usd import load_stage
 
 
 class RecordingBuilder(Recorded):
-    """Stands in for ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``."""
+    """Stands in for ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``.
+
+    What only ``native``, the builder itself, is told is not kept.
+    """
 
     def __init__(self) -> None:
         super().__init__()
-        self._native = _core.SceneBuilder()
+        self.native = _core.SceneBuilder()
         self.scene: _core.Scene | None = None
 
     def add_texture(self, pixels: NDArray[Any], **options: Any) -> int:
         """Keeps a texture."""
         self.textures.append({"pixels": pixels, **options})
-        return self._native.add_texture(pixels, **options)
+        return self.native.add_texture(pixels, **options)
 
     def add_material(self, program: str, **parameters: Any) -> int:
         """Keeps a material."""
         self.materials.append({"program": program, **parameters})
-        return self._native.add_material(program, **parameters)
+        return self.native.add_material(program, **parameters)
 
     def add_mesh(
         self,
@@ -48,7 +51,7 @@ class RecordingBuilder(Recorded):
         **labels: Any,
     ) -> int:
         """Keeps a mesh; labels, as for AOVs, are passed on."""
-        number = self._native.add_mesh(
+        number = self.native.add_mesh(
             positions,
             indices,
             normals=normals,
@@ -63,11 +66,11 @@ class RecordingBuilder(Recorded):
 
     def make_surfaces(self, descriptions: list[dict[str, Any]], threads: int = 0) -> list[Any]:
         """Refines subdivision surfaces; what comes of it is added as any mesh."""
-        return self._native.make_surfaces(descriptions, threads)
+        return self.native.make_surfaces(descriptions, threads)
 
     def replace_mesh(self, mesh: int, *arrays: Any, **options: Any) -> None:
         """Gives a kept mesh other arrays."""
-        self._native.replace_mesh(mesh, *arrays, **options)
+        self.native.replace_mesh(mesh, *arrays, **options)
         old = self.meshes[mesh]
         names = ("normals", "uvs", "face_materials")
         given = [options.get(name) for name in names]
@@ -78,12 +81,12 @@ class RecordingBuilder(Recorded):
     def add_group(self, name: str = "", root: str = "") -> int:
         """Keeps an empty group."""
         self.groups.append(Group())
-        return self._native.add_group(name, root)
+        return self.native.add_group(name, root)
 
     def add_to_group(self, group: int, mesh: int) -> None:
         """Keeps a mesh in a group."""
         self.groups[group].meshes.append(mesh)
-        self._native.add_to_group(group, mesh)
+        self.native.add_to_group(group, mesh)
 
     def add_instances(
         self,
@@ -95,27 +98,27 @@ class RecordingBuilder(Recorded):
     ) -> None:
         """Keeps placements of a group; labels are passed on."""
         self.groups[parent].children.append((child, np.asarray(transforms), materials))
-        self._native.add_instances(parent, child, transforms, materials, **labels)
+        self.native.add_instances(parent, child, transforms, materials, **labels)
 
     def add_light(self, kind: str, transform: NDArray[Any], **options: Any) -> int:
         """Keeps a light."""
         self.lights.append(
             {"kind": kind, "transform": np.asarray(transform, np.float64), **options}
         )
-        return self._native.add_light(kind, transform, **options)
+        return self.native.add_light(kind, transform, **options)
 
     def add_mesh_light(self, transform: NDArray[Any], material_sync: str, **options: Any) -> int:
         """Passes the light of a mesh on; peers get its material alone."""
-        return self._native.add_mesh_light(transform, material_sync, **options)
+        return self.native.add_mesh_light(transform, material_sync, **options)
 
     def set_camera(self, transform: NDArray[Any], **options: Any) -> None:
         """Keeps the camera."""
         self.camera = {"transform": np.asarray(transform, np.float64), **options}
-        self._native.set_camera(transform, **options)
+        self.native.set_camera(transform, **options)
 
     def build(self) -> RecordingBuilder:
         """Makes the native scene, and stands in for it."""
-        self.scene = self._native.build()
+        self.scene = self.native.build()
         self.bounds = np.array(self.scene.bounds, np.float64).reshape(2, 3)
         return self
 
