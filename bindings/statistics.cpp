@@ -152,6 +152,9 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   counts["records"] = s.records;
   counts["packets"] = s.packets;
   counts["packet_lanes"] = s.packet_lanes;
+  counts["volume_steps"] = s.volume_counts.steps;
+  counts["volume_collisions"] = s.volume_counts.collisions;
+  counts["volume_lanes"] = s.volume_counts.lanes;
   d["counts"] = counts;
   const auto rate = [&](uint64_t n) {
     return s.render_s > 0 ? static_cast<double>(n) / s.render_s : 0.0;

@@ -113,6 +113,8 @@ TEST(VolumeGrid, BadGridsAreRefused) {
   EXPECT_THROW(check_volume(make_box({0, 0, 0}, {1, 1, 1}, {1, -1, 1})), Error);
 }
 
+VolumeCounts counts;  ///< nobody reads
+
 /// The means by channel, with their standard errors, of what one(key) gives.
 struct Means {
   double mean[3], error[3];
@@ -191,7 +193,7 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
                             [&](const SampleKey<float>& key) {
                               const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, t};
                               return transmittance_through<float>(
-                                  r.view, Way<float>(p, VertexSet::kShadow), o, d, t, true);
+                                  r.view, Way<float>(p, VertexSet::kShadow, counts), o, d, t, true);
                             }),
                    {std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])}, c.name);
     }
@@ -204,7 +206,7 @@ TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
     const Records r(c.volumes);
     const auto flight = [&](const SampleKey<float>& key, float t) {
       return fly_through<float>(r.view, Passage<float>{SamplerKind::kIndependent, key, 1, o, d, t},
-                                {0.5f, 0.2f, 0.3f}, true);
+                                {0.5f, 0.2f, 0.3f}, true, counts);
     };
     for (const float t : {1.7f, 2.2f, kInf}) {
       const auto depth = c.depth(std::min(double{t}, 10.0));
@@ -266,7 +268,7 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
                               return emission_of<float>(
                                   r.view, 0,
                                   Way<float>({SamplerKind::kIndependent, key, 1, o, d, t},
-                                             VertexSet::kFlight),
+                                             VertexSet::kFlight, counts),
                                   o, d, t, true);
                             }),
                    expected, c.name);

@@ -127,6 +127,13 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
             f"policy {policy}: sorting {_percent(stats['sort_overhead'])} of shading with it, "
             f"lanes {_percent(stats['lane_utilisation'])} full"
         )
+        if counts.get("volume_lanes"):
+            ways = counts["rays"] + counts["shadow_rays"]
+            lines.append(
+                f"volumes: {counts['volume_steps'] / ways:.3g} steps a ray, "
+                f"{_percent(counts['volume_collisions'] / counts['volume_steps'])} of them "
+                f"collisions, lanes {_percent(counts['volume_steps'] / counts['volume_lanes'])} full"
+            )
         lines.append(
             f"runs of a material {coherence['run_length']:.3g} records; neighbours of one material "
             f"{_percent(coherence['material_homogeneity'])}, at one place of a texture "

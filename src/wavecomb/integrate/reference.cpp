@@ -23,7 +23,7 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
   const VolumeView& volumes = context_.scene.volumes;
   if (volumes.count > 0)
-    trace_task(context_, *workers_[i], task, Volumes(volumes));
+    trace_task(context_, *workers_[i], task, Volumes(volumes, workers_[i]->counts.volumes));
   else
     trace_task(context_, *workers_[i], task, NoMedia());
 }

@@ -11,6 +11,19 @@ namespace wavecomb {
 /// Depths that are counted one by one; deeper ones are added to the last.
 inline constexpr uint32_t kCountedDepths = 32;
 
+/// What ways through volumes took.
+struct VolumeCounts {
+  uint64_t steps = 0;       ///< cells that paths and shadow rays went through, and collisions there
+  uint64_t collisions = 0;  ///< of those, collisions with the majorant, real ones and others
+  uint64_t lanes = 0;       ///< lanes that took part, busy or not
+
+  void add(const VolumeCounts& o) {
+    steps += o.steps;
+    collisions += o.collisions;
+    lanes += o.lanes;
+  }
+};
+
 /// Counts of one worker, added up at the end.
 struct Counts {
   uint64_t samples = 0;  ///< paths started
@@ -19,6 +32,7 @@ struct Counts {
   uint64_t records = 0;       ///< hits shaded
   uint64_t packets = 0;       ///< shading packets run
   uint64_t packet_lanes = 0;  ///< lanes of those packets, full or not
+  VolumeCounts volumes;
   /// Rays, shadow rays and records of each depth (0: camera rays and what they hit).
   std::array<uint64_t, kCountedDepths> rays_at{}, shadow_rays_at{}, records_at{};
 
@@ -45,6 +59,7 @@ struct Counts {
     records += o.records;
     packets += o.packets;
     packet_lanes += o.packet_lanes;
+    volumes.add(o.volumes);
     for (size_t d = 0; d < kCountedDepths; ++d) {
       rays_at[d] += o.rays_at[d];
       shadow_rays_at[d] += o.shadow_rays_at[d];

@@ -15,6 +15,7 @@
 #include "wavecomb/core/hash.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/integrate/media.h"
+#include "wavecomb/integrate/statistics.h"
 #include "wavecomb/medium/brick_walk.h"
 
 namespace wavecomb {
@@ -25,10 +26,12 @@ template <typename F>
 struct Way {
   Sample4<F> r;
   UInt<F> seed;
+  VolumeCounts* counts;  ///< gets what it takes
 
-  Way(const Passage<F>& p, VertexSet set)
+  Way(const Passage<F>& p, VertexSet set, VolumeCounts& takes)
       : r(sample_4d<F>(p.sampler, p.key, vertex_set(set, p.depth))),
-        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(p.key.pixel_hash, p.key.sample)) {}
+        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(p.key.pixel_hash, p.key.sample)),
+        counts(&takes) {}
   /// Another one with numbers of its own.
   Way branch(uint32_t number) const {
     Way other = *this;
@@ -41,9 +44,10 @@ struct Way {
 template <typename F>
 struct CollisionNumbers {
   UInt<F> seed, count{0u};
+  VolumeCounts* counts;
 
   CollisionNumbers(const Way<F>& way, uint32_t volume)
-      : seed(hash_u32<UInt<F>>(way.seed, UInt<F>(0x9c8f2d3bu + volume))) {}
+      : seed(hash_u32<UInt<F>>(way.seed, UInt<F>(0x9c8f2d3bu + volume))), counts(way.counts) {}
   F next(const Mask<F>& lanes) {
     const F number = unit_float<F>(hash_u32<UInt<F>>(seed, count));
     count = select(Mask<UInt<F>>(lanes), UInt<F>(count + 1u), count);
@@ -71,6 +75,9 @@ inline void each_collision(const PlacedGrid& placed, float scale, const Vec3<F>&
     const F leave = walk.leave();
     const F here = majorant * (leave - walk.x());
     const Mask<F> collides = walk.on() & (left < here);
+    numbers.counts->lanes += kWidth<F>;
+    numbers.counts->steps += count<F>(walk.on());
+    numbers.counts->collisions += count<F>(collides);
     const Mask<F> passes = walk.on() & not_(collides);
     if (any(collides)) {
       const F x = min(F(walk.x() + left / select(collides, majorant, F(1.f))), leave);
@@ -136,9 +143,10 @@ inline Collision<F> fly_through(const VolumeRecord& v, uint32_t index, const Way
 /// which leaves sum(T) as it was, however often the path is scattered.
 template <typename F>
 inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
-                             const Color<F>& throughput, const Mask<F>& active) {
+                             const Color<F>& throughput, const Mask<F>& active,
+                             VolumeCounts& counts) {
   using U = UInt<F>;
-  const Way<F> way(p, VertexSet::kFlight);
+  const Way<F> way(p, VertexSet::kFlight, counts);
   const F sum = throughput.x + throughput.y + throughput.z, u = way.r.y * sum;
   const U hero =
       select(u < throughput.x, U(0u), select(u < F(throughput.x + throughput.y), U(1u), U(2u)));

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "wavecomb/integrate/statistics.h"
 #include "wavecomb/render/allotment.h"
 #include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/light_calibration.h"
@@ -50,6 +51,7 @@ struct RenderStatistics {
   std::vector<std::pair<std::string, double>> phases_s;
   uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
   uint64_t packets = 0, packet_lanes = 0;
+  VolumeCounts volume_counts;
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
   Sharing sharing;
