@@ -27,7 +27,7 @@ _GREETING = """renders OpenUSD stages on the CPU.
 """
 
 NAMES = (
-    *("render", "view", "info", "scene", "compare", "merge", "farm", "bench"),
+    *("render", "view", "info", "scene", "compare", "sheet", "merge", "farm", "bench"),
     *("doctor", "completion"),
 )
 """The commands, in the order of the help; ``wavecomb.cli.NAME`` has ``NAME_command``."""
