@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -232,3 +233,16 @@ def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
     write_png(tmp_path / "elsewhere" / "a.png", flat(RED))
     assert "no picture of one name" in failed("compare", frames, tmp_path / "elsewhere")
     assert "is one picture, and" in failed("compare", frames, one)
+
+
+def test_both_work_in_their_sandbox(frames: Path, others: Path, tmp_path: Path) -> None:
+    """As a command of its own: a child that writes its outputs only."""
+    page, sheet = tmp_path / "a.html", tmp_path / "b.html"
+    done = forks.wavecomb("sheet", frames / "shot.####.exr", "-o", sheet)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = forks.wavecomb("compare", frames, others, "--page", page)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert sheet.read_text().count("<li>") == 4 and page.read_text().count("<figure>") == 3
+    pair = [frames / f"shot.{k:04d}.exr" for k in (8, 9)]
+    done = forks.wavecomb("compare", *pair, "--wipe", tmp_path / "w.png", "--page", page)
+    assert (done.returncode, done.stderr) == (1, "")

@@ -137,7 +137,8 @@ def compare_command(
     from wavecomb.picture.files import check_writable
     from wavecomb.picture.thumbnails import Look
 
-    look = Look(exposure=exposure, tone_map=tone_map)
+    # What is compared is what is shown.
+    look = Look(denoised=False, exposure=exposure, tone_map=tone_map)
     for option, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
         if file is not None and not file.lower().endswith(ending):
             raise WavecombError(f"{option} {file}: the name must end in {ending}")

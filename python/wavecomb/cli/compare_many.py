@@ -81,7 +81,7 @@ def write_page(
 
 def write_pair_page(page: str, a: str, b: str, found: Comparison, kind: str, look: Look) -> None:
     """The page of two pictures, of which it is known how they differ."""
-    result = PairResult(os.path.basename(a), a, b, found)
+    result = PairResult("", a, b, found)
     write_page(page, [result], (a, b), None, None, kind, look)
 
 

@@ -68,7 +68,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     if os.path.realpath(output) in map(os.path.realpath, found.values()):
         raise WavecombError(f"-o {output}: is one of the pictures")
     check_writable(output)
-    look = Look(options["layer"], options["exposure"], options["tone_map"])
+    look = Look(options["layer"], exposure=options["exposure"], tone_map=options["tone_map"])
     if ending == ".png":
         _write_sheet(found, output, look, options)
     else:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+import os
 import tempfile
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -31,10 +32,14 @@ def encoded(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
     if kind == "jpeg":
         spec.attribute("Compression", _QUALITY)
         spec.attribute("jpeg:subsampling", "4:4:4")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"picture.{kind}")
-        write_bands(path, spec, iter([np.ascontiguousarray(codes)]))
-        return path.read_bytes()
+    # A file, not a folder of its own: that is all that a process in a sandbox may make.
+    number, name = tempfile.mkstemp(suffix=f".{kind}")
+    os.close(number)
+    try:
+        write_bands(name, spec, iter([np.ascontiguousarray(codes)]))
+        return Path(name).read_bytes()
+    finally:
+        os.unlink(name)
 
 
 def base64_text(data: bytes) -> str:

@@ -95,7 +95,7 @@ class Pair:
     """Two pictures of a page, and what is said of them.
 
     Attributes:
-        name: Of both.
+        name: Of both; "" where the page says it.
         facts: Lines of plain text.
         a: 8-bit sRGB codes, (height, width, 3).
         b: The reference, of the same size.
@@ -121,13 +121,14 @@ def pair_section(pair: Pair, key: str, names: tuple[str, str]) -> str:
     if pair.difference is not None:
         shown.append(("difference", pair.difference))
     figures = "".join(
-        f"<figure>{_image(codes, f'{pair.name}: {name}', 'png')}"
+        f"<figure>{_image(codes, f'{pair.name}: {name}' if pair.name else name, 'png')}"
         f"<figcaption>{escape(name)}</figcaption></figure>"
         for name, codes in shown
     )
     facts = "".join(f'<p class="facts">{escape(line)}</p>' for line in pair.facts)
+    head = f"<h2>{escape(pair.name)}</h2>" if pair.name else ""
     return (
-        f'<section id="{key}"><h2>{escape(pair.name)}</h2>{facts}'
+        f'<section id="{key}">{head}{facts}'
         f'<div class="views" id="{key}-views">{figures}</div></section>'
     )
 

@@ -82,8 +82,15 @@ def wipe(a: Codes, b: Codes, at: float = 0.5, names: tuple[str, str] = ("A", "B"
     if column > 0:
         texts.append((6, _TEXT + 6, names[0]))
     if column < width:
-        texts.append((max(width - 8 * len(names[1]) - 6, column + 6), _TEXT + 6, names[1]))
+        texts.append((max(width - _length(names[1]) - 6, column + 6), _TEXT + 6, names[1]))
     return _written(made, texts, width, shadow=True)
+
+
+def _length(text: str) -> int:
+    """Of a text, in pixels."""
+    import OpenImageIO as oiio
+
+    return int(oiio.ImageBufAlgo.text_size(text, _TEXT).width)
 
 
 def _written(
@@ -95,7 +102,7 @@ def _written(
     canvas = oiio.ImageBuf(np.ascontiguousarray(codes))
     edge: dict[str, Any] = {"shadow": 2} if shadow else {}
     for x, y, text in texts:
-        while len(text) > 4 and oiio.ImageBufAlgo.text_size(text, _TEXT).width > room:
+        while len(text) > 4 and _length(text) > room:
             text = "…" + text[2:]
         oiio.ImageBufAlgo.render_text(canvas, x, y, text, _TEXT, "", (0.9, 0.9, 0.9), **edge)
     return np.asarray(canvas.get_pixels(oiio.UINT8), np.uint8).reshape(codes.shape)

@@ -29,12 +29,14 @@ class Look:
     """How files are shown.
 
     Attributes:
-        layer: Of the file; "": denoised where it is there, else the beauty.
+        layer: Of the file; "": its colours.
+        denoised: Whether those are the layer denoised where it is there, and not the beauty.
         exposure: In stops, of light.
         tone_map: "clamp" or "neutral", of light.
     """
 
     layer: str = ""
+    denoised: bool = True
     exposure: float = 0.0
     tone_map: Transfer = "clamp"
 
@@ -46,7 +48,8 @@ class Look:
             OSError: It cannot be read.
         """
         layers = read_layers(file)
-        name = self.layer or ("denoised" if "denoised" in layers else "beauty")
+        is_better = self.denoised and "denoised" in layers
+        name = self.layer or ("denoised" if is_better else "beauty")
         if not self.layer and name not in layers and len(layers) == 1:
             name = next(iter(layers))
         if name not in layers:
