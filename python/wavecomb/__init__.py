@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from wavecomb.picture.rendered import Picture
     from wavecomb.run.sequence import render_frames
     from wavecomb.scheduling import SchedulingPolicy
+    from wavecomb.window import Window, view
 
     __version__: str
 
@@ -36,12 +37,14 @@ __all__ = [
     "SchedulingPolicy",
     "Settings",
     "WavecombError",
+    "Window",
     "__version__",
     "compare",
     "cryptomatte",
     "load",
     "render",
     "render_frames",
+    "view",
 ]
 
 _HOMES = {
@@ -52,10 +55,12 @@ _HOMES = {
     "SchedulingPolicy": "wavecomb.scheduling",
     "Settings": "wavecomb._core",
     "WavecombError": "wavecomb.errors",
+    "Window": "wavecomb.window",
     "compare": "wavecomb.picture.compare",
     "load": "wavecomb.api",
     "render": "wavecomb.api",
     "render_frames": "wavecomb.run.sequence",
+    "view": "wavecomb.window",
 }
 
 

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.load_options import LoadOptions, split
 from wavecomb.picture.rendered import Picture, picture_of
+from wavecomb.run import live
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, prepare
+from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
     from wavecomb.run.boxed.reader import Reader
-    from wavecomb.run.watcher import Watcher
+    from wavecomb.run.live import Shown
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
 
@@ -96,7 +98,7 @@ def render(
     *,
     size: tuple[int, int] | None = None,
     spp: int = 64,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     policy: str | SchedulingPolicy | None = None,
     costs: str | Mapping[str, Mapping[str, float]] | None = None,
     aovs: Iterable[str] | None = None,
@@ -113,7 +115,8 @@ def render(
         size: Width and height, pixels; by default of a path's render settings, else 600 x 600.
         spp: Samples per pixel; with ``adaptive`` or ``noise`` the most of them.
         progress: Called as progress(samples_done, samples_total) about ten times a second; return
-            False to stop and keep what is done.
+            False to stop and keep what is done. In a notebook, None shows a bar and the picture so
+            far; False shows nothing, True shows a bar on a terminal, too.
         policy: Order of shading: a name, or an object of a ``SchedulingPolicy`` of your own. No
             policy changes the picture.
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
@@ -164,9 +167,12 @@ def render(
         scene, loaded, stage = _resolve(source, loading, isolate, chosen, reader)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
-    watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume)
     again = loaded if loaded is source else None
-    result, is_built = _render(scene, again, chosen, progress, own, profile, watcher, state)
+    told, asked = (progress, False) if callable(progress) else (None, progress)
+    space = "rec709" if loaded is None else loaded.working_space
+    with live.watching(asked, space) as shown:
+        watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume, shown)
+        result, is_built = _render(scene, again, chosen, told, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded, is_built=is_built)
     return picture_of(result, stats, scene=scene, aovs=names)
 
@@ -204,20 +210,24 @@ def _keeping(
     checkpoint: str | os.PathLike[str] | None,
     every: float,
     resume: str | os.PathLike[str] | None,
+    shown: Shown | None,
 ) -> tuple[Watcher | None, dict[str, Any] | None]:
-    """Who saves checkpoints, and the state to go on from."""
+    """Who saves checkpoints and shows what goes on, and the state to go on from."""
+    sinks: list[Sink] = [] if shown is None else list(shown.sinks)
+    reporter = None if shown is None else shown.reporter
     if checkpoint is None and resume is None:
-        return None, None
+        return (None if shown is None else Watcher(sinks, reporter=reporter)), None
     from wavecomb.run.checkpoint import check_fits, load_checkpoint, make_header
-    from wavecomb.run.watcher import CheckpointSink, Watcher
 
     header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
     before = load_checkpoint(resume) if resume is not None else None
     if before is not None:
         check_fits(before, header)
     seconds = before.seconds if before is not None else 0.0
-    sinks = [CheckpointSink(checkpoint, every, header, seconds)] if checkpoint is not None else []
-    return Watcher(sinks, warn=_warn), before.state if before is not None else None
+    if checkpoint is not None:
+        sinks.append(CheckpointSink(checkpoint, every, header, seconds))
+    watcher = Watcher(sinks, reporter=reporter, warn=_warn)
+    return watcher, before.state if before is not None else None
 
 
 def _warn(line: str) -> None:

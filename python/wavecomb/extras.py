@@ -4,9 +4,44 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
+from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.errors import WavecombError
+
+
+@dataclass(frozen=True)
+class Extra:
+    """An extra of pyproject.toml.
+
+    Attributes:
+        brings: What it is for, to people.
+        modules: That it installs, as imported.
+    """
+
+    brings: str
+    modules: tuple[str, ...]
+
+
+EXTRAS = {
+    "gui": Extra("the window", ("PySide6.QtWidgets", "pyqtgraph")),
+    "denoise": Extra("denoising", ("pyoidn",)),
+    "farm": Extra("farms on Dask, certificates", ("cryptography", "distributed")),
+    "bench": Extra(
+        "SSIM, FLIP, z-tests, reports", ("flip_evaluator", "matplotlib", "pandas", "scipy")
+    ),
+}
+"""By name; those for people who work on Wavecomb itself are not here."""
+
+
+def install_command(extra: str) -> str:
+    """What brings it.
+
+    >>> install_command("gui")
+    "pip install 'wavecomb[gui]'"
+    """
+    return f"pip install 'wavecomb[{extra}]'"
 
 
 def needed(module: str, what: str, extra: str = "bench") -> Any:
@@ -25,5 +60,27 @@ def needed(module: str, what: str, extra: str = "bench") -> Any:
     except ImportError as error:
         package = module.partition(".")[0].replace("_", "-")
         raise WavecombError(
-            f"{what} needs {package} ({error}): pip install 'wavecomb[{extra}]'"
+            f"{what} needs {package} ({error}): {install_command(extra)}"
         ) from error
+
+
+def missing_modules(extra: str) -> list[str]:
+    """Modules of an extra that are not installed; nothing is imported."""
+    missing = []
+    for module in EXTRAS[extra].modules:
+        package = module.partition(".")[0]
+        if importlib.util.find_spec(package) is None:
+            missing.append(package.replace("_", "-"))
+    return missing
+
+
+def check_installed(extra: str, what: str) -> None:
+    """Raises WavecombError, which says how to install it, unless an extra is installed.
+
+    Args:
+        extra: Of pyproject.toml.
+        what: Who needs it, as the subject of the message.
+    """
+    missing = missing_modules(extra)
+    if missing:
+        raise WavecombError(f"{what} needs {' and '.join(missing)}: {install_command(extra)}")

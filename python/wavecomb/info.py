@@ -73,8 +73,8 @@ def machine_info() -> dict[str, Any]:
     }
 
 
-def machine_lines(info: dict[str, Any]) -> list[str]:
-    """The same for people."""
+def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
+    """The same for people: names, and what there is."""
     from wavecomb.isa import library_text
 
     memory, limit = info["memory_bytes"], info["memory_limit_bytes"]
@@ -86,14 +86,19 @@ def machine_lines(info: dict[str, Any]) -> list[str]:
         files = "files are not kept"
     calls = "no sockets, no programs" if sandbox["seccomp"] else "system calls are not kept"
     has, may = (memory or 0) / 1e9, (limit or 0) / 1e9
-    lines = [
-        f"cores          {info['cores']}",
-        f"memory         {has:.1f} GB; a child may take {may:.1f} GB",
-        f"native         {library_text()}",
-        f"texture limit  {info['texture_store']['obstacle'] or 'by a store'}",
-        f"sandbox        {files}; {calls}",
+    return [
+        ("cores", str(info["cores"])),
+        ("memory", f"{has:.1f} GB; a child may take {may:.1f} GB"),
+        ("native", library_text()),
+        ("texture limit", info["texture_store"]["obstacle"] or "by a store"),
+        ("sandbox", f"{files}; {calls}"),
     ]
-    return lines + [f"  not there    {line}" for line in sandbox["lacks"]]
+
+
+def machine_lines(info: dict[str, Any]) -> list[str]:
+    """The same as lines."""
+    lines = [f"{name:13}  {text}" for name, text in machine_rows(info)]
+    return lines + [f"  not there    {line}" for line in info["sandbox"]["lacks"]]
 
 
 def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> None:

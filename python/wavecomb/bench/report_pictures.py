@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import base64
-import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +16,8 @@ from wavecomb.bench.figures_style import Drawn
 from wavecomb.bench.figures_verdicts import difference_figure
 from wavecomb.bench.report_html import escape, key_of
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import write_png
+from wavecomb.picture.embedded import data_uri, smaller
+from wavecomb.picture.image import display
 
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results
@@ -184,10 +183,4 @@ def _read(path: Path) -> NDArray[Any]:
 
 
 def _data_uri(pixels: NDArray[Any]) -> str:
-    step = -(-max(pixels.shape[:2]) // LARGEST)
-    height, width = (side // step * step for side in pixels.shape[:2])
-    blocks = pixels[:height, :width].reshape(height // step, step, width // step, step, 3)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.png"
-        write_png(path, blocks.mean(axis=(1, 3)))
-        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+    return data_uri(display(smaller(pixels, LARGEST)))

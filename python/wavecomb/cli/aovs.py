@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from wavecomb.run import aovs as aov_names
 
@@ -18,6 +19,11 @@ _COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "d
 
 class _AovOption(click.Option):
     """Its help names what the core keeps, which is loaded when it is read."""
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Names of AOVs."""
+        names = (*aov_names.names(), *aov_names.groups())
+        return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """The option, and its help."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from typing import Any
 
 import click
@@ -25,6 +26,9 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
         "wavecomb compare new.exr reference.exr --tolerance 1e-4 --json",
         "wavecomb compare new.exr reference.exr --metric ssim --metric flip-hdr",
         "wavecomb compare new.exr reference.exr --variance-b reference_variance.exr",
+        "wavecomb compare new.exr reference.exr --wipe wipe.png --page wipe.html",
+        "wavecomb compare new/ reference/ --page differences.html",
+        "wavecomb compare new/shot.####.exr reference/shot.####.exr --tolerance 1e-4",
     ),
 )
 @click.argument("a", type=click.Path())
@@ -41,7 +45,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     type=Real(),
     default=0.0,
     metavar="STOPS",
-    help="For psnr, ssim and flip-ldr: pictures times 2^STOPS.  [default: 0]",
+    help="For psnr, ssim, flip-ldr, --page and --wipe: pictures times 2^STOPS.  [default: 0]",
 )
 @click.option(
     "--variance-a",
@@ -66,6 +70,21 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     show_default=True,
     help="What --heatmap shows.",
 )
+@click.option(
+    "--page",
+    type=click.Path(),
+    metavar="FILE.html",
+    help="A page in which A and B are wiped, with their difference.",
+)
+@click.option("--wipe", type=click.Path(), metavar="FILE.png", help="A left of a line, B right.")
+@click.option("--at", type=click.FloatRange(0, 1), default=0.5, metavar="X", help="Where the line "
+              "of --wipe is, of the width.  [default: 0.5]")  # fmt: skip
+@click.option(
+    "--tone-map",
+    type=click.Choice(["clamp", "neutral"]),
+    default="clamp",
+    help="Of --page and --wipe.  [default: clamp]",
+)
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 @click.option(
     "--tolerance",
@@ -84,10 +103,17 @@ def compare_command(
     significance: float,
     heatmap: str | None,
     kind: str,
+    page: str | None,
+    wipe: str | None,
+    at: float,
+    tone_map: Any,
     as_json: bool,
     tolerance: float | None,
 ) -> None:
     """Say how picture A differs from picture B, the reference.
+
+    Two folders are compared by the names below them, two sequences (shot.####.exr) by their frames;
+    a picture without its other counts as different.
 
     Equal means bit for bit, in every layer that both have. relMSE is the mean of
     (A - B)^2 / (B^2 + 0.01), and trimmed the same without the 0.1 % of pixels with the largest
@@ -101,11 +127,32 @@ def compare_command(
     Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different,
     2 an error.
     """
-    enter_to_read((a, b, variance_a, variance_b), (heatmap,))
+    from wavecomb.picture.collect import is_many
+
+    many = is_many(a) or is_many(b)
+    reads = [os.path.dirname(p) or "." if many and not os.path.isdir(p) else p for p in (a, b)]
+    enter_to_read((*reads, variance_a, variance_b), (heatmap, page, wipe))
     from wavecomb.errors import WavecombError
     from wavecomb.picture.compare import compare
     from wavecomb.picture.files import check_writable
+    from wavecomb.picture.thumbnails import Look
 
+    # What is compared is what is shown.
+    look = Look(denoised=False, exposure=exposure, tone_map=tone_map)
+    for option, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
+        if file is not None and not file.lower().endswith(ending):
+            raise WavecombError(f"{option} {file}: the name must end in {ending}")
+        if file is not None:
+            check_writable(file)
+    if many:
+        _refuse({"--heatmap": heatmap, "--wipe": wipe, "--variance-a": variance_a,
+                 "--variance-b": variance_b, "--metric": metrics})  # fmt: skip
+        from wavecomb.cli.compare_many import compare_many
+
+        passed = compare_many(
+            a, b, tolerance=tolerance, as_json=as_json, page=page, kind=kind, look=look
+        )
+        raise click.exceptions.Exit(0 if passed else 1)
     testing = variance_a is not None or variance_b is not None
     if kind == "z" and not testing:
         raise WavecombError("--map z needs --variance-a or --variance-b")
@@ -125,6 +172,8 @@ def compare_command(
             )
         if heatmap is not None:
             _write_map(heatmap, a, b, kind, exposure, test)
+        if page is not None or wipe is not None:
+            _write_looks(a, b, result, page, wipe, at, kind, look)
     except ValueError as error:
         raise WavecombError(str(error)) from error
     passed = result.equal or (tolerance is not None and result.within(tolerance))
@@ -141,6 +190,28 @@ def compare_command(
             within = result.within(tolerance)
             click.echo("within the tolerance" if within else "not within the tolerance")
     raise click.exceptions.Exit(0 if passed else 1)
+
+
+def _refuse(options: dict[str, Any]) -> None:
+    """Raises WavecombError for what is of two pictures."""
+    from wavecomb.errors import WavecombError
+
+    for name, value in options.items():
+        if value:
+            raise WavecombError(
+                f"{name} is of two pictures; --page FILE.html shows those of folders"
+            )
+
+
+def _write_looks(
+    a: str, b: str, found: Any, page: str | None, wipe: str | None, at: float, kind: str, look: Any
+) -> None:
+    from wavecomb.cli.compare_many import write_pair_page, write_wipe
+
+    if page is not None:
+        write_pair_page(page, a, b, found, kind, look)
+    if wipe is not None:
+        write_wipe(wipe, a, b, at, look)
 
 
 def _measure(a: str, b: str, metrics: tuple[str, ...], exposure: float) -> dict[str, float]:

@@ -18,8 +18,19 @@ from wavecomb.run.progress import keep_interrupts
 ERROR = 2
 INTERRUPTED = 130
 
+_GREETING = """renders OpenUSD stages on the CPU.
 
-NAMES = ("render", "view", "info", "scene", "compare", "merge", "farm", "bench")
+  wavecomb render shot.usd -o shot.exr --png shot.png   a stage of yours
+  wavecomb scene mixed -o mixed.usdc                    none at hand: a stage to try
+  wavecomb view shot.usd                                look at it in a window
+  wavecomb doctor                                       what is installed, and what is missing
+  wavecomb --help                                       all commands; COMMAND --help: its options
+"""
+
+NAMES = (
+    *("render", "view", "info", "scene", "compare", "sheet", "merge", "farm", "bench"),
+    *("doctor", "completion"),
+)
 """The commands, in the order of the help; ``wavecomb.cli.NAME`` has ``NAME_command``."""
 
 
@@ -43,6 +54,15 @@ class Commands(click.Group):
         )
         return command
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Without any, says what to do."""
+        if not args and not ctx.resilient_parsing:
+            from wavecomb.version import version
+
+            click.echo(f"Wavecomb {version()} {_GREETING}", err=True)
+            ctx.exit(ERROR)
+        return super().parse_args(ctx, args)
+
     def main(
         self,
         args: Sequence[str] | None = None,
@@ -59,6 +79,9 @@ class Commands(click.Group):
         keep_interrupts()
         try:
             code = super().main(args, prog_name, complete_var, False, **extra)
+        except click.exceptions.NoArgsIsHelpError as error:
+            click.echo(error.format_message(), err=True)
+            sys.exit(ERROR)
         except click.ClickException as error:
             _fail(error.format_message(), _help_of(error))
         except (click.Abort, KeyboardInterrupt):

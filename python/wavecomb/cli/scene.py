@@ -12,6 +12,13 @@ from wavecomb.cli.options import examples
 from wavecomb.cli.row_options import Real
 
 
+def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """For the shell: the scenes whose names begin so."""
+    from wavecomb.scenes import SCENES
+
+    return [name for name in SCENES if name.startswith(begun)]
+
+
 @click.command(
     "scene",
     epilog=examples(
@@ -24,7 +31,7 @@ from wavecomb.cli.row_options import Real
         "wavecomb scene mixed -o plain.usdc --plain",
     ),
 )
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=_names)
 @click.option("-o", "--output", type=click.Path(), metavar="FILE", help=".usda, .usdc or .usd.")
 @click.option("--list", "list_", is_flag=True, help="List the scenes.")
 @click.option("--dragon", type=click.Path(), metavar="FILE", help="OBJ, PLY or USD mesh to use.")

@@ -23,20 +23,16 @@ from PySide6.QtWidgets import QApplication, QWidget
 from wavecomb.errors import WavecombError
 from wavecomb.gui import theme
 from wavecomb.gui.messages import install_hooks
+from wavecomb.gui.needs import NO_DISPLAY, has_display
 from wavecomb.gui.setup import Setup
-
-_NO_DISPLAY = (
-    "no display to open a window on: set DISPLAY or WAYLAND_DISPLAY (over ssh: ssh -X), "
-    "or use `wavecomb render`"
-)
 
 
 def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
     """Qt's own messages: what ends the process becomes one line, the rest is for developers."""
     if kind == QtMsgType.QtFatalMsg:
         line = " ".join(text.split())
-        if "platform plugin" in line and not _has_display():
-            line = _NO_DISPLAY
+        if "platform plugin" in line and not has_display():
+            line = NO_DISPLAY
         elif "platform plugin" in line or "display" in line:
             line = f"no window can be opened: {line}"
         sys.stderr.write(f"error: {line}\n")
@@ -46,14 +42,10 @@ def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
         sys.stderr.write(f"qt: {text}\n")
 
 
-def _has_display() -> bool:
-    return any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
-
-
 def make_application() -> QApplication:
     """The application; raises WavecombError where there is no display."""
-    if sys.platform.startswith("linux") and not _has_display():
-        raise WavecombError(_NO_DISPLAY)
+    if not has_display():
+        raise WavecombError(NO_DISPLAY)
     qInstallMessageHandler(_qt_says)
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(
         Qt.HighDpiScaleFactorRoundingPolicy.PassThrough

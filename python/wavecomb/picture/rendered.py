@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from wavecomb.picture.image import Transfer
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Picture:
     """A rendered picture. Row 0 is the top.
 
@@ -171,6 +171,26 @@ class Picture:
 
         shown = self.beauty if self.denoised is None else self.denoised
         return to_rec709(shown, self.stats.get("working_space", "rec709"))
+
+    def __repr__(self) -> str:
+        from wavecomb.picture.notebook import facts
+
+        return f"<wavecomb.Picture {facts(self)}; {', '.join(self.layers())}>"
+
+    def _repr_png_(self) -> bytes:
+        """In a notebook: the picture, highlights rolled off towards white."""
+        from wavecomb.picture.embedded import encoded
+        from wavecomb.picture.notebook import codes
+
+        return encoded(codes(self))
+
+    def _repr_mimebundle_(
+        self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
+    ) -> dict[str, str]:
+        """In a notebook: the picture, a line about it, and its layers behind a fold."""
+        from wavecomb.picture.notebook import mime_bundle
+
+        return mime_bundle(self, include, exclude)
 
     def window(self) -> tuple[int, int, int, int] | None:
         """Where a cropped picture lies, as ``write_exr`` takes it; None: it is whole."""

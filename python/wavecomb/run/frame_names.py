@@ -87,6 +87,29 @@ def has_place(pattern: str) -> bool:
     return "<frame>" in name or bool(_HASHES.search(name) or _PRINTF.search(name))
 
 
+def matching(pattern: str) -> dict[float, str]:
+    """The files that are there of a name with a place for the frame, in the order of frames.
+
+    Of two names of one frame (``a.7.exr``, ``a.0007.exr``) the one that ``fill`` gives counts.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
+    folder, name = os.path.split(pattern)
+    parts = re.split(r"(<frame>|#+|%0?\d*d)", name)
+    text = "".join(r"([+-]?\d+(?:\.\d+)?)" if k % 2 else re.escape(p) for k, p in enumerate(parts))
+    shape = re.compile(text)
+    found: dict[float, str] = {}
+    for file in sorted(os.listdir(folder or os.curdir)):
+        match = shape.fullmatch(file)
+        if match is None or len({float(group) for group in match.groups()}) != 1:
+            continue
+        frame, path = float(match[1]), os.path.join(folder, file)
+        if frame not in found or path == fill(pattern, frame):
+            found[frame] = path
+    return dict(sorted(found.items()))
+
+
 def fill(pattern: str, frame: float) -> str:
     """The name of the file of a frame.
 

@@ -158,6 +158,25 @@ class Silent:
         """Says nothing."""
 
 
+def figures(status: Mapping[str, Any]) -> list[str]:
+    """What is said beside a bar: passes, rates, error, time left.
+
+    Args:
+        status: The keys of ``Snapshot.status`` in _core.pyi.
+    """
+    rates = speed(status)
+    said = [
+        f"pass {status['passes']}",
+        f"{count_text(rates['samples_per_s'])} samples/s",
+        f"{count_text(rates['rays_per_s'])} rays/s",
+    ]
+    if status["error"] is not None:
+        said.append(f"error {100 * status['error']:.2g} %")
+    if rates["seconds_left"] is not None:
+        said.append(f"{time_text(rates['seconds_left'])} left")
+    return said
+
+
 class ProgressBar(Silent):
     """A bar with passes, samples and rays per second, error and time left.
 
@@ -187,21 +206,11 @@ class ProgressBar(Silent):
 
     def show(self, status: Mapping[str, Any]) -> None:
         """Draws the bar."""
-        rates = speed(status)
-        figures = [
-            f"pass {status['passes']}",
-            f"{count_text(rates['samples_per_s'])} samples/s",
-            f"{count_text(rates['rays_per_s'])} rays/s",
-        ]
-        if status["error"] is not None:
-            figures.append(f"error {100 * status['error']:.2g} %")
-        if rates["seconds_left"] is not None:
-            figures.append(f"{time_text(rates['seconds_left'])} left")
         self._bar.update(
             self._task,
             completed=status["samples_done"],
             total=status["samples_total"],
-            figures=", ".join(figures),
+            figures=", ".join(figures(status)),
         )
         self._bar.refresh()
 
@@ -225,8 +234,8 @@ def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
         task = bar.add_task("", total=None, figures="")
 
         def show(done: int, found: int) -> None:
-            figures = f"{done:,} of {found:,} prims"
-            bar.update(task, completed=done, total=found, figures=figures)
+            text = f"{done:,} of {found:,} prims"
+            bar.update(task, completed=done, total=found, figures=text)
 
         yield show
 

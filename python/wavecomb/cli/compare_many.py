@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb compare`` of folders and of sequences, and the pages and wipes of any."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import click
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.compare import Comparison
+from wavecomb.picture.compare_folders import Folders, PairResult, as_plain, pair_up
+from wavecomb.picture.files import replacing
+from wavecomb.picture.heatmap import KINDS, Kind
+from wavecomb.picture.thumbnails import Look
+
+
+def compare_many(
+    a: str, b: str, *, tolerance: float | None, as_json: bool, page: str | None, kind: str,
+    look: Look,
+) -> bool:  # fmt: skip
+    """Compares all pairs and says what came of it; whether all pass, and none lacks its other.
+
+    Raises:
+        WavecombError: There is nothing to compare.
+    """
+    folders = pair_up(a, b)
+    results: list[PairResult] = []
+    for one in folders.compared():
+        results.append(one)
+        if not as_json:
+            click.echo(_line(one, tolerance))
+    good = sum(one.passed(tolerance) for one in results)
+    passed = good == len(results) and not folders.only_a and not folders.only_b
+    if page is not None:
+        write_page(page, results, (a, b), folders, tolerance, kind, look)
+    if as_json:
+        pairs = [as_plain(one, tolerance) for one in results]
+        document = {"a": a, "b": b, "tolerance": tolerance, "passed": passed, "pairs": pairs,
+                    "only_a": folders.only_a, "only_b": folders.only_b}  # fmt: skip
+        click.echo(json.dumps(document, indent=2))
+        return passed
+    for label, names in (("A", folders.only_a), ("B", folders.only_b)):
+        for name in names:
+            click.echo(f"{name}: only in {label}")
+    missing = len(folders.only_a) + len(folders.only_b)
+    more = f"; {missing} have no other" if missing else ""
+    click.echo(f"{good} of {len(results)} pairs pass{more}")
+    return passed
+
+
+def _line(one: PairResult, tolerance: float | None) -> str:
+    found = one.result
+    if found is None:
+        return f"{one.name}: {one.problem}"
+    if found.equal:
+        return f"{one.name}: equal, bit for bit"
+    word = "within the tolerance" if one.passed(tolerance) else "different"
+    share = 100.0 * found.pixels_different / (found.width * found.height)
+    return (
+        f"{one.name}: {word}: {share:.3g} % of pixels, RMSE {found.rmse:.4g}, "
+        f"relMSE {found.rel_mse:.4g}, largest {found.max_abs:.4g}"
+    )
+
+
+def write_page(
+    page: str, results: list[PairResult], sources: tuple[str, str], folders: Folders | None,
+    tolerance: float | None, kind: str, look: Look,
+) -> None:  # fmt: skip
+    """Writes the page of pairs, whole or not at all."""
+    from wavecomb.picture.compare_page import compare_page
+
+    chosen: Kind = next((one for one in KINDS if one == kind), "absolute")
+    text = compare_page(
+        results, look, sources=sources, folders=folders, tolerance=tolerance, kind=chosen
+    )
+    with replacing(page) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def write_pair_page(page: str, a: str, b: str, found: Comparison, kind: str, look: Look) -> None:
+    """The page of two pictures, of which it is known how they differ."""
+    result = PairResult("", a, b, found)
+    write_page(page, [result], (a, b), None, None, kind, look)
+
+
+def write_wipe(file: str, a: str, b: str, at: float, look: Look) -> None:
+    """Writes A and B with a line between them as a PNG.
+
+    Raises:
+        WavecombError: They have other sizes.
+    """
+    from wavecomb.picture.image import write_png_codes
+    from wavecomb.picture.sheet import wipe
+
+    shown = look.codes(a), look.codes(b)
+    if shown[0].shape != shown[1].shape:
+        raise WavecombError(f"{a} and {b}: only pictures of one size can be wiped")
+    names = (os.path.basename(a), os.path.basename(b))
+    write_png_codes(file, wipe(*shown, at, names if names[0] != names[1] else ("A", "B")))

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``wavecomb sheet``."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import click
+
+from wavecomb.cli.options import examples, isolate_option
+from wavecomb.cli.row_options import Real
+from wavecomb.cli.sandbox import enter_to_read
+
+
+@click.command(
+    "sheet",
+    epilog=examples(
+        "wavecomb sheet out/shot.####.exr -o sheet.png --columns 8",
+        "wavecomb sheet out/shot.####.exr -o shot.html --fps 24",
+        "wavecomb sheet out/ -o depth.png --layer depth",
+        "wavecomb sheet before.exr after.exr -o both.png --width 480 --exposure 1",
+    ),
+)
+@click.argument("pictures", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "-o", "--output", required=True, type=click.Path(), metavar="FILE",
+    help=".png: a contact sheet; .html: a page that plays them.",
+)  # fmt: skip
+@click.option("--layer", default="", metavar="NAME", help="Of EXR files.  [default: denoised "
+              "where it is there, else beauty]")  # fmt: skip
+@click.option(
+    "--width", type=click.IntRange(16, 8192), metavar="PX",
+    help="Of each picture at most.  [default: 240; .html: 960]",
+)  # fmt: skip
+@click.option("--columns", type=click.IntRange(1), metavar="N",
+              help="Of the contact sheet.  [default: as many as make it wide]")  # fmt: skip
+@click.option("--fps", type=Real(0, above=True), default=24.0, metavar="X",
+              help="Frames a second of the page.  [default: 24]")  # fmt: skip
+@click.option("--title", metavar="TEXT", help="Of the page.  [default: the first name]")
+@click.option("--lossless", is_flag=True, help="Pictures of the page as PNG, not as JPEG.")
+@click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="In stops, of light.")
+@click.option(
+    "--tone-map", type=click.Choice(["clamp", "neutral"]), default="clamp",
+    help="Of light: cut at 1, or roll highlights off.  [default: clamp]",
+)  # fmt: skip
+@isolate_option
+def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> None:
+    """Put PICTURES side by side: files, folders, or names with a place for the frame.
+
+    A page (.html) has all pictures in itself and plays them; it needs no other file.
+    """
+    from wavecomb.picture.collect import is_many
+
+    reads = [
+        p if os.path.isdir(p) or not is_many(p) else os.path.dirname(p) or "." for p in pictures
+    ]
+    enter_to_read(reads, (output,))
+    from wavecomb.errors import WavecombError
+    from wavecomb.picture.collect import collect
+    from wavecomb.picture.files import check_writable
+    from wavecomb.picture.thumbnails import Look
+
+    ending = os.path.splitext(output)[1].lower()
+    if ending not in (".png", ".html"):
+        raise WavecombError(f"-o {output}: the name must end in .png or .html")
+    found = collect(pictures)
+    if os.path.realpath(output) in map(os.path.realpath, found.values()):
+        raise WavecombError(f"-o {output}: is one of the pictures")
+    check_writable(output)
+    look = Look(options["layer"], exposure=options["exposure"], tone_map=options["tone_map"])
+    if ending == ".png":
+        _write_sheet(found, output, look, options)
+    else:
+        title = options["title"] or os.path.basename(os.path.normpath(pictures[0]))
+        _write_page(found, output, look, title, options)
+    click.echo(f"{len(found)} pictures; wrote {output}")
+
+
+def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
+    from wavecomb.errors import WavecombError
+    from wavecomb.picture.image import write_png_codes
+    from wavecomb.picture.sheet import MOST, contact_sheet
+
+    if len(found) > MOST:
+        raise WavecombError(f"{len(found)} pictures: a sheet has {MOST} at most")
+    columns, width = options["columns"] or 0, options["width"] or 240
+    write_png_codes(output, contact_sheet(found, look, width=width, columns=columns))
+
+
+def _write_page(
+    found: dict[str, str], output: str, look: Any, title: str, options: dict[str, Any]
+) -> None:
+    from wavecomb.errors import WavecombError
+    from wavecomb.picture.files import replacing
+    from wavecomb.picture.pages import MOST_FRAMES, sequence_page
+
+    if len(found) > MOST_FRAMES:
+        raise WavecombError(f"{len(found)} pictures: a page has {MOST_FRAMES} at most")
+    text = sequence_page(
+        found, look, title=title, fps=options["fps"], width=options["width"] or 960,
+        kind="png" if options["lossless"] else "jpeg",
+    )  # fmt: skip
+    with replacing(output) as part:
+        part.write_text(text, encoding="utf-8")

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Layers of a picture as a screen shows them: light as colours, everything else in its own way."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.picture import image
+from wavecomb.picture.colour_maps import colour_map
+
+Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
+"""Linear Rec.709, (height, width, 3), to 8-bit codes."""
+
+RADIANCE = ("beauty", "denoised", "emission", "direct", "indirect")
+"""Shown with exposure and tone mapping, as are light groups."""
+_COLOURS = ("albedo", "guide_albedo")
+_NORMALS = ("normal", "guide_normal")
+_IDS = ("material_id", "instance_id")
+_CRYPTO = ("crypto_", "Crypto")
+_UNITS = {
+    "cost": "cost, ns per pixel",
+    "samples": "samples per pixel",
+    "error": "error of the pixel",
+    "variance": "variance, luminance",
+    "depth": "depth, scene units",
+}
+_LOGARITHMIC = ("cost", "error", "variance")
+SCALARS = tuple(_UNITS)
+"""Shown in false colours."""
+NOT_FINITE = (0, 255, 255)
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What false colours mean.
+
+    Attributes:
+        title: Quantity and unit.
+        low: Value of the darkest colour.
+        high: Value of the lightest.
+        logarithmic: Equal steps of colour are equal ratios.
+    """
+
+    title: str
+    low: float
+    high: float
+    logarithmic: bool
+
+    def ticks(self, count: int = 5) -> list[tuple[float, str]]:
+        """Places from 0 to 1 along the bar and what stands there."""
+        out = []
+        for t in np.linspace(0.0, 1.0, count):
+            if self.logarithmic:
+                value = self.low * (self.high / self.low) ** t
+            else:
+                value = self.low + (self.high - self.low) * t
+            out.append((float(t), f"{value:.3g}"))
+        return out
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A layer as it is on the screen.
+
+    Attributes:
+        pixels: (height, width, 3), 8-bit codes.
+        legend: Of false colours; None for colours that are what they are.
+    """
+
+    pixels: NDArray[np.uint8]
+    legend: Legend | None = None
+
+
+def is_light(layer: str) -> bool:
+    """Whether a layer is light: exposure and tone mapping apply."""
+    return layer in RADIANCE or layer.startswith("light_")
+
+
+def show_layer(
+    layer: NDArray[Any],
+    name: str,
+    develop: Develop = image.display,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+) -> Shown:
+    """A layer as the screen shows it.
+
+    Args:
+        layer: (height, width) or (height, width, channels).
+        name: What it is: of an AOV, or of a layer of a file.
+        develop: Of light.
+        low: Of false colours; None: from the picture.
+        high: Likewise.
+    """
+    array = np.asarray(layer)
+    if is_light(name):
+        return Shown(develop(array))
+    if name in _COLOURS:
+        return Shown(image.display(array))
+    if name in _NORMALS:
+        return Shown(_codes(0.5 * array + 0.5))
+    if name in _IDS:
+        return Shown(id_colours(array.reshape(array.shape[:2])))
+    if name.startswith(_CRYPTO):
+        return Shown(id_colours(np.ascontiguousarray(array[:, :, 0], np.float32).view(np.uint32)))
+    if name == "uv":
+        wide = np.zeros((*array.shape[:2], 3), np.float32)
+        wide[:, :, :2] = array - np.floor(array)
+        return Shown(_codes(wide))
+    if name == "position":
+        return Shown(_codes(_stretched(array)))
+    if array.ndim == 3:
+        with np.errstate(invalid="ignore"):  # an infinite variance: not known yet
+            array = array @ np.array((0.2126, 0.7152, 0.0722), np.float32)
+    return heat(array, name, low, high)
+
+
+def heat(
+    values: NDArray[Any],
+    name: str,
+    low: float | None = None,
+    high: float | None = None,
+) -> Shown:
+    """False colours from ``low`` to ``high``, by default those of the picture; not finite: cyan.
+
+    Args:
+        values: (height, width).
+        name: A layer's, for the title and whether the scale is logarithmic; else the title itself.
+        low: Darkest colour.
+        high: Lightest colour.
+    """
+    wide = np.asarray(values, np.float64)
+    finite = np.isfinite(wide)
+    logarithmic = name in _LOGARITHMIC
+    usable = wide[finite & (wide > 0.0)] if logarithmic else wide[finite]
+    if usable.size == 0:
+        usable = np.array([1.0])
+    # Logarithmic: the ends of a hundredth, so that one hot pixel does not darken all others.
+    ends = np.percentile(usable, (1.0, 99.0)) if logarithmic else (usable.min(), usable.max())
+    least = float(ends[0]) if low is None else low
+    most = float(ends[1]) if high is None else high
+    if logarithmic:
+        least = max(least, 1e-30)
+        most = max(most, least * 1.0001)
+        safe = np.maximum(np.where(finite, wide, least), 1e-300)
+        position = np.log(safe / least) / np.log(most / least)
+    else:
+        most = most if most > least else least + 1.0
+        position = (np.where(finite, wide, least) - least) / (most - least)
+    table = _table()
+    index = (np.clip(position, 0.0, 1.0) * (len(table) - 1) + 0.5).astype(np.intp)
+    pixels = table[index]
+    pixels[~finite] = NOT_FINITE
+    return Shown(pixels, Legend(_UNITS.get(name, name), least, most, logarithmic))
+
+
+def ramp(width: int) -> NDArray[np.uint8]:
+    """The false colours from low to high, (width, 3)."""
+    table = _table()
+    return table[np.linspace(0, len(table) - 1, width).astype(np.intp)]
+
+
+@functools.cache
+def _table() -> NDArray[np.uint8]:
+    return image.display(colour_map()[None])[0]
+
+
+def id_colours(ids: NDArray[Any]) -> NDArray[np.uint8]:
+    """A colour for each whole number, 0 black; neighbours differ. (h, w) -> (h, w, 3)."""
+    mixed = ids.astype(np.uint32) * np.uint32(2654435761)
+    mixed ^= mixed >> np.uint32(15)
+    mixed *= np.uint32(2246822519)
+    mixed ^= mixed >> np.uint32(13)
+    channels = [(mixed >> np.uint32(shift)) & np.uint32(255) for shift in (0, 8, 16)]
+    pixels = (64 + np.stack(channels, axis=-1) * 3 // 4).astype(np.uint8)
+    pixels[ids == 0] = 0
+    return pixels
+
+
+def _stretched(array: NDArray[Any]) -> NDArray[np.float32]:
+    finite = np.where(np.isfinite(array), array, 0.0)
+    low = finite.min(axis=(0, 1))
+    size = np.maximum(finite.max(axis=(0, 1)) - low, 1e-20)
+    return ((finite - low) / size).astype(np.float32)
+
+
+def _codes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    clean = np.clip(np.nan_to_num(values), 0.0, 1.0)
+    return np.floor(clean * 255.0 + 0.5).astype(np.uint8)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`wavecomb doctor`: what is there, what is missing, and the command that brings it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from parts import needs
+
+from wavecomb import doctor
+from wavecomb.cli import main
+from wavecomb.errors import WavecombError
+from wavecomb.extras import EXTRAS, check_installed, missing_modules
+
+try:
+    import tomllib
+except ModuleNotFoundError:
+    import tomli as tomllib  # type: ignore[no-redef]
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["doctor", *arguments])
+
+
+@needs("wavecomb._core", "pxr", "OpenImageIO", "MaterialX")
+def test_a_machine_that_is_well() -> None:
+    found = doctor.examine()
+    by_name = {one.name: one for group in found.values() for one in group}
+    assert doctor.is_fit(found)
+    assert "renders as it must" in by_name["a picture"].text
+    assert by_name["Embree"].text.startswith("4.")
+    assert by_name["OpenUSD"].text[:1].isdigit()
+    assert "lanes" in by_name["native library"].text
+    assert set(found) == {"Wavecomb", "Libraries", "Extras", "Machine"}
+    text = "\n".join(doctor.lines(found))
+    for name in ("OpenUSD", "MaterialX", "Embree", "[denoise]", "[gui]", "[farm]", "sandbox"):
+        assert name in text
+
+
+def test_what_is_missing_comes_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "missing_modules", lambda name: ["pyoidn"])
+    monkeypatch.setattr(doctor, "_usd_version", _not_there)
+    monkeypatch.setattr(doctor, "_picture", _wrong)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
+    result = run()
+    assert result.exit_code == 2
+    lines = result.stdout.splitlines()
+
+    def after(name: str) -> list[str]:
+        at = next(k for k, line in enumerate(lines) if name in line)
+        return lines[at : at + 2]
+
+    assert "missing" in after("OpenUSD")[0] and "pip install usd-core" in after("OpenUSD")[1]
+    assert "missing" in after("[denoise]")[0]
+    assert "pip install 'wavecomb[denoise]'" in after("[denoise]")[1]
+    assert "BROKEN" in after("a picture")[0] and "make build" in after("a picture")[1]
+    assert "set DISPLAY" in after("display")[1]
+    plain = json.loads(run("--json").stdout)
+    assert plain["fit"] is False and plain["schema"] == "wavecomb-doctor/1"
+    assert {one["state"] for one in plain["extras"]} == {"missing"}
+
+
+def test_a_missing_extra_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "missing_modules", lambda name: ["nothing"])
+    assert doctor.is_fit({"Extras": [doctor._extra(name) for name in EXTRAS]})
+
+
+def _not_there() -> str:
+    raise ModuleNotFoundError("No module named 'pxr'")
+
+
+def _wrong() -> str:
+    raise WavecombError("a white sky over a grey wall rendered as 0, not 0.5")
+
+
+def test_extras_are_those_of_the_project(pytestconfig: Any) -> None:
+    project = tomllib.loads((pytestconfig.rootpath / "pyproject.toml").read_text())["project"]
+    there = {name for name in project["optional-dependencies"]}
+    assert set(EXTRAS) <= there
+    for name in EXTRAS:
+        wanted = " ".join(project["optional-dependencies"][name]).lower().replace("-", "_")
+        for module in EXTRAS[name].modules:
+            assert module.partition(".")[0].lower() in wanted
+
+
+def test_an_extra_is_asked_for_without_importing_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    before = set(sys.modules)
+    assert missing_modules("gui") == ["PySide6", "pyqtgraph"]
+    with pytest.raises(WavecombError, match=r"the window needs PySide6 and pyqtgraph: pip install"):
+        check_installed("gui", "the window")
+    assert "PySide6" not in set(sys.modules) - before
