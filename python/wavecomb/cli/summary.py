@@ -129,10 +129,11 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
         )
         if counts.get("volume_lanes"):
             ways = counts["rays"] + counts["shadow_rays"]
+            steps = counts["volume_steps"]
             lines.append(
-                f"volumes: {counts['volume_steps'] / ways:.3g} steps a ray, "
-                f"{_percent(counts['volume_collisions'] / counts['volume_steps'])} of them "
-                f"collisions, lanes {_percent(counts['volume_steps'] / counts['volume_lanes'])} full"
+                f"volumes: {steps / ways:.3g} steps a ray, "
+                f"{_percent(counts['volume_collisions'] / steps)} of them collisions, "
+                f"lanes {_percent(steps / counts['volume_lanes'])} full"
             )
         lines.append(
             f"runs of a material {coherence['run_length']:.3g} records; neighbours of one material "
