@@ -20,11 +20,19 @@ size_t brick_words(uint32_t components, bool is_half) {
   return is_half ? (values + 1) / 2 : values;
 }
 
+/// A value as a grid keeps it.
+uint32_t value_bits(float value, bool is_half) {
+  return is_half ? uint32_t{float_to_half(value)} : float_bits<float>(value);
+}
+float value_of(uint32_t bits, bool is_half) {
+  return is_half ? half_to_float<float>(bits) : bits_float<float>(bits);
+}
+
 /// The bricks that came in, by cell.
-class Source {
+class BrickSource {
  public:
-  Source(const GridBricks& b, const std::array<int32_t, 3>& first,
-         const std::array<uint32_t, 3>& size)
+  BrickSource(const GridBricks& b, const std::array<int32_t, 3>& first,
+              const std::array<uint32_t, 3>& size)
       : b_(b), size_(size), at_(size_t{size[0]} * size[1] * size[2], kNoBrick) {
     for (size_t i = 0; i < b.origins.size() / 3; ++i) {
       size_t cell = 0, stride = 1;
@@ -37,17 +45,36 @@ class Source {
       at_[cell] = static_cast<uint32_t>(i);
     }
   }
-  /// Component c of a voxel, counted from the table's first.
-  float value(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
-    const uint32_t cell[3] = {x / kBrickEdge, y / kBrickEdge, z / kBrickEdge};
-    if (cell[0] >= size_[0] || cell[1] >= size_[1] || cell[2] >= size_[2]) return b_.background;
-    const uint32_t brick = at_[cell[0] + size_t{size_[0]} * (cell[1] + size_t{size_[1]} * cell[2])];
-    if (brick == kNoBrick) return b_.background;
-    const size_t voxel =
-        ((x % kBrickEdge) * kBrickEdge + y % kBrickEdge) * kBrickEdge + z % kBrickEdge;
-    const size_t i = (size_t{brick} * kInner + voxel) * b_.components + c;
-    return b_.halves.empty() ? b_.floats[i] : half_to_float<float>(uint32_t{b_.halves[i]});
-  }
+  /// The bricks that a cell's voxels and those on its upper faces are in.
+  class Corner {
+   public:
+    Corner(const BrickSource& source, const std::array<uint32_t, 3>& cell)
+        : b_(source.b_), background_(value_bits(source.b_.background, !b_.halves.empty())) {
+      for (uint32_t i = 0; i < 8; ++i) {
+        const uint32_t x = cell[0] + (i & 1), y = cell[1] + (i >> 1 & 1), z = cell[2] + (i >> 2);
+        const bool there = x < source.size_[0] && y < source.size_[1] && z < source.size_[2];
+        near_[i] = there
+                       ? source.at_[x + size_t{source.size_[0]} * (y + size_t{source.size_[1]} * z)]
+                       : kNoBrick;
+      }
+    }
+    /// The bits of component c of a voxel of the cell, each index below kBrickRow. Values are not
+    /// negative, so that bits are ordered as they are.
+    uint32_t bits(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
+      const uint32_t brick = near_[x / kBrickEdge | y / kBrickEdge << 1 | z / kBrickEdge << 2];
+      if (brick == kNoBrick) return background_;
+      const size_t voxel =
+          ((x % kBrickEdge) * kBrickEdge + y % kBrickEdge) * kBrickEdge + z % kBrickEdge;
+      const size_t i = (size_t{brick} * kInner + voxel) * b_.components + c;
+      if (!b_.halves.empty()) return b_.halves[i] & 0x7fffu;
+      return float_bits<float>(b_.floats[i]) & 0x7fffffffu;
+    }
+
+   private:
+    const GridBricks& b_;
+    uint32_t background_;
+    std::array<uint32_t, 8> near_;
+  };
 
  private:
   const GridBricks& b_;
@@ -107,35 +134,36 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
   if (cells >= kGatherWords / 4)
     throw Error(name + " spans " + with_commas(cells) + " bricks of 8^3 voxels, more than the " +
                 with_commas(kGatherWords / 4) + " that can be numbered; crop or resample it");
-  const Source source(b, first_, size_);
+  const BrickSource source(b, first_, size_);
   table_.assign(cells, kNoBrick);
   most_.assign(cells, background_);
   const size_t words = words_per_brick();
+  const uint32_t background = value_bits(background_, is_half_);
 
   // Which cells have anything, and their greatest value; then their voxels.
   const auto fill = [&](size_t cell, uint32_t* out) {
-    const auto x0 = static_cast<uint32_t>(cell % size_[0]) * kBrickEdge;
-    const auto y0 = static_cast<uint32_t>(cell / size_[0] % size_[1]) * kBrickEdge;
-    const auto z0 = static_cast<uint32_t>(cell / size_[0] / size_[1]) * kBrickEdge;
-    float most = background_;
-    bool differs = false;
+    const BrickSource::Corner corner(source, {static_cast<uint32_t>(cell % size_[0]),
+                                              static_cast<uint32_t>(cell / size_[0] % size_[1]),
+                                              static_cast<uint32_t>(cell / size_[0] / size_[1])});
+    uint32_t most = background, least = background;
     size_t i = 0;
     for (uint32_t z = 0; z < kBrickRow; ++z)
       for (uint32_t y = 0; y < kBrickRow; ++y)
         for (uint32_t x = 0; x < kBrickRow; ++x)
           for (uint32_t c = 0; c < components_; ++c, ++i) {
-            const float value = source.value(x0 + x, y0 + y, z0 + z, c);
-            most = std::max(most, value);
-            differs = differs || value != background_;
-            if (!out) continue;
-            if (is_half_)
-              out[i / 2] |= uint32_t{float_to_half(value)} << (i % 2 * 16);
-            else
-              out[i] = float_bits<float>(value);
+            const uint32_t bits = corner.bits(x, y, z, c);
+            if (out) {
+              if (is_half_)
+                out[i / 2] |= bits << (i % 2 * 16);
+              else
+                out[i] = bits;
+            }
+            most = std::max(most, bits);
+            least = std::min(least, bits);
           }
-    if (!out && differs) {
+    if (!out && most != least) {
       table_[cell] = 0;
-      most_[cell] = most;
+      most_[cell] = value_of(most, is_half_);
     }
   };
   parallel_for(size_[2], [&](size_t z) {
