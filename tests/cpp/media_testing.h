@@ -66,7 +66,7 @@ class FogPhase : public BsdfTraits {
 
 /// What integrate/media.h asks for.
 struct Fog {
-  static constexpr bool kAny = true, kShines = false;
+  static constexpr bool kAny = true, kShines = false, kStreams = false;
   template <typename F>
   using Programs = ProgramList<DiffuseBsdf<F>, EmissiveBsdf<F>, FogPhase<F>>;
 

@@ -193,7 +193,7 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
                             [&](const SampleKey<float>& key) {
                               const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, t};
                               return transmittance_through<float>(
-                                  r.view, Way<float>(p, VertexSet::kShadow, counts), o, d, t, true);
+                                  r.view, Way<float>(p, VertexSet::kShadow), o, d, t, true, counts);
                             }),
                    {std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])}, c.name);
     }
@@ -268,8 +268,8 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
                               return emission_of<float>(
                                   r.view, 0,
                                   Way<float>({SamplerKind::kIndependent, key, 1, o, d, t},
-                                             VertexSet::kFlight, counts),
-                                  o, d, t, true);
+                                             VertexSet::kFlight),
+                                  o, d, t, true, counts);
                             }),
                    expected, c.name);
     }

@@ -11,6 +11,14 @@
 ///   Mask<F>& active) const; template <typename F> Color<F> transmittance(const Passage<F>&, const
 ///   Mask<F>& active) const;
 ///
+/// Where `kStreams` says so it does the same for all rays of a wave at once, whose packets would
+/// else wait for their longest ways:
+///
+///   void fly_all(Wave&, uint32_t depth, SamplerKind) const;      before the rays are collected
+///   Flight<F> flight(const Wave&, size_t ray, const Color<F>& throughput) const;
+///   void pass_all(Wave&, uint32_t depth, SamplerKind) const;     of shadow rays that are free
+///   Color<F> passed(const Wave&, size_t ray) const;
+///
 /// A program of its own shades what happens on the way (BsdfTraits::kOnSurface is false).
 ///
 /// Contract: all functions give a lane what its own passage says, whatever the others are, and
@@ -45,7 +53,7 @@ struct Flight {
 
 /// Nothing between surfaces.
 struct NoMedia {
-  static constexpr bool kAny = false, kShines = false;
+  static constexpr bool kAny = false, kShines = false, kStreams = false;
   template <typename F>
   using Programs = wavecomb::Programs<F>;
 };

@@ -43,6 +43,7 @@ void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& ta
     learn_order(wave.ray_chooser, depth, ray_order, start);
 
     clock.enter(Phase::kShade);
+    if constexpr (Media::kStreams) media.template fly_all<F>(wave, depth, settings.sampler);
     collect<F>(wave, context, settings, depth, media);
     const OrderChoice choice = order_records<F>(wave, context, depth);
     clock.enter(Phase::kMetrics);

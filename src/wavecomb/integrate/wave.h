@@ -81,6 +81,7 @@ struct Wave {
         shadows(capacity),
         columns(3, capacity),
         times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
+        ways(context.scene.volumes.count > 0 ? SoaBlock(kWayColumns, capacity) : SoaBlock()),
         sorter(capacity),
         ray_sorter(context.orders_rays() ? capacity : 0),
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
@@ -89,6 +90,7 @@ struct Wave {
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders) {}
+  static constexpr size_t kWayColumns = 10;
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 
   PathPool pool;
@@ -100,6 +102,7 @@ struct Wave {
   ShadowQueue shadows;
   SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
   SoaBlock times;    ///< of the rays that are traced, where the scene moves
+  SoaBlock ways;     ///< what rays find in volumes (medium/volumes.h), where there are any
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
   std::vector<float> scratch;         ///< one a material, for policies
@@ -112,7 +115,7 @@ struct Wave {
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
-           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes();
+           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + ways.bytes();
   }
 };
 

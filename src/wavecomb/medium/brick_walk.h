@@ -13,35 +13,53 @@ class BrickWalk {
   using U = UInt<F>;
 
  public:
-  /// The part of o + x d, 0 < x < `most`, that is in the grid's table.
+  /// Nobody walks yet.
+  explicit BrickWalk(const PlacedGrid& placed)
+      : placed_(placed),
+        grid_(placed.grid),
+        o_(F(0.f)),
+        d_(F(0.f)),
+        x_(0.f),
+        end_(0.f),
+        on_(false) {
+    for (int k = 0; k < 3; ++k) {
+      inverse_[k] = cell_[k] = next_[k] = F(0.f);
+      forth_[k] = moves_[k] = Mask<F>(false);
+    }
+  }
   BrickWalk(const PlacedGrid& placed, const Vec3<F>& o, const Vec3<F>& d, const F& most,
             const Mask<F>& active)
-      : grid_(placed.grid),
-        o_(bricks_point<F>(placed.to_bricks, o)),
-        d_(bricks_vector<F>(placed.to_bricks, d)) {
+      : BrickWalk(placed) {
+    start(o, d, most, active);
+  }
+
+  /// `lanes` begin to walk the part of o + x d, 0 < x < `most`, that is in the grid's table.
+  void start(const Vec3<F>& o, const Vec3<F>& d, const F& most, const Mask<F>& lanes) {
+    o_ = select<F>(lanes, bricks_point<F>(placed_.to_bricks, o), o_);
+    d_ = select<F>(lanes, bricks_vector<F>(placed_.to_bricks, d), d_);
     const F* const from[3] = {&o_.x, &o_.y, &o_.z};
     const F* const along[3] = {&d_.x, &d_.y, &d_.z};
-    F enter(0.f);
-    end_ = most;
-    on_ = active;
+    F enter(0.f), end = most;
+    Mask<F> meets = lanes;
     for (int k = 0; k < 3; ++k) {
       const auto size = static_cast<float>(grid_.size[k]);
-      const Mask<F> moves = *along[k] != F(0.f);
-      inverse_[k] = F(1.f) / select(moves, *along[k], F(1.f));
-      const F a = (F(0.f) - *from[k]) * inverse_[k], b = (F(size) - *from[k]) * inverse_[k];
-      enter = select(moves, max(enter, min(a, b)), enter);
-      end_ = select(moves, min(end_, max(a, b)), end_);
-      on_ = on_ & (moves | ((*from[k] >= F(0.f)) & (*from[k] < F(size))));
-    }
-    on_ = on_ & (enter < end_);
-    x_ = enter;
-    for (int k = 0; k < 3; ++k) {
-      const F at = select(on_, fma(*along[k], enter, *from[k]), F(0.f));
-      const F cell = clamp(floor(at), F(0.f), F(static_cast<float>(grid_.size[k]) - 1.f));
-      cell_[k] = cell;
-      forth_[k] = *along[k] > F(0.f);
       moves_[k] = *along[k] != F(0.f);
-      next_[k] = crossing(k);
+      forth_[k] = *along[k] > F(0.f);
+      inverse_[k] = F(1.f) / select(moves_[k], *along[k], F(1.f));
+      const F a = (F(0.f) - *from[k]) * inverse_[k], b = (F(size) - *from[k]) * inverse_[k];
+      enter = select(moves_[k], max(enter, min(a, b)), enter);
+      end = select(moves_[k], min(end, max(a, b)), end);
+      meets = meets & (moves_[k] | ((*from[k] >= F(0.f)) & (*from[k] < F(size))));
+    }
+    meets = meets & (enter < end);
+    on_ = (on_ & not_(lanes)) | meets;
+    x_ = select(lanes, enter, x_);
+    end_ = select(lanes, end, end_);
+    for (int k = 0; k < 3; ++k) {
+      const F at = select(meets, fma(*along[k], enter, *from[k]), F(0.f));
+      const F first = clamp(floor(at), F(0.f), F(static_cast<float>(grid_.size[k]) - 1.f));
+      cell_[k] = select(lanes, first, cell_[k]);
+      next_[k] = select(lanes, crossing(k), next_[k]);
     }
   }
 
@@ -86,6 +104,7 @@ class BrickWalk {
     return select(moves_[k], F((face - *from[k]) * inverse_[k]), F(kInfinity));
   }
 
+  const PlacedGrid& placed_;
   const GridView& grid_;
   Vec3<F> o_, d_;
   F inverse_[3], cell_[3], next_[3];

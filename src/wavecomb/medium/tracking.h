@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Free flights, transmittance and emission along a way through volumes.
+/// Free flights, transmittance and emission along ways through volumes.
 ///
 /// Null-scattering (Miller, Georgiev and Jarosz, "A null-scattering path integral formulation of
 /// light transport", 2019): extinction is filled up with collisions that change nothing, to a
@@ -12,11 +12,7 @@
 /// no schedule changes.
 #pragma once
 
-#include "wavecomb/core/hash.h"
-#include "wavecomb/core/math.h"
-#include "wavecomb/integrate/media.h"
-#include "wavecomb/integrate/statistics.h"
-#include "wavecomb/medium/brick_walk.h"
+#include "wavecomb/medium/ways.h"
 
 namespace wavecomb {
 
@@ -26,12 +22,11 @@ template <typename F>
 struct Way {
   Sample4<F> r;
   UInt<F> seed;
-  VolumeCounts* counts;  ///< gets what it takes
 
-  Way(const Passage<F>& p, VertexSet set, VolumeCounts& takes)
-      : r(sample_4d<F>(p.sampler, p.key, vertex_set(set, p.depth))),
-        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(p.key.pixel_hash, p.key.sample)),
-        counts(&takes) {}
+  Way(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth, VertexSet set)
+      : r(sample_4d<F>(sampler, key, vertex_set(set, depth))),
+        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
+  Way(const Passage<F>& p, VertexSet set) : Way(p.sampler, p.key, p.depth, set) {}
   /// Another one with numbers of its own.
   Way branch(uint32_t number) const {
     Way other = *this;
@@ -40,186 +35,234 @@ struct Way {
   }
 };
 
-/// Numbers of a way through one volume, one after the other. Each lane counts its own.
-template <typename F>
-struct CollisionNumbers {
-  UInt<F> seed, count{0u};
-  VolumeCounts* counts;
+// ---- flights -----------------------------------------------------------------------------------
 
-  CollisionNumbers(const Way<F>& way, uint32_t volume)
-      : seed(hash_u32<UInt<F>>(way.seed, UInt<F>(0x9c8f2d3bu + volume))), counts(way.counts) {}
-  F next(const Mask<F>& lanes) {
-    const F number = unit_float<F>(hash_u32<UInt<F>>(seed, count));
-    count = select(Mask<UInt<F>>(lanes), UInt<F>(count + 1u), count);
-    return number;
-  }
+/// What becomes of flights, side by side. Before: `t` is how far they may go, `material` kNoEvent,
+/// `ratio` 1.
+struct Flights {
+  static constexpr uint32_t kNoEvent = 0xffffffffu;
+
+  float* t;
+  uint32_t* material;  ///< of the volume that stopped a flight
+  float* ratio[3];     ///< by channel: probability of what happened, over that by the channel that
+                       ///< decided
+  const uint32_t* hero;  ///< the channel that decides
 };
+
+/// The channel that decides: each as often as it has of the throughput.
+template <typename F>
+inline UInt<F> hero_of(const F& u, const Color<F>& throughput) {
+  using U = UInt<F>;
+  const F at = u * (throughput.x + throughput.y + throughput.z);
+  return select(at < throughput.x, U(0u),
+                select(at < F(throughput.x + throughput.y), U(1u), U(2u)));
+}
+
+/// Each channel decides in so many flights as it has of the path's throughput T (hero wavelengths,
+/// Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). So the weight of a flight is, with
+/// the probabilities p_c of what happened,
+///   p_c sum(T) / sum over channels k of T_k p_k
+/// which leaves sum(T) as it was, however often the path is scattered.
+template <typename F>
+inline Color<F> flight_weight(const Color<F>& ratio, const Color<F>& throughput) {
+  const F sum = throughput.x + throughput.y + throughput.z, shares = dot(ratio, throughput);
+  return ratio * F(sum / select(shares > 0.f, shares, F(1.f)));
+}
 
 namespace detail {
 
-/// Follows lanes from one collision with the majorant to the next, real or not, and calls
-/// collide(lanes, x, p, majorant) there: x along the way, p in the grid's space, the majorant of
-/// the grid's own values. It returns the lanes that end.
-template <typename F, typename Collide>
-inline void each_collision(const PlacedGrid& placed, float scale, const Vec3<F>& o,
-                           const Vec3<F>& d, const F& most, const Mask<F>& active,
-                           CollisionNumbers<F>& numbers, const F* first, const Collide& collide) {
-  if (scale <= 0) return;
-  BrickWalk<F> walk(placed, o, d, most, active);
-  // Optical depth that is left until the next collision.
-  const auto depth = [](const F& number) { return F(-log(F(1.f - number))); };
-  if (none(walk.on())) return;
-  F left = depth(first ? *first : numbers.next(walk.on()));
-  while (any(walk.on())) {
-    const F majorant = walk.most() * scale;
-    const F leave = walk.leave();
-    const F here = majorant * (leave - walk.x());
-    const Mask<F> collides = walk.on() & (left < here);
-    numbers.counts->lanes += kWidth<F>;
-    numbers.counts->steps += count<F>(walk.on());
-    numbers.counts->collisions += count<F>(collides);
-    const Mask<F> passes = walk.on() & not_(collides);
-    if (any(collides)) {
-      const F x = min(F(walk.x() + left / select(collides, majorant, F(1.f))), leave);
-      walk.move_to(x, collides);
-      const F again = depth(numbers.next(collides));
-      left = select(collides, again, F(left - here));
-      walk.stop(collide(collides, x, walk.at(x), majorant));
-    } else {
-      left = left - here;
-    }
-    walk.next_cell(passes);
+/// Flights through one volume.
+template <typename F>
+class FlightVisitor {
+  using U = UInt<F>;
+
+ public:
+  enum Keeps { kStops, kRatios, kBoth };
+  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, Keeps keeps)
+      : v_(v), material_(material), flights_(flights), keeps_(keeps) {}
+
+  void start(const U& way, const Mask<F>& lanes) {
+    const U hero = gather<U>(flights_.hero, way, Mask<U>(lanes));
+    const F own = select(hero == U(0u), F(v_.extinction[0]),
+                         select(hero == U(1u), F(v_.extinction[1]), F(v_.extinction[2])));
+    of_hero_ = select(lanes, own, of_hero_);
+    ratio_ = select<F>(lanes, Color<F>(F(1.f)), ratio_);
+    stopped_ = stopped_ & not_(lanes);
   }
-}
+  Mask<F> collide(const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant,
+                  CollisionNumbers<F>& numbers) {
+    const F density = grid_value<F>(v_.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
+    const F real = min(F(density * of_hero_), F(1.f));
+    const Mask<F> stops = lanes & (numbers.next(lanes) < real);
+    if (!v_.is_grey) {
+      const F by_hero = F(1.f) / select(stops, real, F(1.f - real));
+      const auto channel = [&](const F& ratio, float extinction) {
+        const F share = min(F(density * extinction), F(1.f));
+        return select(lanes, F(ratio * select(stops, share, F(1.f - share)) * by_hero), ratio);
+      };
+      ratio_ = {channel(ratio_.x, v_.extinction[0]), channel(ratio_.y, v_.extinction[1]),
+                channel(ratio_.z, v_.extinction[2])};
+    }
+    stopped_ = stopped_ | stops;
+    x_ = select(stops, x, x_);
+    return stops;
+  }
+  void finish(const U& way, const Mask<F>& lanes) {
+    if (none(lanes)) return;
+    if (keeps_ != kRatios) {
+      const Mask<F> stops = lanes & stopped_;
+      scatter<F>(flights_.t, x_, way, stops);
+      scatter<U>(flights_.material, U(material_), way, Mask<U>(stops));
+    }
+    if (keeps_ == kStops || v_.is_grey) return;
+    const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
+    for (int k = 0; k < 3; ++k)
+      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], way, lanes) * *ratio[k]), way,
+                 lanes);
+  }
+
+ private:
+  const VolumeRecord& v_;
+  uint32_t material_;
+  const Flights& flights_;
+  Keeps keeps_;
+  F of_hero_{0.f}, x_{0.f};
+  Color<F> ratio_{F(1.f)};
+  Mask<F> stopped_{false};
+};
 
 }  // namespace detail
 
-/// What became of a way through one volume.
+/// Flies through all volumes. `ways.most` is `flights.t`; `scratch` has room for as many numbers.
 template <typename F>
-struct Collision {
-  Mask<F> stopped;
-  F x;             ///< where, if so
-  Color<F> ratio;  ///< by channel: probability of what happened, over that by the channel that
-                   ///< decided
-};
-
-/// Lanes fly through `v` until they collide or have come to `most`. Channel `hero` decides in each.
-template <typename F>
-inline Collision<F> fly_through(const VolumeRecord& v, uint32_t index, const Way<F>& way,
-                                const UInt<F>& hero, const Vec3<F>& o, const Vec3<F>& d,
-                                const F& most, const Mask<F>& active) {
-  using U = UInt<F>;
-  Collision<F> out{Mask<F>(false), F(0.f), Color<F>(F(1.f))};
-  CollisionNumbers<F> numbers(way, index);
-  const F of_hero = select(hero == U(0u), F(v.extinction[0]),
-                           select(hero == U(1u), F(v.extinction[1]), F(v.extinction[2])));
-  detail::each_collision<F>(
-      v.density, v.most_extinction, o, d, most, active, numbers, index == 0 ? &way.r.z : nullptr,
-      [&](const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant) {
-        const F density = grid_value<F>(v.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
-        const F real = min(F(density * of_hero), F(1.f));
-        const Mask<F> stops = lanes & (numbers.next(lanes) < real);
-        if (!v.is_grey) {
-          const F by_hero = F(1.f) / select(stops, real, F(1.f - real));
-          const auto channel = [&](const F& ratio, float extinction) {
-            const F share = min(F(density * extinction), F(1.f));
-            return select(lanes, F(ratio * select(stops, share, F(1.f - share)) * by_hero), ratio);
-          };
-          out.ratio = {channel(out.ratio.x, v.extinction[0]), channel(out.ratio.y, v.extinction[1]),
-                       channel(out.ratio.z, v.extinction[2])};
-        }
-        out.stopped = out.stopped | stops;
-        out.x = select(stops, x, out.x);
-        return stops;
-      });
-  return out;
+inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                        float* scratch, VolumeCounts& counts) {
+  using Visitor = detail::FlightVisitor<F>;
+  bool is_grey = true;
+  for (uint32_t i = 0; i < volumes.count; ++i) is_grey = is_grey && volumes.volumes[i].is_grey;
+  const bool again = !is_grey && volumes.count > 1;
+  std::copy_n(flights.t, again ? ways.count : 0, scratch);
+  const auto fly = [&](uint32_t i, const Ways& along, typename Visitor::Keeps keeps) {
+    const VolumeRecord& v = volumes.volumes[i];
+    Visitor visitor(v, volumes.first_material + i, flights, keeps);
+    each_collision<F>(v.density, v.most_extinction, i, along, counts, visitor);
+  };
+  for (uint32_t i = 0; i < volumes.count; ++i)
+    fly(i, ways, again ? Visitor::kStops : Visitor::kBoth);
+  if (!again) return;
+  // Flights through the first volumes went further than to what stopped them in the end: once more,
+  // with the same numbers, to there. A flight to its own end is itself.
+  Ways once_more = ways;
+  once_more.most = scratch + ways.count;
+  for (uint32_t i = 0; i < volumes.count; ++i) {
+    for (size_t k = 0; k < ways.count; ++k)
+      scratch[ways.count + k] =
+          flights.material[k] == volumes.first_material + i ? scratch[k] : flights.t[k];
+    fly(i, once_more, Visitor::kRatios);
+  }
 }
 
-/// A free flight through all volumes. The path meets the volume's material where it stops. Each
-/// channel decides in so many flights as it has of the path's throughput T (hero wavelengths,
-/// Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). So the weight is, with the
-/// probabilities p_c of what happened,
-///   p_c sum(T) / sum over channels k of T_k p_k
-/// which leaves sum(T) as it was, however often the path is scattered.
+/// One flight of each lane.
 template <typename F>
 inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
                              const Color<F>& throughput, const Mask<F>& active,
                              VolumeCounts& counts) {
   using U = UInt<F>;
-  const Way<F> way(p, VertexSet::kFlight, counts);
-  const F sum = throughput.x + throughput.y + throughput.z, u = way.r.y * sum;
-  const U hero =
-      select(u < throughput.x, U(0u), select(u < F(throughput.x + throughput.y), U(1u), U(2u)));
-  Flight<F> f{Mask<F>(false), p.t, U(0u), Color<F>(F(1.f))};
-  bool is_grey = true;
-  for (uint32_t i = 0; i < volumes.count; ++i) {
-    const VolumeRecord& v = volumes.volumes[i];
-    is_grey = is_grey && v.is_grey;
-    const Collision<F> c = fly_through<F>(v, i, way, hero, p.o, p.d, f.t, active);
-    f.t = select(c.stopped, c.x, f.t);
-    f.material = select(Mask<U>(c.stopped), U(volumes.first_material + i), f.material);
-    f.stopped = f.stopped | c.stopped;
-    f.weight = c.ratio;
-  }
-  if (is_grey) {
-    f.weight = Color<F>(F(1.f));
-    return f;
-  }
-  // With several volumes, flights through the first ones went further than to what stopped them in
-  // the end: once more, with the same numbers, to there. A flight to its own end is itself.
-  if (volumes.count > 1) {
-    f.weight = Color<F>(F(1.f));
-    for (uint32_t i = 0; i < volumes.count; ++i) {
-      const Mask<F> stopper = f.stopped & Mask<F>(f.material == U(volumes.first_material + i));
-      const F until = select(stopper, p.t, f.t);
-      f.weight *= fly_through<F>(volumes.volumes[i], i, way, hero, p.o, p.d, until, active).ratio;
-    }
-  }
-  const F shares = dot(f.weight, throughput);
-  f.weight = f.weight * F(sum / select(shares > 0.f, shares, F(1.f)));
-  return f;
+  constexpr size_t kLanes = kWidth<F>;
+  const Way<F> way(p, VertexSet::kFlight);
+  const PacketWays<F> packet(p.o, p.d, p.t, way.seed, way.r.z, active);
+  alignas(64) float t[kLanes], ratio[3][kLanes], scratch[2 * kLanes];
+  alignas(64) uint32_t material[kLanes], hero[kLanes];
+  Ways ways = packet.ways();
+  std::copy_n(ways.most, kLanes, t);
+  ways.most = t;
+  store(material, U(uint32_t{Flights::kNoEvent}));
+  store(hero, hero_of<F>(way.r.y, throughput));
+  for (auto& one : ratio) store(one, F(1.f));
+  fly_through<F>(volumes, ways, {t, material, {ratio[0], ratio[1], ratio[2]}, hero}, scratch,
+                 counts);
+  const U stopped_by = load<U>(material);
+  const Color<F> by_channel{load<F>(ratio[0]), load<F>(ratio[1]), load<F>(ratio[2])};
+  return {Mask<F>(stopped_by != U(uint32_t{Flights::kNoEvent})), load<F>(t), stopped_by,
+          flight_weight<F>(by_channel, throughput)};
 }
 
-/// Transmittance of p.o + x p.d, 0 < x < `most`, by ratio tracking (Novak, Selle and Jarosz,
-/// "Residual Ratio Tracking", 2014, eq. 9), which ends at random where little is left.
+// ---- transmittance -----------------------------------------------------------------------------
+
+namespace detail {
+
+/// Transmittance through one volume, on top of what is there.
+template <typename F>
+class TransmittanceVisitor {
+  using U = UInt<F>;
+  static constexpr float kLittle = 0.1f;
+
+ public:
+  TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3])
+      : v_(v), columns_(product) {}
+
+  void start(const U& way, const Mask<F>& lanes) {
+    const auto column = [&](int k) { return gather<F>(columns_[k], way, lanes); };
+    product_ = select<F>(lanes, Color<F>(column(0), column(1), column(2)), product_);
+  }
+  Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
+                  CollisionNumbers<F>& numbers) {
+    const F density = grid_value<F>(v_.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
+    const auto kept = [&](float extinction) { return max(F(1.f - density * extinction), F(0.f)); };
+    Color<F> now =
+        product_ * Color<F>(kept(v_.extinction[0]), kept(v_.extinction[1]), kept(v_.extinction[2]));
+    const F q = min(F(max_component(now) * (1.f / kLittle)), F(1.f));
+    const Mask<F> ends = lanes & not_(numbers.next(lanes) < q);
+    now = now * F(F(1.f) / select(q > 0.f, q, F(1.f)));
+    product_ = select<F>(lanes, select<F>(ends, Color<F>(F(0.f)), now), product_);
+    return ends;
+  }
+  void finish(const U& way, const Mask<F>& lanes) {
+    const F* const product[3] = {&product_.x, &product_.y, &product_.z};
+    for (int k = 0; k < 3; ++k) scatter<F>(columns_[k], *product[k], way, lanes);
+  }
+
+ private:
+  const VolumeRecord& v_;
+  float* const (&columns_)[3];
+  Color<F> product_{F(0.f)};
+};
+
+}  // namespace detail
+
+/// Multiplies each `product` by the transmittance of a way, by ratio tracking (Novak, Selle and
+/// Jarosz, "Residual Ratio Tracking", 2014, eq. 9), which ends at random where little is left.
+template <typename F>
+inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
+                                  float* const (&product)[3], VolumeCounts& counts) {
+  for (uint32_t i = 0; i < volumes.count; ++i) {
+    const VolumeRecord& v = volumes.volumes[i];
+    detail::TransmittanceVisitor<F> visitor(v, product);
+    each_collision<F>(v.density, v.most_extinction, i, ways, counts, visitor);
+  }
+}
+
+/// That of one way of each lane.
 template <typename F>
 inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
                                       const Vec3<F>& o, const Vec3<F>& d, const F& most,
-                                      const Mask<F>& active) {
-  constexpr float kLittle = 0.1f;
-  Color<F> product(F(1.f));
-  Mask<F> on = active;
-  for (uint32_t i = 0; i < volumes.count && any(on); ++i) {
-    const VolumeRecord& v = volumes.volumes[i];
-    CollisionNumbers<F> numbers(way, i);
-    detail::each_collision<F>(
-        v.density, v.most_extinction, o, d, most, on, numbers, i == 0 ? &way.r.z : nullptr,
-        [&](const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant) {
-          const F density =
-              grid_value<F>(v.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
-          const auto kept = [&](float extinction) {
-            return max(F(1.f - density * extinction), F(0.f));
-          };
-          Color<F> now = product * Color<F>(kept(v.extinction[0]), kept(v.extinction[1]),
-                                            kept(v.extinction[2]));
-          const F largest = max_component(now);
-          const F q = min(F(largest * (1.f / kLittle)), F(1.f));
-          const Mask<F> ends = lanes & not_(numbers.next(lanes) < q);
-          now = now * F(F(1.f) / select(q > 0.f, q, F(1.f)));
-          product = select<F>(lanes, select<F>(ends, Color<F>(F(0.f)), now), product);
-          on = on & not_(ends);
-          return ends;
-        });
-  }
-  return product;
+                                      const Mask<F>& active, VolumeCounts& counts) {
+  const PacketWays<F> packet(o, d, most, way.seed, way.r.z, active);
+  alignas(64) float product[3][kWidth<F>];
+  for (auto& one : product) store(one, F(1.f));
+  float* const columns[3] = {product[0], product[1], product[2]};
+  transmittance_through<F>(volumes, packet.ways(), columns, counts);
+  return {load<F>(product[0]), load<F>(product[1]), load<F>(product[2])};
 }
+
+// ---- emission ----------------------------------------------------------------------------------
 
 /// Radiance that one volume sends along a way, by a point of it with density proportional to the
 /// grid's greatest values of its cells, and the transmittance of all volumes up to there.
 template <typename F>
 inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& way,
                             const Vec3<F>& o, const Vec3<F>& d, const F& most,
-                            const Mask<F>& active) {
+                            const Mask<F>& active, VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[index];
   const auto each_cell = [&](const auto& visit) {
     for (BrickWalk<F> walk(v.glow, o, d, most, active); any(walk.on());) {
@@ -233,7 +276,8 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way
   });
   const Mask<F> shines = active & (total > 0.f);
   if (none(shines)) return Color<F>(F(0.f));
-  CollisionNumbers<F> numbers(way.branch(kMostVolumes), index);
+  CollisionNumbers<F> numbers;
+  numbers.start(way.branch(kMostVolumes).seed, index, shines);
   const F wanted = (index == 0 ? way.r.w : numbers.next(shines)) * total;
   F before(0.f), x(0.f), greatest(0.f);
   Vec3<F> p(F(0.f));
@@ -250,7 +294,8 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way
   const Color<F> value = grid_color<F>(v.glow.grid, p, shines);
   const F weight = total / select(shines & (greatest > 0.f), greatest, F(1.f));
   const Color<F> emission{F(v.emission[0]), F(v.emission[1]), F(v.emission[2])};
-  const Color<F> through = transmittance_through<F>(volumes, way.branch(index), o, d, x, shines);
+  const Color<F> through =
+      transmittance_through<F>(volumes, way.branch(index), o, d, x, shines, counts);
   return select<F>(shines, value * emission * weight * through, Color<F>(F(0.f)));
 }
 

@@ -54,8 +54,11 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
             if (wave.aovs.wants_groups())
               wave.aovs.add<F>(slot, wave.aovs.group_of<F>(U(kNoLight), bright), c, bright);
           }
-        flight = media.template fly<F>({settings.sampler, path.key, depth, o, d, t},
-                                       path.throughput, active);
+        if constexpr (Media::kStreams)
+          flight = media.template flight<F>(wave, i, path.throughput);
+        else
+          flight = media.template fly<F>({settings.sampler, path.key, depth, o, d, t},
+                                         path.throughput, active);
         flight.stopped = active & flight.stopped;
         t = select(flight.stopped, flight.t, t);
         path.throughput = path.throughput * flight.weight;

@@ -90,18 +90,23 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   context.accel->occluded(
       rays, q.occluded, context.traversal_width, false,
       presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
+  if constexpr (Media::kStreams) media.template pass_all<F>(wave, depth, context.settings->sampler);
   const bool is_watched = wave.aovs.wants_groups() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
     Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
     if constexpr (Media::kAny) {
-      const auto path = load_row<PathRow, F>(wave.pool.paths, slot, active);
-      const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
-      const Vec3<F> d{load<F>(q.dx + i), load<F>(q.dy + i), load<F>(q.dz + i)};
-      const F t = load<F>(q.tfar + i) * (1.f / kShadowReach);
-      c = c * media.template transmittance<F>({context.settings->sampler, path.key, depth, o, d, t},
-                                              active);
+      if constexpr (Media::kStreams) {
+        c = c * media.template passed<F>(wave, i);
+      } else {
+        const auto path = load_row<PathRow, F>(wave.pool.paths, slot, active);
+        const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
+        const Vec3<F> d{load<F>(q.dx + i), load<F>(q.dy + i), load<F>(q.dz + i)};
+        const F t = load<F>(q.tfar + i) * (1.f / kShadowReach);
+        c = c * media.template transmittance<F>(
+                    {context.settings->sampler, path.key, depth, o, d, t}, active);
+      }
     }
     add_radiance<F>(wave.pool.radiance, slot, c, active);
     if (is_watched) {
