@@ -29,7 +29,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-naive wheel render test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel bench lint format clean
+.PHONY: help setup setup-test build build-naive wheel render docs test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -70,10 +70,19 @@ wheel: build/.setup ## A wheel for other machines in dist/: a native library for
 
 # ---- use -----------------------------------------------------------------------------------------------
 
+# The README's picture. Without the denoiser, which is an extra and may not be to be had, it has some noise.
+denoiser = $(VENV)/python -c 'import pyoidn' 2> /dev/null
 render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	@mkdir -p out
 	@test -e out/mixed.usdc || $(VENV)/wavecomb scene mixed -o out/mixed.usdc
-	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png
+	@$(denoiser) || $(VENV)/python -m pip install -q -c constraints.txt 'pyoidn>=2.5' || true
+	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
+
+# Not a part of make test: MkDocs comes with its own extra.
+docs: build ## The documentation as a site in out/site
+	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
+	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
+	@echo "wrote out/site/index.html"
 
 # ---- tests ---------------------------------------------------------------------------------------------
 

@@ -134,14 +134,14 @@ def scene() -> Any:
 
 @needs("wavecomb._core")
 def test_a_notebook_shows_a_bar_and_the_picture_so_far(notebook: Handle) -> None:
-    made = wavecomb.render(scene(), size=(256, 256), spp=500, seed=3)
+    made = wavecomb.render(scene(), size=(192, 192), spp=200, seed=3)
     assert not made.cancelled
     bars = [one for one in notebook.shown if "<progress" in one]
     assert "samples/s" in bars[0]
     assert any("<img src='data:image/png;base64," in one for one in bars)
     assert notebook.shown[-1] == ""  # what was rendered takes its place
     before = len(notebook.shown)
-    plain = wavecomb.render(scene(), size=(256, 256), spp=500, seed=3, progress=False)
+    plain = wavecomb.render(scene(), size=(192, 192), spp=200, seed=3, progress=False)
     assert len(notebook.shown) == before
     assert wavecomb.compare(made, plain).equal
     wavecomb.render(scene(), size=(8, 8), spp=1, progress=lambda done, total: None)

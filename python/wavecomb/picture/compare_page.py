@@ -55,7 +55,8 @@ def compare_page(
     if folders is not None:
         missing = len(folders.only_a) + len(folders.only_b)
         facts += f"; {good} of {len(results)} pairs pass"
-        facts += f", {missing} pictures have no other" if missing else ""
+        if missing:
+            facts += f", {missing} {'picture has' if missing == 1 else 'pictures have'} no other"
     title = f"{_short(sources)[0]} and {_short(sources)[1]}"
     return document(title, facts, overview + "".join(sections))
 

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pages of the documentation: their links lead somewhere, and the site is whole."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+from parts import needs, only_where
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted([*DOCS.rglob("*.md"), *(ROOT / f"{name}.md" for name in
+                ("README", "CONTRIBUTING", "CHANGELOG"))])  # fmt: skip
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def text_of(page: Path) -> str:
+    """The page without code."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+    return re.sub(r"`[^`\n]*`", "code", text)
+
+
+@cache
+def anchors(page: Path) -> frozenset[str]:
+    """Addresses of headings, as GitHub and the site make them."""
+    found: set[str] = set()
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+    for heading in re.findall(r"^#+ (.+)$", text, flags=re.M):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").lower().strip()
+        found.add(re.sub(r"[^\w\- ]", "", plain).replace(" ", "-"))
+    return frozenset(found)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page: Path) -> None:
+    broken = []
+    for target in LINK.findall(text_of(page)):
+        if "://" in target or target.startswith("mailto:"):
+            continue
+        file, _, anchor = target.partition("#")
+        path = (page.parent / file).resolve() if file else page
+        if not path.exists():
+            broken.append(f"{target}: no such file")
+        elif anchor and path.suffix == ".md" and anchor not in anchors(path):
+            broken.append(f"{target}: no such heading")
+    assert not broken, "; ".join(broken)
+
+
+def test_every_page_has_a_place_in_the_site() -> None:
+    listed = set(
+        re.findall(r"^\s+- (?:[\w ]+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), flags=re.M)
+    )
+    made = {"changelog.md", "contributing.md"} | {p for p in listed if p.startswith("reference/")}
+    there = {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+    decisions = {page for page in there if page.startswith("decisions/")}
+    assert listed - made == there - decisions
+    text = (DOCS / "decisions" / "README.md").read_text(encoding="utf-8")
+    linked = {f"decisions/{name}" for name in re.findall(r"\]\(([a-z0-9-]+\.md)\)", text)}
+    assert linked | {"decisions/README.md"} == decisions
+
+
+@needs("wavecomb._core")
+def test_reference_pages_have_every_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    import wavecomb
+    from wavecomb.load_options import LoadOptions
+    from wavecomb.options import settings
+    from wavecomb.run.aovs import core_aovs
+
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "site"))
+    import reference
+
+    pages = reference.pages()
+    for name, row in settings().items():
+        assert f"| `{name}` |" in pages["settings.md"]
+        if name in ("policy", "wave_size", "max_depth", "seed", "guiding"):
+            assert f"`{row.option}" in pages["options.md"]
+    for name in core_aovs():
+        assert f"| `{name}` |" in pages["layers.md"]
+    for name in LoadOptions.__dataclass_fields__:
+        assert re.search(rf"^\| `{name}` \|.*\w", pages["loading.md"], flags=re.M), name
+    for name in wavecomb.__all__:
+        assert name == "__version__" or f"## wavecomb.{name}\n" in pages["python.md"]
+    for command in ("render", "farm submit", "bench run", "doctor", "sheet"):
+        assert f"## wavecomb {command}\n" in pages["options.md"]
+    for name, text in pages.items():
+        widths = {line.replace("\\|", "").count("|") for line in text.splitlines()
+                  if line.startswith("| ")}  # fmt: skip
+        assert len(widths) <= 2, name
+
+
+@pytest.mark.slow
+@needs("wavecomb._core")
+@only_where(importlib.util.find_spec("mkdocs"), "mkdocs is not installed: pip install '.[docs]'")
+def test_the_site_is_built_without_warnings(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "index.html").is_file() and (tmp_path / "reference/options.html").is_file()

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What MkDocs is told beside the pages of docs/: those of the root, and reference pages."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(Path(__file__).parent))
+
+import reference  # noqa: E402
+
+PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
+"""Pages of the root, and where they are in the site."""
+LINK = re.compile(r"(!?\[[^\]]*\])\(([^)\s]+)\)")
+CODE = re.compile(r"^(```.*?^```$|    .*?$)", re.DOTALL | re.MULTILINE)
+STYLE = """
+.md-typeset table:not([class]) { font-size: .68rem; }
+.md-typeset img { border-radius: 2px; }
+.md-typeset td:first-child code { white-space: nowrap; }
+.md-grid { max-width: 68rem; }
+"""
+
+
+def on_config(config: Any) -> Any:
+    """Lists all decisions in the navigation, in the order of their page."""
+    text = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
+    pages = ["decisions/README.md"]
+    pages += [f"decisions/{name}" for name in re.findall(r"\]\(([a-z0-9-]+\.md)\)", text)]
+    for section in config.nav:
+        for entry in next(iter(section.values())):
+            if isinstance(entry, dict) and "Decisions" in entry:
+                entry["Decisions"] = list(dict.fromkeys(pages))
+    return config
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Adds what is not in docs/."""
+    made = {f"reference/{name}": text for name, text in reference.pages().items()}
+    made["site.css"] = STYLE
+    for source, name in PAGES.items():
+        made[name] = (ROOT / source).read_text(encoding="utf-8")
+    for name, text in made.items():
+        files.append(File.generated(config, name, content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """Links of and to pages of the root lead to where those are in the site."""
+    name = page.file.src_uri
+    at_root = name in PAGES.values()
+
+    def link(match: re.Match[str]) -> str:
+        text, target = match.groups()
+        if at_root and target.startswith("docs/"):
+            return f"{text}({target.removeprefix('docs/')})"
+        file = target.lstrip("./").partition("#")[0]
+        if target.startswith("../") and file in PAGES:
+            return f"{text}({'../' * name.count('/')}{PAGES[file]})"
+        if not target.startswith("#") and "://" not in target and _is_elsewhere(name, target):
+            return text[1:-1]  # a file that is no page
+        return match[0]
+
+    parts = CODE.split(markdown)
+    return "".join(part if k % 2 else LINK.sub(link, part) for k, part in enumerate(parts))
+
+
+def _is_elsewhere(page: str, target: str) -> bool:
+    """Whether a link leads to a file of the repository outside of docs/."""
+    folder = ROOT if page in PAGES.values() else (ROOT / "docs" / page).parent
+    path = (folder / target.partition("#")[0]).resolve()
+    return path.exists() and ROOT / "docs" not in path.parents

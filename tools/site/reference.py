@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reference pages, made of the tables that the program itself goes by, and of docstrings."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import click
+
+import wavecomb
+from wavecomb.camera_table import camera_parameters
+from wavecomb.cli import main
+from wavecomb.light_table import light_parameters
+from wavecomb.load_options import LoadOptions, rows
+from wavecomb.material_table import material_parameters
+from wavecomb.options import default_text, settings
+from wavecomb.run import aovs
+
+NOTE = "This page is made of the program's own tables by `make docs`.\n"
+ABOUT = {
+    "picture": "What the picture is",
+    "work": "How much is done for it",
+    "order": "What computes it, and in which order; no bit of the picture depends on it",
+}
+
+
+def pages() -> dict[str, str]:
+    """Name -> Markdown."""
+    return {
+        "options.md": options_page(),
+        "settings.md": settings_page(),
+        "loading.md": loading_page(),
+        "layers.md": layers_page(),
+        "lights.md": lights_page(),
+        "materials.md": materials_page(),
+        "cameras.md": cameras_page(),
+        "python.md": python_page(),
+    }
+
+
+def cell(text: object) -> str:
+    """Text that does not end a cell of a table, and is no markup."""
+    plain = " ".join(str(text).split()).replace("|", "\\|")
+    return plain.replace("<", "&lt;").replace("{", "&#123;").replace("*", "\\*")
+
+
+def code(text: object) -> str:
+    """A name in a cell."""
+    plain = " ".join(str(text).split()).replace("|", "\\|")
+    return f"`{plain}`" if plain else ""
+
+
+def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
+    lines += [f"| {' | '.join(row)} |" for row in body]
+    return "\n".join(lines) + "\n"
+
+
+def bounds(least: float | None, most: float | None) -> str:
+    """The numbers that there are."""
+    ends = [f"{end:.10g}" if end is not None and abs(end) < 1e30 else "" for end in (least, most)]
+    if ends[0] and ends[1]:
+        return f"{ends[0]} to {ends[1]}"
+    return f"from {ends[0]}" if ends[0] else f"to {ends[1]}" if ends[1] else ""
+
+
+def options_page() -> str:
+    """Every command with its options."""
+    parts = ["# Options of all commands\n", NOTE]
+    root = click.Context(main, info_name="wavecomb")
+    for path, command, context in walk(main, root):
+        parts.append(f"## wavecomb {path}\n")
+        text = inspect.cleandoc(command.help or "").replace("\b\n", "").partition("\f")[0]
+        parts.append(f"{cell(text.partition(chr(10) + chr(10))[0])}\n")
+        body = []
+        for one in command.get_params(context):
+            record = one.get_help_record(context)
+            if record is not None and "--help" not in one.opts:
+                body.append((code(record[0]), cell(record[1])))
+        if body:
+            parts.append(table(("option", ""), body))
+    return "\n".join(parts)
+
+
+def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple[str, Any, Any]]:
+    """Commands of a group and below, with their paths."""
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if command is None or command.hidden:
+            continue
+        path = f"{before}{name}"
+        inside = click.Context(command, info_name=name, parent=context)
+        yield path, command, inside
+        if isinstance(command, click.Group):
+            yield from walk(command, inside, f"{path} ")
+
+
+def settings_page() -> str:
+    """The settings of a render."""
+    parts = ["# Settings of a render\n", NOTE,
+             "Keywords of `wavecomb.render`, fields of `wavecomb.Settings`, keys of a suite. As "
+             "options of commands they have `-` for `_`.\n"]  # fmt: skip
+    for group, title in ABOUT.items():
+        parts.append(f"## {title}\n")
+        body = []
+        for name, row in settings().items():
+            if row.group != group:
+                continue
+            choices = "<br>".join(f"`{key}`: {cell(text)}" for key, text in row.choices.items())
+            values = choices or bounds(row.least, row.most) or row.kind
+            zero = f" 0: {row.zero}." if row.zero else ""
+            body.append((code(name), cell(row.help + zero), code(default_text(row)), values))
+        parts.append(table(("setting", "", "default", "values"), body))
+    return "\n".join(parts)
+
+
+def loading_page() -> str:
+    """How a stage is read."""
+    item = re.compile(r"^    (\w+): (.+?)(?=^    \w+:|\Z)", re.DOTALL | re.MULTILINE)
+    about = dict(item.findall(attributes(LoadOptions)))
+    body = []
+    with_option = rows()
+    for field in dataclasses.fields(LoadOptions):
+        row = with_option.get(field.name)
+        option = row.option if row is not None else ""
+        body.append((code(field.name), code(option), cell(about.get(field.name, ""))))
+    head = "Keywords of `wavecomb.load`, `wavecomb.render` and `wavecomb.render_frames`.\n"
+    return "\n".join(
+        ["# How a stage is read\n", NOTE, head, table(("keyword", "option", ""), body)]
+    )
+
+
+def attributes(owner: Any) -> str:
+    """The part "Attributes" of a class's docstring."""
+    return inspect.getdoc(owner).partition("Attributes:\n")[2] + "\n"  # type: ignore[union-attr]
+
+
+def layers_page() -> str:
+    """The AOVs."""
+    body = [(code(row.name), str(row.channels or ""), cell(row.kind.replace("_", " ")),
+             cell(row.title)) for row in aovs.core_aovs().values()]  # fmt: skip
+    several = [(code(name), ", ".join(map(code, names))) for name, names in aovs.groups().items()]
+    return "\n".join([
+        "# Layers\n", NOTE,
+        "Names for `--aov` and `aovs=[...]`; [AOVs](../aovs.md) says what they hold. `beauty`, "
+        "`samples`, `error` and `variance` are layers, too.\n",
+        table(("AOV", "channels", "samples become a pixel by", "in the window"), body),
+        "Names that stand for several:\n", table(("name", "AOVs"), several),
+    ])  # fmt: skip
+
+
+def lights_page() -> str:
+    """The parameters of lights."""
+    body = []
+    for row in light_parameters().values():
+        values = ", ".join(map(code, row.choices)) or bounds(row.least, row.most) or row.kind
+        usd = code(f"inputs:{row.input}" if row.input else "")
+        body.append((code(row.name), cell(row.help), usd, values, ", ".join(row.kinds)))
+    head = ("parameter", "", "UsdLux", "values", "lights")
+    return "\n".join(["# Parameters of lights\n", NOTE, table(head, body)])
+
+
+def materials_page() -> str:
+    """The parameters of materials."""
+    body = [(code(row.name), row.kind, code(row.default), bounds(row.least, row.most),
+             code(row.program)) for row in material_parameters().values()]  # fmt: skip
+    head = ("parameter", "kind", "default", "values", "of the program alone")
+    return "\n".join(["# Parameters of materials\n", NOTE,
+                      "Keywords of `SceneBuilder.add_material`.\n", table(head, body)])  # fmt: skip
+
+
+def cameras_page() -> str:
+    """The parameters of cameras."""
+    body = []
+    for row in camera_parameters().values():
+        values = ", ".join(map(code, row.choices)) or bounds(row.least, None) or row.kind
+        default = "" if row.default is None else code(row.default)
+        body.append((code(row.name), cell(row.help), default, values))
+    return "\n".join(["# Parameters of cameras\n", NOTE, "Keywords of `SceneBuilder.set_camera`.\n",
+                      table(("parameter", "", "default", "values"), body)])  # fmt: skip
+
+
+def python_page() -> str:
+    """What `wavecomb` names, from its docstrings."""
+    parts = ["# Python\n", "What `import wavecomb` gives, from its docstrings.\n"]
+    for name in wavecomb.__all__:
+        thing = getattr(wavecomb, name)
+        if name == "__version__":
+            continue
+        parts.append(f"## wavecomb.{name}\n")
+        if inspect.isfunction(thing):
+            parts.append(f"```python\n{name}{signature(thing)}\n```\n")
+        parts.append(docstring(thing))
+        if inspect.isclass(thing) and thing.__module__ != "wavecomb._core":
+            for method, function in vars(thing).items():
+                if not method.startswith("_") and inspect.isfunction(function):
+                    parts.append(f"### {name}.{method}\n")
+                    parts.append(f"```python\n{method}{signature(function)}\n```\n")
+                    parts.append(docstring(function))
+    return "\n".join(parts)
+
+
+def signature(function: Any) -> str:
+    """As Python writes it, a line for each argument where there are many."""
+    text = str(inspect.signature(function)).replace("'", "")
+    if len(text) < 70:
+        return text
+    inside, _, answer = text[1:].rpartition(")")
+    arguments = re.split(r", (?=[*\w]+(?:[:=]|, |$)|\*)", inside)
+    return "(\n" + "".join(f"    {one},\n" for one in arguments) + ")" + answer
+
+
+def docstring(thing: Any) -> str:
+    """Google's sections as headings and lists; examples as code."""
+    out: list[str] = []
+    text = (inspect.getdoc(thing) or "").replace("``", "`").replace("  # doctest: +SKIP", "")
+    is_code = False
+    for line in text.splitlines():
+        if line.startswith((">>>", "...")) or (is_code and line.strip()):
+            out += [] if is_code else ["", "```pycon"]
+            is_code = True
+        elif is_code:
+            out.append("```")
+            is_code = False
+        section = re.fullmatch(r"(Args|Attributes|Returns|Raises|Contract):", line)
+        item = re.fullmatch(r"    (\*{0,2}\w+): (.*)", line)
+        if section:
+            out += ["", f"**{section[1]}**", ""]
+        elif item and not is_code:
+            out.append(f"- `{item[1]}`: {escaped(item[2])}")
+        else:
+            out.append(line if is_code else escaped(line))
+    return "\n".join([*out, *["```"] * is_code, ""])
+
+
+def escaped(line: str) -> str:
+    """A line whose angle brackets are no markup."""
+    return line.replace("<", "&lt;")
