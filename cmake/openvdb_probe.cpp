@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   for (int i = 0; i < 100; ++i)
     ok = ok && found->tree().getValue({i, -i, 3 * i}) == 0.5f * static_cast<float>(i);
   if (!ok) std::fprintf(stderr, "openvdb probe: a grid came back as another\n");
-  if (ok) std::printf("openvdb probe: headers and library %s agree\n", OPENVDB_LIBRARY_VERSION_STRING);
+  if (ok)
+    std::printf("openvdb probe: headers and library %s agree\n", OPENVDB_LIBRARY_VERSION_STRING);
   return ok ? 0 : 1;
 }

@@ -76,8 +76,12 @@ struct ChannelsOf : std::integral_constant<uint32_t, 1> {};
 template <typename T>
 struct ChannelsOf<openvdb::math::Vec3<T>> : std::integral_constant<uint32_t, 3> {};
 
-inline float channel(float value, uint32_t) { return value; }
-inline float channel(double value, uint32_t) { return static_cast<float>(value); }
+inline float channel(float value, uint32_t) {
+  return value;
+}
+inline float channel(double value, uint32_t) {
+  return static_cast<float>(value);
+}
 template <typename T>
 float channel(const openvdb::math::Vec3<T>& value, uint32_t c) {
   return static_cast<float>(value[static_cast<int>(c)]);

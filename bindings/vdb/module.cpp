@@ -145,8 +145,7 @@ nb::dict bricks(const std::string& path, size_t number, uint64_t most_bytes,
       });
     });
     if (grid != nullptr)
-      is_known =
-          with_grid(*grid, [&](const auto& typed) { made = vdb::collect(typed, options); });
+      is_known = with_grid(*grid, [&](const auto& typed) { made = vdb::collect(typed, options); });
   }
   if (!is_known) throw vdb::BrokenFile("it is of a type that is not read");
   nb::dict d;

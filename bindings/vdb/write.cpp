@@ -24,8 +24,7 @@ openvdb::GridBase::Ptr fill(const GridDesc& desc) {
   for (size_t b = 0; b < desc.count; ++b) {
     const int32_t* at = desc.origins + 3 * b;
     for (int axis = 0; axis < 3; ++axis)
-      if (at[axis] % kBrickEdge != 0)
-        throw std::invalid_argument("origins must be multiples of 8");
+      if (at[axis] % kBrickEdge != 0) throw std::invalid_argument("origins must be multiples of 8");
     auto* leaf = grid->tree().touchLeaf({at[0], at[1], at[2]});
     const float* voxel = desc.values + b * kBrickVoxels * channels;
     for (uint32_t i = 0; i < kBrickVoxels; ++i, voxel += channels) {

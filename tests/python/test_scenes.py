@@ -28,7 +28,9 @@ from wavecomb.scenes.teapot import teapot, teapot_patches
 from wavecomb.scenes.textures import TEXTURES, sky
 from wavecomb.usd import LoadedStage
 
-SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
+SMALL = {
+    "triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5, "voxels": 24,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=sorted(SCENES))
@@ -109,7 +111,9 @@ def test_textures_are_beside_the_stage(stage: Usd.Stage) -> None:
         for attribute in prim.GetAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset and attribute.Get():
                 written = attribute.Get().path
-                assert re.fullmatch(r"\./[\w-]+_textures/\w+\.(png|exr)", written)
+                assert re.fullmatch(
+                    r"\./[\w-]+_(textures/\w+\.(png|exr)|volumes/\w+\.vdb)", written
+                )
                 assert (folder / written).is_file()
     assert not list(folder.rglob("*.part*"))
 
