@@ -102,7 +102,7 @@ std::string Archive::one_line(const char* text) {
   if (colon != std::string::npos && line.find(' ') == colon + 6) line.erase(0, colon + 7);
   std::replace_if(
       line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
-  return line.substr(0, 200);
+  return line.empty() ? "it is damaged" : line.substr(0, 200);
 }
 
 }  // namespace vdb

@@ -43,13 +43,6 @@ bool with_grid(const openvdb::GridBase& grid, Use&& use) {
          as.template operator()<openvdb::Vec3DGrid>();
 }
 
-/// "float", "half", "vec3s" ...: OpenVDB's word for the values, and half for floats in 16 bits.
-std::string value_name(const openvdb::GridBase& grid) {
-  std::string name = grid.valueType();
-  if (grid.saveFloatAsHalf()) name = name == "float" ? "half" : name == "vec3s" ? "vec3h" : name;
-  return name;
-}
-
 /// (4, 4) rows of p' = p M; None where the transform is not affine.
 nb::object transform_of(const openvdb::GridBase& grid) {
   if (!grid.transform().isLinear()) return nb::none();
@@ -91,11 +84,9 @@ nb::dict describe(const Entry& entry, const openvdb::GridBase* grid) {
   d["name"] = nb::bytes(entry.name().data(), entry.name().size());
   d["index"] = entry.index;
   d["type"] = nb::bytes(entry.descriptor.gridType().data(), entry.descriptor.gridType().size());
-  d["value"] = nb::none();
+  d["half"] = entry.descriptor.saveFloatAsHalf();
   if (grid == nullptr) return d;
-  const bool is_known = with_grid(*grid, [](const auto&) {});
-  d["value"] = value_name(*grid);
-  d["is_read"] = is_known;
+  d["is_read"] = with_grid(*grid, [](const auto&) {});
   tell(d, *grid);
   nb::dict metadata;
   for (auto item = grid->beginMeta(); item != grid->endMeta(); ++item) {

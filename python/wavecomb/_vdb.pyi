@@ -13,7 +13,7 @@ class TooLarge(ValueError):
     """A grid takes more memory than it may."""
 
 def grids(path: str, heads: bool = False) -> list[dict[str, Any]]:
-    """Of each grid name, index and type (bytes), and unless ``heads`` what its topology says.
+    """Of each grid name, index, type (bytes) and half, and unless ``heads`` what its topology says.
 
     Raises BrokenFile, OSError, MemoryError."""
 

@@ -63,7 +63,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
 
 def machine_info() -> dict[str, Any]:
     """What this machine has for a render, as plain data."""
-    from wavecomb import _core
+    from wavecomb import _core, vdb
     from wavecomb.isa import library_info
     from wavecomb.machine import memory_bytes, usable_cores
     from wavecomb.run.isolate import box
@@ -75,6 +75,7 @@ def machine_info() -> dict[str, Any]:
         "memory_limit_bytes": machine_limit(),
         "native": library_info(),
         "texture_store": {"obstacle": _core.TextureStore.obstacle() or None},
+        "openvdb": vdb.version(),
         "sandbox": box.describe(),
     }
 
@@ -97,6 +98,7 @@ def machine_lines(info: dict[str, Any]) -> list[str]:
         f"memory         {has:.1f} GB; a child may take {may:.1f} GB",
         f"native         {library_text()}",
         f"texture limit  {info['texture_store']['obstacle'] or 'by a store'}",
+        f"openvdb        {info['openvdb'] or 'none: volumes are left out'}",
         f"sandbox        {files}; {calls}",
     ]
     return lines + [f"  not there    {line}" for line in sandbox["lacks"]]

@@ -44,13 +44,26 @@ class GridHead:
         number: Place in the file.
         name: Several may share one.
         index: Among those of its name.
-        type_name: OpenVDB's, as "Tree_float_5_4_3_HalfFloat".
+        type_name: OpenVDB's, as "Tree_float_5_4_3".
+        is_half: Whether its floats are kept in 16 bits.
     """
 
     number: int
     name: str
     index: int
     type_name: str
+    is_half: bool
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether a value is several numbers."""
+        return self.type_name.startswith("Tree_vec")
+
+    @property
+    def value_name(self) -> str:
+        """OpenVDB's word for a value, and half for floats in 16 bits: "float", "vec3s" ..."""
+        word = self.type_name.removeprefix("Tree_").partition("_")[0]
+        return {"float": "half", "vec3s": "vec3h"}.get(word, word) if self.is_half else word
 
 
 @dataclass(frozen=True)
@@ -58,7 +71,6 @@ class GridInfo(GridHead):
     """A grid as it is without its values.
 
     Attributes:
-        value: "float", "half" (floats in 16 bits), "vec3s" ...; "" where the library knows none.
         is_read: Whether there are bricks of it.
         kind: "fog volume", "level set", "staggered" or "unknown".
         voxels: That are active.
@@ -68,7 +80,6 @@ class GridInfo(GridHead):
         metadata: As texts.
     """
 
-    value: str = ""
     is_read: bool = False
     kind: str = "unknown"
     voxels: int = 0
@@ -149,7 +160,6 @@ def grids(path: str | Path) -> list[GridInfo]:
 
     Raises:
         WavecombError: As ``grid_heads``.
-        MemoryError: There is no room for a tree.
     """
     plugin = _needed(path)
     with _errors(plugin, path):
@@ -170,7 +180,6 @@ def read(
 
     Raises:
         WavecombError: The file is broken, the grid too large, or of a type that is not read.
-        MemoryError: There is no room for it.
     """
     plugin = _needed(path)
     with _errors(plugin, path, head.name):
@@ -239,6 +248,11 @@ def _errors(plugin: Any, path: str | Path, grid: str = "") -> Iterator[None]:
         raise WavecombError(f"{named}: {error}") from None
     except OSError as error:
         raise WavecombError(f"{named}: {error.strerror or error}") from None
+    except MemoryError:
+        limit = memory.describe_limit()
+        raise WavecombError(
+            f"{named}: out of memory: it is damaged, or too large for this machine{limit}"
+        ) from None
 
 
 def _text(value: bytes) -> str:
@@ -246,18 +260,27 @@ def _text(value: bytes) -> str:
 
 
 def _head(number: int, one: Mapping[str, Any]) -> GridHead:
-    return GridHead(number, _text(one["name"]), one["index"], _text(one["type"]))
+    return GridHead(*_table_row(number, one))
+
+
+def _table_row(number: int, one: Mapping[str, Any]) -> tuple[int, str, int, str, bool]:
+    return number, _text(one["name"]), one["index"], _text(one["type"]), one["half"]
 
 
 def _info(number: int, one: Mapping[str, Any]) -> GridInfo:
-    head = (number, _text(one["name"]), one["index"], _text(one["type"]))
-    if one["value"] is None:
-        return GridInfo(*head)
+    row = _table_row(number, one)
+    if "is_read" not in one:
+        return GridInfo(*row)
     return GridInfo(
-        *head, one["value"], one["is_read"], one["kind"], one["voxels"], _box(one["box"]),
-        _matrix(one["index_to_object"]), tuple(one["background"]),
+        *row,
+        one["is_read"],
+        one["kind"],
+        one["voxels"],
+        _box(one["box"]),
+        _matrix(one["index_to_object"]),
+        tuple(one["background"]),
         {_text(key): _text(value) for key, value in one["metadata"].items()},
-    )  # fmt: skip
+    )
 
 
 def _matrix(rows: Any) -> NDArray[np.float64] | None:

@@ -86,7 +86,7 @@ def test_what_is_said_of_a_grid(tmp_path: Path) -> None:
     made["origins"] = np.array([[0, 0, 0], [-8, 16, 24]], np.int32)
     vdb.write(path, [{"name": "d", **made}])
     (info,) = vdb.grids(path)
-    assert (info.value, info.kind, info.is_read) == ("float", "fog volume", True)
+    assert (info.value_name, info.kind, info.is_read) == ("float", "fog volume", True)
     assert info.voxels == 2 * EDGE**3
     assert info.box is not None and info.box.tolist() == [[-8, 0, 0], [7, 23, 31]]
     assert info.index_to_object is not None and np.allclose(
@@ -211,7 +211,7 @@ def test_smoke_of_arnold() -> None:
 def test_spheres_of_openimageio() -> None:
     for name, kind in (("sphere", "float"), ("sphereCd", "vec3s")):
         path = asset(f"volumes/{name}.vdb")
-        values = {info.name: info.value for info in vdb.grids(path)}
+        values = {info.name: info.value_name for info in vdb.grids(path)}
         assert kind in " ".join(values.values()) or "half" in " ".join(values.values())
         for head in vdb.grid_heads(path):
             got = vdb.read(path, head)

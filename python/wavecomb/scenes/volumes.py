@@ -241,23 +241,27 @@ def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
 def cloud_density(seed: int) -> Density:
     """Heaps of cloud with flat bottoms over a layer, in units of 100 m; at most 1."""
     rng = np.random.default_rng([seed, 41])
-    count = 26
-    place = np.stack([rng.uniform(-9, 9, count), np.zeros(count), rng.uniform(-9, 9, count)], 1)
-    size = rng.uniform(1.0, 2.4, count)
-    place[:, 1] = 0.35 * size * rng.uniform(0.5, 1.6, count)
+    place, size = [], []
+    for _ in range(9):
+        middle, spread = rng.uniform(-7.5, 7.5, 2), rng.uniform(1.2, 2.2)
+        for _ in range(9):
+            high = float(rng.random() ** 1.5)
+            x, z = middle + rng.normal(0, spread * (1.0 - 0.7 * high), 2)
+            place.append((x, 0.4 + 2.6 * high * spread / 2.2, z))
+            size.append(rng.uniform(0.7, 1.3) * (1.25 - 0.55 * high))
     detail = Noise(seed, 7)
 
     def density(points: Points) -> NDArray[np.float32]:
         best = np.full(len(points), -1.0, np.float32)
         for centre, radius in zip(place, size, strict=True):
-            away = ((points - centre.astype(np.float32)) ** 2 * (1.0, 1.9, 1.0)).sum(axis=1)
+            away = ((points - np.array(centre, np.float32)) ** 2).sum(axis=1)
             best = np.maximum(best, (1.0 - away / radius**2).astype(np.float32))
-        near = (best > -0.35) & (points[:, 1] > 0)
+        near = (best > -0.8) & (points[:, 1] > 0)
 
         def inside(some: Points) -> NDArray[np.float32]:
-            cut = detail.fractal(some * np.float32(1.1), 6, 0.55) - 0.5
-            floor = np.clip(some[:, 1] * 5.0, 0.0, 1.0)
-            return np.asarray(np.clip(2.0 * (best[near] + 2.0 * cut), 0, 1) * floor, np.float32)
+            cut = detail.fractal(some * np.float32(1.3), 6, 0.6) - 0.5
+            floor = np.clip(some[:, 1] * 3.0, 0.0, 1.0)
+            return np.asarray(np.clip(best[near] + 3.0 * cut, 0, 1) * floor, np.float32)
 
         return _where(near, points, inside)
 

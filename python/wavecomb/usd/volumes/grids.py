@@ -74,7 +74,7 @@ class GridTable:
         scalar = []
         for field in fields.values():
             head = self._head(field)
-            if head is not None and not head.type_name.startswith("Tree_vec"):
+            if head is not None and not head.is_vector:
                 scalar.append(field)
         cold = [field for field in scalar if field.name.lower() not in _WARM]
         return next(iter(cold or scalar), None)
@@ -156,7 +156,7 @@ class GridTable:
         background = self._background(found, head, use, field)
         values = self._values(found.values, use, kelvin)
         facts = GridFacts(
-            use, field.name, field.file, head.name, _value_name(head), found.voxels,
+            use, field.name, field.file, head.name, head.value_name, found.voxels,
             values.nbytes + found.origins.nbytes,
         )  # fmt: skip
         handle = self._handed_over(found.origins, values, matrix, background)
@@ -214,14 +214,6 @@ class GridTable:
 
             make = _core.VolumeGrid
         return make(origins, values, matrix, background)
-
-
-def _value_name(head: vdb.GridHead) -> str:
-    """The word for values in a type's name: half of Tree_float_5_4_3_HalfFloat."""
-    word = head.type_name.removeprefix("Tree_").partition("_")[0]
-    if head.type_name.endswith("_HalfFloat"):
-        return {"float": "half", "vec3s": "vec3h"}.get(word, word)
-    return word
 
 
 def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
