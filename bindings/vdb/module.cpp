@@ -3,15 +3,21 @@
 /// python/wavecomb/_vdb.pyi. It is loaded where there are volumes, and nowhere else.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <tuple>
+#include <vector>
 
 #include "archive.h"
 #include "bricks.h"
@@ -26,6 +32,7 @@ using vdb::Bricks;
 using vdb::Entry;
 using vdb::Part;
 
+using Index = std::array<int32_t, 3>;
 template <typename T>
 using Input = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 
@@ -176,6 +183,9 @@ void write_file(const std::string& path, const nb::list& grids) {
     desc.origins = origins.data();
     desc.values = values.data();
     std::copy_n(matrix.data(), 16, desc.index_to_object.begin());
+    for (const auto& [first, last, value] :
+         nb::cast<std::vector<std::tuple<Index, Index, float>>>(d["boxes"]))
+      desc.boxes.push_back({first, last, value});
     made.push_back(vdb::make_grid(desc));
   }
   const nb::gil_scoped_release release;

@@ -21,6 +21,10 @@ openvdb::GridBase::Ptr fill(const GridDesc& desc) {
   using Value = typename Grid::ValueType;
   constexpr uint32_t channels = ChannelsOf<Value>::value;
   auto grid = Grid::create();
+  for (const FilledBox& box : desc.boxes)
+    grid->sparseFill(
+        {{box.first[0], box.first[1], box.first[2]}, {box.last[0], box.last[1], box.last[2]}},
+        Value(box.value));
   for (size_t b = 0; b < desc.count; ++b) {
     const int32_t* at = desc.origins + 3 * b;
     for (int axis = 0; axis < 3; ++axis)

@@ -7,8 +7,15 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace vdb {
+
+/// Voxels from the first to the last index that have one value.
+struct FilledBox {
+  std::array<int32_t, 3> first{}, last{};
+  float value = 0;
+};
 
 /// A grid to be written: bricks as `Bricks` has them, always of floats.
 struct GridDesc {
@@ -17,6 +24,8 @@ struct GridDesc {
   uint32_t channels = 1;
   const int32_t* origins = nullptr;
   const float* values = nullptr;
+  /// Filled before bricks are written, with tiles where these fit.
+  std::vector<FilledBox> boxes;
   /// Row vectors: p' = p M.
   std::array<double, 16> index_to_object{};
   /// Values are kept in 16 bits.

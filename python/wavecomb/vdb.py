@@ -203,7 +203,8 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
         path: Of the file; who calls sees to it that it is whole or not there.
         made: Of each grid ``name``, ``origins``, ``values`` (as of ``Bricks``; of float16 they are
             kept in 16 bits) and ``index_to_object``; with ``tiles`` bricks of one value become
-            tiles, which takes less room.
+            tiles, which takes less room; ``boxes`` (first index, last index, value) are filled
+            before.
 
     Raises:
         WavecombError: There is no OpenVDB, or the file cannot be written.
@@ -213,6 +214,7 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
         {
             "name": one["name"],
             "tiles": bool(one.get("tiles", False)),
+            "boxes": list(one.get("boxes", ())),
             "half": np.asarray(one["values"]).dtype == np.float16,
             "origins": np.ascontiguousarray(one["origins"], np.int32),
             "values": np.ascontiguousarray(one["values"], np.float32),

@@ -148,7 +148,7 @@ def test_the_density_is_the_first_field_that_is_no_temperature(tmp_path: Path) -
 
 def test_a_volume_without_fields_fills_its_extent(tmp_path: Path) -> None:
     found, _, _ = the_volume(tmp_path, volume("", "float3[] extent = [(-1, -2, -3), (1, 2, 3)]"))
-    assert found["bounds"].tolist() == [[-1, -2, -3], [1, 2, 3]]
+    assert found["bounds"] == ((-1, -2, -3), (1, 2, 3))
     _, loaded = load(tmp_path, volume(""))
     assert "without fields and without an extent" in said(loaded)
 
@@ -247,7 +247,7 @@ def test_modes_of_emission(
     assert bool(scene.lights) == (mode == "none")  # else it lights itself
 
 
-CLOSURE = """uniform token info:id = "ND_volume_volumeshader"
+CLOSURE = """uniform token info:id = "ND_volume"
     token inputs:vdf.connect = </M/Vdf.outputs:out>
     token inputs:edf.connect = </M/Edf.outputs:out>
 """
@@ -445,3 +445,33 @@ def test_files_of_volumes_are_listed(tmp_path: Path) -> None:
     found = dependencies(write(tmp_path, text))
     assert str(tmp_path / "a.vdb") in found.files
     assert any("gone.vdb" in line for line in found.missing)
+
+
+MIST = """<?xml version="1.0"?>
+<materialx version="1.39">
+  <anisotropic_vdf name="medium" type="VDF">
+    <input name="absorption" type="vector3" value="1, 2, 3"/>
+    <input name="scattering" type="vector3" value="1, 2, 1"/>
+  </anisotropic_vdf>
+  <volume name="vol" type="volumeshader">
+    <input name="vdf" type="VDF" nodename="medium"/>
+  </volume>
+  <volumematerial name="Mist" type="material">
+    <input name="volumeshader" type="volumeshader" nodename="vol"/>
+  </volumematerial>
+</materialx>
+"""
+
+
+@needs("MaterialX")
+def test_volumes_of_materialx_files(tmp_path: Path) -> None:
+    (tmp_path / "mist.mtlx").write_text(MIST)
+    extent = "float3[] extent = [(0, 0, 0), (1, 1, 1)]"
+    text = (
+        "#usda 1.0\n(metersPerUnit = 1)\n"
+        'def "Looks" (references = @mist.mtlx@</MaterialX>) {}\n'
+        + volume("", f"{extent}\nrel material:binding = </Looks/Materials/Mist>")
+    )
+    found, _, report = the_volume(tmp_path, text)
+    assert found["extinction"] == (2, 4, 4) and found["albedo"] == (0.5, 0.5, 0.25)
+    assert "not supported" not in report

@@ -194,6 +194,42 @@ def test_more_than_there_is_room_for_is_one_line(
         vdb.read(path, vdb.grid_heads(path)[0])
 
 
+def huge(path: Path) -> None:
+    """A thousand million voxels, as some tiles."""
+    made = noise(1)
+    made["boxes"] = [((0, 0, 0), (1023, 1023, 1023), 0.5)]
+    vdb.write(path, [{"name": "density", **made}])
+    assert path.stat().st_size < 100_000
+
+
+def test_a_thousand_million_voxels_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.vdb"
+    huge(path)
+    (info,) = vdb.grids(path)
+    assert info.voxels >= 1024**3
+    monkeypatch.setattr("wavecomb.run.isolate.memory.room", lambda: 4_000_000_000)
+    with pytest.raises(WavecombError, match=r"107\d million voxels take 4.3 GB; there is room for"):
+        vdb.read(path, vdb.grid_heads(path)[0])
+
+
+@pytest.mark.slow
+def test_the_memory_limit_holds(tmp_path: Path) -> None:
+    """In the process that reads, whose limit the command sets."""
+    huge(tmp_path / "a.vdb")
+    stage = tmp_path / "s.usda"
+    stage.write_text(
+        '#usda 1.0\ndef Volume "V" {\nrel field:density = </V/d>\n'
+        'def OpenVDBAsset "d" {\nasset filePath = @./a.vdb@\ntoken fieldName = "density"\n}\n}\n'
+    )
+    words = ["-m", "wavecomb", "info", str(stage), "--memory-limit", "600"]
+    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    (line,) = done.stderr.strip().splitlines()
+    assert "/V/d" in line and "million voxels" in line
+
+
 # Files of others
 
 

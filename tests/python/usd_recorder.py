@@ -168,7 +168,7 @@ class Recorder:
         self.lights.append({"kind": kind, "transform": np.asarray(transform), **options})
         return len(self.lights) - 1
 
-    def make_volume_grid(self, origins, values, index_to_object, background=0.0):
+    def make_volume_grid(self, origins, values, index_to_object, background=0.0, name=""):
         assert origins.dtype == np.int32 and origins.shape == (len(values), 3)
         assert values.dtype in (np.float16, np.float32) and values.flags.c_contiguous
         assert values.shape[1:] in ((8, 8, 8), (8, 8, 8, 3)) and np.isfinite(values).all()

@@ -93,7 +93,7 @@ class _Volumes:
         """A MaterialX volume: coefficients per metre, times fields where these are named."""
         path = f"/World/Looks/{name}"
         material = UsdShade.Material.Define(self._stage, path)
-        shader = self._node(f"{path}/Volume", "ND_volume_volumeshader")
+        shader = self._node(f"{path}/Volume", "ND_volume")
         medium = self._node(f"{path}/Medium", "ND_anisotropic_vdf")
         for key, value in (("absorption", absorption), ("scattering", scattering)):
             self._coefficient(medium, key, Sdf.ValueTypeNames.Vector3f, value, density)

@@ -298,7 +298,7 @@ CALLS: dict[str, Call] = {
     "make_volume_grid": Call(
         {
             "origins": array("<i4", 2), "values": array("<f2 <f4", 4, 5),
-            "index_to_object": _MATRIX, "background": number,
+            "index_to_object": _MATRIX, "background": number, "name": text,
         },
         {},
         "volume grids",
@@ -307,7 +307,7 @@ CALLS: dict[str, Call] = {
         {"to_world": _MATRIX},
         {
             **dict.fromkeys(GRIDS, maybe(whole)),
-            "bounds": array("<f8 <f4", 2), "anisotropy": number, "name": text,
+            "bounds": row(COLOUR, COLOUR), "anisotropy": number, "name": text,
             **dict.fromkeys(("extinction", "albedo", "emission"), COLOUR),
         },
         "volumes",

@@ -11,7 +11,7 @@ from wavecomb.usd.looks.network import MAX_DEPTH, shader_id, source_of
 from wavecomb.usd.volumes.inputs import Inputs
 from wavecomb.usd.volumes.look import BLACK, WHITE, Driven, VolumeLook, grey, share, total
 
-IDENTIFIER = "ND_volume_volumeshader"
+IDENTIFIERS = ("ND_volume", "ND_volume_volumeshader")
 
 _NOTHING = Driven()
 

@@ -153,13 +153,17 @@ class GridTable:
             self._report.missing(f"vectors as {use} (left out)", field.prim)
             return None
         self._check_sign(found, named, use, field)
+        if use == "colour" and found.greatest > 1:
+            self._report.note("colour above 1 of a volume: taken for 1", field.prim)
+            np.minimum(found.values, 1, out=found.values)
         background = self._background(found, head, use, field)
         values = self._values(found.values, use, kelvin)
         facts = GridFacts(
             use, field.name, field.file, head.name, head.value_name, found.voxels,
             values.nbytes + found.origins.nbytes,
         )  # fmt: skip
-        handle = self._handed_over(found.origins, values, matrix, background)
+        name = self._report.place(field.prim)
+        handle = self._handed_over(found.origins, values, matrix, background, name)
         return Grid(handle, _corners(found.box, matrix), facts)
 
     def _check_sign(self, found: vdb.Bricks, named: str, use: str, field: Field) -> None:
@@ -180,7 +184,8 @@ class GridTable:
 
     def _background(self, found: vdb.Bricks, head: vdb.GridHead, use: str, field: Field) -> float:
         if use == "colour":
-            return max(found.background[0], 0.0) if len(set(found.background)) == 1 else 0.0
+            same = len(set(found.background)) == 1
+            return min(max(found.background[0], 0.0), 1.0) if same else 0.0
         if any(found.background):
             values = " ".join(f"{value:g}" for value in found.background)
             what = f"grid {head.name!r} of background {values}: 0 outside of what is active"
@@ -197,7 +202,8 @@ class GridTable:
                 made[at : at + _CHUNK] = np.maximum(rgb, 0)
             return made
         if values.ndim == 5 and self._working != "rec709":
-            return np.maximum(from_rec709(np.asarray(values, np.float32), self._working), 0)
+            rgb = from_rec709(np.asarray(values, np.float32), self._working)
+            return np.clip(rgb, 0, 1 if use == "colour" else None)
         return values
 
     def _handed_over(
@@ -206,6 +212,7 @@ class GridTable:
         values: NDArray[Any],
         matrix: NDArray[np.float64],
         background: float,
+        name: str,
     ) -> Any:
         """The grid as the builder has it: in this process, or in the one that builds the scene."""
         make = getattr(self._builder, "make_volume_grid", None)
@@ -213,7 +220,7 @@ class GridTable:
             from wavecomb import _core
 
             make = _core.VolumeGrid
-        return make(origins, values, matrix, background)
+        return make(origins, values, matrix, background, name)
 
 
 def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.float64]:

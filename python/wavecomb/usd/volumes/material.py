@@ -50,7 +50,7 @@ class VolumeLooks:
             kind = shader_id(shader)
             if kind in standard_volume.IDENTIFIERS:
                 return standard_volume.read(shader, inputs)
-            if kind.startswith(closures.IDENTIFIER):
+            if kind in closures.IDENTIFIERS:
                 return closures.ClosureReader(inputs, self._metres).read(shader)
             unknown = unknown or kind
         if unknown:

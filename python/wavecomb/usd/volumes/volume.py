@@ -96,7 +96,7 @@ class VolumeReader:
                 what = "volume without fields and without an extent: left out"
                 self._report.warn(what, prim.GetPath())
                 return None
-            options["bounds"] = bounds
+            options["bounds"] = (tuple(bounds[0].tolist()), tuple(bounds[1].tolist()))
             corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]]
                                 for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
         if corners is None:
