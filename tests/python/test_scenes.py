@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from parts import asset
+from parts import asset, written_scenes
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
@@ -33,7 +33,7 @@ SMALL = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=sorted(SCENES))
+@pytest.fixture(scope="module", params=written_scenes())
 def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Usd.Stage:
     path = tmp_path_factory.mktemp("scenes") / f"{request.param}.usdc"
     write_scene(request.param, path, **SMALL)
