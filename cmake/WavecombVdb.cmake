@@ -17,8 +17,9 @@ set_target_properties(wavecomb_vdb PROPERTIES
   INSTALL_RPATH_USE_LINK_PATH OFF)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
   # DT_RPATH, not DT_RUNPATH: it holds for what OpenVDB is linked with, too.
-  target_link_options(wavecomb_vdb PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map"
+  target_link_options(wavecomb_vdb PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map"
     "-Wl,--disable-new-dtags")
+  set_property(TARGET wavecomb_vdb APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map")
 endif()
 install(TARGETS wavecomb_vdb LIBRARY DESTINATION wavecomb COMPONENT python)
 add_dependencies(wavecomb_python wavecomb_vdb)

@@ -245,7 +245,8 @@ def _errors(plugin: Any, path: str | Path, grid: str = "") -> Iterator[None]:
     try:
         yield
     except plugin.BrokenFile as error:
-        raise WavecombError(f"{named}: no .vdb file that can be read: {error}") from None
+        why = str(error).strip() or "it is damaged"
+        raise WavecombError(f"{named}: no .vdb file that can be read: {why}") from None
     except (plugin.TooLarge, ValueError) as error:
         raise WavecombError(f"{named}: {error}") from None
     except OSError as error:
