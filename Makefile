@@ -36,14 +36,15 @@ help: ## This list
 
 # ---- set-up and build --------------------------------------------------------------------------------
 
-build/.setup: tools/setup tools/setup_embree cmake/embree_probe.cpp constraints.txt pyproject.toml
+build/.setup: tools/setup tools/setup_embree tools/setup_openvdb cmake/embree_probe.cpp cmake/openvdb_probe.cpp constraints.txt \
+  pyproject.toml
 	@mkdir -p build && $(LOCK) tools/setup && touch $@
 
 build/.setup-test: build/.setup
 	@$(LOCK) tools/setup test && touch $@
 
 # pip configures, builds and installs once; after a source edit CMake alone is quicker.
-build/.configured: build/.setup $(CMAKE_INPUTS) pyproject.toml
+build/.configured: build/.setup $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
 	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
 	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Finds Embree 4, oneTBB, OpenSubdiv, Dr.Jit's headers and Python.
+# Finds Embree 4, oneTBB, OpenSubdiv, Dr.Jit's headers and Python; and OpenVDB, which may be missing.
 #
 # Embree: the distribution's first; else the one that tools/setup_embree staged in .deps/embree.
 # oneTBB: from where Embree came, so that one scheduler owns the threads: the distribution's beside the
@@ -80,6 +80,20 @@ find_package(OpenSubdiv 3.4 MODULE QUIET)
 if(NOT OpenSubdiv_FOUND)
   message(FATAL_ERROR "OpenSubdiv 3.4 or newer was not found: run tools/setup, or install your distribution's "
     "package (libosd-dev, opensubdiv-devel, opensubdiv), or pass -DOpenSubdiv_ROOT=.")
+endif()
+
+# OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake): linked with the oneTBB above, so from where
+# Embree came.
+option(WAVECOMB_VDB "Python: build the plug-in that reads volumes, where OpenVDB is found" ON)
+set(WAVECOMB_STAGED_OPENVDB "${PROJECT_SOURCE_DIR}/.deps/openvdb")
+if(WAVECOMB_PYTHON AND WAVECOMB_VDB)
+  if(WAVECOMB_EMBREE_IS_STAGED AND NOT OpenVDB_ROOT)
+    set(OpenVDB_ROOT "${WAVECOMB_STAGED_OPENVDB}")
+  endif()
+  find_package(OpenVDB MODULE QUIET)
+  if(NOT OpenVDB_FOUND)
+    message(STATUS "No OpenVDB: volumes will not be read (tools/setup_openvdb stages it)")
+  endif()
 endif()
 
 message(STATUS "Embree ${embree_VERSION} (${embree_DIR})")

@@ -185,7 +185,10 @@ def _started() -> Server | None:
 
 
 def _import_everything() -> None:
-    """All modules of the package but the window's, and what they import when they need it."""
+    """All modules of the package but the window's, and what they import when they need it.
+
+    Not the plug-in for volumes: what OpenVDB logs with starts threads when it is loaded.
+    """
     import importlib
     import pkgutil
 
@@ -194,7 +197,7 @@ def _import_everything() -> None:
     names = [module.name for module in pkgutil.walk_packages(wavecomb.__path__, "wavecomb.", str)]
     names += ["difflib", "runpy"]
     for name in names:
-        if not name.startswith("wavecomb.gui") and not name.endswith("__main__"):
+        if not name.startswith(("wavecomb.gui", "wavecomb._vdb")) and not name.endswith("__main__"):
             # Without an extra that is not installed; who needs it says so.
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)

@@ -84,6 +84,15 @@ def asset(file: str) -> Path:
     return path
 
 
+def written_scenes() -> list[str]:
+    """Names of the scenes that can be written here: grids need OpenVDB."""
+    from wavecomb import vdb
+    from wavecomb.scenes import SCENES
+
+    grids = () if vdb.is_there() else ("smoke", "clouds")
+    return sorted(set(SCENES) - set(grids))
+
+
 def only_where(condition: object, reason: str) -> pytest.MarkDecorator:
     """Marks tests of other machines or builds: no part is missing, so CI may skip them, too."""
     return pytest.mark.skipif(not condition, reason=NOT_HERE + reason)

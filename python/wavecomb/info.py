@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from wavecomb.usd import LoadedStage
+
+
+_MOST_VOLUMES = 16
+"""That are listed for people."""
 
 
 def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
@@ -43,6 +48,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
             "bytes": sum(size for _, size in scene.textures),
             "files": [{"name": name, "bytes": size} for name, size in scene.textures],
         },
+        "volumes": [volume.as_dict() for volume in loaded.volumes],
         "lights": scene.light_count,
         "lights_by_kind": dict(sorted(Counter(kind for _, kind in scene.lights).items())),
         "cameras": list(loaded.cameras),
@@ -57,7 +63,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
 
 def machine_info() -> dict[str, Any]:
     """What this machine has for a render, as plain data."""
-    from wavecomb import _core
+    from wavecomb import _core, vdb
     from wavecomb.isa import library_info
     from wavecomb.machine import memory_bytes, usable_cores
     from wavecomb.run.isolate import box
@@ -69,6 +75,7 @@ def machine_info() -> dict[str, Any]:
         "memory_limit_bytes": machine_limit(),
         "native": library_info(),
         "texture_store": {"obstacle": _core.TextureStore.obstacle() or None},
+        "openvdb": vdb.version(),
         "sandbox": box.describe(),
     }
 
@@ -91,6 +98,7 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
         ("memory", f"{has:.1f} GB; a child may take {may:.1f} GB"),
         ("native", library_text()),
         ("texture limit", info["texture_store"]["obstacle"] or "by a store"),
+        ("openvdb", info["openvdb"] or "none: volumes are left out"),
         ("sandbox", f"{files}; {calls}"),
     ]
 
@@ -134,6 +142,10 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
         row("", f"{entry['bytes'] / 1e6:8.1f} MB  {entry['name']}")
     if textures["count"] > 8:
         row("", f"and {textures['count'] - 8} more (--json has all)")
+    for volume in info["volumes"][:_MOST_VOLUMES]:
+        _volume_rows(row, volume)
+    if len(info["volumes"]) > _MOST_VOLUMES:
+        row("", f"and {len(info['volumes']) - _MOST_VOLUMES} more volumes (--json has all)")
     row("lights", f"{info['lights']}{_counts(info['lights_by_kind'])}")
     others = [path for path in info["cameras"] if path != info["camera"]]
     if others:
@@ -151,6 +163,18 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
             console.print(f"[bold]{title}[/bold]")
             for finding in findings:
                 console.print(f"  {escape(finding.line())}", highlight=False)
+
+
+def _volume_rows(row: Callable[[str, str], None], volume: dict[str, Any]) -> None:
+    """A volume, and its grids below it."""
+    low, high = volume["bounds"]
+    times = f" x {volume['count']}" if volume["count"] > 1 else ""
+    what = "" if volume["grids"] else ", homogeneous"
+    row("volume", f"{volume['name']}{times}{what}, {_point(low)} to {_point(high)}")
+    for grid in volume["grids"]:
+        named = f"{grid['grid']} ({grid['value']}) of {grid['file']}"
+        size = f"{grid['voxels']:,} voxels, {grid['bytes'] / 1e6:.1f} MB"
+        row("", f"{grid['use']}: {named}, {size}")
 
 
 def _counts(counts: dict[str, int]) -> str:

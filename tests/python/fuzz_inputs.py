@@ -20,6 +20,8 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+from wavecomb import vdb
+
 Mutation = Callable[[random.Random, bytes], bytes]
 
 BALL = """#usda 1.0
@@ -215,6 +217,48 @@ def left_over(what: str) -> bytes:
         return out.read_bytes()
 
 
+VOLUME = """#usda 1.0
+def Volume "Smoke" {
+    rel field:density = </Smoke/density>
+    rel field:heat = </Smoke/heat>
+    def OpenVDBAsset "density" { asset filePath = @a.vdb@
+}
+    def OpenVDBAsset "heat" { asset filePath = @a.vdb@
+}
+    rel material:binding = </Look>
+}
+def Material "Look" {
+    token outputs:volume.connect = </Look/Shader.outputs:out>
+    def Shader "Shader" {
+        uniform token info:id = "standard_volume"
+        string inputs:temperature_channel = "heat"
+        token outputs:out
+    }
+}
+"""
+
+
+@cache
+def vdb_bytes() -> bytes:
+    """Two small grids, one of them with a tile."""
+    import numpy as np
+
+    rng = np.random.default_rng(1)
+    values = rng.random((4, 8, 8, 8), np.float32)
+    values[values < 0.5] = 0
+    values[3] = 0.5
+    bricks = {
+        "origins": np.array([[0, 0, 0], [8, 0, 0], [-8, 16, 8], [64, 0, 0]], np.int32),
+        "index_to_object": np.diag([0.1, 0.1, 0.1, 1.0]), "tiles": True,
+    }  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "a.vdb")
+        halves = values.astype(np.float16)
+        vdb.write(file, [{"name": "density", "values": values, **bricks},
+                         {"name": "heat", "values": halves, **bricks}])  # fmt: skip
+        return file.read_bytes()
+
+
 _WORDS = re.compile(rb"[^\s<>=\"/,:{}\[\]]+")
 STRANGE = (
     b"-1", b"0", b"4294967296", b"99999999999999999999", b"1e999", b"nan", b"", b"\xff\xfe",
@@ -290,6 +334,10 @@ def make_input(kind: str, rng: random.Random, folder: Path, mutations: list[Muta
         (folder / "more.mtlx").write_bytes(mutate(rng, more) if how < 0.2 else more)
         stage.write_text(MATERIALX_STAGE)
         return stage
+    if kind == "vdb":
+        (folder / "a.vdb").write_bytes(mutate(rng, vdb_bytes()))
+        stage.write_text(VOLUME)
+        return stage
     if kind in ("ply", "obj"):
         form = rng.choice(("ascii", "binary_little_endian", "binary_big_endian"))
         data = mutate(rng, ply_bytes(form) if kind == "ply" else OBJ.encode())
@@ -321,7 +369,10 @@ def make_input(kind: str, rng: random.Random, folder: Path, mutations: list[Muta
     return file
 
 
-INPUTS = ("ies", "mtlx", "ply", "obj", "checkpoint", "merge", "costs", "product names")
+INPUTS = (
+    "ies", "mtlx", "ply", "obj", "checkpoint", "merge", "costs", "product names",
+    *(("vdb",) if vdb.is_there() else ()),
+)  # fmt: skip
 BY_COMMAND = ("product names",)
 """Kinds that only the command judges: it is what writes files."""
 

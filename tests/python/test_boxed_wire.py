@@ -146,7 +146,7 @@ for _ in range(200):
         (described("<f4", [1.0]), "shape"),
         (described("<f4", [True]), "shape"),
         (described("<f4", "12"), "shape"),
-        (described("<f4", [1] * 5), "shape"),
+        (described("<f4", [1] * 6), "shape"),
         (described("<f4", [1 << 40, 1 << 40]), "shape"),
         (described("<f4", [0, 1 << 60]), "shape"),
         (described("<f4"), "not described"),

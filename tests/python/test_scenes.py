@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from parts import asset
+from parts import asset, written_scenes
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
@@ -28,10 +28,12 @@ from wavecomb.scenes.teapot import teapot, teapot_patches
 from wavecomb.scenes.textures import TEXTURES, sky
 from wavecomb.usd import LoadedStage
 
-SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
+SMALL = {
+    "triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5, "voxels": 24,
+}  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=sorted(SCENES))
+@pytest.fixture(scope="module", params=written_scenes())
 def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Usd.Stage:
     path = tmp_path_factory.mktemp("scenes") / f"{request.param}.usdc"
     write_scene(request.param, path, **SMALL)
@@ -109,7 +111,9 @@ def test_textures_are_beside_the_stage(stage: Usd.Stage) -> None:
         for attribute in prim.GetAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset and attribute.Get():
                 written = attribute.Get().path
-                assert re.fullmatch(r"\./[\w-]+_textures/\w+\.(png|exr)", written)
+                assert re.fullmatch(
+                    r"\./[\w-]+_(textures/\w+\.(png|exr)|volumes/\w+\.vdb)", written
+                )
                 assert (folder / written).is_file()
     assert not list(folder.rglob("*.part*"))
 

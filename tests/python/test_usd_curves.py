@@ -278,9 +278,7 @@ def test_broken_prims_are_named_once(tmp_path, text, words, drawn):
     assert words in line and line.endswith("/C")
 
 
-@pytest.mark.parametrize(
-    "kind", ["NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh", "Volume"]
-)
+@pytest.mark.parametrize("kind", ["NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh"])
 def test_what_is_not_supported_is_named(tmp_path, kind):
     _, loaded = load(tmp_path, f'def {kind} "N" {{ }}')
     assert f"not supported: {kind}: /N" in said(loaded)

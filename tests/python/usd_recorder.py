@@ -20,6 +20,7 @@ class Recorder:
         self.profiles, self.sets, self.mesh_lights, self.graphs = [], [], [], []
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
+        self.grids, self.volumes = [], []
         self.motions = []  # (name of a group, its transforms over the shutter)
 
     def add_texture(self, pixels, *, srgb, wrap_s="repeat", wrap_t="repeat", name=""):
@@ -166,6 +167,35 @@ class Recorder:
         assert np.shape(transform) == (4, 4)
         self.lights.append({"kind": kind, "transform": np.asarray(transform), **options})
         return len(self.lights) - 1
+
+    def make_volume_grid(self, origins, values, index_to_object, background=0.0, name=""):
+        assert origins.dtype == np.int32 and origins.shape == (len(values), 3)
+        assert values.dtype in (np.float16, np.float32) and values.flags.c_contiguous
+        assert values.shape[1:] in ((8, 8, 8), (8, 8, 8, 3)) and np.isfinite(values).all()
+        assert (values >= 0).all() and (origins % 8 == 0).all()
+        assert len(np.unique(origins, axis=0)) == len(origins)
+        assert index_to_object.shape == (4, 4) and background >= 0
+        self.grids.append(
+            {
+                "origins": origins,
+                "values": values,
+                "matrix": index_to_object,
+                "background": background,
+            }
+        )
+        return len(self.grids) - 1
+
+    def add_volume(self, *, to_world, density=None, color=None, emission_grid=None, bounds=None,
+                   **options):  # fmt: skip
+        assert np.shape(to_world) == (4, 4) and (density is None) != (bounds is None)
+        grids = [
+            None if one is None else self.grids[one] for one in (density, color, emission_grid)
+        ]
+        self.volumes.append(
+            {"to_world": to_world, "density": grids[0], "color": grids[1], "glow": grids[2],
+             "bounds": bounds, **options}
+        )  # fmt: skip
+        return len(self.volumes) - 1
 
     def add_mesh_light(self, transform, material_sync, **options):
         assert np.shape(transform) == (4, 4)

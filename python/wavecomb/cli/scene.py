@@ -28,6 +28,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
         "wavecomb scene spread -o spread.usdc --materials 256 --texture-mb 64 --shader-cost 10",
         "wavecomb scene heavy -o heavy.usdc --materials 64 --texture-mb 2000",
         "wavecomb scene lights -o street.usdc --lights 10000",
+        "wavecomb scene smoke -o smoke.usdc --voxels 500",
         "wavecomb scene mixed -o plain.usdc --plain",
     ),
 )
@@ -52,6 +53,12 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     "--programs", type=click.IntRange(1, 5), metavar="N", help="spread: kinds of materials, 1 to 5."
 )
 @click.option("--lights", type=click.IntRange(min=1), metavar="N", help="lights: how many.")
+@click.option(
+    "--voxels",
+    type=click.IntRange(min=16),
+    metavar="N",
+    help="smoke, clouds: along the longest edge.",
+)
 @click.option("--texture-mb", type=Real(0), metavar="X", help="spread, heavy: memory of textures.")
 @click.option(
     "--shader-cost",
@@ -65,7 +72,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     help="UsdPreviewSurface as others export it: no program, metallic workflow. Not of heavy.",
 )
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
-    """Write one of our own test stages, and its textures beside it."""
+    """Write one of our own test stages, and its textures and grids beside it."""
     from wavecomb.errors import WavecombError
     from wavecomb.scenes import SCENES, write_scene
 

@@ -22,6 +22,7 @@ from wavecomb.scenes.room import build_room
 from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.studio import build_studio
+from wavecomb.scenes.volumes import build_clouds, build_fog, build_smoke
 
 __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
 
@@ -50,13 +51,16 @@ SCENES: dict[str, SceneInfo] = {
     "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
     "studio": SceneInfo("90 objects, a key, a fill and a dim dome", 0.1, build_studio),
     "room": SceneInfo("a dining room, lit through a door ajar", 1.0, build_room),
+    "smoke": SceneInfo("smoke over an ember, a grid: see --voxels", 1.0, build_smoke),
+    "clouds": SceneInfo("clouds over the sea, a grid: see --voxels", 100.0, build_clouds),
+    "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""
 
 
 def write_scene(name: str, path: Path, **options: Any) -> None:
-    """Writes a procedural stage, and its textures to ``<stem>_textures/`` beside it.
+    """Writes a procedural stage; textures and grids go to folders ``<stem>_...`` beside it.
 
     Args:
         name: A key of ``SCENES``.

@@ -30,6 +30,7 @@ class SceneOptions:
         shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
             which is none, geometrically.
         lights: How many ``lights`` has.
+        voxels: Along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
             the metallic workflow, no program named. ``heavy`` has no such form, ``spread`` none of
             a ``shader_cost`` above 1.
@@ -47,12 +48,15 @@ class SceneOptions:
     texture_mb: float = 16.0
     shader_cost: float = 1.0
     lights: int = 1000
+    voxels: int = 160
     plain: bool = False
 
     def __post_init__(self) -> None:
         """Refuses what no scene can use."""
         if self.aspect is not None and not 0.01 <= self.aspect <= 100.0:
             raise SceneError(f"aspect must be from 0.01 to 100, not {self.aspect}")
+        if not 16 <= self.voxels <= 4096:
+            raise SceneError(f"voxels must be from 16 to 4096, not {self.voxels}")
         if self.seed < 0:
             raise SceneError(f"seed must not be negative: {self.seed}")
 

@@ -226,7 +226,14 @@ class StageWriter:
             surface.CreateInput(key, value).ConnectToSource(output)
 
     def _texture_path(self, file_name: str) -> tuple[Path, Sdf.AssetPath]:
-        folder = self._path.with_name(f"{self._path.stem}_textures")
+        return self._beside("textures", file_name)
+
+    def volume_file(self, file_name: str) -> tuple[Path, Sdf.AssetPath]:
+        """Where a file of grids goes, in ``<stem>_volumes/``, and the path that a stage has."""
+        return self._beside("volumes", file_name)
+
+    def _beside(self, kind: str, file_name: str) -> tuple[Path, Sdf.AssetPath]:
+        folder = self._path.with_name(f"{self._path.stem}_{kind}")
         folder.mkdir(parents=True, exist_ok=True)
         return folder / file_name, Sdf.AssetPath(f"./{folder.name}/{file_name}")
 

@@ -211,6 +211,9 @@ class Call:
         return {name: _known(kinds, name)(value, arrays) for name, value in body.items()}
 
 
+GRIDS = ("density", "color", "emission_grid")
+"""Arguments of ``add_volume`` that are grids: numbers of ``make_volume_grid``."""
+
 _MESH: dict[str, Kind] = {
     "positions": array(_FLOATS, 2, 3), "indices": array("<u4 <i4", 2),
 }  # fmt: skip
@@ -291,6 +294,23 @@ CALLS: dict[str, Call] = {
     "add_light": Call({"kind": text, "transform": _MATRIX}, _LIGHT, "lights"),
     "add_mesh_light": Call(
         {"transform": _MATRIX, "material_sync": text}, _MESH_LIGHT, "mesh lights"
+    ),
+    "make_volume_grid": Call(
+        {
+            "origins": array("<i4", 2), "values": array("<f2 <f4", 4, 5),
+            "index_to_object": _MATRIX, "background": number, "name": text,
+        },
+        {},
+        "volume grids",
+    ),
+    "add_volume": Call(
+        {"to_world": _MATRIX},
+        {
+            **dict.fromkeys(GRIDS, maybe(whole)),
+            "bounds": row(COLOUR, COLOUR), "anisotropy": number, "name": text,
+            **dict.fromkeys(("extinction", "albedo", "emission"), COLOUR),
+        },
+        "volumes",
     ),
     "add_geometry_set": Call({"rules": named(text)}, {}, "sets"),
     "add_ies": Call(

@@ -17,6 +17,7 @@ from wavecomb.usd.looks.texture_cache import Image, TextureCache
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.report import Finding, LoadReport
+from wavecomb.usd.volumes.info import GridFacts, VolumeFacts
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -43,10 +44,15 @@ _REPORT = calls.fields(
     notes=_FINDINGS, warnings=_FINDINGS, unsupported=_FINDINGS, counts=named(size),
     aliases=named(text),
 )  # fmt: skip
+_POINT = row(number, number, number)
+_GRID = calls.fields(
+    use=text, field=text, file=text, grid=text, value=text, voxels=size, bytes=size,
+)  # fmt: skip
+_VOLUME = calls.fields(name=text, count=size, low=_POINT, high=_POINT, grids=many(_GRID))
 _STAGE = calls.fields(
     report=_REPORT, camera_path=maybe(text), cameras=_TEXTS, lights=_TEXTS, material_paths=_TEXTS,
     light_paths=_TEXTS, frame=maybe(number), shutter=maybe(_PAIR), render=_CHOICE,
-    leaves_out_levels=flag, outline=maybe(calls.array("<f8", 2)),
+    leaves_out_levels=flag, outline=maybe(calls.array("<f8", 2)), volumes=many(_VOLUME),
 )  # fmt: skip
 _IMAGE = calls.fields(
     size=row(whole, whole), channels=whole, dtype=text, stamp=maybe(row(size, size)),
@@ -99,6 +105,10 @@ def of_stage(loaded: LoadedStage) -> dict[str, Any]:
              "shutter", "leaves_out_levels", "outline")  # fmt: skip
     return {
         **{name: getattr(loaded, name) for name in names},
+        "volumes": [
+            {**vars(one), "grids": [dict(vars(grid)) for grid in one.grids]}
+            for one in loaded.volumes
+        ],
         "report": of_report(loaded.report),
         "render": of_choice(loaded.render),
     }
@@ -109,7 +119,8 @@ def read_stage(
 ) -> LoadedStage:
     """What was read, of plain data and the scene that was built. Raises Refused."""
     wanted = ("report", "camera_path", "cameras", "lights", "material_paths", "light_paths",
-              "frame", "shutter", "render", "leaves_out_levels", "outline")  # fmt: skip
+              "frame", "shutter", "render", "leaves_out_levels", "outline",
+              "volumes")  # fmt: skip
     read = _complete(_STAGE(value, arrays), wanted)
     outline = read["outline"]
     if outline is not None and outline.shape[1] != 3:
@@ -135,7 +146,15 @@ def read_stage(
         working_space,
         read["leaves_out_levels"],
         outline,
+        tuple(_volume(one) for one in read["volumes"]),
     )
+
+
+def _volume(value: Mapping[str, Any]) -> VolumeFacts:
+    one = _complete(value, [field.name for field in fields(VolumeFacts)])
+    wanted = [field.name for field in fields(GridFacts)]
+    grids = tuple(GridFacts(**_complete(grid, wanted)) for grid in one["grids"])
+    return VolumeFacts(**{**one, "grids": grids})
 
 
 def of_cache(cache: TextureCache) -> dict[str, Any]:

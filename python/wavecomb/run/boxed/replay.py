@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from wavecomb import _core
 from wavecomb.errors import WavecombError
-from wavecomb.run.boxed.calls import CALLS
+from wavecomb.run.boxed.calls import CALLS, GRIDS
 from wavecomb.run.boxed.wire import Message, Refused
 
 
@@ -34,6 +35,7 @@ class Replay:
         self._scenes = scenes
         self._store = store
         self._give_back = give_back
+        self._grids: list[_core.VolumeGrid] = []
 
     def make(self, message: Message) -> None:
         """Makes one call.
@@ -55,7 +57,7 @@ class Replay:
             values["scene"] = self._scene(values["scene"])
         fails = body.get("fails", False)
         try:
-            number = getattr(self._builder, name)(**values)
+            number = self._called(name, values)
         except TypeError:
             raise Refused(f"a call {name} with other arguments") from None
         except ValueError as error:
@@ -68,6 +70,22 @@ class Replay:
             raise Refused(f"a call {name} that comes to {number}, not to {body.get('id')!r:.32}")
         if not call.keeps and (self._store is not None or name != "add_texture"):
             self._give_back(sum(array.nbytes for array in message.arrays))
+
+    def _called(self, name: str, values: dict[str, Any]) -> Any:
+        """What a call comes to; grids of volumes are kept here, by their numbers."""
+        if name == "make_volume_grid":
+            self._grids.append(_core.VolumeGrid(**values))
+            return len(self._grids) - 1
+        if name == "add_volume":
+            values = {**values, **{use: self._grid(values.get(use)) for use in GRIDS}}
+        return getattr(self._builder, name)(**values)
+
+    def _grid(self, number: int | None) -> _core.VolumeGrid | None:
+        if number is None:
+            return None
+        if number >= len(self._grids):
+            raise Refused(f"grid {number} of a volume, which is not there")
+        return self._grids[number]
 
     def wait(self, message: Message) -> None:
         """Notes what lies ready in the sandbox to become textures."""

@@ -268,11 +268,11 @@ def _checked_entry(entry: Any) -> tuple[np.dtype[Any], list[int], int, bool]:
 
 
 def is_shape(value: Any) -> bool:
-    """Whether a value is a shape of at most 4 dimensions and 2^53 values."""
+    """Whether a value is a shape of at most 5 dimensions and 2^53 values."""
     return (
         isinstance(value, Sequence)
         and not isinstance(value, str)
-        and len(value) <= 4
+        and len(value) <= 5
         and all(type(edge) is int and 0 <= edge < 1 << 53 for edge in value)
         and math.prod(max(edge, 1) for edge in value) < 1 << 53
     )

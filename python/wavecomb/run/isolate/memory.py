@@ -125,6 +125,14 @@ def data_bytes() -> int:
     return 0
 
 
+def room() -> int:
+    """Bytes that this process may still take."""
+    bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
+    if bytes_ == resource.RLIM_INFINITY:
+        bytes_ = machine_limit() or 1 << 62
+    return max(bytes_ - data_bytes(), 0)
+
+
 def describe_limit() -> str:
     """For a line about this process's memory: "; the limit is 24000 MB (--memory-limit)"."""
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]

@@ -137,6 +137,11 @@ class MaterialTable:
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
         self._emitting: set[int] = set()
 
+    @property
+    def working(self) -> str:
+        """The space of colours."""
+        return self._textures.working
+
     def expect(self, material: UsdShade.Material) -> None:
         """Starts what takes long for a material that will be used: reading its images."""
         if material.GetPath() not in self._surfaces:
@@ -182,7 +187,7 @@ class MaterialTable:
         if known is not None:
             return known[1]
         try:
-            varied = with_attributes(surface, varying, self._textures.working)
+            varied = with_attributes(surface, varying, self.working)
         except GraphTooLarge as error:
             what = f"shading network too large for primvars ({error}): left out"
             self._report.missing(what, surface.name)
@@ -234,7 +239,7 @@ class MaterialTable:
 
     def _in_working_space(self, parameters: dict[str, Any]) -> dict[str, Any]:
         """Parameters whose colours are those of the working space."""
-        working = self._textures.working
+        working = self.working
         if working == "rec709":
             return parameters
 

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,10 @@ from pxr import Sdf
 
 from wavecomb.usd.cameras import framing
 from wavecomb.usd.lights.light import Light
+from wavecomb.usd.volumes.volume import Volume
 
 Matrices = NDArray[np.float64]
+T = TypeVar("T")
 
 _MANY_BOXES = 1024
 """More are made one before others are added."""
@@ -21,7 +24,7 @@ _MANY_BOXES = 1024
 
 @dataclass
 class Group:
-    """Meshes, lights and instances that are placed together.
+    """Meshes, lights, volumes and instances that are placed together.
 
     Attributes:
         number: In the scene, once something is in it.
@@ -29,8 +32,10 @@ class Group:
         outlines: Where what is in it reaches farthest, in its own space; see ``framing``.
         root: Prim path that the names of what is in it begin with.
         lights: With their transforms (4, 4) in the group.
-        children: Groups that hold lights placed in it, transforms (k, 4, 4).
+        volumes: Likewise.
+        children: Groups that hold lights or volumes placed in it, transforms (k, 4, 4).
         surfaced: The same of groups that hold surfaces to be refined.
+        holds_placed: Whether lights or volumes are in it, or in what is placed in it.
         sampled_lamp: A mesh light in it that cannot move.
     """
 
@@ -39,9 +44,10 @@ class Group:
     number: int | None = None
     boxes: list[NDArray[Any]] = field(default_factory=list)
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
+    volumes: list[tuple[Volume, Matrices]] = field(default_factory=list)
     children: list[tuple[Group, Matrices]] = field(default_factory=list)
     surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
-    lit: bool = False
+    holds_placed: bool = False
     has_surfaces: bool = False
     sampled_lamp: Sdf.Path | None = None
     outlines: list[NDArray[np.float64]] = field(default_factory=list)
@@ -104,11 +110,22 @@ def middle_of(motion: Matrices) -> Matrices:
 
 def placed_lights(group: Group, limit: int) -> list[tuple[Light, Matrices]]:
     """All lights of a group and of what is placed in it, at most ``limit``."""
-    out = list(group.lights[:limit])
+    return _placed(group, limit, lambda one: one.lights)
+
+
+def placed_volumes(group: Group, limit: int) -> list[tuple[Volume, Matrices]]:
+    """All volumes of a group and of what is placed in it, at most ``limit``."""
+    return _placed(group, limit, lambda one: one.volumes)
+
+
+def _placed(
+    group: Group, limit: int, of: Callable[[Group], list[tuple[T, Matrices]]]
+) -> list[tuple[T, Matrices]]:
+    out = list(of(group)[:limit])
     for child, transforms in group.children:
-        inner = placed_lights(child, limit)
+        inner = _placed(child, limit, of)
         for transform in transforms:
             if len(out) >= limit:
                 return out
-            out += [(light, local @ transform) for light, local in inner]
+            out += [(one, local @ transform) for one, local in inner]
     return out[:limit]

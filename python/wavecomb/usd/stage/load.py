@@ -47,6 +47,8 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.traverse import Traversal
 from wavecomb.usd.stage.view_options import Seen, check_view, seen_on
+from wavecomb.usd.stage.volumes import add_volumes
+from wavecomb.usd.volumes.info import VolumeFacts
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -69,6 +71,7 @@ class _Filled:
     shutter: tuple[float, float] | None
     render: RenderChoice
     outline: NDArray[np.float64] | None
+    volumes: tuple[VolumeFacts, ...]
 
 
 @dataclass(frozen=True)
@@ -185,6 +188,7 @@ def load_stage(
         chosen.working_space,
         chosen.texture_limit is not None and store is None,
         filled.outline,
+        filled.volumes,
     )
 
 
@@ -229,7 +233,7 @@ def _fill(
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
     seen = seen_on(stage, choice.options, report)
-    chosen, lights, shutter, outline = _read(
+    chosen, lights, shutter, outline, volumes = _read(
         stage,
         time,
         choice,
@@ -244,7 +248,9 @@ def _fill(
         progress,
     )
     used = frame_number(time)
-    return _Filled(chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline)
+    return _Filled(
+        chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline, volumes
+    )
 
 
 def _native_builder(threads: int, store: _core.TextureStore | None) -> _core.SceneBuilder:
@@ -266,8 +272,11 @@ def _read(
     surfaces: Surfaces,
     cache: FrameCache | None,
     progress: LoadProgress | None,
-) -> tuple[str | None, tuple[str, ...], tuple[float, float] | None, NDArray[np.float64] | None]:
-    """Fills the builder; gives paths of the camera and of lights, the shutter, the outline."""
+) -> tuple[
+    str | None, tuple[str, ...], tuple[float, float] | None, NDArray[np.float64] | None,
+    tuple[VolumeFacts, ...],
+]:  # fmt: skip
+    """Fills the builder; gives paths of camera and lights, the shutter, the outline, volumes."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = seen.camera
     groups = LightGroups(report)
@@ -291,8 +300,9 @@ def _read(
         framed=planes if view is None else None,
     )  # fmt: skip
     world = groups_of.world()
-    lit = materials.glows or has_lights or groups_of.mesh_lights.any
+    lit = materials.glows or has_lights or groups_of.mesh_lights.any or groups_of.volumes.glow
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
+    volumes = add_volumes(world, builder, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")
     chosen = None if view is None or view_prim is None else str(view_prim.GetPath())
@@ -308,7 +318,7 @@ def _read(
     if cache is not None:
         cache.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
-    return chosen, light_paths, None if motion is None else motion.shutter, outline
+    return chosen, light_paths, None if motion is None else motion.shutter, outline, volumes
 
 
 def _limit_textures(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.volumes.info import VolumeFacts
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -44,6 +45,7 @@ class LoadedStage:
         leaves_out_levels: Whether textures have only the mip levels that its view needs.
         outline: Points (n, 3) in the world where what is drawn reaches farthest; None unless a view
             was framed for it.
+        volumes: What there is to say of each.
     """
 
     scene: _core.Scene
@@ -62,6 +64,7 @@ class LoadedStage:
     working_space: str = "rec709"
     leaves_out_levels: bool = False
     outline: NDArray[np.float64] | None = None
+    volumes: tuple[VolumeFacts, ...] = ()
     _kept: list[_core.Renderer] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @contextlib.contextmanager

@@ -88,21 +88,33 @@ class GroupPlacer:
             parent.sampled_lamp = child.sampled_lamp
             if motion is not None:
                 self.mesh_lights.say_moving(child.sampled_lamp)
-        if child.lit:
+        if child.holds_placed:
             middle = transforms if motion is None else middle_of(motion)
             parent.children.append((child, middle))
-            parent.lit = True
+            parent.holds_placed = True
         if child.has_surfaces:
             parent.surfaced.append((child, transforms))
             parent.has_surfaces = True
-        if child.number is None:
-            return
+        if child.number is not None:
+            self._add_instances(parent, child, transforms, materials, prims, numbers, motion)
+        self._grow(parent, child, transforms if motion is None else motion.reshape(-1, 4, 4))
+
+    def _add_instances(
+        self,
+        parent: Group,
+        child: Group,
+        transforms: Matrices,
+        materials: NDArray[np.uint32],
+        prims: Sequence[Usd.Prim],
+        numbers: NDArray[np.uint32] | None,
+        motion: Matrices | None,
+    ) -> None:
         paths = [str(prim.GetPath()) for prim in prims]
         names = [self.report.place(path) for path in paths]
         lengths = [self.asset_length(*each) for each in zip(prims, paths, names, strict=True)]
         self.builder.add_instances(
             self.number(parent),
-            child.number,
+            self.number(child),
             transforms,
             materials,
             names=names,
@@ -110,19 +122,21 @@ class GroupPlacer:
             asset_lengths=lengths,
             **({} if motion is None else {"motion": motion}),
         )
-        if child.bounds is not None:
-            if motion is not None:
-                transforms = motion.reshape(-1, 4, 4)
-            if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
-                child.outlines = [inner]
-                more = self.framed if parent.number == 0 else None
-                parent.reach(framing.placed(inner, transforms, more), more)
-            lo, hi = child.bounds
-            centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
-            linear = transforms[:, :3, :3]
-            middle = centre @ linear + transforms[:, 3, :3]
-            reach = half @ np.abs(linear)
-            parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
+
+    def _grow(self, parent: Group, child: Group, transforms: Matrices) -> None:
+        """Makes the bounds and outlines of a group hold what is placed in it."""
+        if child.bounds is None:
+            return
+        if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
+            child.outlines = [inner]
+            more = self.framed if parent.number == 0 else None
+            parent.reach(framing.placed(inner, transforms, more), more)
+        lo, hi = child.bounds
+        centre, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
+        linear = transforms[:, :3, :3]
+        middle = centre @ linear + transforms[:, 3, :3]
+        reach = half @ np.abs(linear)
+        parent.grow(np.array([(middle - reach).min(axis=0), (middle + reach).max(axis=0)]))
 
 
 def outline_of(

@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdRender
 
 from wavecomb.errors import WavecombError
 
-_FOLLOWED = ("material:binding", "prototypes", "skel:", "light:filters", "portals")
+_FOLLOWED = ("material:binding", "prototypes", "skel:", "light:filters", "portals", "field:")
 """What names of relationships begin with whose targets are needed to draw a prim."""
 
 _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)

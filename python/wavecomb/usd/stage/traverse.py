@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdVol
 
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.geometry.shapes import SHAPES
@@ -25,7 +25,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]
 
-_UNSUPPORTED = ("NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh", "Volume")
+_UNSUPPORTED = ("NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh")
 
 
 STRANDS = {"BasisCurves": "curves", "Points": "points"}
@@ -50,6 +50,7 @@ class Gathered:
     """What a walk found in one group."""
 
     draws: list[Draw] = field(default_factory=list)
+    volumes: list[Draw] = field(default_factory=list)
     instances: list[Placed] = field(default_factory=list)
     instancers: list[Placed] = field(default_factory=list)
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
@@ -93,6 +94,8 @@ class Traversal:
                 kind = STRANDS[name]
             elif name in LIGHT_KINDS:
                 kind = "light"
+            elif prim.IsA(UsdVol.Volume):
+                kind = "volume"
             elif prim.IsA(UsdGeom.PointInstancer):
                 kind = "instancer"
             elif name == "PortalLight":
@@ -189,6 +192,12 @@ class Traversal:
                         self.report.note("moving light: still, in mid-shutter", prim.GetPath())
                         matrix = track.at(self.motion.middle)
                     self._light(found, prim, matrix)
+            elif kind == "volume":
+                if shown:
+                    if track is not None and self.motion is not None:
+                        self.report.note("moving volume: still, in mid-shutter", prim.GetPath())
+                        matrix = track.at(self.motion.middle)
+                    found.volumes.append(Draw(prim, matrix, inherited, kind=kind, parent=parent))
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+# The Python module wavecomb._vdb, which reads volumes through OpenVDB, in the install component `python`. It
+# knows nothing of the core, so one serves all instruction sets.
+message(STATUS "OpenVDB ${OpenVDB_VERSION} (${OpenVDB_LIBRARY})")
+
+file(GLOB _vdb_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/vdb/*.cpp")
+nanobind_add_module(wavecomb_vdb NB_STATIC NOMINSIZE NB_SUPPRESS_WARNINGS ${_vdb_sources})
+target_link_libraries(wavecomb_vdb PRIVATE wavecomb_common OpenVDB::openvdb TBB::tbb)
+set(_vdb_rpath "$ORIGIN" "$ORIGIN/lib")
+if(WAVECOMB_TBB_IS_WHEEL)
+  list(APPEND _vdb_rpath "$ORIGIN/../../..")
+endif()
+set_target_properties(wavecomb_vdb PROPERTIES
+  OUTPUT_NAME _vdb
+  LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}"
+  INSTALL_RPATH "${_vdb_rpath}"
+  INSTALL_RPATH_USE_LINK_PATH OFF)
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  # DT_RPATH, not DT_RUNPATH: it holds for what OpenVDB is linked with, too.
+  target_link_options(wavecomb_vdb PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map"
+    "-Wl,--disable-new-dtags")
+  set_property(TARGET wavecomb_vdb APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map")
+endif()
+install(TARGETS wavecomb_vdb LIBRARY DESTINATION wavecomb COMPONENT python)
+add_dependencies(wavecomb_python wavecomb_vdb)
+
+# What is staged travels with us.
+string(FIND "${OpenVDB_LIBRARY}" "${WAVECOMB_STAGED_OPENVDB}/" _at)
+if(_at EQUAL 0)
+  install(DIRECTORY "${WAVECOMB_STAGED_OPENVDB}/lib/" DESTINATION wavecomb/lib COMPONENT python
+    USE_SOURCE_PERMISSIONS
+    PATTERN "libopenvdb.so" EXCLUDE PATTERN "libImath.so" EXCLUDE)
+endif()

@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stages of volumes: smoke over an ember, clouds over the sea, and a lamp in fog.
+
+Grids are made procedurally and written as .vdb files in ``<stem>_volumes/`` beside the stage.
+Materials are MaterialX's ``volume``, whose coefficients are per metre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, UsdLux, UsdShade, UsdVol
+
+from wavecomb import vdb
+from wavecomb.errors import WavecombError
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.materials import Colour
+from wavecomb.scenes.noise import Noise, Points
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.stage import StageWriter
+
+Density = Callable[[Points], NDArray[np.float32]]
+
+_BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+
+
+def sampled(
+    density: Density, low: Sequence[float], high: Sequence[float], voxels: int, half: bool = True
+) -> dict[str, Any]:
+    """A function of space as bricks, for ``vdb.write``; without bricks of zeros.
+
+    Args:
+        density: Gives values at points (n, 3), 0 where nothing is.
+        low: Corner of the box that it is looked at in.
+        high: The other one.
+        voxels: Along the longest edge.
+        half: Keep values in 16 bits.
+    """
+    start, end = np.array(low), np.array(high)
+    step = float((end - start).max()) / voxels
+    counts = np.ceil((end - start) / (step * vdb.BRICK) - 1e-9).astype(int)
+    inside = np.stack(np.meshgrid(*[np.arange(vdb.BRICK)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    origins, values = [], []
+    for x in range(counts[0]):
+        cells = np.stack(np.meshgrid([x], *map(np.arange, counts[1:]), indexing="ij"), -1)
+        bricks = (cells.reshape(-1, 3) * vdb.BRICK).astype(np.int32)
+        index = (bricks[:, None, :] + inside[None]).reshape(-1, 3)
+        points = (start + (index + 0.5) * step).astype(np.float32)
+        found = density(points).reshape(-1, vdb.BRICK, vdb.BRICK, vdb.BRICK)
+        found = found.astype(np.float16 if half else np.float32)
+        filled = found.any(axis=(1, 2, 3))
+        origins.append(bricks[filled])
+        values.append(found[filled])
+    matrix = np.diag([step, step, step, 1.0])
+    matrix[3, :3] = start + 0.5 * step
+    return {
+        "origins": np.concatenate(origins),
+        "values": np.concatenate(values),
+        "index_to_object": matrix,
+    }
+
+
+def _where(mask: NDArray[np.bool_], points: Points, of: Density) -> NDArray[np.float32]:
+    """Values of a function where it is looked at, 0 elsewhere."""
+    found = np.zeros(len(points), np.float32)
+    if mask.any():
+        found[mask] = of(points[mask])
+    return found
+
+
+class _Volumes:
+    """Writes the volumes of a stage."""
+
+    def __init__(self, writer: StageWriter) -> None:
+        self._writer = writer
+        self._stage = writer.stage
+
+    def material(
+        self,
+        name: str,
+        absorption: Colour,
+        scattering: Colour,
+        anisotropy: float = 0.0,
+        density: str = "",
+        emission: Colour | None = None,
+        glow: str = "",
+    ) -> str:
+        """A MaterialX volume: coefficients per metre, times fields where these are named."""
+        path = f"/World/Looks/{name}"
+        material = UsdShade.Material.Define(self._stage, path)
+        shader = self._node(f"{path}/Volume", "ND_volume")
+        medium = self._node(f"{path}/Medium", "ND_anisotropic_vdf")
+        for key, value in (("absorption", absorption), ("scattering", scattering)):
+            self._coefficient(medium, key, Sdf.ValueTypeNames.Vector3f, value, density)
+        medium.CreateInput("anisotropy", Sdf.ValueTypeNames.Float).Set(anisotropy)
+        vdf = shader.CreateInput("vdf", Sdf.ValueTypeNames.Token)
+        vdf.ConnectToSource(medium.CreateOutput("out", Sdf.ValueTypeNames.Token))
+        if emission is not None:
+            glowing = self._node(f"{path}/Glow", "ND_uniform_edf")
+            self._coefficient(glowing, "color", Sdf.ValueTypeNames.Color3f, emission, glow)
+            edf = shader.CreateInput("edf", Sdf.ValueTypeNames.Token)
+            edf.ConnectToSource(glowing.CreateOutput("out", Sdf.ValueTypeNames.Token))
+        terminal = material.CreateVolumeOutput("mtlx")
+        terminal.ConnectToSource(shader.CreateOutput("out", Sdf.ValueTypeNames.Token))
+        return self._writer.own_material(name, material)
+
+    def _node(self, path: str, identifier: str) -> UsdShade.Shader:
+        node = UsdShade.Shader.Define(self._stage, path)
+        node.CreateIdAttr(identifier)
+        return node
+
+    def _coefficient(
+        self,
+        node: UsdShade.Shader,
+        name: str,
+        kind: Sdf.ValueTypeName,
+        value: Colour,
+        field: str,
+    ) -> None:
+        """Sets an input, or feeds it with a value times a field."""
+        target = node.CreateInput(name, kind)
+        if not field:
+            target.Set(Gf.Vec3f(*value))
+            return
+        path = f"{node.GetPath()}_{name}"
+        reader = self._node(f"{path}_field", "ND_geompropvalue_float")
+        reader.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(field)
+        word = "color3" if kind == Sdf.ValueTypeNames.Color3f else "vector3"
+        times = self._node(f"{path}_times", f"ND_multiply_{word}FA")
+        times.CreateInput("in1", kind).Set(Gf.Vec3f(*value))
+        scale = times.CreateInput("in2", Sdf.ValueTypeNames.Float)
+        scale.ConnectToSource(reader.CreateOutput("out", Sdf.ValueTypeNames.Float))
+        target.ConnectToSource(times.CreateOutput("out", kind))
+
+    def volume(
+        self,
+        name: str,
+        material: str,
+        extent: tuple[Sequence[float], Sequence[float]],
+        grids: dict[str, dict[str, Any]] | None = None,
+    ) -> None:
+        """A volume of some grids by field, or a homogeneous one that fills its extent."""
+        path = f"/World/Objects/{name}"
+        prim = UsdVol.Volume.Define(self._stage, path)
+        prim.CreateExtentAttr([Gf.Vec3f(*map(float, end)) for end in extent])
+        self._writer.bind(prim.GetPrim(), material)
+        if not grids:
+            return
+        file, asset = self._writer.volume_file(f"{name.lower()}.vdb")
+        part = file.with_name(f".{file.name}.part")
+        try:
+            vdb.write(part, [{"name": field, **grid} for field, grid in grids.items()])
+            part.replace(file)
+        except WavecombError as error:
+            raise SceneError(str(error).replace(str(part), str(file))) from error
+        finally:
+            Path(part).unlink(missing_ok=True)
+        for field in grids:
+            grid = UsdVol.OpenVDBAsset.Define(self._stage, f"{path}/{field}")
+            grid.CreateFilePathAttr(asset)
+            grid.CreateFieldNameAttr(field)
+            prim.CreateFieldRelationship(field, grid.GetPath())
+
+
+def _box(
+    writer: StageWriter, name: str, middle: Sequence[float], half: Sequence[float], look: str
+) -> None:
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    points = np.array(middle) + corners * np.array(half)
+    writer.polygons(f"/World/Objects/{name}", points, _BOX, look)
+
+
+def _ground(writer: StageWriter, half: float, colour: Colour) -> None:
+    writer.material("Ground", looks.diffuse(colour))
+    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
+    writer.polygons("/World/Set/Ground", corners, [[0, 1, 2, 3]], "Ground")
+
+
+def smoke_density(seed: int) -> Density:
+    """A plume of 4 m that rises from the origin, swirls and widens; at most 1."""
+    swirl = [Noise(seed, number) for number in range(3)]
+    detail = Noise(seed, 3)
+
+    def density(points: Points) -> NDArray[np.float32]:
+        height = points[:, 1]
+        radius = 0.16 + 0.2 * height
+        drift = np.stack([0.18 * np.sin(1.7 * height), 0 * height, 0.14 * np.cos(2.1 * height)], 1)
+        away = np.hypot(points[:, 0] - drift[:, 0], points[:, 2] - drift[:, 2])
+        near = (away < 1.8 * radius) & (height > 0)
+
+        def inside(some: Points) -> NDArray[np.float32]:
+            high = some[:, 1]
+            bend = np.stack([noise.at(some * np.float32(1.6)) for noise in swirl], axis=1) - 0.5
+            moved = some + bend * (0.15 + 0.25 * high)[:, None]
+            shift = np.stack([0.18 * np.sin(1.7 * high), 0 * high, 0.14 * np.cos(2.1 * high)], 1)
+            r = np.hypot(moved[:, 0] - shift[:, 0], moved[:, 2] - shift[:, 2])
+            body = 1.0 - (r / (0.16 + 0.2 * high)) ** 2
+            cut = detail.fractal(moved * np.float32(4.0), 5) - 0.5
+            fading = np.clip(4.0 - high, 0.0, 1.0) * np.clip(8.0 * high, 0.0, 1.0)
+            thick = np.clip(body + 2.2 * cut, 0.0, 1.0) * fading / (1.0 + 0.5 * high)
+            return np.asarray(thick, np.float32)
+
+        return _where(near, points, inside)
+
+    return density
+
+
+def _fire(points: Points, smoke: Density) -> NDArray[np.float32]:
+    """Temperatures, of 1 at most, low in the plume."""
+    low = np.clip(1.0 - points[:, 1] / 0.9, 0.0, 1.0)
+    return _where(low > 0, points, lambda some: smoke(some) ** np.float32(0.3)) * low
+
+
+def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
+    """Smoke that rises over an ember, before a wall."""
+    volumes = _Volumes(writer)
+    _ground(writer, 8.0, (0.3, 0.3, 0.3))
+    writer.material("Brick", looks.diffuse((0.32, 0.16, 0.12)))
+    _box(writer, "Hearth", (0.0, 0.06, 0.0), (0.35, 0.06, 0.35), "Brick")
+    density = smoke_density(options.seed)
+    low, high = (-1.6, 0.0, -1.6), (1.6, 4.0, 1.6)
+    grids = {
+        "density": sampled(density, low, high, options.voxels),
+        "heat": sampled(lambda at: _fire(at, density), (-0.8, 0.0, -0.8), (0.8, 0.9, 0.8),
+                        max(options.voxels * 2 // 5, 8)),
+    }  # fmt: skip
+    smoke = volumes.material(
+        "Smoke", (0.9, 0.95, 1.0), (8.0, 8.0, 8.0), 0.2, "density", (14.0, 4.2, 0.9), "heat"
+    )
+    volumes.volume("Plume", smoke, (low, high), grids)
+    writer.rect_light("Key", (-3.5, 5.5, 3.0), 2.0, 2.0, (22.0, 21.0, 19.0), -60.0)
+    writer.dome_light("Sky", 30.0, 0.35)
+    writer.camera((0.0, 1.7, 6.5), (0.0, 1.8, 0.0), 42.0, options.aspect or 0.75)
+
+
+def cloud_density(seed: int) -> Density:
+    """Heaps of cloud with flat bottoms over a layer, in units of 100 m; at most 1."""
+    rng = np.random.default_rng([seed, 41])
+    place, size = [], []
+    for _ in range(9):
+        middle, spread = rng.uniform(-7.5, 7.5, 2), rng.uniform(1.2, 2.2)
+        for _ in range(9):
+            high = float(rng.random() ** 1.5)
+            x, z = middle + rng.normal(0, spread * (1.0 - 0.7 * high), 2)
+            place.append((x, 0.4 + 2.6 * high * spread / 2.2, z))
+            size.append(rng.uniform(0.7, 1.3) * (1.25 - 0.55 * high))
+    detail = Noise(seed, 7)
+
+    def density(points: Points) -> NDArray[np.float32]:
+        best = np.full(len(points), -1.0, np.float32)
+        for centre, radius in zip(place, size, strict=True):
+            away = ((points - np.array(centre, np.float32)) ** 2).sum(axis=1)
+            best = np.maximum(best, (1.0 - away / radius**2).astype(np.float32))
+        near = (best > -0.8) & (points[:, 1] > 0)
+
+        def inside(some: Points) -> NDArray[np.float32]:
+            cut = detail.fractal(some * np.float32(1.3), 6, 0.6) - 0.5
+            floor = np.clip(some[:, 1] * 3.0, 0.0, 1.0)
+            return np.asarray(np.clip(best[near] + 3.0 * cut, 0, 1) * floor, np.float32)
+
+        return _where(near, points, inside)
+
+    return density
+
+
+def build_clouds(writer: StageWriter, options: SceneOptions) -> None:
+    """Clouds over the sea in the evening; a unit is 100 m."""
+    volumes = _Volumes(writer)
+    _ground(writer, 400.0, (0.015, 0.03, 0.045))
+    low, high = (-11.0, 0.0, -11.0), (11.0, 5.0, 11.0)
+    grid = sampled(cloud_density(options.seed), low, high, options.voxels)
+    grid["index_to_object"][3, 1] += 6.0
+    haze = volumes.material("Cloud", (0.0, 0.0, 0.0), (0.05, 0.05, 0.05), 0.6, "density")
+    extent = ((low[0], low[1] + 6.0, low[2]), (high[0], high[1] + 6.0, high[2]))
+    volumes.volume("Heaps", haze, extent, {"density": grid})
+    sun = UsdLux.DistantLight.Define(writer.stage, "/World/Lights/Sun")
+    sun.CreateAngleAttr(0.53)
+    sun.CreateIntensityAttr(45000.0)
+    sun.CreateColorAttr(Gf.Vec3f(1.0, 0.78, 0.52))
+    sun.AddRotateXYZOp().Set(Gf.Vec3f(-14.0, 62.0, 0.0))
+    writer.dome_light("Sky", 30.0, 0.6)
+    # A window of the observer's, which sees to it that shadows are not black.
+    writer.rect_light("Glow", (0.0, 40.0, 0.0), 30.0, 30.0, (0.25, 0.3, 0.4))
+    writer.camera((0.0, 5.5, 26.0), (0.0, 7.5, 0.0), 50.0, options.aspect or 16.0 / 9.0)
+
+
+def build_fog(writer: StageWriter, options: SceneOptions) -> None:
+    """A street lamp and a window in fog that is everywhere alike, posts before them."""
+    volumes = _Volumes(writer)
+    _ground(writer, 14.0, (0.2, 0.2, 0.21))
+    writer.material("Post", looks.diffuse((0.12, 0.1, 0.09)))
+    writer.material("House", looks.diffuse((0.4, 0.36, 0.3)))
+    rng = np.random.default_rng([options.seed, 53])
+    for index in range(9):
+        x, z = -6.0 + 1.5 * index, -1.5 - 2.0 * float(rng.random())
+        tall = float(rng.uniform(0.9, 1.3))
+        _box(writer, f"Post_{index}", (x, tall, z), (0.09, tall, 0.09), "Post")
+    _box(writer, "House", (5.5, 2.5, -7.0), (2.0, 2.5, 0.3), "House")
+    fog = volumes.material("Fog", (0.0, 0.0, 0.0), (0.09, 0.09, 0.09), 0.7)
+    volumes.volume("Fog", fog, ((-13.0, 0.001, -13.0), (13.0, 8.0, 13.0)))
+    lamp = UsdLux.SphereLight.Define(writer.stage, "/World/Lights/Lamp")
+    lamp.CreateRadiusAttr(0.12)
+    lamp.CreateIntensityAttr(900.0)
+    lamp.CreateColorAttr(Gf.Vec3f(1.0, 0.72, 0.4))
+    lamp.AddTranslateOp().Set(Gf.Vec3d(-1.2, 3.4, -4.5))
+    lamp.AddRotateXOp().Set(-90.0)
+    shaping = UsdLux.ShapingAPI.Apply(lamp.GetPrim())
+    shaping.CreateShapingConeAngleAttr(52.0)
+    shaping.CreateShapingConeSoftnessAttr(0.2)
+    writer.rect_light("Window", (5.0, 3.2, -6.6), 1.0, 1.4, (9.0, 7.0, 4.0), 180.0)
+    writer.camera((0.0, 1.6, 8.5), (0.0, 2.0, -4.0), 55.0, options.aspect or 16.0 / 9.0)

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Grids of fields as the core takes them: read, checked and handed over once each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb import vdb
+from wavecomb.errors import WavecombError
+from wavecomb.picture.working_space import from_rec709
+from wavecomb.run.isolate import trail
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.volumes.blackbody import radiance
+from wavecomb.usd.volumes.fields import Field
+from wavecomb.usd.volumes.info import GridFacts
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+_SLIGHTLY = 1e-3
+"""Share of its greatest value by which a grid may go below 0: what filters leave behind."""
+
+_WARM = ("temperature", "heat", "flame", "flames", "fire", "fuel")
+"""Fields that are no densities where there is another one."""
+
+_CHUNK = 4096
+"""Bricks that are computed with at a time."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A grid that the scene has.
+
+    Attributes:
+        handle: What ``SceneBuilder.add_volume`` takes.
+        corners: (8, 3) Of what is active in it, in object space.
+        facts: For people.
+    """
+
+    handle: Any
+    corners: NDArray[np.float64]
+    facts: GridFacts
+
+
+class GridTable:
+    """Reads grids for one scene."""
+
+    def __init__(self, builder: _core.SceneBuilder, working: str, report: LoadReport) -> None:
+        """``working``: the space of colours."""
+        self._builder = builder
+        self._working = working
+        self._report = report
+        self._tables: dict[str, list[vdb.GridHead] | None] = {}
+        self._known: dict[tuple[Any, ...], Grid | None] = {}
+
+    def find(self, fields: Mapping[str, Field], name: str) -> Field | None:
+        """The field of a name, or the one that leads to a grid of this name."""
+        if name in fields:
+            return fields[name]
+        for field in fields.values():
+            head = self._head(field)
+            if head is not None and head.name == name:
+                return field
+        return None
+
+    def densest(self, fields: Mapping[str, Field]) -> Field | None:
+        """The first field of numbers, which is none of temperatures if there is another."""
+        scalar = []
+        for field in fields.values():
+            head = self._head(field)
+            if head is not None and not head.is_vector:
+                scalar.append(field)
+        cold = [field for field in scalar if field.name.lower() not in _WARM]
+        return next(iter(cold or scalar), None)
+
+    def get(self, field: Field, use: str, kelvin: float = 0.0) -> Grid | None:
+        """A field as a grid of the scene; None, and said, where it cannot be.
+
+        Args:
+            field: Of a volume.
+            use: "density", "colour", "emission", or "temperature", which becomes emission.
+            kelvin: What 1 in a grid of temperatures means.
+
+        Raises:
+            WavecombError: The file is broken, or holds what no volume can have.
+        """
+        key = (field.file, field.grid or field.name, field.index, use, kelvin)
+        if key not in self._known:
+            trail.note("reading", field.file)
+            try:
+                self._known[key] = self._read(field, use, kelvin)
+            except WavecombError as error:
+                raise WavecombError(f"{self._report.place(field.prim)}: {error}") from None
+        return self._known[key]
+
+    def _table(self, field: Field) -> list[vdb.GridHead] | None:
+        """The grids of a field's file; None, and said, where there is no file."""
+        if field.file not in self._tables:
+            table = None
+            if not os.path.isfile(field.file):
+                what = f"volume file {field.file} is not there: field left out"
+                self._report.warn(what, field.prim)
+            else:
+                try:
+                    table = vdb.grid_heads(field.file)
+                except WavecombError as error:
+                    raise WavecombError(f"{self._report.place(field.prim)}: {error}") from None
+            self._tables[field.file] = table
+        return self._tables[field.file]
+
+    def _head(self, field: Field) -> vdb.GridHead | None:
+        """The grid that a field leads to; None, and said, where there is none."""
+        table = self._table(field)
+        if table is None:
+            return None
+        wanted = field.grid or field.name
+        for head in table:
+            if head.name == wanted and head.index == field.index:
+                return head
+        if not field.grid and len(table) == 1:
+            return table[0]
+        there = ", ".join(repr(head.name) for head in table[:8]) or "none"
+        what = f"{field.file} has no grid {wanted!r} {field.index} (there are {there}): left out"
+        self._report.warn(what, field.prim)
+        return None
+
+    def _read(self, field: Field, use: str, kelvin: float) -> Grid | None:
+        head = self._head(field)
+        if head is None:
+            return None
+        is_dark = use != "colour"
+        found = vdb.read(field.file, head, background_is_zero=is_dark, whole=not is_dark)
+        named = f"{field.file}: grid {head.name!r}"
+        if found.not_finite:
+            numbers = f"{found.not_finite:,} numbers that are infinite or none"
+            raise WavecombError(f"{named} has {numbers}: clean it where it was made")
+        if found.box is None or not len(found.origins):
+            self._report.note(f"empty grid {head.name!r}: left out", field.prim)
+            return None
+        matrix = found.index_to_object
+        if matrix is None:
+            self._report.missing("grids in a frustum (left out)", field.prim)
+            return None
+        if not np.isfinite(matrix).all() or not np.linalg.det(matrix[:3, :3]):
+            raise WavecombError(f"{named} has a transform without an inverse")
+        if found.values.ndim == 5 and use in ("density", "temperature"):
+            self._report.missing(f"vectors as {use} (left out)", field.prim)
+            return None
+        self._check_sign(found, named, use, field)
+        if use == "colour" and found.greatest > 1:
+            self._report.note("colour above 1 of a volume: taken for 1", field.prim)
+            np.minimum(found.values, 1, out=found.values)
+        background = self._background(found, head, use, field)
+        values = self._values(found.values, use, kelvin)
+        facts = GridFacts(
+            use, field.name, field.file, head.name, head.value_name, found.voxels,
+            values.nbytes + found.origins.nbytes,
+        )  # fmt: skip
+        name = self._report.place(field.prim)
+        handle = self._handed_over(found.origins, values, matrix, background, name)
+        return Grid(handle, _corners(found.box, matrix), facts)
+
+    def _check_sign(self, found: vdb.Bricks, named: str, use: str, field: Field) -> None:
+        """Refuses a grid of negative values, unless it is by next to nothing."""
+        if not found.negative:
+            return
+        if found.kind == "level set" and use == "density":
+            raise WavecombError(f"{named} is a level set; convert it to a fog volume")
+        is_slight = -found.least <= _SLIGHTLY * found.greatest
+        if not is_slight and use != "colour":
+            raise WavecombError(
+                f"{named} has {found.negative:,} numbers below 0, down to {found.least:g}: a "
+                f"{use} has none"
+            )
+        how = "slightly " if is_slight else ""
+        self._report.note(f"{use} {how}below 0: taken for 0", field.prim)
+        np.maximum(found.values, 0, out=found.values)
+
+    def _background(self, found: vdb.Bricks, head: vdb.GridHead, use: str, field: Field) -> float:
+        if use == "colour":
+            same = len(set(found.background)) == 1
+            return min(max(found.background[0], 0.0), 1.0) if same else 0.0
+        if any(found.background):
+            values = " ".join(f"{value:g}" for value in found.background)
+            what = f"grid {head.name!r} of background {values}: 0 outside of what is active"
+            self._report.note(what, field.prim)
+        return 0.0
+
+    def _values(self, values: NDArray[Any], use: str, kelvin: float) -> NDArray[Any]:
+        """Values in the working space, of temperatures their light."""
+        if use == "temperature":
+            made = np.empty((*values.shape, 3), np.float32)
+            for at in range(0, len(values), _CHUNK):
+                part = np.asarray(values[at : at + _CHUNK], np.float32)
+                rgb = from_rec709(radiance(part * kelvin), self._working)
+                made[at : at + _CHUNK] = np.maximum(rgb, 0)
+            return made
+        if values.ndim == 5 and self._working != "rec709":
+            rgb = from_rec709(np.asarray(values, np.float32), self._working)
+            return np.clip(rgb, 0, 1 if use == "colour" else None)
+        return values
+
+    def _handed_over(
+        self,
+        origins: NDArray[np.int32],
+        values: NDArray[Any],
+        matrix: NDArray[np.float64],
+        background: float,
+        name: str,
+    ) -> Any:
+        """The grid as the builder has it: in this process, or in the one that builds the scene."""
+        make = getattr(self._builder, "make_volume_grid", None)
+        if make is None:
+            from wavecomb import _core
+
+            make = _core.VolumeGrid
+        return make(origins, values, matrix, background, name)
+
+
+def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(8, 3) Corners of the voxels from the first to the last index, in object space."""
+    ends = np.array([box[0] - 0.5, box[1] + 0.5])
+    index = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1)
+                      for k in (0, 1)])  # fmt: skip
+    corners: NDArray[np.float64] = index @ matrix[:3, :3] + matrix[3, :3]
+    return corners

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdVol volumes as the core takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom, UsdVol
+
+from wavecomb import vdb
+from wavecomb.picture.working_space import from_rec709
+from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.volumes.fields import Field, read_fields
+from wavecomb.usd.volumes.grids import Grid, GridTable
+from wavecomb.usd.volumes.info import GridFacts
+from wavecomb.usd.volumes.look import BLACK, Colour, VolumeLook
+from wavecomb.usd.volumes.material import VolumeLooks
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+GLOW = 1e-4
+"""Emission times the size of a volume from which it is taken for a lamp."""
+
+_MOST_ANISOTROPY = 0.999
+_VELOCITY = ("velocity", "vel", "v")
+
+
+@dataclass(frozen=True)
+class Volume:
+    """A volume before it is placed.
+
+    Attributes:
+        options: Arguments of ``SceneBuilder.add_volume`` but ``to_world``.
+        corners: (8, 3) of it, in its own space.
+        grids: That it is made of.
+        glows: Whether it may light a scene.
+    """
+
+    options: dict[str, Any]
+    corners: NDArray[np.float64]
+    grids: tuple[GridFacts, ...]
+    glows: bool
+
+
+class VolumeReader:
+    """Reads the volumes of one stage.
+
+    Attributes:
+        glow: Whether one of them may light the scene.
+    """
+
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        builder: _core.SceneBuilder,
+        time: Usd.TimeCode,
+        working: str,
+        report: LoadReport,
+        is_blurred: bool = False,
+    ) -> None:
+        """``is_blurred``: the shutter is open for a while."""
+        self._time = time
+        self._working = working
+        self._report = report
+        self._is_blurred = is_blurred
+        self._grids = GridTable(builder, working, report)
+        self._looks = VolumeLooks(time, UsdGeom.GetStageMetersPerUnit(stage), report)
+        self.glow = False
+
+    def read(self, draw: Draw) -> Volume | None:
+        """The volume of a prim; None, and said, where there is none to draw.
+
+        Raises:
+            WavecombError: A file is broken, or holds what no volume can have.
+        """
+        prim = draw.prim
+        fields = read_fields(prim, self._time, self._report)
+        if not fields and UsdVol.Volume(prim).GetFieldPaths():
+            return None  # which was said
+        look = self._looks.of(draw.material, prim)
+        self._say_still(prim, fields)
+        if fields and not vdb.is_there():
+            self._report.missing(f"Volume without {vdb.ABSENT}: left out", prim.GetPath())
+            return None
+        density = self._density(prim, fields, look) if fields else None
+        corners = density.corners if density is not None else None
+        options: dict[str, Any] = {"density": None if density is None else density.handle}
+        if not fields:
+            bounds = self._extent(prim)
+            if bounds is None:
+                what = "volume without fields and without an extent: left out"
+                self._report.warn(what, prim.GetPath())
+                return None
+            options["bounds"] = (tuple(bounds[0].tolist()), tuple(bounds[1].tolist()))
+            corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]]
+                                for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
+        if corners is None:
+            return None
+        colour = self._named(fields, look.colour, "colour")
+        use = "temperature" if look.kelvin else "emission"
+        glow = self._named(fields, look.glow, use, look.kelvin) if any(look.emission) else None
+        emission = look.emission if glow is not None or not look.glow else BLACK
+        options |= {
+            "color": None if colour is None else colour.handle,
+            "emission_grid": None if glow is None else glow.handle,
+            "extinction": self._working_colour(look.extinction),
+            "albedo": self._working_colour(look.albedo),
+            "anisotropy": self._anisotropy(look, prim),
+            "emission": self._working_colour(emission),
+            "name": self._report.place(prim.GetPath()),
+        }
+        used = tuple(grid.facts for grid in (density, colour, glow) if grid is not None)
+        size = float(np.ptp(corners, axis=0).max())
+        glows = max(emission) * size > GLOW
+        self.glow = self.glow or glows
+        return Volume(options, corners, used, glows)
+
+    def _density(self, prim: Usd.Prim, fields: dict[str, Field], look: VolumeLook) -> Grid | None:
+        """The grid that a volume is as dense as."""
+        field = self._grids.find(fields, look.density) if look.density else None
+        if field is None:
+            if look.density and look.density != "density":
+                what = f"volume without the field {look.density}: its density taken"
+                self._report.warn(what, prim.GetPath())
+            field = fields.get("density") or self._grids.densest(fields)
+        return None if field is None else self._grids.get(field, "density")
+
+    def _named(
+        self, fields: dict[str, Field], name: str, use: str, kelvin: float = 0.0
+    ) -> Grid | None:
+        field = self._grids.find(fields, name) if name and fields else None
+        return None if field is None else self._grids.get(field, use, kelvin)
+
+    def _extent(self, prim: Usd.Prim) -> NDArray[np.float64] | None:
+        value = UsdGeom.Boundable(prim).GetExtentAttr().Get(self._time)
+        if value is None or len(value) != 2:
+            return None
+        bounds = np.array(value, np.float64)
+        is_box = np.isfinite(bounds).all() and (bounds[0] < bounds[1]).all()
+        return bounds if is_box else None
+
+    def _working_colour(self, colour: Colour) -> Colour:
+        r, g, b = (max(float(c), 0.0) for c in from_rec709(np.array(colour), self._working))
+        return (r, g, b)
+
+    def _anisotropy(self, look: VolumeLook, prim: Usd.Prim) -> float:
+        limited = min(max(look.anisotropy, -_MOST_ANISOTROPY), _MOST_ANISOTROPY)
+        if limited != look.anisotropy:
+            what = f"anisotropy {look.anisotropy:g} of a volume: {limited:g} taken"
+            self._report.warn(what, look.name or prim.GetPath())
+        return limited
+
+    def _say_still(self, prim: Usd.Prim, fields: dict[str, Field]) -> None:
+        """Says what of a volume would be blurred."""
+        if not self._is_blurred:
+            return
+        if any(field.changes for field in fields.values()):
+            what = "volumes whose files change while the shutter is open (still)"
+            self._report.missing(what, prim.GetPath())
+        if any(name.lower() in _VELOCITY for name in fields):
+            self._report.missing("velocity blur of volumes (still)", prim.GetPath())
