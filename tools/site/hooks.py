@@ -19,10 +19,11 @@ PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 """Pages of the root, and where they are in the site."""
 LINK = re.compile(r"(!?\[[^\]]*\])\(([^)\s]+)\)")
 CODE = re.compile(r"^(```.*?^```$|    .*?$)", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"`[^`\n]+`")
 STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
-.md-typeset td:first-child code { white-space: nowrap; }
+@media (min-width: 60em) { .md-typeset td:first-child code { white-space: nowrap; } }
 .md-grid { max-width: 68rem; }
 """
 
@@ -66,6 +67,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
             return text[1:-1]  # a file that is no page
         return match[0]
 
+    # GitHub wants the bar of a table escaped in code, too; here the stroke would be seen.
+    markdown = INLINE.sub(lambda match: match[0].replace("\\|", "|"), markdown)
     parts = CODE.split(markdown)
     return "".join(part if k % 2 else LINK.sub(link, part) for k, part in enumerate(parts))
 
