@@ -98,6 +98,7 @@ class Fake:
             scene=scene,
             report=report,
             camera_path="/Camera",
+            volumes=[],
             working_space="rec709",
             seconds=0.25,
             stage_path=path,
