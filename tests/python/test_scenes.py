@@ -17,7 +17,7 @@ from parts import asset, written_scenes
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
-from wavecomb.scenes import SCENES, SceneError, write_scene
+from wavecomb.scenes import SceneError, write_scene
 from wavecomb.scenes.dragon import MIN_TRIANGLES, dragon
 from wavecomb.scenes.materials import PROGRAMS
 from wavecomb.scenes.mesh import Mesh, face_areas, signed_volume
