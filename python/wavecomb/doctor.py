@@ -51,6 +51,7 @@ def examine() -> dict[str, list[Check]]:
             _try("oneTBB", _tbb_version),
             _try("OpenSubdiv", _subdiv_version),
             _library("MaterialX", "materialx", _materialx_version, needed=False),
+            _openvdb(),
         ],
         "Extras": [_extra(name) for name in EXTRAS] + [_display()],
         "Machine": _machine(),
@@ -146,6 +147,16 @@ def _library(name: str, package: str, look: Callable[[], str], *, needed: bool =
     except Exception as error:
         do = f"pip install --force-reinstall {package}"
         return Check(name, BROKEN, _why(error), needed, do)
+
+
+def _openvdb() -> Check:
+    """The plug-in for volumes, which a build may be without."""
+    from wavecomb import vdb
+
+    if version := vdb.version():
+        return Check("OpenVDB", OK, version, False)
+    do = vdb.BRING if _rebuild() == "make build" else "a wheel that was built with OpenVDB"
+    return Check("OpenVDB", MISSING, "volumes are left out", False, do)
 
 
 def _usd_version() -> str:

@@ -26,7 +26,10 @@ from wavecomb.run.isolate import memory
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-ABSENT = "OpenVDB, which this build is without (tools/setup_openvdb && make build)"
+BRING = "tools/setup_openvdb && make build"
+"""The command that brings OpenVDB to a source tree."""
+
+ABSENT = f"OpenVDB, which this build is without ({BRING})"
 """What is said where a .vdb file is asked for and cannot be read."""
 
 BRICK = 8

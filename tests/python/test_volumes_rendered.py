@@ -51,7 +51,7 @@ def Camera "Cam" {
 
 
 def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
-    """exp(-sigma d s): a density of 1.5 over 7 voxels, tapering off by half a voxel each side."""
+    """exp(-sigma d s): a density of 1.5 over 8 voxels, which tapers off at either end."""
     values = np.full((16, 8, 8, 8), 1.5, np.float16)
     cells = [[x, y, 0] for x in range(-2, 2) for y in range(-2, 2)]
     bricks = {"origins": np.array(cells, np.int32) * 8, "values": values}

@@ -30,10 +30,11 @@ from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.group import Group, Matrices, Scope
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.instance_materials import InstanceMaterials
-from wavecomb.usd.stage.instancing import moved_instances, read_instances, sound
+from wavecomb.usd.stage.instancing import moved_instances, read_instances
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
+from wavecomb.usd.stage.volumes import VolumePlacer
 from wavecomb.usd.volumes.volume import VolumeReader
 
 if TYPE_CHECKING:
@@ -100,9 +101,10 @@ class GroupBuilder:
         self.bindings = BindingScan()
         self.placer = GroupPlacer(builder, self.mesh_lights, report, framed)
         self.worn = InstanceMaterials(traversal, materials, report)
-        self.volumes = VolumeReader(
+        reads = VolumeReader(
             stage, builder, self.time, materials.working, report, self.motion is not None
         )
+        self.volumes = VolumePlacer(reads, report, framed)
         self._groups: dict[Hashable, Group] = {}
         self._known: dict[Sdf.Path, UsdShade.Material] = {}
         self._building: set[Hashable] = set()
@@ -126,7 +128,7 @@ class GroupBuilder:
         group.lights += found.lights
         self._bind(found, scope)
         for draw in found.volumes:
-            self._add_volume(group, draw, scope)
+            self.volumes.add(group, draw, scope)
         group.holds_placed = group.holds_placed or bool(group.lights or group.volumes)
         self.found += len(found.draws)
         for draw in found.draws:
@@ -254,26 +256,6 @@ class GroupBuilder:
         if isinstance(shape, MeshArrays) and shape.cage is not None:
             self.surfaces.add(group, number, draw, shape, worn)
         self.report.tally(_COUNTS[kind])
-
-    def _add_volume(self, group: Group, draw: Draw, scope: Scope) -> None:
-        """Adds a volume to a group."""
-        path = draw.prim.GetPath()
-        if scope.override or (scope.bound and draw.material is None):
-            self.report.missing("materials of instances on volumes in them (left out)", path)
-        volume = self.volumes.read(draw)
-        if volume is None:
-            return
-        matrix = np.array(draw.matrix)
-        if not bool(sound(matrix[None])[0]):
-            self.report.warn("volume left out: its transform has no inverse", path)
-            return
-        corners = volume.corners @ matrix[:3, :3] + matrix[3, :3]
-        group.volumes.append((volume, matrix))
-        group.grow(np.array([corners.min(axis=0), corners.max(axis=0)]))
-        if self.framed is not None:
-            more = self.framed if group.number == 0 else None
-            group.reach(corners, more)
-        self.report.tally("volumes")
 
     def _draw_alone(
         self,

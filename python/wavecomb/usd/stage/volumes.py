@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds the volumes of a stage to its scene, wherever they are placed."""
+"""Puts the volumes of a stage into groups, and adds them to its scene wherever these are."""
 
 from __future__ import annotations
 
@@ -8,16 +8,59 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.stage.group import Group, placed_volumes
+from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.stage.group import Group, Scope, placed_volumes
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import GridFacts, VolumeFacts
+from wavecomb.usd.volumes.volume import VolumeReader
 
 if TYPE_CHECKING:
     from wavecomb import _core
 
 MAX_VOLUMES = 4096
 """Volumes that are placed; instances may multiply them."""
+
+
+class VolumePlacer:
+    """Puts volumes into groups."""
+
+    def __init__(
+        self, reader: VolumeReader, report: LoadReport, framed: NDArray[np.float64] | None
+    ) -> None:
+        """``framed``: as of ``GroupBuilder``."""
+        self._reader = reader
+        self._report = report
+        self._framed = framed
+
+    @property
+    def glow(self) -> bool:
+        """Whether one of them may light the scene."""
+        return self._reader.glow
+
+    def add(self, group: Group, draw: Draw, scope: Scope) -> None:
+        """Adds a prim's volume to a group; what keeps it out is said.
+
+        Raises:
+            WavecombError: A file is broken, or holds what no volume can have.
+        """
+        path = draw.prim.GetPath()
+        if scope.override or (scope.bound and draw.material is None):
+            what = "materials of instances on volumes in them (left out)"
+            self._report.missing(what, path)
+        volume = self._reader.read(draw)
+        if volume is None:
+            return
+        matrix = np.array(draw.matrix)
+        if not bool(sound(matrix[None])[0]):
+            self._report.warn("volume left out: its transform has no inverse", path)
+            return
+        corners = volume.corners @ matrix[:3, :3] + matrix[3, :3]
+        group.volumes.append((volume, matrix))
+        group.grow(np.array([corners.min(axis=0), corners.max(axis=0)]))
+        if self._framed is not None:
+            group.reach(corners, self._framed if group.number == 0 else None)
+        self._report.tally("volumes")
 
 
 def add_volumes(
