@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,8 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 from wavecomb.farm.folder import DONE, Folder
 from wavecomb.farm.part import load_part
-from wavecomb.picture.image import read_layers, read_metadata, write_png
+from wavecomb.picture.embedded import encoded
+from wavecomb.picture.image import display, read_layers, read_metadata
 from wavecomb.picture.working_space import to_rec709
 
 MOST_EDGE = 1600
@@ -100,8 +99,5 @@ def png_so_far(folder: Folder, picture: int) -> bytes:
     if "png" in names and (folder.path / DONE / spec.last_of(picture).id).exists():
         with contextlib.suppress(OSError):
             return Path(spec.place(names["png"])).read_bytes()
-    with tempfile.TemporaryDirectory() as place:
-        file = os.path.join(place, "a.png")
-        colours = shown_so_far(folder, picture)
-        write_png(file, colours, exposure=spec.exposure, tone_map=spec.tone_map)  # type: ignore[arg-type]
-        return Path(file).read_bytes()
+    colours = shown_so_far(folder, picture)
+    return encoded(display(colours, exposure=spec.exposure, tone_map=spec.tone_map))  # type: ignore[arg-type]

@@ -109,8 +109,8 @@ inline Color<F> fresnel_conductor(const F& cos_i, const Color<F>& eta, const Col
 
 /// Schlick's formula with a tint near grazing: F(c) = F0 + (1 - F0)(1 - c)^5 - b c (1 - c)^6, where
 /// b makes F(1/7) = tint * Schlick(1/7) at the angle of 82 degrees (Kutz, Hasan, Edmondson, "Novel
-/// Fresnel Equations for Realistic Metals and Dielectrics", 2021; Hoffman, "Fresnel Equations
-/// Considered Harmful", 2019).
+/// Aspects of the Adobe Standard Material", 2021; Hoffman, "Fresnel Equations Considered Harmful",
+/// 2019).
 template <typename F>
 struct F82Tint {
   Color<F> f0, b;
