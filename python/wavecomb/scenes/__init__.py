@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from wavecomb.scenes.caustics import build_caustics
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.heavy import build_heavy
@@ -50,6 +51,7 @@ SCENES: dict[str, SceneInfo] = {
     "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
     "studio": SceneInfo("90 objects, a key, a fill and a dim dome", 0.1, build_studio),
     "room": SceneInfo("a dining room, lit through a door ajar", 1.0, build_room),
+    "caustics": SceneInfo("a glass ball and a gold ring before a small lamp", 0.1, build_caustics),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""

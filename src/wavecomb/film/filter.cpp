@@ -25,7 +25,11 @@ double filter_value(FilterKind kind, double x) {
 
 }  // namespace
 
-FilterTable::FilterTable(FilterKind kind, float width) : offsets_(kBins + 2) {
+FilterTable::FilterTable(FilterKind kind, float width)
+    : offsets_(kBins + 2),
+      radius_(0.5f * width),
+      density_scale_(float{kBins} / width),
+      density_(kBins) {
   constexpr int kSteps = 1 << 16;
   std::vector<double> cdf(kSteps + 1, 0.0);
   for (int i = 0; i < kSteps; ++i)
@@ -39,6 +43,11 @@ FilterTable::FilterTable(FilterKind kind, float width) : offsets_(kBins + 2) {
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
+  constexpr int kPart = kSteps / kBins;
+  for (uint32_t bin = 0; bin < kBins; ++bin) {
+    const double mass = (cdf[(bin + 1) * kPart] - cdf[bin * kPart]) / cdf[kSteps];
+    density_[bin] = static_cast<float>(mass * kBins / double{width});
+  }
 }
 
 }  // namespace wavecomb

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/integrate/reference.h"
 
+#include "wavecomb/integrate/light_tracer.h"
 #include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/shared_kernels.h"
 
@@ -20,6 +21,7 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 }
 
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
+  if (task.from_lights) return trace_light_task(context_, *workers_[i], task);
   trace_task(context_, *workers_[i], task, NoMedia());
 }
 
