@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/film/filter.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace wavecomb {
@@ -43,10 +44,18 @@ FilterTable::FilterTable(FilterKind kind, float width)
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
-  constexpr int kPart = kSteps / kBins;
+  // What interpolation makes of the offsets: in the tails another than the filter's own.
+  uint32_t from = 0;
+  const auto share_below = [&](double x) {
+    while (from + 1 < kBins && double{offsets_[from + 1]} <= x) ++from;
+    const double low = double{offsets_[from]}, size = double{offsets_[from + 1]} - low;
+    return (from + (size > 0 ? std::clamp((x - low) / size, 0.0, 1.0) : 0.0)) / kBins;
+  };
+  double below = 0;
   for (uint32_t bin = 0; bin < kBins; ++bin) {
-    const double mass = (cdf[(bin + 1) * kPart] - cdf[bin * kPart]) / cdf[kSteps];
-    density_[bin] = static_cast<float>(mass * kBins / double{width});
+    const double next = share_below(((bin + 1.0) / kBins - 0.5) * double{width});
+    density_[bin] = static_cast<float>((next - below) * kBins / double{width});
+    below = next;
   }
 }
 

@@ -33,7 +33,7 @@ class FilterTable {
  private:
   std::vector<float> offsets_;
   float radius_, density_scale_;
-  std::vector<float> density_;  ///< means over kBins equal parts of the width
+  std::vector<float> density_;  ///< of offsets_, means over kBins equal parts of the width
 };
 
 }  // namespace wavecomb

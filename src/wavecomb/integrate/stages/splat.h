@@ -33,10 +33,9 @@ template <typename F>
 void splat(Wave& wave, const WaveContext& context, uint32_t depth) {
   const ShadowQueue& q = wave.shadows;
   occlude<F>(wave, context, depth, false);
-  const auto* rows = reinterpret_cast<const ShadowRow<float>*>(wave.pool.shadows);
   for (size_t i = 0; i < q.size; ++i) {
     if (q.occluded[i] != 0) continue;
-    const ShadowRow<float>& row = rows[q.slot[i]];
+    const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
     add_splat(context, wave.splats, bits_float<float>(row.group), bits_float<float>(row.set),
               {q.r[i], q.g[i], q.b[i]});
   }
