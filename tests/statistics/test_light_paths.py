@@ -147,7 +147,9 @@ LENSES = {
 def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
     prims = [p if "Camera" not in p else LENSES[lens] for p in corner(*lights(tmp_path)["rect"])]
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
-    compare(f"light paths {lens}", stage, beauty, filter="blackman-harris", filter_width=3.0)
+    # Not at the clip's edge: filters have tails there that camera paths do not come to.
+    wide = {} if lens == "clipped" else {"filter": "blackman-harris", "filter_width": 3.0}
+    compare(f"light paths {lens}", stage, beauty, **wide)
 
 
 @pytest.mark.parametrize("ball", ["Frosted", "Clear", "Coated"])

@@ -55,8 +55,8 @@ def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
     level = 2 * options.teapot_level
     for name, mesh, material in (
         ("Ball", placed(ball(0.8, level), (-1.1, 0.81, 0.0)), "Glass"),
-        ("Ring", placed(ring(0.9, 0.16, 0.5, level), (1.2, 0.002, 0.4)), "Gold"),
+        ("Ring", placed(ring(0.9, 0.16, 0.5, level), (1.2, 0.002, 0.7)), "Gold"),
     ):
         writer.bind(writer.mesh(f"/World/Objects/{name}", mesh).GetPrim(), material)
-    writer.sphere_light("Lamp", (2.6, 4.2, 2.2), _LAMP_RADIUS, _LAMP_RADIANCE)
+    writer.sphere_light("Lamp", (2.5, 4.1, -1.1), _LAMP_RADIUS, _LAMP_RADIANCE)
     writer.camera((0.0, 4.2, 6.4), (0.0, 0.35, 0.1), 40.0, options.aspect or 1.0)
