@@ -180,6 +180,9 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   d["light_calibration"] = light_calibration_dict(s.light_calibration);
   d["allotment"] = allotment_dict(s.allotment);
   d["guiding"] = guiding_dict(s.guiding);
+  nb::list without_paths;
+  for (const std::string& name : s.lights_without_paths) without_paths.append(name);
+  d["lights_without_paths"] = without_paths;
   nb::dict uses;
   for (const auto& [name, n] : s.policy_uses) uses[name.c_str()] = n;
   d["policy_uses"] = uses;

@@ -60,7 +60,7 @@ set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <li
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 
 # wavecomb_lane_units(VAR WIDTH): units of WIDTH lanes, made in the build tree: one for each *.lanes.cpp, and one
-# for each program, out of program.lanes.cpp.in. They differ from one width to the next by WAVECOMB_LANES. With
+# for each program, out of program.lanes.cpp.in, and another out of joint.lanes.cpp.in. They differ from one width to the next by WAVECOMB_LANES. With
 # PLAIN, the plain kernels of all variants, too, out of variant.lanes.cpp.in.
 function(wavecomb_lane_units var width plain)
   set(folder "${PROJECT_BINARY_DIR}/lanes")
@@ -68,7 +68,9 @@ function(wavecomb_lane_units var width plain)
   foreach(program IN LISTS programs)
     configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/program.lanes.cpp.in"
       "${folder}/${program}_${width}.cpp" @ONLY)
-    list(APPEND units "${folder}/${program}_${width}.cpp")
+    configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/joint.lanes.cpp.in"
+      "${folder}/joint_${program}_${width}.cpp" @ONLY)
+    list(APPEND units "${folder}/${program}_${width}.cpp" "${folder}/joint_${program}_${width}.cpp")
   endforeach()
   set(index 0)
   foreach(row IN LISTS variants)

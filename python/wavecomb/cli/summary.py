@@ -94,6 +94,10 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         lines.append(line)
     elif settings.get("guiding") == "auto":
         lines.append("not guided: too few samples to find out whether that pays")
+    lines += [
+        f"light {name} is sampled by camera paths only"
+        for name in stats.get("lights_without_paths", ())
+    ]
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
         line = f"{stats['passes']} passes, {mean:.3g} samples a pixel"

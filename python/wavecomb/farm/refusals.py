@@ -37,9 +37,11 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
 
 
 def is_better_whole(settings: Mapping[str, Any]) -> bool:
-    """Whether each tile costs much beside its own pixels: a border, or a field that it learns."""
+    """Whether each tile costs much beside its own pixels: a border, a field that it learns, or the
+    paths from the lights, of which each tile traces all."""
     return (
         bool(settings.get("adaptive"))
+        or settings.get("transport") == "light"
         or settings.get("guiding", "off") != "off"
         or (settings.get("roulette") == "efficient")
     )

@@ -271,6 +271,17 @@ class StageWriter:
         light.AddTranslateOp().Set(Gf.Vec3d(*position))
         light.AddRotateXOp().Set(tilt_degrees)
 
+    def sphere_light(
+        self, name: str, position: Sequence[float], radius: float, radiance: Sequence[float]
+    ) -> None:
+        """Adds a ball that shines."""
+        light = UsdLux.SphereLight.Define(self.stage, f"/World/Lights/{name}")
+        peak = max(radiance)
+        light.CreateRadiusAttr(radius)
+        light.CreateIntensityAttr(peak)
+        light.CreateColorAttr(_vec([v / peak for v in radiance]))
+        light.AddTranslateOp().Set(Gf.Vec3d(*position))
+
     def dome_light(self, name: str, turn_degrees: float, intensity: float = 1.0) -> None:
         """Adds an environment with the procedural sky, 1024 x 512 at full texture size."""
         file, asset = self._texture_path("sky.exr")

@@ -40,10 +40,11 @@ inline constexpr uint32_t kTimeSet = 0xffffffffu;
 /// Sets that it draws from at each vertex. A step asks for its own by name, so that a step that
 /// comes or goes changes no other step's numbers.
 enum class VertexSet : uint32_t {
-  kLight,   ///< the light sample: choice, u, v; and roulette
-  kBsdf,    ///< the bounce: lobe, u, v
-  kFlight,  ///< the way to the vertex, where something lies on it (integrate/media.h)
-  kShadow,  ///< the way of its shadow ray
+  kLight,     ///< the light sample: choice, u, v; and roulette
+  kBsdf,      ///< the bounce: lobe, u, v
+  kFlight,    ///< the way to the vertex, where something lies on it (integrate/media.h)
+  kShadow,    ///< the way of its shadow ray
+  kEmission,  ///< of a path from a light, at depth 0: the choice of the light, and the time
 };
 /// Depths below this have sets of their own.
 inline constexpr uint32_t kSetDepths = 1u << 23;

@@ -21,6 +21,9 @@ constexpr float default_filter_width(FilterKind kind) {
 }
 
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
+/// Where paths begin: at the camera, or as many at the lights, too, joined by multiple importance
+/// sampling (docs/light-paths.md).
+enum class Transport : uint8_t { kPath, kLight };
 /// How the light is chosen that a vertex is lit by: by its power alone, or by tree for the vertex
 /// (light/light_tree.h). kAuto: by tree where there are lights enough for it to pay.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
@@ -87,6 +90,7 @@ struct Settings {
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
+  Transport transport = Transport::kPath;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
   std::vector<std::string> light_groups;  ///< of Aov::kLightGroups, by name; empty: all
   /// Adaptive sampling: a pixel is done when its error is no larger (ErrorMap::error); 0: off.
@@ -118,6 +122,7 @@ struct Settings {
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
   float used_filter_width() const { return filter_width.value_or(default_filter_width(filter)); }
+  bool joins_light() const { return transport == Transport::kLight; }
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Pixels that are rendered.
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }

@@ -160,6 +160,12 @@ std::vector<SettingInfo> work_settings() {
            {"efficient",
             "By the light that it is expected to bring, as paths before the first pass find out."}},
           "How paths end early. Each is unbiased, but another estimate."),
+      choice<&S::transport>("transport", "Transport",
+                            {{"path", "From the camera alone."},
+                             {"light",
+                              "And as many from the lights, joined by their densities: for "
+                              "caustics of small lights."}},
+                            "Where paths begin."),
       number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
                                  "The first vertex at which a path may end early."),
       choice<&S::light_selection>(

@@ -76,7 +76,8 @@ inline void merge(Surface<F>& to, const Surface<F>& from, const Mask<F>& m) {
         {select(m, from.uv.x, to.uv.x), select(m, from.uv.y, to.uv.y)},
         select(m, from.uv_per_length, to.uv_per_length),
         select(m, from.offset, to.offset),
-        select<F>(m, from.terminator, to.terminator)};
+        select<F>(m, from.terminator, to.terminator),
+        select<F>(m, from.ns, to.ns)};
 }
 
 /// Texture coordinates, how they change with length, and the tangent along them.

@@ -41,9 +41,13 @@ class Film {
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
-  /// Keeps splats from now on, in units of `unit`; the beauty is then the pixel's mean and theirs.
-  void keep_splats(FixedPoint unit) { splats_ = SplatLayer(pixels_.size(), unit); }
+  /// Keeps splats from now on, in units of `unit`, of `paths` numbers of paths; the beauty is then
+  /// the pixel's mean and theirs.
+  void keep_splats(FixedPoint unit, size_t paths = 0) {
+    splats_ = SplatLayer(pixels_.size(), unit, paths);
+  }
   SplatLayer& splats() { return splats_; }
+  const SplatLayer& splats() const { return splats_; }
   /// Number of a pixel of the picture, row by row of the window.
   size_t index(uint32_t x, uint32_t y) const { return window_.index(x, y); }
   const Pixel& pixel(size_t i) const { return pixels_[i]; }

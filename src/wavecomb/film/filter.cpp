@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/film/filter.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace wavecomb {
@@ -25,7 +26,11 @@ double filter_value(FilterKind kind, double x) {
 
 }  // namespace
 
-FilterTable::FilterTable(FilterKind kind, float width) : offsets_(kBins + 2) {
+FilterTable::FilterTable(FilterKind kind, float width)
+    : offsets_(kBins + 2),
+      radius_(0.5f * width),
+      density_scale_(float{kBins} / width),
+      density_(kBins) {
   constexpr int kSteps = 1 << 16;
   std::vector<double> cdf(kSteps + 1, 0.0);
   for (int i = 0; i < kSteps; ++i)
@@ -39,6 +44,19 @@ FilterTable::FilterTable(FilterKind kind, float width) : offsets_(kBins + 2) {
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
+  // What interpolation makes of the offsets: in the tails another than the filter's own.
+  uint32_t from = 0;
+  const auto share_below = [&](double x) {
+    while (from + 1 < kBins && double{offsets_[from + 1]} <= x) ++from;
+    const double low = double{offsets_[from]}, size = double{offsets_[from + 1]} - low;
+    return (from + (size > 0 ? std::clamp((x - low) / size, 0.0, 1.0) : 0.0)) / kBins;
+  };
+  double below = 0;
+  for (uint32_t bin = 0; bin < kBins; ++bin) {
+    const double next = share_below(((bin + 1.0) / kBins - 0.5) * double{width});
+    density_[bin] = static_cast<float>((next - below) * kBins / double{width});
+    below = next;
+  }
 }
 
 }  // namespace wavecomb

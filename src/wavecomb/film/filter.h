@@ -21,8 +21,19 @@ class FilterTable {
   /// kBins + 2 offsets in pixels; entry i belongs to u = i / kBins.
   const float* offsets() const { return offsets_.data(); }
 
+  /// Half the filter's full width, pixels.
+  float radius() const { return radius_; }
+  /// Density of the offsets at `x` pixels from the pixel's centre, per pixel: what light that
+  /// arrives there counts for the pixel.
+  float density(float x) const {
+    const float at = (x + radius_) * density_scale_;
+    return at >= 0 && at < float{kBins} ? density_[static_cast<size_t>(at)] : 0.f;
+  }
+
  private:
   std::vector<float> offsets_;
+  float radius_, density_scale_;
+  std::vector<float> density_;  ///< of offsets_, means over kBins equal parts of the width
 };
 
 }  // namespace wavecomb

@@ -16,8 +16,10 @@ enum Feature : uint32_t {
   kMeshLights = 8,    ///< mesh lights, and lights that bounces do not find
   kNotes = 16,        ///< AOVs of vertices, histories of paths
   kExperiments = 32,  ///< cosine sampling, Schlick's approximation
+  kJoined = 64,       ///< paths from the lights, which share in the weights of the camera's
 };
-inline constexpr uint32_t kPlain = kNotes, kEverything = 63;
+/// Renders that are joined by paths from the lights have kernels of their own.
+inline constexpr uint32_t kPlain = kNotes, kEverything = 63, kJoint = kEverything | kJoined;
 
 /// Whether there are plain kernels and least variants for packets of F: for the widest ones.
 /// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.

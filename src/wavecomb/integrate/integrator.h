@@ -20,6 +20,8 @@ struct WaveTask {
   uint32_t pixel_count;
   uint32_t first_sample;
   uint32_t samples;
+  /// Paths start at lights: that of a pixel is one of as many, and says nothing of the pixel.
+  bool from_lights = false;
   uint32_t path_count() const { return pixel_count * samples; }
 };
 

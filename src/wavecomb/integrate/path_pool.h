@@ -77,24 +77,27 @@ static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
 class PathPool {
  public:
   PathPool() = default;
-  /// `cold`: paths keep a PathColdRow.
-  PathPool(size_t capacity, bool cold)
+  /// `cold`: paths keep a PathColdRow. `joined`: and PathState::ratio.
+  PathPool(size_t capacity, bool cold, bool joined = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
-        cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()) {
+        cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
+        ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
     this->cold = cold ? cold_.floats(0) : nullptr;
+    ratio = joined ? ratios_.floats(0) : nullptr;
   }
 
   float* paths = nullptr;     ///< PathRow
   float* shadows = nullptr;   ///< ShadowRow
   float* radiance = nullptr;  ///< RadianceRow
   float* cold = nullptr;      ///< PathColdRow; null where no path has one
-  size_t bytes() const { return rows_.bytes() + cold_.bytes(); }
+  float* ratio = nullptr;     ///< PathState::ratio; null where no paths start at lights
+  size_t bytes() const { return rows_.bytes() + cold_.bytes() + ratios_.bytes(); }
 
  private:
-  SoaBlock rows_, cold_;
+  SoaBlock rows_, cold_, ratios_;
 };
 
 /// Adds c to the active lanes' rows of radiance, which are distinct.

@@ -39,6 +39,13 @@ struct ShadeSettings {
         schlick_fresnel(s.schlick_fresnel),
         cosine_sampling(s.cosine_sampling),
         filters_textures_whole(s.texture_filter == TextureFilter::kWhole) {}
+
+  /// For paths from lights, whose every vertex the camera looks at.
+  ShadeSettings of_light_paths() const {
+    ShadeSettings s = *this;
+    s.filters_textures_whole = true;
+    return s;
+  }
 };
 
 /// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the
@@ -54,6 +61,7 @@ struct PathState {
   UInt<F> receiver;   ///< LightReceiver::normal of the vertex before
   UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
   F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
+  F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one
 
   LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };

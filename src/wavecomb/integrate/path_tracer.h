@@ -2,12 +2,14 @@
 /// Path tracing by the reference integrator: one path after the other, in scalars.
 #pragma once
 
+#include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/program_dispatch.h"
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/integrate/shading_record.h"
+#include "wavecomb/integrate/single_rays.h"
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/integrate/steps/survive.h"
 #include "wavecomb/learn/guide.h"
@@ -20,12 +22,15 @@ namespace wavecomb {
 /// Contract: one thread at a time.
 struct ReferenceWorker {
   explicit ReferenceWorker(const WaveContext& context)
-      : aovs(1, context.film->aovs().layout(), context.aovs), history(1, context.kept_vertices()) {}
+      : aovs(1, context.film->aovs().layout(), context.aovs),
+        history(1, context.kept_vertices()),
+        splats(context.joins_light() ? Wave::kSplats : 0) {}
   PhaseClock clock;
   Counts counts;
   // Of the path that is traced, in slot 0.
   PathAovs aovs;
   PathHistory history;
+  SplatList splats;  ///< of paths from lights
 };
 
 /// Traces paths one after the other, each depth first, through what lies between surfaces.
@@ -40,6 +45,7 @@ class PathTracer {
         settings_(*context.settings),
         clock_(worker.clock),
         counts_(worker.counts),
+        rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),
         history_(worker.history) {}
 
@@ -76,11 +82,11 @@ class PathTracer {
   uint32_t trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
-    keys_ = {&key.pixel_hash, &key.sample, 1, 0};
     const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
-    time_ = context_.moves() ? path_time<F>(settings_.sampler, key) : 0.f;
+    const F time = context_.moves() ? path_time<F>(settings_.sampler, key) : 0.f;
+    rays_.begin(key, time);
     const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
-                                           static_cast<F>(pixel >> 16), r, true, time_);
+                                           static_cast<F>(pixel >> 16), r, true, time);
     aovs_.begin<F>(*context_.camera, r, kSlot, true);
     F cone_at_origin = ray.width;
     const F importance =
@@ -94,7 +100,7 @@ class PathTracer {
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
-      Hit hit = intersect(path.o, path.dir, tfar, depth);
+      SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
       if constexpr (Media::kAny) {
         if constexpr (Media::kShines)
@@ -118,15 +124,15 @@ class PathTracer {
       }
       const Vec3<F> p = fma(path.dir, hit.t, path.o);
       if (hit.inst == kLightShape) {
-        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time_, hit.geom, true);
+        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
         add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
         return depth;
       }
       const bool on_surface = hit.inst != kNoSurface;
-      const uint32_t mesh = on_surface ? mesh_of(hit) : 0;
-      const uint32_t material = on_surface ? material_of(hit, mesh) : hit.event_material;
+      const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
+      const uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
       if (depth == 0 && on_surface)
-        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time_, hit.inst, hit.geom, material, true);
+        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time, hit.inst, hit.geom, material, true);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
         if (!(cost_aware_number<F>(key, depth) < q)) return depth;
@@ -134,6 +140,9 @@ class PathTracer {
       }
       VertexAovs<F> aovs = aovs_.wanted<F>(depth);
       aovs.wants_lights |= !probes_.empty();
+      if (context_.joins_light() && depth == 0 && on_surface)
+        path.ratio =
+            first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
       add(aovs.emitter, v.emitted);
       aovs_.vertex<F>(depth, kSlot, aovs, path, true);
@@ -142,8 +151,9 @@ class PathTracer {
       bool is_free = false;
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
-        shadow_set_ = v.shadow_set;
-        is_free = !occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth);
+        const bool links = context_.scene.lights.links.members != nullptr;
+        is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
+                                  links ? &v.shadow_set : nullptr);
         if (is_free) add_direct(key, depth, v, aovs.lit_by);
       }
       if (!probes_.empty() && aovs.light_weight >= 0.f)
@@ -162,34 +172,6 @@ class PathTracer {
                                aovs.light_weight,
                                {aovs.lit_at.x, aovs.lit_at.y, aovs.lit_at.z},
                                v.next.receiver};
-  }
-
-  struct Hit {
-    F t, u, v;
-    uint32_t prim, geom, inst;
-    uint32_t event_material;  ///< where inst is kNoSurface
-  };
-
-  Hit intersect(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
-    Hit h;
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kSlot, 1, times()};
-    keys_.salt = 2 * depth;
-    keys_.shadow_set = nullptr;
-    context_.accel->intersect(ray, {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, keys_);
-    counts_.add_rays(depth, 1);
-    aovs_.charge_rays(1, [](size_t) { return kSlot; });
-    return h;
-  }
-
-  bool occluded(const Vec3<F>& o, const Vec3<F>& d, F tfar, uint32_t depth) {
-    const RaySpan ray{&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &tfar, &kSlot, 1, times()};
-    uint32_t blocked = 0;
-    keys_.salt = 2 * depth + 1;
-    keys_.shadow_set = context_.scene.lights.links.members ? &shadow_set_ : nullptr;
-    context_.accel->occluded(ray, &blocked, 1, false, keys_);
-    counts_.add_shadow_rays(depth, 1);
-    aovs_.charge_rays(1, [](size_t) { return kSlot; });
-    return blocked != 0;
   }
 
   /// Light `light`, or kNoLight, has brought `c`.
@@ -211,39 +193,31 @@ class PathTracer {
     if (history_) history_.light<F>(depth, kSlot, c, true);
   }
 
-  uint32_t mesh_of(const Hit& hit) const {
-    const SceneView& scene = context_.scene;
-    return scene.geometry_mesh[scene.instances[hit.inst].geometry + hit.geom];
-  }
-
-  uint32_t material_of(const Hit& hit, uint32_t mesh) const {
-    const SceneView& scene = context_.scene;
-    return hit_material<F>(scene, scene.instances[hit.inst].material, mesh, hit.prim, true);
-  }
-
-  VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const Hit& hit, uint32_t mesh,
-                        uint32_t material, const PathState<F>& path, VertexAovs<F>& aovs) {
+  VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
+                        uint32_t mesh, uint32_t material, const PathState<F>& path,
+                        VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
-    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, time_};
+    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
+    if constexpr (!Media::kAny)
+      if (context_.joins_light())
+        return kShadeJointVertex<F>[scene.material_program[material]](
+            {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
+             context_.guide});
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     return kernels[scene.material_program[material]]({scene, settings_, key, depth, mesh_hit,
                                                       hit.geom, hit.t, material, path, &aovs, true,
                                                       context_.guide});
   }
 
-  const float* times() const { return context_.scene.has_motion ? &time_ : nullptr; }
-
-  static constexpr uint32_t kSlot = 0;  ///< the one that there is
+  static constexpr uint32_t kSlot = kOnlySlot;
   const WaveContext& context_;
   [[maybe_unused]] const Media& media_;
   const ShadeSettings settings_;
   PhaseClock& clock_;
   Counts& counts_;
-  PresenceKeys keys_;
-  uint32_t shadow_set_ = 0;
-  F time_ = 0.f;  ///< of the path
+  SingleRays rays_;
   PathAovs& aovs_;
   PathHistory& history_;
   RadianceRow<F> radiance_;

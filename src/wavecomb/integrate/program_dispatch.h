@@ -19,16 +19,24 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                  uint32_t depth, size_t begin, size_t end);
 template <typename Bsdf, typename F, uint32_t kFeatures>
 VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v);
+// In stages/shade_light_batch.h and light_vertex.h.
+struct LightPathSetup;
+template <typename F>
+struct LightVertexResult;
+template <typename Bsdf, typename F, uint32_t kFeatures>
+void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                       uint32_t depth, size_t begin, size_t end);
+template <typename Bsdf, typename F, uint32_t kFeatures>
+LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup);
 
 namespace detail {
 template <typename F>
 using BatchKernels =
     std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything>), kVariantCount>;
 
-template <typename F, typename... Bsdf>
-constexpr auto batch_kernels(ProgramList<Bsdf...>) {
-  BatchKernels<F> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F, kEverything>), ...);
+/// All variants of a program are the program.
+template <typename Kernels>
+constexpr Kernels for_variants(Kernels kernels) {
   for (uint32_t v = kProgramCount; v < kVariantCount; ++v)
     kernels[v] = kernels[static_cast<size_t>(program_of(v))];
   return kernels;
@@ -41,14 +49,33 @@ constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
   else
     return nullptr;
 }
+template <typename F, uint32_t kFeatures, typename... Bsdf>
+constexpr auto batch_kernels(ProgramList<Bsdf...>) {
+  BatchKernels<F> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F, kFeatures>), ...);
+  return for_variants(kernels);
+}
+template <typename F, typename... Bsdf>
+constexpr auto light_batch_kernels(ProgramList<Bsdf...>) {
+  BatchKernels<F> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_light_batch<Bsdf, F, kEverything>), ...);
+  return for_variants(kernels);
+}
 template <typename F, size_t... kVariant>
 constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
   return BatchKernels<F>{plain_batch_kernel<kVariant, F>()...};
 }
-template <typename F, typename... Bsdf>
+template <typename F, uint32_t kFeatures, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
-  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kEverything>), ...);
+  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kFeatures>), kProgramCount> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kFeatures>), ...);
+  return kernels;
+}
+template <typename F, typename... Bsdf>
+constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
+  std::array<decltype(&shade_light_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount>
+      kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_light_vertex<Bsdf, F, kEverything>), ...);
   return kernels;
 }
 }  // namespace detail
@@ -56,9 +83,18 @@ constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
 /// The kernels of the programs of a list: shade_batch, for the wave, by variant (all of a program
 /// are the program), and shade_vertex, for the reference, by ProgramId.
 template <typename F, typename List>
-inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
+inline constexpr auto kShadeBatch = detail::batch_kernels<F, kEverything>(List{});
 template <typename F, typename List>
-inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
+inline constexpr auto kShadeVertex = detail::vertex_kernels<F, kEverything>(List{});
+/// The same where paths from lights share in the weights, and for those paths.
+template <typename F>
+inline constexpr auto kShadeJointBatch = detail::batch_kernels<F, kJoint>(Programs<F>{});
+template <typename F>
+inline constexpr auto kShadeJointVertex = detail::vertex_kernels<F, kJoint>(Programs<F>{});
+template <typename F>
+inline constexpr auto kShadeLightBatch = detail::light_batch_kernels<F>(Programs<F>{});
+template <typename F>
+inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
 /// Plain kernels by variant; only where kHasPlain.
 template <typename F>
 inline constexpr auto kShadePlain =

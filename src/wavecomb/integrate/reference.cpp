@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/integrate/reference.h"
 
+#include "wavecomb/integrate/light_tracer.h"
 #include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/shared_kernels.h"
 #include "wavecomb/medium/volumes.h"
@@ -21,6 +22,7 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 }
 
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
+  if (task.from_lights) return trace_light_task(context_, *workers_[i], task);
   const VolumeView& volumes = context_.scene.volumes;
   if (volumes.count > 0)
     trace_task(context_, *workers_[i], task, Volumes(volumes, workers_[i]->counts.volumes));

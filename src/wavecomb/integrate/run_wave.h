@@ -4,31 +4,96 @@
 
 #include "wavecomb/integrate/stages/collect.h"
 #include "wavecomb/integrate/stages/generate.h"
+#include "wavecomb/integrate/stages/generate_light.h"
 #include "wavecomb/integrate/stages/order.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/stages/resolve.h"
 #include "wavecomb/integrate/stages/shade.h"
+#include "wavecomb/integrate/stages/splat.h"
 #include "wavecomb/integrate/stages/trace.h"
 
 namespace wavecomb {
 
+/// The stages of paths from the camera, through what lies between surfaces.
+template <typename F, typename Media>
+struct CameraPaths {
+  const Media& media;
+  const float* tfar = nullptr;  ///< of the first rays
+
+  void generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
+    tfar = wavecomb::generate<F>(wave, context, task);
+    wave.counts.samples += task.path_count();
+  }
+  /// Camera rays of a pinhole are coherent as they come, and from one point packets give the same
+  /// hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
+  static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
+  static ShadeSettings settings(const WaveContext& context) {
+    return ShadeSettings(*context.settings);
+  }
+  void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+               uint32_t depth) const {
+    if constexpr (Media::kStreams) media.template fly_all<F>(wave, depth, settings.sampler);
+    wavecomb::collect<F>(wave, context, settings, depth, media);
+  }
+  static const auto& kernels(const WaveContext& context, const ShadeSettings& settings) {
+    return kernels_for<F, Media>(context, settings);
+  }
+  void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
+    wavecomb::shadow<F>(wave, context, depth, media);
+  }
+  static void end_depth(Wave& wave, const WaveTask& task, uint32_t depth) {
+    wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
+  }
+  static void resolve(Wave& wave, const WaveContext& context, const WaveTask& task,
+                      uint32_t depth) {
+    wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
+    if (wave.history) context.histories->ended(wave.history, wave.pool.radiance, task);
+    if (!context.discards) wavecomb::resolve(wave, context, task);
+  }
+};
+
+/// The stages of paths from lights.
+template <typename F>
+struct LightPaths {
+  static constexpr const float* tfar = nullptr;
+
+  static void generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
+    generate_light<F>(wave, context, task);
+    fetch_rays<F>(wave);
+  }
+  static bool are_coherent(const WaveContext& /*context*/) { return false; }
+  static ShadeSettings settings(const WaveContext& context) {
+    return ShadeSettings(*context.settings).of_light_paths();
+  }
+  static void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                      uint32_t depth) {
+    wavecomb::collect<F, NoMedia, true>(wave, context, settings, depth, NoMedia());
+  }
+  static const auto& kernels(const WaveContext& /*context*/, const ShadeSettings& /*settings*/) {
+    return kShadeLightBatch<F>;
+  }
+  static void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
+    splat<F>(wave, context, depth);
+  }
+  static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
+  static void resolve(Wave& /*wave*/, const WaveContext& context, const WaveTask& task,
+                      uint32_t /*depth*/) {
+    count_light_paths(context, task);
+  }
+};
+
 /// Runs a wave to its end in lanes of type F: generate -> (trace -> collect -> order -> shade ->
 /// shadow)* -> resolve.
-template <typename F, typename Media>
-void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& task,
-                      const Media& media) {
+template <typename F, typename Paths>
+void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Paths paths) {
   using Clock = PhaseClock::Clock;
   const Settings& s = *context.settings;
-  const ShadeSettings settings(s);
+  const ShadeSettings settings = paths.settings(context);
   PhaseClock& clock = wave.clock;
   clock.start(Phase::kGenerate);
-  const float* tfar = generate<F>(wave, context, task);
-  wave.counts.samples += task.path_count();
+  paths.generate(wave, context, task);
   uint32_t depth = 0;
   for (; wave.rays.size > 0; ++depth) {
-    // Camera rays of a pinhole are coherent as they come, and from one point packets give the same
-    // hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
-    const bool coherent = depth == 0 && context.camera->is_pinhole();
     RayOrderChoice ray_order;
     clock.enter(Phase::kTrace);
     if (depth > 0) {
@@ -38,26 +103,25 @@ void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& ta
       fetch_rays<F>(wave);
     }
     Clock::time_point start = Clock::now();
-    trace(wave, context, depth, depth == 0 ? tfar : nullptr, fetch_times<F>(wave, wave.rays),
-          coherent);
+    trace(wave, context, depth, depth == 0 ? paths.tfar : nullptr, fetch_times<F>(wave, wave.rays),
+          depth == 0 && paths.are_coherent(context));
     learn_order(wave.ray_chooser, depth, ray_order, start);
 
     clock.enter(Phase::kShade);
-    if constexpr (Media::kStreams) media.template fly_all<F>(wave, depth, settings.sampler);
-    collect<F>(wave, context, settings, depth, media);
+    paths.collect(wave, context, settings, depth);
     const OrderChoice choice = order_records<F>(wave, context, depth);
     clock.enter(Phase::kMetrics);
     watch_coherence<F>(wave, context);
     clock.enter(Phase::kShade);
     start = Clock::now();
-    shade<F, Media>(wave, context, settings, depth);
+    shade<F>(wave, context, settings, depth, paths.kernels(context, settings));
     if (choice.work.records > 0)
       wave.policy_chooser.learn(
           depth, choice.arm, choice.work,
           std::chrono::duration<double, std::nano>(Clock::now() - start).count(),
           choice.prepare_ns);
     compact<F>(wave);
-    wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
+    paths.end_depth(wave, task, depth);
 
     if (wave.shadows.size == 0) continue;
     const RayOrderChoice shadow_order = order_rays<F>(
@@ -65,14 +129,19 @@ void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& ta
     clock.enter(Phase::kShadow);
     fetch_shadows<F>(wave);
     start = Clock::now();
-    shadow<F>(wave, context, depth, media);
+    paths.shadow(wave, context, depth);
     learn_order(wave.shadow_chooser, depth, shadow_order, start);
   }
   clock.enter(Phase::kResolve);
-  wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
-  if (wave.history) context.histories->ended(wave.history, wave.pool.radiance, task);
-  if (!context.discards) resolve(wave, context, task);
+  paths.resolve(wave, context, task, depth);
   clock.stop();
+}
+
+/// Paths from the camera, in lanes of type F.
+template <typename F, typename Media>
+void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& task,
+                      const Media& media) {
+  run_stages<F>(wave, context, task, CameraPaths<F, Media>{media});
 }
 
 }  // namespace wavecomb

@@ -8,6 +8,7 @@
 #include "wavecomb/graph/run.h"
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/learn/guide.h"
+#include "wavecomb/light/emission.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/surface.h"
 #include "wavecomb/texture/lookup.h"
@@ -22,6 +23,13 @@
   KEYWORD template F triangle_light_pdf<F>(const LightView&, const UInt<F>&,                       \
                                            const LightReceiver<F>&, const Vec3<F>&, const F&,      \
                                            const Mask<F>&);                                        \
+  KEYWORD template Emission<F> sample_emission<F>(const LightView&, const EmissionNumbers<F>&,     \
+                                                  const Mask<F>&);                                 \
+  KEYWORD template F emission_density<F>(const LightView&, const UInt<F>&, const Vec3<F>&,         \
+                                         const Vec3<F>&, const F&, const Mask<F>&);                \
+  KEYWORD template LightReach<F> light_reach<F>(const LightView&, const UInt<F>&,                  \
+                                                const LightReceiver<F>&, const Vec3<F>&, const F&, \
+                                                const Mask<F>&);                                   \
   KEYWORD template UInt<F> chosen_light<F>(const LightView&, const LightReceiver<F>&, const F&,    \
                                            const Mask<F>&);                                        \
   KEYWORD template Color<F> mesh_light_emission<F>(const SceneView&, const UInt<F>&,               \

@@ -6,6 +6,7 @@
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/integrate/steps/join.h"
 #include "wavecomb/integrate/steps/sample_light.h"
 #include "wavecomb/integrate/steps/scatter.h"
 #include "wavecomb/integrate/steps/survive.h"
@@ -41,14 +42,17 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
 
   const auto seen = at.bsdf.view(wo);
   const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
+  JointVertex<F> joint{};
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+    joint = joint_vertex<Bsdf, F>(v, at, frame);
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
-  sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, place, receiver, out);
+  sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, place, joint, receiver, out);
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
-  scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, receiver, out);
+  scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, joint, receiver, out);
   survive<F>(v, place, max_component(at.throughput), r_light.w, out);
   return out;
 }

@@ -10,6 +10,7 @@
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
+#include "wavecomb/film/splat_filter.h"
 #include "wavecomb/integrate/aov_tables.h"
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/integrate/camera_ray.h"
@@ -53,6 +54,14 @@ struct WaveContext {
   HistoryReader* histories = nullptr;  ///< gets vertices of paths; null where none are kept
   const GuideView* guide = nullptr;    ///< guides bounces, or is to be learned; null: neither
   bool discards = false;               ///< paths are for `histories` alone, and the film gets none
+  const SplatFilter* splat_filter = nullptr;  ///< of paths from lights; null: there are none
+
+  /// Whether paths start at lights, too.
+  bool joins_light() const { return splat_filter != nullptr; }
+  /// One over how many start there for each of a pixel's: as many as the picture has pixels.
+  float light_path_share() const {
+    return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height));
+  }
 
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }
@@ -72,7 +81,8 @@ struct WaveContext {
 /// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.moves() || context.links() || context.weighs_pixels()),
+      : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
+             context.joins_light()),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),
@@ -87,10 +97,12 @@ struct Wave {
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
         scratch(context.traits.size()),
         costs(context.traits.size()),
+        splats(context.joins_light() ? kSplats : 0),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders) {}
   static constexpr size_t kWayColumns = 10;
+  static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 
   PathPool pool;
@@ -107,6 +119,7 @@ struct Wave {
   std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
   std::vector<float> scratch;         ///< one a material, for policies
   CostTracker costs;
+  SplatList splats;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
   uint32_t queues = 0;  ///< shading queues so far; coherence is measured on some
@@ -115,12 +128,13 @@ struct Wave {
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
-           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + ways.bytes();
+           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + ways.bytes() +
+           splats.bytes();
   }
 };
 
 /// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* ->
-/// resolve.
+/// resolve. Of paths from lights, where the task is of such.
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
 

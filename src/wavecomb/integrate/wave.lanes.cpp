@@ -12,6 +12,7 @@ WAVECOMB_SHARED_KERNELS(extern, Lanes<WAVECOMB_LANES>);
 
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
+  if (task.from_lights) return run_stages<Lanes<W>>(wave, context, task, LightPaths<Lanes<W>>());
   run_wave_through<Lanes<W>>(wave, context, task, NoMedia());
 }
 

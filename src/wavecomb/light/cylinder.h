@@ -135,6 +135,18 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
           select(front, cylinder_pdf<F>(c, size), F(0.f))};
 }
 
+/// A path from a point uniform over the outside.
+template <typename F>
+inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
+  const LightReader<F>& light = q.light;
+  const Frame<F> frame = make_frame(make_direction<F>(light.u()).wi);
+  const auto [sine, cosine] = sincos_2pi(q.u);
+  const Vec3<F> n = fma(frame.s, cosine, Vec3<F>(frame.t * sine));
+  const Vec3<F> p = fma(n, light.radius(), fma(light.u(), q.v, light.p()));
+  return emit_by_cosine<F>(p, n, q.s, q.t, light.radiance(),
+                           even_emission_density<F>(light.area()));
+}
+
 }  // namespace wavecomb::detail
 
 namespace wavecomb {
@@ -149,6 +161,14 @@ struct CylinderKind : NoEscape {
   template <typename F>
   static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
     return detail::hit_cylinder<F>(m.light, m.origin, m.dir, m.t);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_cylinder<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::even_emission_density<F>(m.light.area());
   }
 };
 

@@ -28,6 +28,15 @@ inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, cons
           area_to_solid_angle<F>(F(t * t), cos_light, light.area())};
 }
 
+/// A path from a point uniform over the disk.
+template <typename F>
+inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
+  const LightReader<F>& light = q.light;
+  const Vec2<F> ab = square_to_disk(q.u, q.v);
+  return emit_by_cosine<F>(fma(light.u(), ab.x, fma(light.v(), ab.y, light.p())), light.n(), q.s,
+                           q.t, light.radiance(), even_emission_density<F>(light.area()));
+}
+
 }  // namespace wavecomb::detail
 
 namespace wavecomb {
@@ -42,6 +51,14 @@ struct DiskKind : NoEscape {
   template <typename F>
   static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
     return detail::hit_disk<F>(m.light, m.dir, m.t);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_disk<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::even_emission_density<F>(m.light.area());
   }
 };
 

@@ -37,6 +37,22 @@ inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
           select(inside, distant_pdf<F>(one_minus_cos), F(0.f))};
 }
 
+/// KindEmission::density of paths that come along -dir: see hit_distant.
+template <typename F>
+inline F distant_emission_density(const LightView& view, const LightReader<F>& light,
+                                  const Vec3<F>& dir) {
+  const F direction_pdf =
+      select(light.one_minus_cos() == 0.f, F(1.f), hit_distant<F>(light, dir).pdf);
+  return density_from_afar<F>(view, direction_pdf);
+}
+
+/// A path in a direction of the cone.
+template <typename F>
+inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
+  const KindSample<F> way = sample_distant<F>(q.light, q.s, q.t);
+  return emit_from_afar<F>(q.view, -way.wi, q.u, q.v, way.radiance, way.pdf);
+}
+
 }  // namespace wavecomb::detail
 
 namespace wavecomb {
@@ -51,6 +67,14 @@ struct DistantKind : NoShape {
   template <typename F>
   static detail::KindHit<F> escape(const detail::LightEscape<F>& e) {
     return detail::hit_distant<F>(detail::LightReader<F>(e.light, e.lanes), e.dir);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_distant<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::distant_emission_density<F>(m.view, m.light, m.dir);
   }
 };
 

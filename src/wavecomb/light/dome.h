@@ -94,6 +94,17 @@ inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<
   return result;
 }
 
+/// Where in the image a direction of the dome's own coordinates is.
+template <typename F>
+struct ImageDirection {
+  F sin_theta;
+  F s, down;  ///< from the left, and from the top
+  explicit ImageDirection(const Vec3<F>& w)
+      : sin_theta(sqrt(fma(w.x, w.x, F(w.z * w.z)))),
+        s(fnma(atan2(w.x, w.z), F(kInv2Pi), F(0.5f))),
+        down(atan2(sin_theta, w.y) * kInvPi) {}
+};
+
 /// What a ray that left the scene along `dir` gets from the dome `record`.
 template <typename F>
 inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, const Vec3<F>& dir,
@@ -101,13 +112,10 @@ inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, con
   const LightReader<F> light(record, active);
   if (record.texture == kNoTexture) return {light.radiance(), F(kInv4Pi)};
   const Distribution2D& d = view.distributions[record.distribution];
-  const Vec3<F> w = to_dome<F>(light, dir);
-  const F sin_theta = sqrt(fma(w.x, w.x, F(w.z * w.z)));
-  const F s = fnma(atan2(w.x, w.z), F(kInv2Pi), F(0.5f));
-  const F down = atan2(sin_theta, w.y) * kInvPi;
-  return {
-      dome_radiance<F>(light, view.materials.textures[record.texture], s, F(1.f - down), active),
-      dome_pdf<F>(image_pdf_at<F>(d, s, down, active), sin_theta)};
+  const ImageDirection<F> at(to_dome<F>(light, dir));
+  return {dome_radiance<F>(light, view.materials.textures[record.texture], at.s, F(1.f - at.down),
+                           active),
+          dome_pdf<F>(image_pdf_at<F>(d, at.s, at.down, active), at.sin_theta)};
 }
 
 /// hit_dome, with the density as seen from `from`.
@@ -168,6 +176,31 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
   return sample_dome_light<F>(view, light, u, v, active);
 }
 
+/// A path in a direction by the density of the image, whatever portals there are.
+template <typename F>
+inline KindEmission<F> emit_dome(const EmissionQuery<F>& q) {
+  const KindSample<F> way = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);
+  return emit_from_afar<F>(q.view, -way.wi, q.u, q.v, way.radiance, way.pdf);
+}
+
+/// KindEmission::density of emit_dome for paths that come along -dir: each image once.
+template <typename F>
+inline F dome_emission_density(const LightMeeting<F>& m) {
+  F pdf(kInv4Pi);
+  const UInt<F> index = m.light[&LightRecord::distribution];
+  const Vec3<F> w = to_dome<F>(m.light, m.dir);
+  const ImageDirection<F> at(w);
+  Mask<F> pending = m.lanes & Mask<F>(m.light.texture() != UInt<F>(kNoTexture));
+  while (any(pending)) {
+    const uint32_t one = lane(index, static_cast<size_t>(std::countr_zero(lane_bits<F>(pending))));
+    const Mask<F> same = pending & Mask<F>(index == UInt<F>(one));
+    pending = pending & not_(same);
+    const F image = image_pdf_at<F>(m.view.distributions[one], at.s, at.down, same);
+    pdf = select(same, dome_pdf<F>(image, at.sin_theta), pdf);
+  }
+  return density_from_afar<F>(m.view, pdf);
+}
+
 }  // namespace wavecomb::detail
 
 namespace wavecomb {
@@ -182,6 +215,14 @@ struct DomeKind : NoShape {
   template <typename F>
   static detail::KindHit<F> escape(const detail::LightEscape<F>& e) {
     return detail::hit_dome_from<F>(e.view, e.light, e.from, e.dir, e.lanes);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_dome<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::dome_emission_density<F>(m);
   }
 };
 

@@ -7,7 +7,9 @@
 ///   sample       a direction from a point to the light, radiance and density,
 ///   hit          radiance and density for a ray that met its shape, and
 ///   escape       for a ray that left the scene;
-/// of the last two NoShape and NoEscape say nothing.
+///   emit         where a path from the light starts, and where it goes, and
+///   emission_density    with which it would have come along a ray that met the light.
+/// Of hit and escape NoShape and NoEscape say nothing.
 #pragma once
 
 #include <cstdint>
@@ -69,6 +71,30 @@ inline KindHit<F> escape_kind(LightKind kind, const LightEscape<F>& escape) {
 #undef WAVECOMB_LIGHT_KIND
   }
   return dark<F>();
+}
+
+template <typename F>
+inline KindEmission<F> emit_kind(LightKind kind, const EmissionQuery<F>& query) {
+  switch (kind) {
+#define WAVECOMB_LIGHT_KIND(name) \
+  case LightKind::k##name:        \
+    return name##Kind::emit<F>(query);
+    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+  }
+  return {};
+}
+
+template <typename F>
+inline F emission_density_of_kind(LightKind kind, const LightMeeting<F>& meeting) {
+  switch (kind) {
+#define WAVECOMB_LIGHT_KIND(name) \
+  case LightKind::k##name:        \
+    return name##Kind::emission_density<F>(meeting);
+    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+  }
+  return F(0.f);
 }
 
 }  // namespace detail

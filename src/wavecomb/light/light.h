@@ -91,6 +91,19 @@ inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& r
   return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
 }
 
+/// Emission::density (light/emission.h) of a path from infinite light `light` that came along -dir.
+template <typename F>
+inline F infinite_emission_density(const LightView& view, uint32_t light, const Vec3<F>& dir,
+                                   const Mask<F>& active) {
+  const LightRecord& record = view.lights[light];
+  if (record.sampled_only != 0 || record.light_link != kNoSet) return F(0.f);
+  const LightReader<F> reader(record, active);
+  const float pick = view.pick_pdf ? view.pick_pdf[light] : record.pick_pdf;
+  const F density = emission_density_of_kind<F>(static_cast<LightKind>(record.kind),
+                                                {view, reader, dir, dir, F(0.f), active});
+  return select(is_finite(density), F(density * pick), F(0.f));
+}
+
 /// Runs `one(kind, lanes)` for each kind of light among the active lanes.
 template <typename F, typename Function>
 inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Function& one) {
@@ -229,6 +242,23 @@ struct LightEffect {
   }
 };
 
+/// Probability with which sample_light chooses infinite light `light`.
+inline float infinite_pick_pdf(const LightView& view, uint32_t light) {
+  if (view.by_tree) return view.tree.infinite_pdf[light];
+  return view.pick_pdf ? view.pick_pdf[light] : view.lights[light].pick_pdf;
+}
+
+/// Balance heuristic of three: weight of a bounce of density `p` (of a delta lobe: any), beside
+/// light samples of density `light_pdf` and paths from the lights of density `others` times that of
+/// the bounce.
+template <typename F>
+inline F joint_bounce_weight(const F& p, const F& light_pdf, const Mask<F>& is_delta,
+                             const F& others) {
+  const Mask<F> sampled = not_(is_delta) & (p > 0.f);
+  const F by_light = select(sampled, F(light_pdf / select(sampled, p, F(1.f))), F(0.f));
+  return 1.f / F(F(1.f + by_light) + others);
+}
+
 /// Radiance * MIS weight of infinite light `light` for a ray that left `from` and the scene along
 /// dir, as
 /// escaped_radiance sums them up.
@@ -236,17 +266,19 @@ template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& from,
                                         const Vec3<F>& dir, const F& bsdf_pdf,
                                         const Mask<F>& bsdf_is_delta, const Mask<F>& active,
-                                        bool from_camera = false,
-                                        const UInt<F>& link = UInt<F>(0u)) {
+                                        bool from_camera = false, const UInt<F>& link = UInt<F>(0u),
+                                        const F& ratio = F(0.f)) {
   const LightRecord& record = view.lights[light];
   detail::KindHit<F> hit = detail::escape_kind<F>(static_cast<LightKind>(record.kind),
                                                   {view, record, from, dir, active});
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -dir, hit.radiance, active);
-  const float pick_pdf = view.by_tree    ? view.tree.infinite_pdf[light]
-                         : view.pick_pdf ? view.pick_pdf[light]
-                                         : record.pick_pdf;
-  F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, F(hit.pdf * pick_pdf)));
+  const F light_pdf = hit.pdf * infinite_pick_pdf(view, light);
+  F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, light_pdf));
+  if (view.sends_paths()) [[unlikely]]
+    weight = joint_bounce_weight<F>(
+        bsdf_pdf, light_pdf, bsdf_is_delta,
+        F(ratio * detail::infinite_emission_density<F>(view, light, dir, active)));
   if (view.has_sampled_only)
     weight *= LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera);
   if (view.links.members)
@@ -257,16 +289,16 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 /// Sum over all infinite lights of radiance * MIS weight for a ray that left `from` and the scene
 /// along dir;
 /// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
-/// too).
+/// too). `ratio`: PathState::ratio, where lights send paths, which then share in the weight.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
                                  const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
                                  const Mask<F>& active, bool from_camera = false,
-                                 const UInt<F>& link = UInt<F>(0u)) {
+                                 const UInt<F>& link = UInt<F>(0u), const F& ratio = F(0.f)) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
     sum += infinite_light_radiance<F>(view, i, from, dir, bsdf_pdf, bsdf_is_delta, active,
-                                      from_camera, link);
+                                      from_camera, link, ratio);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

@@ -67,6 +67,14 @@ struct TriangleKind : NoEscape, NoShape {
   static detail::KindSample<F> sample(const detail::LightQuery<F>& /*query*/) {
     return {};
   }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& /*query*/) {
+    return {};
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& /*meeting*/) {
+    return F(0.f);
+  }
 };
 
 }  // namespace wavecomb

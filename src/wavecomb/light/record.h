@@ -2,6 +2,7 @@
 /// Reads light records by lane, and what the files of the light kinds share.
 #pragma once
 
+#include "wavecomb/core/frame.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/record_reader.h"
 #include "wavecomb/core/vec.h"
@@ -97,6 +98,65 @@ struct LightEscape {
   const Vec3<F>&from, &dir;
   const Mask<F>& lanes;
 };
+
+/// What a kind is asked to send a path from: the light in lanes `lanes`, its place by (u, v), its
+/// direction by (s, t).
+template <typename F>
+struct EmissionQuery {
+  const LightView& view;
+  const LightReader<F>& light;
+  const F &u, &v, &s, &t;
+  const Mask<F>& lanes;
+};
+
+/// Where a path starts at a light and where it goes, before the choice of the light is counted.
+///
+/// `density` is what the path's weight and those of multiple importance sampling need (docs/
+/// light-paths.md): that of the place times that of the direction over its cosine,
+///   p_A(p) p_w(d) / |cos|;   of a point p_w(d);   of an infinite light p_w(d) / (pi R^2);
+///   of a distant one without an angle 1 / (pi R^2),
+/// so that radiance (a point: intensity; without an angle: irradiance) / density is the flux that
+/// the path carries. 0: no path.
+template <typename F>
+struct KindEmission {
+  Vec3<F> p, d;  ///< unit d
+  Vec3<F> n;     ///< unit, out of the light's surface, to keep clear of; 0: it has none
+  Color<F> radiance;
+  F density;
+};
+
+/// A path from `p` by cosine about the surface's normal `n`.
+template <typename F>
+inline KindEmission<F> emit_by_cosine(const Vec3<F>& p, const Vec3<F>& n, const F& s, const F& t,
+                                      const Color<F>& radiance, const F& density) {
+  return {p, make_frame(n).to_world(square_to_cosine_hemisphere(s, t)), n, radiance, density};
+}
+
+/// kInvPi / area; 0 where that is out of range.
+template <typename F>
+inline F even_emission_density(const F& area) {
+  const F density = kInvPi / select(area > 0.f, area, F(1.f));
+  return select((area > 0.f) & is_finite(density), density, F(0.f));
+}
+
+/// A path towards the sphere around the scene, along `d`, from a place of its shadow by (u, v).
+template <typename F>
+inline KindEmission<F> emit_from_afar(const LightView& view, const Vec3<F>& d, const F& u,
+                                      const F& v, const Color<F>& radiance,
+                                      const F& direction_pdf) {
+  const Vec2<F> at = square_to_disk(u, v);
+  const Frame<F> frame = make_frame(d);
+  const Vec3<F> centre{F(view.centre[0]), F(view.centre[1]), F(view.centre[2])};
+  const Vec3<F> across = fma(frame.s, F(at.x * view.radius),
+                             fma(frame.t, F(at.y * view.radius), Vec3<F>(d * F(-view.reach))));
+  return {centre + across, d, Vec3<F>(F(0.f)), radiance,
+          direction_pdf * (kInvPi / (view.radius * view.radius))};
+}
+/// The same density for a direction that was met.
+template <typename F>
+inline F density_from_afar(const LightView& view, const F& direction_pdf) {
+  return direction_pdf * (kInvPi / (view.radius * view.radius));
+}
 
 template <typename F>
 inline KindHit<F> dark() {

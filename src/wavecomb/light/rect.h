@@ -234,6 +234,20 @@ inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& li
           pdf, Mask<F>(false)};
 }
 
+/// Where on the rect a point of its plane is, as shares of its edges: with h = q - p = a u + b v
+/// and m = u x v, a = (h x v) . m / m^2 and b = (u x h) . m / m^2.
+template <typename F>
+inline Vec2<F> place_on_rect(const LightReader<F>& light, const Vec3<F>& q) {
+  const Vec3<F> h = q - light.p();
+  const Vec3<F> edge_u = light.u(), edge_v = light.v();
+  const Vec3<F> m = cross(edge_u, edge_v);
+  const F m2 = dot(m, m);
+  const F inverse = 1.f / select(m2 > 0.f, m2, F(1.f));
+  const F a = dot(cross(h, edge_v), m) * inverse;
+  const F b = dot(cross(edge_u, h), m) * inverse;
+  return {clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f))};
+}
+
 /// What a ray gets from the rect at distance t.
 template <typename F>
 inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
@@ -241,15 +255,7 @@ inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
                            const Mask<F>& active) {
   const F cos_light = -dot(dir, light.n());
   const Mask<F> front = active & (cos_light > 0.f);
-  // h = a u + b v; with m = u x v: a = (h x v) . m / m^2, b = (u x h) . m / m^2.
-  const Vec3<F> h = fma(dir, t, origin) - light.p();
-  const Vec3<F> edge_u = light.u(), edge_v = light.v();
-  const Vec3<F> m = cross(edge_u, edge_v);
-  const F m2 = dot(m, m);
-  const F inverse = 1.f / select(m2 > 0.f, m2, F(1.f));
-  const F a = dot(cross(h, edge_v), m) * inverse;
-  const F b = dot(cross(edge_u, h), m) * inverse;
-  const Vec2<F> at{clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f))};
+  const Vec2<F> at = place_on_rect<F>(light, fma(dir, t, origin));
   const Color<F> radiance = rect_radiance<F>(light, view.materials.textures, at.x, at.y, front);
   const SphericalRect<F> r = make_spherical_rect<F>(light, origin);
   F pdf = rect_pdf<F>(r, F(t * t), cos_light, light.area());
@@ -261,6 +267,38 @@ inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
     pdf = select(lanes, mixed, pdf);
   });
   return {select<F>(front, radiance, Color<F>(F(0.f))), pdf};
+}
+
+/// A path from a point of the picture by its density, or of the rect evenly.
+template <typename F>
+inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
+  const LightReader<F>& light = q.light;
+  Vec2<F> at{q.u, q.v};
+  F square_pdf(1.f);
+  const Mask<F> pictured = has_picture<F>(light, q.lanes);
+  for_each_picture<F>(q.view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const ImagePoint<F> point = sample_image<F>(d, q.u, q.v, lanes);
+    at = {select(lanes, point.x, at.x), select(lanes, F(1.f - point.y), at.y)};
+    square_pdf = select(lanes, point.pdf, square_pdf);
+  });
+  const Vec3<F> p = fma(light.u(), at.x, fma(light.v(), at.y, light.p()));
+  return emit_by_cosine<F>(p, light.n(), q.s, q.t,
+                           rect_radiance<F>(light, q.view.materials.textures, at.x, at.y, q.lanes),
+                           F(square_pdf * even_emission_density<F>(light.area())));
+}
+
+/// KindEmission::density of emit_rect for a ray that met it.
+template <typename F>
+inline F rect_emission_density(const LightMeeting<F>& m) {
+  const LightReader<F>& light = m.light;
+  F density = even_emission_density<F>(light.area());
+  const Mask<F> pictured = has_picture<F>(light, m.lanes);
+  if (none(pictured)) return density;
+  const Vec2<F> at = place_on_rect<F>(light, fma(m.dir, m.t, m.origin));
+  for_each_picture<F>(m.view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    density *= select(lanes, image_pdf_at<F>(d, at.x, F(1.f - at.y), lanes), F(1.f));
+  });
+  return density;
 }
 
 }  // namespace wavecomb::detail
@@ -277,6 +315,14 @@ struct RectKind : NoEscape {
   template <typename F>
   static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
     return detail::hit_rect<F>(m.view, m.light, m.origin, m.dir, m.t, m.lanes);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_rect<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::rect_emission_density<F>(m);
   }
 };
 

@@ -67,6 +67,26 @@ inline KindHit<F> hit_sphere(const LightReader<F>& light, const Vec3<F>& origin)
   return {select<F>(cone.outside, light.radiance(), Color<F>(F(0.f))), sphere_cone_pdf<F>(cone)};
 }
 
+/// A path from a point uniform over the sphere; of radius 0: in any direction.
+template <typename F>
+inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
+  const LightReader<F>& light = q.light;
+  const Mask<F> is_point = light.radius() == 0.f;
+  const Vec3<F> n = square_to_sphere(q.u, q.v);
+  KindEmission<F> e = emit_by_cosine<F>(fma(n, light.radius(), light.p()), n, q.s, q.t,
+                                        light.radiance(), even_emission_density<F>(light.area()));
+  e.d = select<F>(is_point, square_to_sphere(q.s, q.t), e.d);
+  e.n = select<F>(is_point, Vec3<F>(F(0.f)), e.n);
+  e.density = select(is_point, F(kInv4Pi), e.density);
+  return e;
+}
+
+/// KindEmission::density of emit_sphere.
+template <typename F>
+inline F sphere_emission_density(const LightReader<F>& light) {
+  return select(light.radius() == 0.f, F(kInv4Pi), even_emission_density<F>(light.area()));
+}
+
 }  // namespace wavecomb::detail
 
 namespace wavecomb {
@@ -81,6 +101,14 @@ struct SphereKind : NoEscape {
   template <typename F>
   static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
     return detail::hit_sphere<F>(m.light, m.origin);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_sphere<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::sphere_emission_density<F>(m.light);
   }
 };
 

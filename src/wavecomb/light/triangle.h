@@ -71,6 +71,39 @@ template <typename F>
   return radiance;
 }
 
+/// What a triangle gives at barycentrics `b`, world position q.
+template <typename F>
+inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightView& view,
+                                  const Vec2<F>& b, const Vec3<F>& q, const Mask<F>& active) {
+  const Mask<F> varies = active & (light.radiance.x < 0.f);
+  if (none(varies)) [[likely]]
+    return light.radiance;
+  // Copies, so that what plain triangles use may stay in registers.
+  const UInt<F> material = float_bits<F>(light.radiance.y), index = float_bits<F>(light.radiance.z);
+  const Vec2<F> at = b;
+  const Vec3<F> place = q;
+  const Mask<F> glows = varies & (light.radiance.x == TriangleLight::kEmission), on = varies;
+  return select<F>(varies, varying_radiance<F>(view, material, index, at, place, glows, on),
+                   light.radiance);
+}
+
+/// A path from a point uniform over the triangle, to either side.
+template <typename F>
+inline KindEmission<F> emit_triangle(const TriangleReader<F>& light, const LightView& view,
+                                     const F& u, const F& v, const F& s, const F& t,
+                                     const Mask<F>& active) {
+  const Vec2<F> b = square_to_triangle(u, v);
+  const Vec3<F> q = fma(light.u, b.x, fma(light.v, b.y, light.p));
+  const F area = length(light.m);
+  const Mask<F> back = s >= 0.5f;
+  const F side = select(back, F(-1.f), F(1.f));
+  const Vec3<F> n = light.m * F(side / select(area > 0.f, area, F(1.f)));
+  const F part =
+      clamp(F(fma(s, F(2.f), select(back, F(-1.f), F(0.f)))), F(0.f), F(kOneMinusEpsilon));
+  return emit_by_cosine<F>(q, n, part, t, triangle_radiance<F>(light, view, b, q, active),
+                           F(0.5f * even_emission_density<F>(area)));
+}
+
 /// A point q = p + b1 u + b2 v, with density 1 / area.
 template <typename F>
 inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const LightView& view,
@@ -81,18 +114,7 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
   const Direction<F> d = make_direction<F>(q - from);
   const F pdf = area_to_solid_angle<F>(d.length2, abs(dot(d.wi, light.m)), F(1.f));
 
-  Color<F> radiance = light.radiance;
-  const Mask<F> varies = active & (pdf > 0.f) & (light.radiance.x < 0.f);
-  if (any(varies)) [[unlikely]] {
-    // Copies, so that what plain triangles use may stay in registers.
-    const UInt<F> material = float_bits<F>(light.radiance.y),
-                  index = float_bits<F>(light.radiance.z);
-    const Vec2<F> at = b;
-    const Vec3<F> place = q;
-    const Mask<F> glows = varies & (light.radiance.x == TriangleLight::kEmission), on = varies;
-    radiance = select<F>(varies, varying_radiance<F>(view, material, index, at, place, glows, on),
-                         radiance);
-  }
+  const Color<F> radiance = triangle_radiance<F>(light, view, b, q, active & (pdf > 0.f));
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }
 

@@ -17,6 +17,9 @@
 ///   Color<F> diffuse_f_cos(wo, wi) const;  the part of eval's that counts as diffuse
 ///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    numbers in [0, 1)
 /// The four of them take a view in place of wo, too.
+///   Mask<F> is_layered() const;    optional: lanes where what a delta lobe lets through is not
+///   alike
+///                                  in both directions
 ///
 /// A program that shades what is no surface (kOnSurface false: an event in a medium) is the same
 /// with a phase function in place of the BSDF, without a cosine, and has

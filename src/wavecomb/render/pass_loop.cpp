@@ -28,6 +28,9 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film
       throw Error("the counts of samples to resume from are not of such a render");
     allotment_ = {rules_.pilot, *least, *most, 0};
   }
+  // The light of a region, too, comes of the paths of the whole picture.
+  if (settings.joins_light())
+    light_order_ = morton_pixel_order({0, 0, settings.width, settings.height});
   pass_.allotment.pilot = rules_.pilot;
   pass_.allotment.spp = rules_.spp;
   const std::vector<uint32_t> samples = film.samples();
@@ -51,13 +54,16 @@ void PassLoop::run() {
   for (;;) {
     const std::vector<uint32_t> samples = film_.samples();
     const PassPlan plan = plan_pass(order_, film_.window(), samples, pass_);
-    if (plan.batches.empty()) {
+    const PassPlan from_lights = light_plan();
+    if (plan.batches.empty() && from_lights.batches.empty()) {
       if (!begin_pass(samples)) return;
       continue;
     }
     const uint64_t before = runner_.samples_done();
     const double begin = seconds();
-    runner_.run(plan, [this] { return watch_.halted() || is_late(); });
+    const auto halted = [this] { return watch_.halted() || is_late(); };
+    runner_.run(plan, halted);
+    if (!from_lights.batches.empty()) runner_.run(from_lights, halted, true);
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
     for (uint32_t i = 0; i < runner_.threads(); ++i)
@@ -66,6 +72,14 @@ void PassLoop::run() {
     if (watch_.stopped() || is_late()) return;
     watch_.rest();
   }
+}
+
+PassPlan PassLoop::light_plan() const {
+  if (light_order_.empty()) return {};
+  PassState pass;
+  pass.target = pass_.target;
+  return plan_pass(light_order_, {0, 0, settings_.width, settings_.height},
+                   film_.splats().samples(), pass);
 }
 
 bool PassLoop::begin_pass(std::span<const uint32_t> samples) {

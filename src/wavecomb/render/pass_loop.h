@@ -47,6 +47,8 @@ class PassLoop {
   const AllotmentFacts& allotment() const { return allotment_; }
 
  private:
+  /// Paths from lights that the pass is to have still; none where there are no such paths.
+  PassPlan light_plan() const;
   /// Decides on the next pass. False: the picture is done.
   bool begin_pass(std::span<const uint32_t> samples);
   bool is_late() const;
@@ -60,6 +62,7 @@ class PassLoop {
   RenderCosts& costs_;
   Watch& watch_;
   std::vector<uint32_t> order_;
+  std::vector<uint32_t> light_order_;  ///< of the numbers of paths from lights
   AllotmentFacts allotment_;
   Clock::time_point start_ = Clock::now();
   uint64_t resumed_samples_ = 0;

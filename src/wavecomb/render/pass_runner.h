@@ -32,7 +32,8 @@ class PassRunner {
 
   /// Runs a plan until it is done or `halted` says so; asked before each wave, by all workers.
   /// Every pixel then has whole waves of samples, without gaps.
-  void run(const PassPlan& plan, const std::function<bool()>& halted);
+  /// `from_lights`: the plan's paths start there (WaveTask::from_lights), and are no samples.
+  void run(const PassPlan& plan, const std::function<bool()>& halted, bool from_lights = false);
 
   const Integrator& integrator() const { return integrator_; }
   uint32_t threads() const { return static_cast<uint32_t>(workers_.size()); }

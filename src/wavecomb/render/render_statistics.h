@@ -71,7 +71,8 @@ struct RenderStatistics {
   LightShares light_calibration;
   AllotmentFacts allotment;
   GuideStatistics guiding;
-  std::optional<StoreStatistics> texture_store;  ///< where textures have a limit
+  std::vector<std::string> lights_without_paths;  ///< where others send some
+  std::optional<StoreStatistics> texture_store;   ///< where textures have a limit
 };
 
 /// Adds up what the workers counted, by phase, depth, policy and material, into `statistics`.

@@ -19,6 +19,7 @@
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/light_calibration.h"
+#include "wavecomb/render/light_paths.h"
 #include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb {
@@ -223,6 +224,11 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const AovTables aovs(scene, settings);
   const Region window = settings.film();
   Film film(window, aovs.layout, settings.keeps_error());
+  const SplatFilter splat_filter(filter, settings.rendered());
+  if (settings.joins_light()) {
+    check_light_paths(scene);
+    film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height);
+  }
   PassState pass;
   if (options.resume) options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();
@@ -248,6 +254,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
       options.recorder,
       &aovs};
 
+  if (settings.joins_light()) context.splat_filter = &splat_filter;
   const Clock::time_point start = Clock::now();
   const std::unique_ptr<Integrator> integrator =
       make_integrator(settings.integrator, context, lanes, threads, wave_size);
@@ -255,12 +262,15 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), film, runner,
                 costs, watch);
   const LightCalibration* lights = nullptr;
+  std::vector<std::string> without_paths;
+  if (settings.joins_light()) without_paths = lights_without_paths(scene);
   GuideTraining training;
   GuideView guide;
   const auto work = [&] {
     lights = &impl_->light_calibrations.get(impl_->scene, *impl_->accel, scene_view, settings,
                                             [&] { return watch.stopped(); });
     lights->weighed.apply(context.scene.lights);
+    if (settings.joins_light()) send_paths(scene, context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
     training =
         train_guide(context, scene, {lanes, threads, wave_size}, [&] { return watch.stopped(); });
@@ -285,6 +295,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.error = status.error;
     s.allotment = loop.allotment();
     s.guiding = training.statistics;
+    s.lights_without_paths = without_paths;
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();
     s.accelerator_bytes = impl_->accel->bytes();

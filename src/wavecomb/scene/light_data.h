@@ -306,6 +306,11 @@ struct LightView {
   bool has_sampled_only = false;  ///< some record is that
   LinkView links;
   MaterialView materials;  ///< textures, and emission and opacity of triangles where they vary
+  /// A sphere around all surfaces, which paths from infinite lights start towards, from `reach`
+  /// before its centre, where no light's shape is. Radius 0: no paths start at lights.
+  float centre[3] = {0, 0, 0};
+  float radius = 0, reach = 0;
+  bool sends_paths() const { return radius > 0; }
   // For graphs of opacity, which may ask where a triangle is; null where lights stand alone.
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;

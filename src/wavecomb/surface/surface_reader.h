@@ -32,6 +32,7 @@ struct Surface {
   F uv_per_length;     ///< sqrt(uv area / world area) of the triangle
   F offset;            ///< bound of the error of p along ng
   Vec3<F> terminator;  ///< from p to the smooth surface that the vertex normals suggest, along ng
+  Vec3<F> unbent;      ///< ns before facing_normal has bent it
 };
 
 namespace detail {

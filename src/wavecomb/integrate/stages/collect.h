@@ -4,6 +4,7 @@
 #pragma once
 
 #include "wavecomb/core/rows.h"
+#include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
@@ -14,8 +15,25 @@
 
 namespace wavecomb {
 
-/// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order.
-template <typename F, typename Media>
+/// Notes how dense the camera's paths are that have met something: what PathState::ratio begins
+/// with.
+template <typename F>
+[[gnu::noinline, gnu::cold]] void begin_ratios(Wave& wave, const WaveContext& context,
+                                               const UInt<F>& slot, const Vec3<F>& o,
+                                               const Vec3<F>& d, const F& t,
+                                               const Mask<F>& active) {
+  F time(0.f);
+  if (context.camera->moves())
+    time = gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, active);
+  scatter<F>(
+      wave.pool.ratio,
+      first_ratio<F>(*context.camera, context.light_path_share(), fma(d, t, o), d, time, active),
+      slot, active);
+}
+
+/// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order. Paths from
+/// lights (`kFromLights`) bring nothing where they end.
+template <typename F, typename Media, bool kFromLights = false>
 void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
              [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
@@ -36,7 +54,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const U slot = load<U>(rays.slot + i);
     const Vec3<F> o{load<F>(rays.ox + i), load<F>(rays.oy + i), load<F>(rays.oz + i)};
     const Vec3<F> d{load<F>(rays.dx + i), load<F>(rays.dy + i), load<F>(rays.dz + i)};
-    const Mask<F> wanted = Media::kAny || cost_aware ? active : Mask<F>(missed | shape);
+    Mask<F> wanted = Media::kAny || cost_aware ? active : Mask<F>(missed | shape);
+    if (kFromLights && !cost_aware) wanted = Mask<F>(false);
     PathRow<F> path;
     PathState<F> state;
     [[maybe_unused]] Flight<F> flight;
@@ -72,8 +91,10 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
                F(0.f), F(0.f),          path.o,   path.receiver};
       if (context.links() && depth > 0)
         state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
+      if (context.joins_light() && depth > 0)
+        state.ratio = gather<F>(wave.pool.ratio, slot, wanted);
     }
-    if (const Mask<F> ended = missed | shape; any(ended)) {
+    if (const Mask<F> ended = missed | shape; !kFromLights && any(ended)) {
       Color<F> c(F(0.f));
       if (any(missed))
         c = select<F>(missed, environment_emission<F>(scene, settings, depth, state, missed), c);
@@ -88,7 +109,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
           wave.aovs.add<F>(slot, wave.aovs.group_of<F>(load<U>(hits.geom + i), shape), c, shape);
       }
     }
-    const bool notes_hits = depth == 0 && wave.aovs.wants_hits();
+    if (!kFromLights && context.joins_light() && depth == 0) [[unlikely]]
+      begin_ratios<F>(wave, context, slot, o, d, t, surface);
+    const bool notes_hits = !kFromLights && depth == 0 && wave.aovs.wants_hits();
     const auto time = [&] {
       return context.camera->moves()
                  ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, active)

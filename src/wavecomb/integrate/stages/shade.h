@@ -72,16 +72,18 @@ inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) 
 template <typename F, typename Media>
 const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
                                            const ShadeSettings& settings) {
+  if constexpr (!Media::kAny)
+    if (context.joins_light()) return kShadeJointBatch<F>;
   if constexpr (kHasPlain<F> && !Media::kAny)
     if (is_plain(context, settings)) return kShadePlain<F>;
   return kShadeBatch<F, typename Media::template Programs<F>>;
 }
 
-/// Shades the whole queue, batch by batch.
-template <typename F, typename Media>
-void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth) {
+/// Shades the whole queue with `kernels`, batch by batch.
+template <typename F>
+void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
+           const detail::BatchKernels<F>& kernels) {
   const ShadingQueue& queue = wave.shading;
-  const auto& kernels = kernels_for<F, Media>(context, settings);
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
     const size_t end = batch_end<F>(queue, begin);

@@ -2,8 +2,7 @@
 /// Stage 3c for one program: a batch of its records, in lanes.
 #pragma once
 
-#include "wavecomb/integrate/shading_record.h"
-#include "wavecomb/integrate/stages/order_rays.h"
+#include "wavecomb/integrate/stages/record_packet.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/integrate/wave.h"
 
@@ -15,7 +14,6 @@ template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {
   using U = UInt<F>;
-  using Q = ShadingQueue;
   const ShadingQueue& queue = wave.shading;
   const PathPool& pool = wave.pool;
   VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
@@ -24,15 +22,10 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   const bool is_watched = wants_aovs || (V::has(kNotes) && wave.history);
   const bool links = V::has(kLinks) && context.links();
   for (size_t i = begin; i < end; i += kWidth<F>) {
-    const Mask<F> active = first_lanes<F>(end - i);
-    const Mask<U> on(active);
-    const U here = lane_index<F>() + static_cast<uint32_t>(i);
-    const U sorted = queue.ordered || queue.moved ? load<U>(queue.sorted_indices + i) : here;
-    const U at = queue.ordered ? sorted : here;
-    const auto r = load_row<ShadingRecord, F>(queue.row(0), at, active);
-    const U slot = r.slot;
-    const U material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, on)
-                                     : load<U>(queue.uints(Q::kMaterial) + i);
+    const RecordPacket<F> packet(queue, i, end);
+    const Mask<F>& active = packet.active;
+    const auto& r = packet.record;
+    const U slot = r.slot, material = packet.material;
     MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
     if (V::has(kMotion) && context.scene.has_motion) [[unlikely]]
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
@@ -50,6 +43,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
     if (context.weighs_pixels()) [[unlikely]]
       state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
+    if constexpr ((kFeatures & kJoined) != 0) state.ratio = gather<F>(pool.ratio, slot, active);
     const VertexResult<F> v =
         take_steps<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
                               state, wants_aovs ? &aovs : nullptr, active, context.guide});
@@ -67,11 +61,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       if (wave.history)
         wave.history.template vertex<F>(depth, slot, state, t, material, v, pool.radiance, active);
     }
-    const U outcome = select(Mask<U>(v.alive), U(uint32_t{Q::kAlive}), U(0u)) |
-                      select(Mask<U>(v.has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
-                      (direction_key<F>(v.next.dir) << Q::kRayKeyShift) |
-                      (direction_key<F>(v.shadow_d) << Q::kShadowKeyShift);
-    scatter<U>(queue.outcome, outcome, sorted, on);
+    packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
       store_row<ShadowRow, F>(
           pool.shadows, slot,
@@ -81,6 +71,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
                              v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
                             v.alive);
+    if constexpr ((kFeatures & kJoined) != 0) scatter<F>(pool.ratio, v.next.ratio, slot, v.alive);
     if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;

@@ -76,20 +76,30 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
+/// Asks which shadow rays are free. `linked`: of presence_keys.
+template <typename F>
+void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool linked) {
+  const ShadowQueue& q = wave.shadows;
+  const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
+                     q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
+  if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
+  const auto start = wave.aovs.start_time();
+  context.accel->occluded(rays, q.occluded, context.traversal_width, false,
+                          presence_keys(wave.pool, depth, true, linked));
+  const auto slot_of = [&](size_t i) { return q.slot[i]; };
+  wave.aovs.charge_rays(q.size, slot_of);
+  wave.aovs.spread_time(q.size, start, slot_of);
+  wave.counts.add_shadow_rays(depth, q.size);
+}
+
 /// Adds what the unblocked shadow rays bring to their slots, as much of it as comes through what
 /// lies on the way. A slot has at most one, so the order of the queue cannot matter.
 template <typename F, typename Media>
 void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
             [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
-  ShadowQueue& q = wave.shadows;
-  const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
-                     q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
-  if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
-  const auto start = wave.aovs.start_time();
-  context.accel->occluded(
-      rays, q.occluded, context.traversal_width, false,
-      presence_keys(wave.pool, depth, true, context.scene.lights.links.members != nullptr));
+  const ShadowQueue& q = wave.shadows;
+  occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
   if constexpr (Media::kStreams) media.template pass_all<F>(wave, depth, context.settings->sampler);
   const bool is_watched = wave.aovs.wants_groups() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
@@ -117,10 +127,6 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
       if (wave.history) wave.history.light<F>(depth, slot, c, active);
     }
   }
-  const auto slot_of = [&](size_t i) { return q.slot[i]; };
-  wave.aovs.charge_rays(q.size, slot_of);
-  wave.aovs.spread_time(q.size, start, slot_of);
-  wave.counts.add_shadow_rays(depth, q.size);
 }
 
 }  // namespace wavecomb

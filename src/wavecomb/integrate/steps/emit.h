@@ -7,6 +7,7 @@
 #pragma once
 
 #include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/light/emission.h"
 #include "wavecomb/light/light.h"
 
 namespace wavecomb {
@@ -40,6 +41,10 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
   const LightHit<F> hit =
       light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
   F w = bounce_weight<F>(path.pdf, hit.pdf);
+  if (scene.lights.sends_paths()) [[unlikely]]
+    w = joint_bounce_weight<F>(
+        path.pdf, hit.pdf, not_(Mask<F>(path.pdf > 0.f)),
+        F(path.ratio * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
   if (scene.lights.has_sampled_only)
     w *= LightEffect<F>(scene.lights, light, active).of_hit(not_(path.pdf > 0.f), depth == 0);
   if (scene.lights.links.members)
@@ -54,7 +59,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le = escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
-                                          depth == 0, path.link);
+                                          depth == 0, path.link, path.ratio);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
@@ -83,7 +88,18 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
                                                v.path.vertex_before(), v.path.dir, v.t, sampled),
                          F(0.f));
   }
-  const F w = bounce_weight<F>(v.path.pdf, light_pdf);
+  F w = bounce_weight<F>(v.path.pdf, light_pdf);
+  if constexpr ((kFeatures & kJoined) != 0) {
+    if (scene.has_emissive_meshes && v.depth > 0) {
+      const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
+      const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
+      const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
+      const F density =
+          emission_density<F>(scene.lights, base + v.hit.prim, v.path.o, v.path.dir, v.t, known);
+      w = joint_bounce_weight<F>(v.path.pdf, light_pdf, not_(Mask<F>(v.path.pdf > 0.f)),
+                                 F(v.path.ratio * density));
+    }
+  }
   const Color<F> e = clean<F>(at.throughput * emission * w, clamp_limit(v.settings, v.depth));
   return select<F>(emits, e, Color<F>(F(0.f)));
 }

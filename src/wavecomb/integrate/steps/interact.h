@@ -55,6 +55,14 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   /// What the BSDF's directions are local to: z is the shading normal.
   template <uint32_t kFeatures>
   Frame<F> frame(const Vertex<F, kFeatures>& v) const;
+  /// The same as paths from the lights have it, which do not know yet who looks: with the normal
+  /// that nobody's look has bent.
+  template <uint32_t kFeatures>
+  Frame<F> unbent_frame(const Vertex<F, kFeatures>& v) const;
+  /// Lanes where the normal is bent towards who looks along `dir`. What is seen there is the
+  /// camera's paths' to find.
+  template <uint32_t kFeatures>
+  Mask<F> bends(const Vertex<F, kFeatures>& v, const Frame<F>& unbent, const Vec3<F>& dir) const;
   /// Notes for AOVs what is seen here, where they are wanted.
   template <uint32_t kFeatures>
   void note(const Vertex<F, kFeatures>& v, const Frame<F>& frame) const;
@@ -66,6 +74,14 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   /// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light
   /// leaks.
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
+
+ private:
+  /// Lanes whose normal is of a map.
+  template <uint32_t kFeatures>
+  Mask<F> mapped(const Vertex<F, kFeatures>& v) const;
+  /// The normal of the map, about the normal `n`.
+  Vec3<F> bumped(const Vec3<F>& n, const Vec3<F>& tangent) const;
+  Vec3<F> tangent() const { return select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f))); }
 };
 
 /// How textures are seen whose footprint is `width` wide: whole by the camera, where a texel alone
@@ -144,26 +160,61 @@ WAVECOMB_INLINE auto interact(const Vertex<F, kFeatures>& v) {
     return Bsdf::interact(v);
 }
 
+template <typename Bsdf, typename F>
+template <uint32_t kFeatures>
+WAVECOMB_INLINE Mask<F> SurfaceInteraction<Bsdf, F>::mapped(const Vertex<F, kFeatures>& v) const {
+  return v.active & Mask<F>((this->textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) !=
+                            UInt<F>(0u));
+}
+
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::bumped(const Vec3<F>& n,
+                                                            const Vec3<F>& tangent) const {
+  return normalize(make_frame<F>(n, tangent, s.handedness).to_world(this->normal));
+}
+
 /// The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing
 /// but its own hit, whatever its neighbours are.
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {
-  using U = UInt<F>;
   if (!Bsdf::kTextured || !this->textured) return make_frame<F>(s.ns);
   const Vec3<F>& dir = v.path.dir;
   Vec3<F> n = s.ns;
-  const Vec3<F> tangent = select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f)));
-  const Mask<F> mapped =
-      v.active &
-      Mask<F>((this->textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != U(0u));
-  if (any(mapped)) {
-    const Vec3<F> bumped =
-        normalize(make_frame<F>(n, tangent, s.handedness).to_world(this->normal));
-    const Vec3<F> seen = facing_normal<F>(dir, s.ng, bumped);
-    n = select<F>(mapped, reflecting_normal<F>(dir, s.ng, seen), n);
+  const Vec3<F> along = tangent();
+  if (const Mask<F> by_map = mapped(v); any(by_map)) {
+    const Vec3<F> seen = facing_normal<F>(dir, s.ng, bumped(n, along));
+    n = select<F>(by_map, reflecting_normal<F>(dir, s.ng, seen), n);
   }
-  return make_frame<F>(n, tangent, s.handedness);
+  return make_frame<F>(n, along, s.handedness);
+}
+
+template <typename Bsdf, typename F>
+template <uint32_t kFeatures>
+WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::unbent_frame(
+    const Vertex<F, kFeatures>& v) const {
+  if (!Bsdf::kTextured || !this->textured) return make_frame<F>(s.unbent);
+  Vec3<F> n = s.unbent;
+  const Vec3<F> along = tangent();
+  if (const Mask<F> by_map = mapped(v); any(by_map)) n = select<F>(by_map, bumped(n, along), n);
+  return make_frame<F>(n, along, s.handedness);
+}
+
+template <typename Bsdf, typename F>
+template <uint32_t kFeatures>
+WAVECOMB_INLINE Mask<F> SurfaceInteraction<Bsdf, F>::bends(const Vertex<F, kFeatures>& v,
+                                                           const Frame<F>& unbent,
+                                                           const Vec3<F>& dir) const {
+  const auto differ = [](const Vec3<F>& a, const Vec3<F>& b) {
+    return Mask<F>(a.x != b.x) | Mask<F>(a.y != b.y) | Mask<F>(a.z != b.z);
+  };
+  Mask<F> bent = differ(facing_normal<F>(dir, s.ng, s.unbent), s.unbent);
+  if (!Bsdf::kTextured || !this->textured) return bent;
+  if (const Mask<F> by_map = mapped(v); any(by_map)) {
+    const Vec3<F> seen = facing_normal<F>(dir, s.ng, unbent.n);
+    bent = bent | (by_map & differ(reflecting_normal<F>(dir, s.ng, seen), unbent.n));
+  }
+  return bent;
 }
 
 template <typename Bsdf, typename F>

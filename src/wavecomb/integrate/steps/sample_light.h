@@ -10,6 +10,7 @@
 #include "wavecomb/integrate/steps/bounce_sampling.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/integrate/steps/join.h"
 #include "wavecomb/light/light.h"
 
 namespace wavecomb {
@@ -29,13 +30,33 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
   return receiver;
 }
 
+/// Weight of the light sample `l` of `light` beside bounces, of density `p_bounce`, and paths from
+/// the light (join.h): with R up to this vertex and p_light in place of p_bounce,
+///   w = 1 / (1 + p_bounce / p_light + R D / p_light);   a point has p_light d^2 in the last.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
+WAVECOMB_INLINE F joint_light_weight(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                     const JointVertex<F>& joint, const Vec3<F>& wo,
+                                     const LightSample<F>& l, const Vec3<F>& wi, const F& p_bounce,
+                                     const UInt<F>& light, const Vec3<F>& from) {
+  const LightView& lights = v.scene.lights;
+  const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
+  const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
+  if (!lights.sends_paths()) return 1.f / F(1.f + by_bounce);
+  const F density = emission_density<F>(lights, light, from, l.wi, l.distance, l.valid);
+  const Mask<F> point = l.is_delta & (l.distance < kFarAway);
+  const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
+  const F by_path = F(joint.template towards<Bsdf>(v, at, wo, l.wi, wi) * density) / nee;
+  return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
+}
+
 /// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
 /// known.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
                                   const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
                                   const Sample4<F>& r, const GuidePlace<F>& place,
-                                  LightReceiver<F>& receiver, VertexResult<F>& out) {
+                                  const JointVertex<F>& joint, LightReceiver<F>& receiver,
+                                  VertexResult<F>& out) {
   using U = UInt<F>;
   const LightView& lights = v.scene.lights;
   const Mask<F> lit = v.active & at.bsdf.has_non_delta();
@@ -51,8 +72,10 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   Color<F> f_cos = e.f_cos;
   U light(kNoLight);
   const bool sampled_only = v.has(kMeshLights) && lights.has_sampled_only;
-  if (sampled_only || v.has_links() || v.wants_lights()) [[unlikely]]
+  if ((kFeatures & kJoined) != 0 || sampled_only || v.has_links() || v.wants_lights()) [[unlikely]]
     light = chosen_light<F>(lights, receiver, r.x, lit);
+  if constexpr ((kFeatures & kJoined) != 0)
+    w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, receiver.p);
   if (sampled_only) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);
     const Color<F> diffuse = at.bsdf.diffuse_f_cos(seen, wi);

@@ -9,6 +9,7 @@
 #include "wavecomb/integrate/steps/bounce_sampling.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/integrate/steps/join.h"
 
 namespace wavecomb {
 
@@ -16,7 +17,8 @@ template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, t
 WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& at,
                              const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
                              const Sample4<F>& r, const GuidePlace<F>& place,
-                             const LightReceiver<F>& receiver, VertexResult<F>& out) {
+                             const JointVertex<F>& joint, const LightReceiver<F>& receiver,
+                             VertexResult<F>& out) {
   const PathState<F>& path = v.path;
   BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, seen, r);
   guide_bounce<Bsdf, F>(v, at, frame, wo, seen, r, place, b, out);
@@ -30,6 +32,8 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
+  if constexpr ((kFeatures & kJoined) != 0)
+    out.next.ratio = next_ratio<Bsdf, F>(v, at, joint, wo, d, b);
   const F largest = max_component(out.next.throughput);
   out.alive =
       v.active & (b.pdf > 0.f) & at.is_consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);

@@ -89,6 +89,14 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return any_lobe;
   }
 
+  /// A coat or a fuzz is seen from outside alone.
+  Mask<F> is_layered() const {
+    Mask<F> layered(false);
+    if constexpr (kFuzz) layered = layered | (fuzz_ > 0.f);
+    if constexpr (kCoat) layered = layered | (coat_.weight > 0.f);
+    return layered;
+  }
+
   /// What depends on wo alone. `o` is above: the frame is mirrored and turned along the grain.
   struct View {
     F side;

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The camera as paths from the lights see it: where on the film a point shows, and with which
+/// density the camera's own paths find it.
+///
+/// With M the linear part of the camera's place, a point at depth s is p = o + s M d', where
+/// d' = (x, y, -1) and o is a point of the lens (of an orthographic camera of its plane). A pixel
+/// takes up A = step_x step_y of the window, and each has one camera path a sample, so that
+/// directions from o have the density |M d'|^3 / (|det M| A) over solid angle, and a surface at p
+/// which is seen under cos has G cos over its area, with
+///   G = |M d'| / (|det M| A s^2);   orthographic:   |M d'| / (|det M| A).
+/// The lens is sampled evenly from both ends, and its density cancels.
+#pragma once
+
+#include "wavecomb/integrate/camera_ray.h"
+
+namespace wavecomb {
+
+/// The place of a camera, and the way back: rows of the inverse times the determinant.
+template <typename F>
+struct CameraSpace {
+  MatrixLanes<F> m;
+  Vec3<F> x, y, z;
+  F det;
+
+  CameraSpace(const CameraSetup& camera, const F& time, const Mask<F>& active)
+      : m(camera_place<F>(camera, time, active)) {
+    const Vec3<F> a(m.row[0].x, m.row[1].x, m.row[2].x), b(m.row[0].y, m.row[1].y, m.row[2].y),
+        c(m.row[0].z, m.row[1].z, m.row[2].z);
+    x = cross(b, c);
+    y = cross(c, a);
+    z = cross(a, b);
+    det = dot(c, z);
+  }
+};
+
+/// G of a point at depth s whose distance from the lens is `stretch` s.
+template <typename F>
+inline F camera_density(const CameraSetup& camera, const F& det, const F& stretch, const F& s) {
+  const F pixel = abs(det) * (camera.step_x * camera.step_y);
+  const F density = stretch / pixel;
+  return camera.projection == Projection::kOrthographic ? density : F(density / F(s * s));
+}
+
+/// 1 / G of the point p that the camera has met along the unit direction d; 0 where it is out of
+/// range.
+template <typename F>
+inline F inverse_camera_density(const CameraSetup& camera, const F& time, const Vec3<F>& p,
+                                const Vec3<F>& d, const Mask<F>& active) {
+  const CameraSpace<F> space(camera, time, active);
+  const F s = -dot(space.z, Vec3<F>(p - space.m.t)) / space.det;
+  const F stretch = F(-space.det) / dot(space.z, d);
+  const F inverse = 1.f / camera_density<F>(camera, space.det, stretch, s);
+  return select(is_finite(inverse) & (s > 0.f) & (stretch > 0.f), inverse, F(0.f));
+}
+
+/// What PathState::ratio is at p, which a camera ray along d has met: N / G. `share`: 1 / N.
+template <typename F>
+inline F first_ratio(const CameraSetup& camera, float share, const Vec3<F>& p, const Vec3<F>& d,
+                     const F& time, const Mask<F>& active) {
+  return inverse_camera_density<F>(camera, time, p, d, active) * (1.f / share);
+}
+
+/// A point as a point of the lens sees it.
+template <typename F>
+struct CameraConnection {
+  Vec3<F> to;  ///< where the camera's ray to the point begins: on the lens, or beyond what it clips
+  F x, y;      ///< on the film, pixels from the upper left corner
+  F density;   ///< G
+  Mask<F> valid;
+};
+
+/// `u`, `v` choose the point of the lens. Not of latlong cameras.
+template <typename F>
+inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
+                                             const F& u, const F& v, const F& time,
+                                             const Mask<F>& active) {
+  const CameraSpace<F> space(camera, time, active);
+  const Vec3<F> from = p - space.m.t;
+  const F inverse_det = 1.f / space.det;
+  const Vec3<F> q(dot(space.x, from) * inverse_det, dot(space.y, from) * inverse_det,
+                  dot(space.z, from) * inverse_det);
+  const F s = -q.z;
+  const Mask<F> ahead = active & (s > 0.f);
+  const F inverse_s = 1.f / select(ahead, s, F(1.f));
+  const bool is_parallel = camera.projection == Projection::kOrthographic;
+  Vec2<F> lens{F(0.f), F(0.f)};
+  float focus = 0;  // 1 / distance
+  if (camera.lens_radius > 0) {
+    const Vec2<F> at = square_to_disk(u, v);
+    lens = {at.x * camera.lens_radius, at.y * camera.lens_radius};
+    focus = 1.f / camera.focus_distance;
+  }
+  // d' and o; what the window shows is d' + lens / focus_distance, or of o less the lens's share.
+  detail::LocalRay<F> ray;
+  F wx, wy;
+  if (is_parallel) {
+    ray.d = {F(-lens.x * focus), F(-lens.y * focus), F(-1.f)};
+    ray.o = {fma(F(-s), ray.d.x, q.x), fma(F(-s), ray.d.y, q.y), F(0.f)};
+    wx = ray.o.x - lens.x;
+    wy = ray.o.y - lens.y;
+  } else {
+    ray.d = {F(F(q.x - lens.x) * inverse_s), F(F(q.y - lens.y) * inverse_s), F(-1.f)};
+    ray.o = {lens.x, lens.y, F(0.f)};
+    wx = fma(lens.x, F(focus), ray.d.x);
+    wy = fma(lens.y, F(focus), ray.d.y);
+  }
+  F near(camera.near_clip), far(camera.far_clip);
+  if (!camera.clip_planes.empty()) detail::clip<F>(camera, ray, near, far);
+  const Vec3<F> start = fma(ray.d, near, ray.o);
+  const auto world = [&](const Vec3<F>& a) {
+    return Vec3<F>(dot(space.m.row[0], a), dot(space.m.row[1], a), dot(space.m.row[2], a));
+  };
+  CameraConnection<F> c;
+  c.to = world(start) + space.m.t;
+  c.x = F(wx - camera.x0) * (1.f / camera.step_x);
+  c.y = F(camera.y1 - wy) * (1.f / camera.step_y);
+  c.density = camera_density<F>(camera, space.det, length(world(ray.d)), s);
+  c.valid = ahead & (s > near) & (s < far) & (c.density > 0.f) & is_finite(c.density);
+  return c;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Paths from lights by the reference integrator: one after the other, in scalars.
+#pragma once
+
+#include "wavecomb/integrate/light_path.h"
+#include "wavecomb/integrate/path_tracer.h"
+#include "wavecomb/integrate/program_dispatch.h"
+#include "wavecomb/integrate/single_rays.h"
+#include "wavecomb/integrate/stages/splat.h"
+
+namespace wavecomb {
+
+/// Traces paths from lights one after the other and gives the film what they bring.
+class LightTracer {
+  using F = float;
+
+ public:
+  LightTracer(const WaveContext& context, ReferenceWorker& worker)
+      : context_(context),
+        settings_(ShadeSettings(*context.settings).of_light_paths()),
+        setup_{*context.camera, *context.splat_filter, context.light_path_share()},
+        clock_(worker.clock),
+        counts_(worker.counts),
+        rays_(context, worker.counts, worker.aovs),
+        splats_(worker.splats) {}
+
+  void trace(uint32_t pixel, uint32_t sample) {
+    const SceneView& scene = context_.scene;
+    const LightPath<F> start =
+        begin_light_path<F>(scene.lights, *context_.settings, pixel, sample, true);
+    const Emission<F>& e = start.emission;
+    if (!e.valid) return;
+    rays_.begin(start.key, context_.moves() ? path_time<F>(settings_.sampler, start.key) : 0.f);
+    PathState<F> path{e.d, start.flux, start.weight, start.eta_scale, 0.f, 0.f, e.o, e.light};
+    for (uint32_t depth = 0;; ++depth) {
+      clock_.enter(Phase::kTrace);
+      const SingleHit hit = rays_.intersect(path.o, path.dir, kInfinity, depth);
+      clock_.enter(Phase::kShade);
+      if (hit.inst == kNoHit || hit.inst == kLightShape) return;
+      const uint32_t mesh = rays_.mesh_of(hit), material = rays_.material_of(hit, mesh);
+      if (settings_.cost_aware && depth >= settings_.roulette_depth) {
+        const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
+        if (!(cost_aware_number<F>(start.key, depth) < q)) return;
+        path.throughput *= 1.f / q;
+      }
+      const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path);
+      const VertexResult<F>& v = out.v;
+      if (v.has_shadow) {
+        clock_.enter(Phase::kShadow);
+        if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
+          add_splat(context_, splats_, out.x, out.y, v.direct);
+      }
+      if (!v.alive) return;
+      path = v.next;
+    }
+  }
+
+ private:
+  LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
+                             uint32_t mesh, uint32_t material, const PathState<F>& path) {
+    const SceneView& scene = context_.scene;
+    counts_.add_records(depth, 1);
+    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
+    const PathState<F> state =
+        light_path_state<F>(*context_.camera, path.dir, path.throughput, path.pdf, path.eta_scale,
+                            path.o, path.receiver, hit.t, rays_.time(), true);
+    return kShadeLightVertex<F>[scene.material_program[material]](
+        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, nullptr, true},
+        setup_);
+  }
+
+  const WaveContext& context_;
+  const ShadeSettings settings_;
+  const LightPathSetup setup_;
+  PhaseClock& clock_;
+  Counts& counts_;
+  SingleRays rays_;
+  SplatList& splats_;
+};
+
+/// Traces the paths of a task.
+inline void trace_light_task(const WaveContext& context, ReferenceWorker& worker,
+                             const WaveTask& task) {
+  LightTracer tracer(context, worker);
+  worker.clock.start(Phase::kGenerate);
+  for (uint32_t p = 0; p < task.pixel_count; ++p)
+    for (uint32_t s = 0; s < task.samples; ++s) {
+      worker.clock.enter(Phase::kGenerate);
+      tracer.trace(task.pixels[p], task.first_sample + s);
+    }
+  context.film->splats().add(worker.splats);
+  worker.splats.clear();
+  count_light_paths(context, task);
+  worker.clock.stop();
+}
+
+}  // namespace wavecomb

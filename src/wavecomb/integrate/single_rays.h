@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The rays of the reference integrator, one at a time.
+#pragma once
+
+#include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/integrate/path_aovs.h"
+#include "wavecomb/integrate/statistics.h"
+#include "wavecomb/integrate/wave.h"
+#include "wavecomb/surface/hit.h"
+
+namespace wavecomb {
+
+/// The slot of the path that is traced.
+inline constexpr uint32_t kOnlySlot = 0;
+
+struct SingleHit {
+  float t, u, v;
+  uint32_t prim, geom, inst;
+  uint32_t event_material;  ///< where inst is kNoSurface
+};
+
+/// Rays of one path after the other.
+class SingleRays {
+ public:
+  SingleRays(const WaveContext& context, Counts& counts, PathAovs& aovs)
+      : context_(context), counts_(counts), aovs_(aovs) {}
+
+  /// Rays are of the path of `key`, which must live as long, at `time` of the shutter, from now on.
+  void begin(const SampleKey<float>& key, float time) {
+    keys_ = {&key.pixel_hash, &key.sample, 1, 0};
+    time_ = time;
+  }
+  float time() const { return time_; }
+
+  SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth) {
+    SingleHit h;
+    keys_.salt = 2 * depth;
+    keys_.shadow_set = nullptr;
+    context_.accel->intersect(span(o, d, tfar), {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1,
+                              false, keys_);
+    counts_.add_rays(depth, 1);
+    charge();
+    return h;
+  }
+
+  /// `shadow_set`: VertexResult's.
+  bool occluded(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth,
+                const uint32_t* shadow_set) {
+    uint32_t blocked = 0;
+    keys_.salt = 2 * depth + 1;
+    keys_.shadow_set = shadow_set;
+    context_.accel->occluded(span(o, d, tfar), &blocked, 1, false, keys_);
+    counts_.add_shadow_rays(depth, 1);
+    charge();
+    return blocked != 0;
+  }
+
+  uint32_t mesh_of(const SingleHit& hit) const {
+    const SceneView& scene = context_.scene;
+    return scene.geometry_mesh[scene.instances[hit.inst].geometry + hit.geom];
+  }
+  uint32_t material_of(const SingleHit& hit, uint32_t mesh) const {
+    const SceneView& scene = context_.scene;
+    return hit_material<float>(scene, scene.instances[hit.inst].material, mesh, hit.prim, true);
+  }
+
+ private:
+  RaySpan span(const Vec3<float>& o, const Vec3<float>& d, const float& tfar) const {
+    return {&o.x, &o.y,  &o.z,       &d.x, &d.y,
+            &d.z, &tfar, &kOnlySlot, 1,    context_.scene.has_motion ? &time_ : nullptr};
+  }
+  void charge() {
+    aovs_.charge_rays(1, [](size_t) { return kOnlySlot; });
+  }
+
+  const WaveContext& context_;
+  Counts& counts_;
+  PathAovs& aovs_;
+  PresenceKeys keys_;
+  float time_ = 0;
+};
+
+}  // namespace wavecomb

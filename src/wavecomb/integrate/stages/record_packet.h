@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A packet of records of the shading queue, and what became of it.
+#pragma once
+
+#include "wavecomb/integrate/shading_record.h"
+#include "wavecomb/integrate/stages/order_rays.h"
+#include "wavecomb/integrate/wave.h"
+
+namespace wavecomb {
+
+/// Records from `i` on of the queue's order, before `end`.
+template <typename F>
+struct RecordPacket {
+  using U = UInt<F>;
+  Mask<F> active;
+  U arrival;  ///< where outcomes are noted
+  ShadingRecord<F> record;
+  U material;
+
+  RecordPacket(const ShadingQueue& queue, size_t i, size_t end) : active(first_lanes<F>(end - i)) {
+    using Q = ShadingQueue;
+    const U here = lane_index<F>() + static_cast<uint32_t>(i);
+    arrival = queue.ordered || queue.moved ? load<U>(queue.sorted_indices + i) : here;
+    const U at = queue.ordered ? arrival : here;
+    record = load_row<ShadingRecord, F>(queue.row(0), at, active);
+    material = queue.ordered ? gather<U>(queue.uints(Q::kMaterial), at, Mask<U>(active))
+                             : load<U>(queue.uints(Q::kMaterial) + i);
+  }
+
+  /// Notes which paths go on along `next` and which have a shadow ray.
+  void note(const ShadingQueue& queue, const Mask<F>& alive, const Vec3<F>& next,
+            const Mask<F>& has_shadow, const Vec3<F>& shadow) const {
+    using Q = ShadingQueue;
+    const U outcome = select(Mask<U>(alive), U(uint32_t{Q::kAlive}), U(0u)) |
+                      select(Mask<U>(has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |
+                      (direction_key<F>(next) << Q::kRayKeyShift) |
+                      (direction_key<F>(shadow) << Q::kShadowKeyShift);
+    scatter<U>(queue.outcome, outcome, arrival, Mask<U>(active));
+  }
+};
+
+}  // namespace wavecomb

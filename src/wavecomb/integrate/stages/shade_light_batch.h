@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A batch of the records of one program, of paths from lights, in lanes.
+#pragma once
+
+#include "wavecomb/integrate/light_vertex.h"
+#include "wavecomb/integrate/stages/record_packet.h"
+
+namespace wavecomb {
+
+/// Shades records [begin, end) of the queue's order, as shade_batch does those of camera paths. The
+/// words of a shadow ray's row that say whose light it brings hold its place on the film.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                       uint32_t depth, size_t begin, size_t end) {
+  const ShadingQueue& queue = wave.shading;
+  const PathPool& pool = wave.pool;
+  const CameraSetup& camera = *context.camera;
+  const LightPathSetup setup{camera, *context.splat_filter, context.light_path_share()};
+  for (size_t i = begin; i < end; i += kWidth<F>) {
+    const RecordPacket<F> packet(queue, i, end);
+    const Mask<F>& active = packet.active;
+    const auto& r = packet.record;
+    MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
+    if (context.moves()) [[unlikely]]
+      hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, r.slot, active);
+    const auto path = load_row<PathRow, F>(pool.paths, r.slot, active);
+    const PathState<F> state =
+        light_path_state<F>(camera, path.d, path.throughput, path.pdf, path.eta_scale, path.o,
+                            path.receiver, r.t, hit.time, active);
+    const LightVertexResult<F> out = take_light_steps<Bsdf, F>(
+        Vertex<F, kFeatures>{context.scene, settings, path.key, depth, hit, r.geom, r.t,
+                             packet.material, state, nullptr, active},
+        setup);
+    const VertexResult<F>& v = out.v;
+    packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
+    if (any(v.has_shadow))
+      store_row<ShadowRow, F>(pool.shadows, r.slot,
+                              {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct,
+                               float_bits<F>(out.x), float_bits<F>(out.y)},
+                              v.has_shadow);
+    if (any(v.alive))
+      store_row<PathRow, F>(pool.paths, r.slot,
+                            {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
+                             F(0.f), F(0.f), path.key, v.next.receiver},
+                            v.alive);
+    ++wave.counts.packets;
+    wave.counts.packet_lanes += kWidth<F>;
+  }
+}
+
+}  // namespace wavecomb

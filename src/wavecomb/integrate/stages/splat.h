@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Stage 4 of paths from lights: what their unblocked vertices bring to the film.
+#pragma once
+
+#include "wavecomb/integrate/light_path.h"
+#include "wavecomb/integrate/stages/trace.h"
+
+namespace wavecomb {
+
+/// Adds light that arrives at (x, y) of the film to the sums of the pixels around. Integers: the
+/// order does not matter.
+inline void add_splat(const WaveContext& context, SplatList& list, float x, float y,
+                      const Color<float>& c) {
+  Film& film = *context.film;
+  context.splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
+    const SplatList::Splat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
+                                 c.z * weight};
+    if (list.add(splat)) return;
+    film.splats().add(list);
+    list.clear();
+    (void)list.add(splat);
+  });
+}
+
+/// The task's paths are done.
+inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
+  for (uint32_t p = 0; p < task.pixel_count; ++p)
+    context.film->splats().done(light_path_number(*context.settings, task.pixels[p]), task.samples);
+}
+
+/// Asks which vertices the camera sees, and gives the film what they bring.
+template <typename F>
+void splat(Wave& wave, const WaveContext& context, uint32_t depth) {
+  const ShadowQueue& q = wave.shadows;
+  occlude<F>(wave, context, depth, false);
+  for (size_t i = 0; i < q.size; ++i) {
+    if (q.occluded[i] != 0) continue;
+    const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
+    add_splat(context, wave.splats, bits_float<float>(row.group), bits_float<float>(row.set),
+              {q.r[i], q.g[i], q.b[i]});
+  }
+  context.film->splats().add(wave.splats);
+  wave.splats.clear();
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/light_paths.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/accel/light_shapes.h"
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+/// The sphere around all surfaces, a little larger.
+constexpr float kRoom = 1.001f;
+
+Bounds shape_bounds(const PlacedShape& shape) {
+  if (shape.shape == LightShape::kOwn) return own_shape_bounds(shape);
+  Bounds box;
+  const LightRecord& l = shape.light;
+  for (const float a : {0.f, 1.f})
+    for (const float b : {0.f, 1.f})
+      box.add(Vec3<float>{l.p[0] + a * l.u[0] + b * l.v[0], l.p[1] + a * l.u[1] + b * l.v[1],
+                          l.p[2] + a * l.u[2] + b * l.v[2]});
+  return box;
+}
+
+float farthest(const Bounds& box, const Vec3<float>& from) {
+  const float x = std::max(std::abs(box.lo.x - from.x), std::abs(box.hi.x - from.x));
+  const float y = std::max(std::abs(box.lo.y - from.y), std::abs(box.hi.y - from.y));
+  const float z = std::max(std::abs(box.lo.z - from.z), std::abs(box.hi.z - from.z));
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+}  // namespace
+
+void check_light_paths(const Scene& scene) {
+  if (scene.camera().projection == Projection::kLatlong)
+    throw Error(
+        "transport light does not go with latlong cameras; give another camera, or transport path");
+  if (!scene.volumes().empty())
+    throw Error("transport light does not go with volumes, such as '" + scene.volumes()[0].name +
+                "'; leave them out, or give transport path");
+}
+
+FixedPoint splat_unit(const Scene& scene) {
+  const double radius = double{scene.view().scale};
+  const double pi = 3.14159265358979323846;
+  const double brightness =
+      scene.light_set().total_power * double{scene.camera().exposure} / (pi * pi * radius * radius);
+  const int exponent = brightness > 0 && std::isfinite(brightness) ? std::ilogb(brightness) + 1 : 0;
+  return {exponent - 44};
+}
+
+void send_paths(const Scene& scene, LightView& view) {
+  const Bounds& b = scene.bounds();
+  if (b.empty() || view.count == 0 || !view.pick.bins) return;
+  const Vec3<float> centre = (b.lo + b.hi) * 0.5f;
+  view.centre[0] = centre.x;
+  view.centre[1] = centre.y;
+  view.centre[2] = centre.z;
+  view.radius = scene.view().scale * kRoom;
+  view.reach = view.radius;
+  for (const PlacedShape& shape : light_shapes(scene))
+    if (shape.shape != LightShape::kNone)
+      view.reach = std::max(view.reach, farthest(shape_bounds(shape), centre) * kRoom);
+}
+
+std::vector<std::string> lights_without_paths(const Scene& scene) {
+  std::vector<std::string> names;
+  const LightSet& set = scene.light_set();
+  for (size_t i = 0; i < scene.lights().size(); ++i) {
+    const LightRecord& record = set.records[set.of_input[i]];
+    if (record.sampled_only != 0 || record.light_link != kNoSet)
+      names.push_back(scene.lights()[i].name);
+  }
+  for (const Light& light : scene.geometry()->mesh_lights) names.push_back(light.name);
+  return names;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths from lights: one picture for all schedules, parts of it, what they do not go with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import wavecomb
+from wavecomb.cli import main
+from wavecomb.picture.image import read_image
+from wavecomb.scenes import write_scene
+
+_core = pytest.importorskip("wavecomb._core")
+
+SIZE, SPP = 40, 4
+
+
+@pytest.fixture(scope="module")
+def stages(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Generated stages as files."""
+    folder = tmp_path_factory.mktemp("light_paths")
+
+    def get(name: str) -> Path:
+        path = folder / f"{name}.usdc"
+        if not path.exists():
+            write_scene(name, path, triangles=12_000, teapot_level=6, texture_size=64)
+        return path
+
+    return get
+
+
+def render(stage: Any, **settings: Any) -> wavecomb.Picture:
+    plain: dict[str, Any] = {"size": (SIZE, SIZE), "spp": SPP, "transport": "light"}
+    return wavecomb.render(stage, **(plain | settings))
+
+
+@pytest.mark.parametrize("name", ["caustics", "mixed"])
+def test_one_picture_whatever_the_schedule(stages: Any, name: str) -> None:
+    stage = wavecomb.load(stages(name))
+    plain = render(stage)
+    assert not np.array_equal(plain.beauty, render(stage, transport="path").beauty)
+    ways: list[dict[str, Any]] = [{"lanes": lanes} for lanes in _core.lane_widths()]
+    ways += [
+        {"threads": 1, "wave_size": 64},
+        {"wave_size": 1000, "policy": "random-runs"},
+        {"policy": "material", "ray_order": "morton", "materialize": "on"},
+        {"integrator": "reference"},
+        {"traversal": "single", "progressive": True},
+        {"aovs": ("crypto_object", "position")},
+    ]
+    for way in ways:
+        other = render(stage, **way)
+        assert np.array_equal(plain.beauty, other.beauty), way
+        assert np.array_equal(plain.albedo, other.albedo), way
+
+
+def test_settings_of_paths_change_the_picture_alike(stages: Any) -> None:
+    stage = wavecomb.load(stages("caustics"))
+    for way in ({"roulette": "cost-aware", "costs": "model"}, {"fresnel": "schlick"},
+                {"sampler": "independent"}, {"light_selection": "tree"}, {"seed": 9}):
+        assert np.array_equal(render(stage, **way).beauty,
+                              render(stage, integrator="reference", **way).beauty), way
+
+
+def test_parts_are_those_of_the_whole(stages: Any) -> None:
+    stage = wavecomb.load(stages("caustics"))
+    whole = render(stage).beauty
+    x0, y0, x1, y1 = region = (9, 5, 31, 26)
+    part = render(stage, region=region).beauty
+    assert np.array_equal(part[y0:y1, x0:x1], whole[y0:y1, x0:x1])
+    assert not part[:y0].any()
+    crop = render(stage, region=region, crop=True).beauty
+    assert np.array_equal(crop, whole[y0:y1, x0:x1])
+
+
+def test_a_resumed_picture_is_that_which_nothing_stopped(stages: Any, tmp_path: Path) -> None:
+    def run(name: str, *arguments: str) -> Any:
+        out = tmp_path / name
+        size = ["--size", str(SIZE), str(SIZE), "--transport", "light"]
+        result = CliRunner().invoke(
+            main, ["render", str(stages("caustics")), "-o", str(out), *size, *arguments]
+        )
+        assert result.exit_code == 0, result.output
+        return read_image(out)
+
+    whole = run("whole.exr", "--spp", "12")
+    state = str(tmp_path / "state.wcc")
+    run("half.exr", "--spp", "12", "--checkpoint", state)
+    assert np.array_equal(whole, run("again.exr", "--spp", "12", "--resume", state))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"adaptive": 0.1}, "adaptive"),
+        ({"noise": 0.1}, "noise"),
+        ({"allocate": "error", "spp": 64}, "allocate"),
+        ({"guiding": "on"}, "guiding"),
+        ({"clamp_indirect": 1.0}, "clamp_indirect"),
+        ({"cosine_sampling": True}, "cosine_sampling"),
+        ({"aovs": ("direct",)}, "AOV direct"),
+        ({"aovs": ("light_groups",)}, "AOV light_groups"),
+        ({"transport": "bdpt"}, "must be one of path, light"),
+    ],
+    ids=lambda x: str(x)[:30],
+)
+def test_what_it_does_not_go_with_is_one_line(
+    stages: Any, settings: dict[str, Any], message: str
+) -> None:
+    stage = wavecomb.load(stages("caustics"))
+    with pytest.raises(ValueError, match=message) as error:
+        render(stage, **settings)
+    assert "\n" not in str(error.value)
+
+
+def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
+    """Units of sums follow the lights: all of 2^20 times the power is all of 2^20 times as bright."""
+    from pxr import Usd, UsdLux
+
+    path = stages("caustics")
+    plain = render(wavecomb.load(path)).beauty
+    stage = Usd.Stage.Open(str(path))
+    lamp = UsdLux.SphereLight.Get(stage, "/World/Lights/Lamp").GetIntensityAttr()
+    lamp.Set(lamp.Get() * 2.0**20)
+    brighter = path.with_name("brighter.usdc")
+    stage.Export(str(brighter))
+    np.testing.assert_array_equal(render(wavecomb.load(brighter)).beauty, plain * np.float32(2**20))
+
+
+def test_lights_that_send_no_paths_are_named(stages: Any, tmp_path: Path) -> None:
+    """And no light is lost: a lamp that is not seen lights as camera paths alone say."""
+    from pxr import Usd, UsdGeom, UsdLux
+
+    stage = Usd.Stage.Open(str(stages("caustics")))
+    lamp = UsdLux.LightAPI(stage.GetPrimAtPath("/World/Lights/Lamp"))
+    lamp.CreateSpecularAttr(0.5)
+    UsdGeom.Imageable(lamp.GetPrim())
+    path = tmp_path / "half.usdc"
+    stage.Export(str(path))
+    loaded = wavecomb.load(path)
+    picture = render(loaded)
+    assert picture.stats["lights_without_paths"] == ["/World/Lights/Lamp"]
+    alone = render(loaded, transport="path")
+    np.testing.assert_allclose(picture.beauty, alone.beauty, rtol=1e-5)

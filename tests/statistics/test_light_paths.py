@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths from lights, joined to the camera's: no bias with any kind of light, lens or material, and
+closed forms where paths from the camera find nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from agreement import assert_agree, batches
+from stages import (
+    box,
+    camera,
+    ground,
+    light,
+    look_at,
+    material,
+    mesh,
+    moved,
+    quad,
+    sphere,
+    write_sky,
+    write_stage,
+)
+
+import wavecomb
+
+DOWN = look_at((0.4, 1.9, 0.3), (0.2, 0.0, -0.2))
+VIEW = camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.42)
+LOOKS = (
+    material("White", "diffuse", diffuseColor=(0.7, 0.65, 0.6)),
+    material("Blue", "diffuse", diffuseColor=(0.2, 0.3, 0.6)),
+    material("Gloss", "plastic", diffuseColor=(0.5, 0.2, 0.1), roughness=0.4, ior=1.5),
+    material("Rough", "metal", diffuseColor=(0.9, 0.7, 0.4), roughness=0.5),
+    material("Frosted", "dielectric", roughness=0.5, ior=1.4, diffuseColor=(0.9, 0.95, 0.9)),
+)
+
+
+def corner(*prims: str) -> tuple[str, ...]:
+    """A floor, a back wall, a block and a ball; not closed, so that light of afar comes in."""
+    wall = quad("Wall", [(-2, 0, -1.5), (2, 0, -1.5), (2, 2.5, -1.5), (-2, 2.5, -1.5)], "Blue")
+    return (
+        *LOOKS,
+        VIEW,
+        ground("White", 2.0),
+        wall,
+        box("Block", (-1.2, 0.0, -0.8), (-0.5, 0.9, -0.1), "Gloss"),
+        sphere("Ball", "Rough", (0.6, 0.45, 0.2), 0.45, rings=16),
+        *prims,
+    )
+
+
+def spot(angle: float) -> str:
+    lamp = light("Disk", colour=(30, 28, 25), transform=DOWN, radius=0.1)
+    cone = f"float inputs:shaping:cone:angle = {angle}\nfloat inputs:shaping:cone:softness = 0.3\n"
+    lamp = lamp.replace('"Light" {', '"Light" ( prepend apiSchemas = ["ShapingAPI"] ) {')
+    return lamp.replace("{\n", "{\n" + cone + "float inputs:shaping:focus = 2\n", 1)
+
+
+def portal_dome(sky: Path) -> str:
+    return (
+        f'def DomeLight "Dome" {{ asset inputs:texture:file = @{sky}@\n'
+        "rel portals = [</World/Portal>]\n}\n"
+        'def PortalLight "Portal" {\nfloat inputs:width = 3\nfloat inputs:height = 2\n'
+        "double3 xformOp:translate = (0, 1.2, 2)\n"
+        'uniform token[] xformOpOrder = ["xformOp:translate"]\n}'
+    )
+
+
+def lights(folder: Path) -> dict[str, tuple[str, ...]]:
+    sky = write_sky(folder, 32)
+    glow = material("Glow", "emissive", emissiveColor=(9, 8, 6))
+    turned = look_at((1.2, 1.6, 1.2), (0, 0.4, 0))
+    return {
+        "rect": (light("Rect", colour=(9, 8, 7), transform=DOWN, width=0.5, height=0.3),),
+        "picture": (
+            light("Rect", colour=(5, 5, 5), transform=DOWN, width=1, height=0.6, texture=sky),
+        ),
+        "disk": (light("Disk", colour=(9, 8, 7), transform=DOWN, radius=0.25),),
+        "sphere": (light("Sphere", colour=(20, 18, 15), transform=moved(0.5, 1.5, 0.9), radius=0.12),),
+        "point": (
+            light("Sphere", colour=(20, 18, 15), transform=moved(0.5, 1.5, 0.9), radius=0),
+        ),
+        "cylinder": (
+            light("Cylinder", colour=(9, 8, 7), transform=turned, radius=0.06, length=0.8),
+        ),
+        "sun": (light("Distant", colour=(900, 850, 800), transform=turned, angle=3.0),),
+        "direction": (light("Distant", colour=(2, 2, 2), transform=turned, angle=0.0),),
+        "dome": (light("Dome", colour=(1, 0.9, 0.8)),),
+        "sky": (light("Dome", texture=sky),),
+        "portal": (portal_dome(sky),),
+        "mesh": (glow, sphere("Lamp", "Glow", (0.4, 1.6, 0.8), 0.2, rings=5)),
+        "spot": (spot(35.0),),
+        "several": (
+            glow,
+            sphere("Lamp", "Glow", (0.4, 1.6, 0.8), 0.15, rings=4),
+            light("Rect", "One", (4, 3, 2), DOWN, width=0.5, height=0.3),
+            light("Sphere", "Two", (8, 9, 9), moved(-1.4, 1.4, 0.9), radius=0.1),
+            light("Distant", "Three", (1, 1, 2), turned, angle=0.0),
+            light("Dome", "Four", (0.1, 0.1, 0.1)),
+        ),
+    }
+
+
+KINDS = (
+    "rect picture disk sphere point cylinder sun direction dome sky portal mesh spot several".split()
+)
+
+
+def compare(
+    name: str, stage: Any, beauty: Any, size: int = 32, spp: int = 16, **settings: Any
+) -> None:
+    """Pictures with and without paths from lights."""
+    plain: dict[str, Any] = {"max_depth": 4, **settings}
+    joined = batches(
+        lambda seed: beauty(stage, size, spp, seed=seed, transport="light", **plain), 12
+    )
+    alone = batches(lambda seed: beauty(stage, size, 2 * spp, seed=seed, **plain), 12, 500)
+    assert_agree(name, joined, alone)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_lights_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
+    path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)[kind]))
+    compare(f"light paths {kind}", wavecomb.load(path), beauty)
+
+
+def test_a_tree_of_lights(tmp_path: Path, beauty: Any) -> None:
+    path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)["several"]))
+    compare("light paths tree", wavecomb.load(path), beauty, light_selection="tree")
+
+
+LENSES = {
+    "lens": camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.42).replace(
+        "float focalLength", "float fStop = 0.35\nfloat focusDistance = 3.2\nfloat focalLength"
+    ),
+    "parallel": camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.3).replace(
+        "float focalLength", 'token projection = "orthographic"\nfloat focalLength'
+    ),
+    "clipped": camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.42, clip=(2.9, 4.3)),
+}
+
+
+@pytest.mark.parametrize("lens", list(LENSES))
+def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
+    prims = [p if "Camera" not in p else LENSES[lens] for p in corner(*lights(tmp_path)["rect"])]
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
+    # Not at the clip's edge: filters have tails there that camera paths do not come to.
+    wide = {} if lens == "clipped" else {"filter": "blackman-harris", "filter_width": 3.0}
+    compare(f"light paths {lens}", stage, beauty, **wide)
+
+
+@pytest.mark.parametrize("ball", ["Frosted", "Clear", "Coated"])
+def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> None:
+    """A ball under a large lamp, which paths from the camera find through it, too."""
+    looks = (
+        material("Clear", "dielectric", roughness=0.0, ior=1.4, diffuseColor=(0.9, 0.95, 0.9)),
+        material("Coated", "principled", diffuseColor=(0.5, 0.2, 0.1), roughness=0.3,
+                 clearcoat=1.0, clearcoatRoughness=0.2, opacity=0.5),
+    )
+    lamp = light("Rect", colour=(3, 2.8, 2.5), transform=look_at((0.4, 2.6, 0.3), (0.2, 0, -0.2)),
+                 width=2.4, height=2.4)
+    shape = sphere("Glass", ball, (-0.2, 0.6, 0.9), 0.4, rings=24, smooth=True)
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *corner(*looks, lamp, shape)))
+    compare(f"light paths through {ball}", stage, beauty, max_depth=6)
+
+
+def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
+    """Smooth normals on coarse facets, whose silhouettes are bent towards the camera."""
+    shape = sphere("Coarse", "Gloss", (-0.2, 0.6, 0.9), 0.5, rings=5, smooth=True)
+    prims = corner(*lights(tmp_path)["sphere"], shape)
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
+    a = batches(lambda seed: beauty(stage, 32, 16, seed=seed, max_depth=2, transport="light"), 12)
+    b = batches(lambda seed: beauty(stage, 32, 32, seed=seed, max_depth=2), 12, 500)
+    # Camera paths leave the facets for the smooth surface (docs/light-paths.md).
+    assert_agree("light paths coarse", a, b, tolerance=0.02)
+
+
+def test_light_through_a_plate_of_glass(tmp_path: Path, beauty: Any) -> None:
+    """A point over a clear plate over a floor: no path from the camera finds it.
+
+    Under the point rays are upright, and a plate of thickness t and index n lifts the point by
+    t (1 - 1 / n). With R = ((n - 1) / (n + 1))^2, what is reflected inside m times over comes from
+    2 m t / n further:
+        E = I sum_m (1 - R)^2 R^(2 m) / (h - t (1 - 1 / n) + 2 m t / n)^2.
+    """
+    height, thick, index, albedo, power = 2.0, 0.3, 1.5, 0.6, 10.0
+    glass = material("Clear", "dielectric", roughness=0.0, ior=index, diffuseColor=(1, 1, 1))
+    grey = material("Grey", "diffuse", diffuseColor=(albedo,) * 3)
+    # USD: a sphere of radius 0 counts as normalized, which makes the intensity a quarter.
+    point = light("Sphere", colour=(4 * power,) * 3, transform=moved(0, height, 0), radius=0)
+    prims = (
+        glass,
+        grey,
+        ground("Grey", 3.0),
+        box("Plate", (-3.0, 1.2, -3.0), (3.0, 1.2 + thick, 3.0), "Clear"),
+        point,
+        camera((0, 1.0, 0.8), (0, 0, 0), half=0.1),
+    )
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
+    r = ((index - 1) / (index + 1)) ** 2
+    way = height - thick * (1 - 1 / index)
+    reflected = [(1 - r) ** 2 * r ** (2 * m) / (way + 2 * m * thick / index) ** 2 for m in range(3)]
+    expected = albedo / np.pi * power * sum(reflected)
+    settings: dict[str, Any] = {"max_depth": 7, "sampler": "sobol"}
+    found = beauty(stage, 48, 512, transport="light", **settings)
+    # Some thousand paths come there; 2 % more light comes by way of floor and plate.
+    assert found.mean() == pytest.approx(1.01 * expected, rel=0.06)
+    assert beauty(stage, 16, 16, **settings).max() == 0.0
+
+
+def test_a_furnace_stays_white(tmp_path: Path, beauty: Any) -> None:
+    """What reflects all and stands in an even sky is not to be told from it."""
+    looks = (
+        material("White", "diffuse", diffuseColor=(1, 1, 1)),
+        material("Ice", "dielectric", roughness=0.4, ior=1.3, diffuseColor=(1, 1, 1)),
+    )
+    prims = (
+        *looks,
+        sphere("A", "White", (-0.6, 0, 0), 0.5, rings=20),
+        sphere("B", "Ice", (0.6, 0, 0), 0.5, rings=32, smooth=True),
+        light("Dome"),
+        camera((0, 0.4, 3), (0, 0, 0), half=0.4),
+    )
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
+    picture = beauty(stage, 24, 256, max_depth=24, transport="light")
+    # Rough glass loses what bounces twice between facets.
+    assert picture[:, :12].mean() == pytest.approx(1.0, abs=0.01)
+    alone = beauty(stage, 24, 256, max_depth=24)
+    assert picture[:, 12:].mean() == pytest.approx(alone[:, 12:].mean(), abs=0.01)
