@@ -17,7 +17,7 @@ from wavecomb.scenes import write_scene
 
 _core = pytest.importorskip("wavecomb._core")
 
-SIZE, SPP = 40, 4
+SIZE, SPP = 32, 2
 
 
 @pytest.fixture(scope="module")
@@ -46,31 +46,34 @@ def test_one_picture_whatever_the_schedule(stages: Any, name: str) -> None:
     assert not np.array_equal(plain.beauty, render(stage, transport="path").beauty)
     ways: list[dict[str, Any]] = [{"lanes": lanes} for lanes in _core.lane_widths()]
     ways += [
-        {"threads": 1, "wave_size": 64},
-        {"wave_size": 1000, "policy": "random-runs"},
-        {"policy": "material", "ray_order": "morton", "materialize": "on"},
+        {"threads": 1, "wave_size": 64, "policy": "random-runs"},
+        {"policy": "material", "ray_order": "morton", "materialize": "on", "wave_size": 1000},
         {"integrator": "reference"},
-        {"traversal": "single", "progressive": True},
-        {"aovs": ("crypto_object", "position")},
+        {"traversal": "single", "progressive": True, "aovs": ("crypto_object", "position")},
     ]
     for way in ways:
         other = render(stage, **way)
         assert np.array_equal(plain.beauty, other.beauty), way
-        assert np.array_equal(plain.albedo, other.albedo), way
 
 
 def test_settings_of_paths_change_the_picture_alike(stages: Any) -> None:
     stage = wavecomb.load(stages("caustics"))
-    for way in ({"roulette": "cost-aware", "costs": "model"}, {"fresnel": "schlick"},
-                {"sampler": "independent"}, {"light_selection": "tree"}, {"seed": 9}):
-        assert np.array_equal(render(stage, **way).beauty,
-                              render(stage, integrator="reference", **way).beauty), way
+    for way in (
+        {"roulette": "cost-aware", "costs": "model"},
+        {"fresnel": "schlick"},
+        {"sampler": "independent"},
+        {"light_selection": "tree"},
+        {"seed": 9},
+    ):
+        assert np.array_equal(
+            render(stage, **way).beauty, render(stage, integrator="reference", **way).beauty
+        ), way
 
 
 def test_parts_are_those_of_the_whole(stages: Any) -> None:
     stage = wavecomb.load(stages("caustics"))
     whole = render(stage).beauty
-    x0, y0, x1, y1 = region = (9, 5, 31, 26)
+    x0, y0, x1, y1 = region = (9, 5, 27, 22)
     part = render(stage, region=region).beauty
     assert np.array_equal(part[y0:y1, x0:x1], whole[y0:y1, x0:x1])
     assert not part[:y0].any()
@@ -119,7 +122,7 @@ def test_what_it_does_not_go_with_is_one_line(
 
 
 def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
-    """Units of sums follow the lights: all of 2^20 times the power is all of 2^20 times as bright."""
+    """Units of sums follow the lights: 2^20 times the power is 2^20 times as bright."""
     from pxr import Usd, UsdLux
 
     path = stages("caustics")
@@ -133,13 +136,12 @@ def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
 
 
 def test_lights_that_send_no_paths_are_named(stages: Any, tmp_path: Path) -> None:
-    """And no light is lost: a lamp that is not seen lights as camera paths alone say."""
-    from pxr import Usd, UsdGeom, UsdLux
+    """And no light is lost: camera paths alone find all of it."""
+    from pxr import Usd, UsdLux
 
     stage = Usd.Stage.Open(str(stages("caustics")))
     lamp = UsdLux.LightAPI(stage.GetPrimAtPath("/World/Lights/Lamp"))
     lamp.CreateSpecularAttr(0.5)
-    UsdGeom.Imageable(lamp.GetPrim())
     path = tmp_path / "half.usdc"
     stage.Export(str(path))
     loaded = wavecomb.load(path)

@@ -17,7 +17,6 @@ from stages import (
     light,
     look_at,
     material,
-    mesh,
     moved,
     quad,
     sphere,
@@ -79,10 +78,10 @@ def lights(folder: Path) -> dict[str, tuple[str, ...]]:
             light("Rect", colour=(5, 5, 5), transform=DOWN, width=1, height=0.6, texture=sky),
         ),
         "disk": (light("Disk", colour=(9, 8, 7), transform=DOWN, radius=0.25),),
-        "sphere": (light("Sphere", colour=(20, 18, 15), transform=moved(0.5, 1.5, 0.9), radius=0.12),),
-        "point": (
-            light("Sphere", colour=(20, 18, 15), transform=moved(0.5, 1.5, 0.9), radius=0),
+        "sphere": (
+            light("Sphere", colour=(20, 18, 15), transform=moved(0.5, 1.5, 0.9), radius=0.12),
         ),
+        "point": (light("Sphere", colour=(20, 18, 15), transform=moved(0.5, 1.5, 0.9), radius=0),),
         "cylinder": (
             light("Cylinder", colour=(9, 8, 7), transform=turned, radius=0.06, length=0.8),
         ),
@@ -105,8 +104,18 @@ def lights(folder: Path) -> dict[str, tuple[str, ...]]:
 
 
 KINDS = (
-    "rect picture disk sphere point cylinder sun direction dome sky portal mesh spot several".split()
+    "rect",
+    "picture",
+    "disk",
+    "sphere",
+    "point",
+    "cylinder",
+    "sun",
+    "direction",
+    "dome",
+    "sky",
 )
+KINDS += ("portal", "mesh", "spot", "several")
 
 
 def compare(
@@ -157,11 +166,23 @@ def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> N
     """A ball under a large lamp, which paths from the camera find through it, too."""
     looks = (
         material("Clear", "dielectric", roughness=0.0, ior=1.4, diffuseColor=(0.9, 0.95, 0.9)),
-        material("Coated", "principled", diffuseColor=(0.5, 0.2, 0.1), roughness=0.3,
-                 clearcoat=1.0, clearcoatRoughness=0.2, opacity=0.5),
+        material(
+            "Coated",
+            "principled",
+            diffuseColor=(0.5, 0.2, 0.1),
+            roughness=0.3,
+            clearcoat=1.0,
+            clearcoatRoughness=0.2,
+            opacity=0.5,
+        ),
     )
-    lamp = light("Rect", colour=(3, 2.8, 2.5), transform=look_at((0.4, 2.6, 0.3), (0.2, 0, -0.2)),
-                 width=2.4, height=2.4)
+    lamp = light(
+        "Rect",
+        colour=(3, 2.8, 2.5),
+        transform=look_at((0.4, 2.6, 0.3), (0.2, 0, -0.2)),
+        width=2.4,
+        height=2.4,
+    )
     shape = sphere("Glass", ball, (-0.2, 0.6, 0.9), 0.4, rings=24, smooth=True)
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *corner(*looks, lamp, shape)))
     compare(f"light paths through {ball}", stage, beauty, max_depth=6)

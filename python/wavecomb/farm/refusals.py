@@ -37,8 +37,7 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
 
 
 def is_better_whole(settings: Mapping[str, Any]) -> bool:
-    """Whether each tile costs much beside its own pixels: a border, a field that it learns, or the
-    paths from the lights, of which each tile traces all."""
+    """Whether each tile costs much beside its own pixels: a border, a field, all light paths."""
     return (
         bool(settings.get("adaptive"))
         or settings.get("transport") == "light"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A glass ball and a gold ring under a small lamp, on a matt floor: light that paths from the camera
-hardly find."""
+"""A glass ball and a gold ring under a small lamp, on a matt floor.
+
+Paths from the camera hardly find the light that comes by way of them.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,7 @@ def ball(radius: float, level: int) -> Mesh:
 
 
 def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
-    """A finger ring that lies on y = 0: an ellipse ``thickness`` wide and ``height`` high, turned
-    about y at a distance ``radius``."""
+    """A finger ring on y = 0: an ellipse, ``thickness`` wide, turned about y at ``radius``."""
     across, around = 2 * level, 8 * level
     a = np.linspace(0.0, 2.0 * np.pi, across + 1)
     b = np.linspace(0.0, 2.0 * np.pi, around + 1)
