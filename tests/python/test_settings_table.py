@@ -55,6 +55,7 @@ def test_rows_are_the_cores() -> None:
             setattr(made, name, choice)
             assert getattr(made, name) == choice
             made.check()
+        setattr(made, name, value)
         for step in row.steps:
             setattr(made, name, int(step))
             made.check()

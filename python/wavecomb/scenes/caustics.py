@@ -35,8 +35,8 @@ def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
     a[-1] = b[-1] = 0.0
     far = radius + 0.5 * thickness * np.cos(a)[:, None]
     up = np.broadcast_to(0.5 * height * (1.0 + np.sin(a))[:, None], (across + 1, around + 1))
-    points = np.stack([far * np.cos(b), up, far * np.sin(b)], axis=2).reshape(-1, 3)
-    points = points.astype(np.float32)
+    places = np.stack([far * np.cos(b), up, far * np.sin(b)], axis=2)
+    points = places.reshape(-1, 3).astype(np.float32)
     faces = grid_faces(across + 1, around + 1)
     uv = np.stack(np.meshgrid(np.linspace(0, 1, around + 1), np.linspace(0, 1, across + 1)), axis=2)
     return Mesh(points, faces, smooth_normals(points, faces), uv.reshape(-1, 2).astype(np.float32))
