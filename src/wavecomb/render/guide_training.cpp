@@ -40,7 +40,7 @@ constexpr double kUncountedPaths = 0.001;
 /// Efficiency to the same without the field that is worth it.
 constexpr double kWorthwhileGain = 1.2;
 constexpr uint32_t kTrainingRounds = 3;
-/// Paths whose vertices are kept at once: some 20 MB.
+/// Paths whose vertices are kept at once: some 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there. (Trials; what
 /// materials cost, roulette knows by themselves.)
@@ -214,8 +214,9 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   auto field = std::make_unique<const GuideField>(grid);
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
   std::optional<PictureTiles> tiles;
+  const CostSnapshot shading = model_costs(scene);
   const PathCosts costs{context.accel->has_list() ? kListRay : 1.0, guides ? kGuidedRays : 0,
-                        context.roulette_costs};
+                        &shading};
   Lessons lessons;
   uint32_t first_sample = 0;
   for (uint32_t round = 0; round < kTrainingRounds; ++round) {
