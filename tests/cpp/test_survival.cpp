@@ -75,20 +75,19 @@ TEST(Survival, IsOnePictureForAllSchedules) {
     const Counts& counts = reference.reference_counts();
     for (const uint32_t lanes : lane_widths())
       for (const uint32_t wave_size : {64u, 1000u})
-        for (const char* policy : {"none", "program", "random-runs"})
-          for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
-            s.policy = policy;
-            s.materialize = materialize;
-            const uint32_t traversal = lanes == 1 ? 1 : std::min(lanes, accel->native_width());
-            WaveRun run(scene, {s, lanes, traversal}, accel);
-            run.guide(absurd.view());
-            run.all(wave_size);
-            expect_same_picture(expected, run.picture(),
-                                std::to_string(lanes) + " lanes, waves of " +
-                                    std::to_string(wave_size) + ", policy " + policy);
-            EXPECT_EQ(run.wave().counts.rays, counts.rays);
-            if (testing::Test::HasFailure()) return;
-          }
+        for (const char* policy : {"none", "random-runs"}) {
+          s.policy = policy;
+          s.materialize = wave_size == 64 ? Materialize::kOn : Materialize::kOff;
+          const uint32_t traversal = lanes == 1 ? 1 : std::min(lanes, accel->native_width());
+          WaveRun run(scene, {s, lanes, traversal}, accel);
+          run.guide(absurd.view());
+          run.all(wave_size);
+          expect_same_picture(expected, run.picture(),
+                              std::to_string(lanes) + " lanes, waves of " +
+                                  std::to_string(wave_size) + ", policy " + policy);
+          EXPECT_EQ(run.wave().counts.rays, counts.rays);
+          if (testing::Test::HasFailure()) return;
+        }
   }
 }
 
@@ -103,7 +102,7 @@ TEST(Survival, HasTheSameMeanForAbsurdCostsAndFields) {
     s.filter = FilterKind::kBox;
     std::vector<double> plain, believed;
     const AbsurdField absurd(*scene, 3);
-    for (s.seed = 0; s.seed < size_for_build(60, 15); ++s.seed) {
+    for (s.seed = 0; s.seed < size_for_build(40, 10); ++s.seed) {
       const auto mean = [&](bool believes) {
         Settings own = s;
         if (!believes) {
