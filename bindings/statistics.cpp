@@ -99,6 +99,7 @@ nb::object guiding_dict(const GuideStatistics& s) {
   d["moment_ratio"] = s.facts.moment_ratio;
   d["field_bytes"] = s.field_bytes;
   d["gain"] = s.gain > 0 ? nb::cast(s.gain) : nb::none();
+  d["survival"] = s.survival;
   d["used"] = s.used;
   return d;
 }

@@ -7,6 +7,7 @@
 #include "wavecomb/learn/guide_field.h"
 #include "wavecomb/learn/guide_shares.h"
 #include "wavecomb/learn/guide_table.h"
+#include "wavecomb/learn/worth.h"
 
 namespace wavecomb {
 namespace {
@@ -163,21 +164,23 @@ TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   EXPECT_FALSE(find_guide<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
 }
 
-/// What bounces bring in the mean counts those that bring nothing, too.
-TEST(Guide, MeansCountDarkBounces) {
+/// What a region's bounces are worth, counting those that bring nothing, by the formula.
+TEST(Guide, BouncesAreWeighed) {
   std::vector<TrainingRecord> records;
   for (int i = 0; i < 1000; ++i) records.push_back(bounce(0.5f, 0.5f, 0.5f, 2, {0.f, 1.f, 0.f}, 4));
   GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
-  const auto mean = [&] {
-    return find_guide<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true).mean;
-  };
-  EXPECT_FLOAT_EQ(mean(), 4.f);
-  const std::vector<uint64_t> dark(3000, dark_bounce(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2));
-  field.count_dark(dark);
-  EXPECT_FLOAT_EQ(mean(), 1.f);
+  const uint64_t at = bounce_place(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2);
+  std::vector<BounceLesson> lessons(3000, {at, 0.f, 0.f, 2.f});
+  lessons.insert(lessons.end(), 1000, {at, 4.f, 16.f, 6.f});
   // Of surfaces that face another way nothing is known.
-  field.count_dark(std::vector<uint64_t>(10, dark_bounce(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3)));
-  EXPECT_FLOAT_EQ(mean(), 1.f);
+  lessons.insert(lessons.end(), 10, {bounce_place(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
+  field.weigh_bounces(lessons, {27, 0.5});
+  // X = 16 / 4, c = 12 / 4.
+  const auto place = find_guide<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true);
+  EXPECT_NEAR(place.survival, std::sqrt(4. / 3 * 27 / 0.5), 1e-4);
+  EXPECT_EQ(worthwhile_survival<float>(place, 0.f), kLeastSurvival);
+  EXPECT_FLOAT_EQ(worthwhile_survival<float>(place, 0.05f), 0.05f * place.survival);
+  EXPECT_EQ(worthwhile_survival<float>(place, 9.f), 1.f);
 }
 
 TEST(Guide, MemoryIsBounded) {

@@ -127,6 +127,8 @@ class WaveRun {
     return *wave_;
   }
   const WaveContext& context() const { return context_; }
+  /// Bounces are guided by a field. Contract: before buffers are reserved; outlives the run.
+  void guide(const GuideView& view) { context_.guide = &view; }
   Film& film() { return film_; }
   const Counts& reference_counts() const { return *reference_->worker(0).counts; }
 

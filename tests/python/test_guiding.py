@@ -78,7 +78,7 @@ def test_one_picture_whatever_the_schedule(
     for other in others:
         same = render(scene, **way, **other)
         assert np.array_equal(plain.beauty, same.beauty), other
-        for fact in ("bounces", "cells", "regions", "guided_regions", "guided_share"):
+        for fact in ("bounces", "cells", "survival", "regions", "guided_regions", "guided_share"):
             assert same.stats["guiding"][fact] == learned[fact], (other, fact)
 
 
@@ -164,7 +164,9 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert "learned from" in result.output
-    assert "of bounced light is guided" in " ".join(result.output.split())
+    words = " ".join(result.output.split())
+    assert "of bounced light is guided" in words
+    assert "of bounces go on" in words
 
 
 @pytest.mark.slow

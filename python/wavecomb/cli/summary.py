@@ -91,6 +91,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
             line += "; not used"
         elif learned["guided_share"] > 0:
             line += f"; {_percent(learned['guided_share'])} of bounced light is guided"
+        if learned["used"] and settings["roulette"] in ("auto", "efficient"):
+            line += f"; {_percent(learned['survival'])} of bounces go on"
         lines.append(line)
     elif settings.get("guiding") == "auto":
         lines.append("not guided: too few samples to find out whether that pays")

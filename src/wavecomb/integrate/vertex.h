@@ -53,7 +53,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, joint, receiver, out);
-  survive<F>(v, place, max_component(at.throughput), r_light.w, out);
+  survive<F>(v, place, luminance(at.throughput), r_light.w, out);
   return out;
 }
 

@@ -20,7 +20,7 @@ struct GuidePlace {
   UInt<F> axis{0u};  ///< which way its surface faces: of kGuideAxes
   UInt<F> region{kNoGuideRegion};
   F bsdf_share{1.f};      ///< a; 1: not guided
-  F mean{0.f};            ///< what bounces bring here of a throughput of 1
+  F survival{0.f};        ///< GuideView::survival
   Mask<F> known{false};   ///< lanes with a region
   Mask<F> guided{false};  ///< lanes with a < 1
 };
@@ -116,7 +116,7 @@ template <typename F>
   const F least = gather<F>(guide.material_share, material, known);
   const F share = max(gather<F>(guide.bsdf_share, place.region, known), least);
   place.bsdf_share = select(known, share, F(1.f));
-  place.mean = gather<F>(guide.mean, place.region, known);
+  place.survival = gather<F>(guide.survival, place.region, known);
   place.guided = known & (place.bsdf_share < 1.f);
   return place;
 }

@@ -76,8 +76,6 @@ class GuideFieldBuilder {
     field_.cells_.clear();
     field_.tables_.clear();
     field_.bsdf_share_.clear();
-    field_.brought_.clear();
-    field_.counts_.clear();
     field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
     bring_ = off_ = on_ = 0;
     guided_ = 0;
@@ -160,8 +158,6 @@ class GuideFieldBuilder {
     const size_t at = field_.tables_.size();
     field_.tables_.resize(at + kGuideWords);
     write_guide_table(part.density, std::span(field_.tables_).subspan(at).first<kGuideWords>());
-    field_.brought_.push_back(0);
-    field_.counts_.push_back(0);
     field_.bsdf_share_.push_back(!guides_ ? 1.f
                                  : first_ ? kFirstShare
                                           : kBsdfShares[part.moments.best()]);
@@ -205,10 +201,6 @@ class GuideFieldBuilder {
                                                      ? field_.material_share_[r.material]
                                                      : 0.f);
       const double brought = double{r.weight} * double{r.value};
-      if (region != kNoGuideRegion) {
-        field_.brought_[region] += double{r.value};
-        field_.counts_[region] += 1;
-      }
       bring_ += brought;
       guided_ += a < 1 ? brought * (1 - double{a}) : 0;
       if (!(r.guide_pdf > 0)) continue;
@@ -268,26 +260,46 @@ GuideField::GuideField(const GuideGrid& grid, std::span<const TrainingRecord> re
     builder->build(cell_records);
     if (bytes() <= most_bytes || cell_records >= records.size()) break;
   }
-  count_dark({});
+  weigh_bounces({}, {});
 }
 
-uint64_t dark_bounce(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
+uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
   return uint64_t{code_of(grid, {p.x, p.y, p.z})} << 3 | axis;
 }
 
-void GuideField::count_dark(std::span<const uint64_t> dark) {
-  const GuideView v = view();
-  for (const uint64_t bounce : dark) {
-    if (!v.grid) break;
-    const auto code = static_cast<uint32_t>(bounce >> 3);
-    const uint32_t cell = detail::guide_cell<float>(
-        v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
-    const uint32_t region = cells_[size_t{cell} * kGuideAxes + (bounce & 7u)];
-    if (region != kNoGuideRegion) counts_[region] += 1;
+void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths) {
+  struct Sums {
+    double count = 0, value = 0, squared = 0, cost = 0;
+  };
+  const size_t regions = bsdf_share_.size();
+  std::vector<Sums> sums(regions + 1);  // the last: of all
+  survival_.assign(regions, 0.f);
+  const auto for_each = [&, v = view()](const auto& add) {
+    for (const BounceLesson& lesson : lessons) {
+      if (!v.grid) break;
+      const auto code = static_cast<uint32_t>(lesson.place >> 3);
+      const uint32_t cell = detail::guide_cell<float>(
+          v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
+      const uint32_t region = cells_[size_t{cell} * kGuideAxes + (lesson.place & 7u)];
+      if (region != kNoGuideRegion) add(sums[region], lesson);
+      add(sums[regions], lesson);
+    }
+  };
+  for_each([](Sums& s, const BounceLesson& lesson) {
+    s.count += 1;
+    s.value += double{lesson.value};
+    s.cost += double{lesson.cost};
+  });
+  // As no bounce counts for more than root n mean ones.
+  for_each([](Sums& s, const BounceLesson& lesson) {
+    s.squared += std::min(double{lesson.squared}, s.value * s.value / s.count);
+  });
+  for (size_t i = 0; i < regions; ++i) {
+    const Sums& s = sums[i].count >= kOwnRecords ? sums[i] : sums[regions];
+    if (s.cost > 0 && paths.variance > 0)
+      survival_[i] = static_cast<float>(
+          std::sqrt(std::max(s.squared, 0.0) / s.cost * paths.cost / paths.variance));
   }
-  mean_.resize(brought_.size());
-  for (size_t i = 0; i < mean_.size(); ++i)
-    mean_[i] = static_cast<float>(brought_[i] / std::max(counts_[i], 1.0));
 }
 
 GuideView GuideField::view() const {
@@ -301,14 +313,14 @@ GuideView GuideField::view() const {
   view.cells = cells_.data();
   view.tables = tables_.data();
   view.bsdf_share = bsdf_share_.data();
-  view.mean = mean_.data();
+  view.survival = survival_.data();
   view.material_share = material_share_.data();
   return view;
 }
 
 size_t GuideField::bytes() const {
   return (entries_.size() + cells_.size() + tables_.size()) * sizeof(uint32_t) +
-         (bsdf_share_.size() + material_share_.size() + mean_.size()) * sizeof(float);
+         (bsdf_share_.size() + material_share_.size() + survival_.size()) * sizeof(float);
 }
 
 }  // namespace wavecomb

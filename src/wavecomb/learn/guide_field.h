@@ -24,6 +24,7 @@
 #include "wavecomb/core/vec3.h"
 #include "wavecomb/learn/guide_view.h"
 #include "wavecomb/learn/training_record.h"
+#include "wavecomb/learn/worth.h"
 
 namespace wavecomb {
 
@@ -35,8 +36,8 @@ struct GuideGrid {
   GuideGrid(const float (&low)[3], const float (&high)[3]);
 };
 
-/// A bounce at p that brought nothing, of a surface that faces `axis`.
-uint64_t dark_bounce(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis);
+/// Where a bounce begins: at p, on a surface that faces `axis`.
+uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis);
 
 /// What a field is, in numbers.
 struct GuideFacts {
@@ -57,9 +58,8 @@ class GuideField {
   GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records, size_t materials,
              bool first, bool guides, size_t most_bytes);
 
-  /// Tells the regions how often bounces brought nothing: `dark` of each cell's code and axis, as
-  /// dark_bounce gives it. Each mean is then over all bounces.
-  void count_dark(std::span<const uint64_t> dark);
+  /// Tells the regions what their bounces are worth, by bounces with and without light.
+  void weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths);
 
   GuideView view() const;
   size_t bytes() const;
@@ -70,8 +70,7 @@ class GuideField {
 
   GuideGrid grid_;
   std::vector<uint32_t> entries_, cells_, tables_;
-  std::vector<float> bsdf_share_, material_share_, mean_;
-  std::vector<double> brought_, counts_;  ///< of each region: sum of values, and of how many
+  std::vector<float> bsdf_share_, material_share_, survival_;
   GuideFacts facts_;
 };
 

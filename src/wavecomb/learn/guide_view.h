@@ -36,7 +36,9 @@ struct GuideView {
   const uint32_t* cells = nullptr;    ///< region, or kNoGuideRegion, of (kGuideAxes * cell + axis)
   const uint32_t* tables = nullptr;   ///< kGuideWords of each region
   const float* bsdf_share = nullptr;  ///< of each region: of bounces that the BSDF alone samples
-  const float* mean = nullptr;        ///< of each region: what bounces bring of a throughput of 1
+  /// Of each region: the probability of going on of a path whose throughput over the brightness of
+  /// the picture is 1, where that is a probability (learn/worth.h).
+  const float* survival = nullptr;
   const float* material_share = nullptr;  ///< the least of those that a material allows
   /// One over the brightness of the picture, in tile_rows x tile_rows tiles; null: not known.
   const float* tiles = nullptr;

@@ -9,6 +9,7 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/learn/guide.h"
+#include "wavecomb/render/bounce_reader.h"
 #include "wavecomb/render/lane_kernels.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/picture_tiles.h"
@@ -29,17 +30,20 @@ constexpr double kTaughtInSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 20;
 constexpr uint64_t kTrialPixels = 4096;
 constexpr uint32_t kTrialSamples = 16;
 constexpr std::array<uint32_t, 2> kTrialSeeds = {0x6c078965u, 0x9908b0dfu};
+/// Share of the paths that teach, of more that tell how samples spread.
+constexpr uint64_t kSpreadShare = 8;
 /// Share of those pixels that differ most and do not count: fireflies tell too little of the
 /// others.
 constexpr double kUncounted = 0.005;
+/// The same of paths that tell of the picture's variance.
+constexpr double kUncountedPaths = 0.001;
 /// Efficiency to the same without the field that is worth it.
 constexpr double kWorthwhileGain = 1.2;
 constexpr uint32_t kTrainingRounds = 3;
-/// Paths whose vertices are kept at once: some 20 MB.
+/// Paths whose vertices are kept at once: some 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
-/// Vertices of a path that teach.
-constexpr uint32_t kTaughtVertices = 6;
-/// Of the cost of a vertex, in rays: shading it, and looking up the field there.
+/// Of the cost of a vertex, in rays: shading it, and looking up the field there. (Trials; what
+/// materials cost, roulette knows by themselves.)
 constexpr double kShadingRays = 0.7, kGuidedRays = 0.9;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
 constexpr double kListRay = 0.3;
@@ -58,98 +62,6 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
   return paths >= (is_auto ? kLeastAutoPaths : kLeastTrainingPaths) ? paths : 0;
 }
 
-/// Gathers what the bounces of a round teach, each path's in its own place.
-class BounceReader final : public HistoryReader {
- public:
-  /// Paths of `pixels`, `samples` each from sample `first` on. `scale`: of the picture at a pixel.
-  BounceReader(std::span<const uint32_t> pixels, uint32_t first, uint32_t samples,
-               uint32_t most_depth, const GuideGrid& grid, const GuideView& guide,
-               const PictureTiles* tiles)
-      : pixels_(pixels),
-        first_(first),
-        samples_(samples),
-        most_depth_(most_depth),
-        grid_(grid),
-        guide_(guide),
-        tiles_(tiles) {
-    const size_t paths = pixels.size() * samples;
-    records_.resize(paths * kTaughtVertices);
-    dark_.resize(paths * kTaughtVertices);
-    counts_.assign(paths, 0);
-    dark_counts_.assign(paths, 0);
-    luminance_.assign(paths, 0.f);
-  }
-
-  uint32_t most() const override { return kTaughtVertices; }
-
-  void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override {
-    for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
-      const auto pixel = static_cast<size_t>(task.pixels - pixels_.data()) + slot / task.samples;
-      const size_t path = pixel * samples_ + (task.first_sample - first_) + slot % task.samples;
-      const Color<float> end = load_row<RadianceRow, float>(radiance, slot, true).sum;
-      luminance_[path] = luminance(end);
-      const float inverse_scale = tiles_ && tiles_->is_lit()
-                                      ? static_cast<float>(tiles_->inverse_scale(pixels_[pixel]))
-                                      : 1.f;
-      Color<float> throughput(1.f);
-      for (uint32_t j = 0; j < history.count(slot); ++j) {
-        const HistoryRow<float> v = history.vertex(slot, j);
-        const float arrived = luminance(throughput);
-        const float brought = luminance(end - v.radiance);
-        throughput = v.throughput;
-        const float value = brought / arrived;
-        if (j == most_depth_) break;  // which makes no bounce
-        const bool is_dead = is_black(v.throughput);
-        if (is_dead || (v.pdf > 0 && !(value > 0)))
-          dark_[path * kTaughtVertices + dark_counts_[path]++] = dark_bounce(grid_, v.p, v.axis);
-        else if (v.pdf > 0 && std::isfinite(value))
-          add(path, v, value, arrived * inverse_scale);
-      }
-    }
-  }
-
-  /// Appends the records, path by path.
-  void append_to(std::vector<TrainingRecord>& all, std::vector<uint64_t>& dark) const {
-    for (size_t path = 0; path < counts_.size(); ++path) {
-      const auto from = records_.begin() + static_cast<std::ptrdiff_t>(path * kTaughtVertices);
-      all.insert(all.end(), from, from + counts_[path]);
-      const auto first_dark = dark_.begin() + static_cast<std::ptrdiff_t>(path * kTaughtVertices);
-      dark.insert(dark.end(), first_dark, first_dark + dark_counts_[path]);
-    }
-  }
-  std::span<const float> luminances() const { return luminance_; }
-
- private:
-  void add(size_t path, const HistoryRow<float>& v, float value, float weight) {
-    TrainingRecord& r = records_[path * kTaughtVertices + counts_[path]++];
-    const Vec2<float> at = octahedral_point<float>(v.wi);
-    const auto bin = [](float x) {
-      return std::min(static_cast<uint32_t>(x * kGuideSide), kGuideSide - 1);
-    };
-    r = {{v.p.x, v.p.y, v.p.z},
-         v.material,
-         static_cast<uint8_t>(v.axis),
-         static_cast<uint8_t>(bin(at.y) * kGuideSide + bin(at.x)),
-         value,
-         v.pdf,
-         v.bsdf_pdf,
-         0.f,
-         weight};
-    const GuidePlace<float> place = find_guide<float>(guide_, v.p, v.axis, v.material, true);
-    if (place.region != kNoGuideRegion) r.guide_pdf = guide_pdf<float>(guide_, place, v.wi, true);
-  }
-
-  std::span<const uint32_t> pixels_;
-  uint32_t first_, samples_, most_depth_;
-  const GuideGrid& grid_;
-  const GuideView& guide_;
-  const PictureTiles* tiles_;
-  std::vector<TrainingRecord> records_;  ///< kTaughtVertices of each path
-  std::vector<uint64_t> dark_;
-  std::vector<uint8_t> counts_, dark_counts_;
-  std::vector<float> luminance_;
-};
-
 /// `count` of the picture's pixels, evenly spread, in an order that keeps neighbours together.
 std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t count) {
   if (count >= order.size()) return order;
@@ -158,12 +70,14 @@ std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t c
   return pixels;
 }
 
-/// What the paths of training have taught, path by path.
-struct Lessons {
-  std::vector<TrainingRecord> records;
-  std::vector<uint64_t> dark;
-  std::vector<float> luminances;  ///< of the paths of the last round
-};
+/// The mean without the share of values that are largest. Sorts them.
+double mean_without_largest(std::vector<double>& values, double share) {
+  std::sort(values.begin(), values.end());
+  const auto counted =
+      static_cast<std::ptrdiff_t>(static_cast<double>(values.size()) * (1 - share));
+  return std::accumulate(values.begin(), values.begin() + counted, 0.0) /
+         static_cast<double>(std::max<std::ptrdiff_t>(counted, 1));
+}
 
 /// Cost of what an integrator has done, in rays of a hierarchy.
 double cost_of(const Integrator& integrator, const TrainingMeans& means, bool has_list,
@@ -177,35 +91,52 @@ double cost_of(const Integrator& integrator, const TrainingMeans& means, bool ha
   return (has_list ? kListRay : 1) * rays + (kShadingRays + (looks_up ? kGuidedRays : 0)) * records;
 }
 
-/// Runs `samples` paths of each of `pixels` from sample `first` on with the field of `context`,
-/// some at a time, and adds what they taught. Gives what they cost, in rays of a hierarchy.
+/// Cost and variance of a path: of those of the last round, which are of `pixels`, with what
+/// roulette adds. `spread`: the variance without; where it is not known yet, neighbours tell. The
+/// paths that differ most do not count, as in trials.
+PathLesson mean_path(const Lessons& lessons, std::span<const uint32_t> pixels,
+                     const PictureTiles& tiles, std::optional<double> spread) {
+  PathLesson mean;
+  if (!tiles.is_lit() || pixels.size() < 2) return mean;
+  std::vector<double> variances;
+  variances.reserve(pixels.size());
+  for (size_t i = 0; i + 1 < pixels.size(); ++i) {
+    const PathLesson& path = lessons.paths[i];
+    const double scale = tiles.inverse_scale(pixels[i]);
+    const double d = double{lessons.luminances[i]} - double{lessons.luminances[i + 1]};
+    const double v = ((spread ? 0 : 0.5 * d * d) + path.variance) * scale * scale;
+    variances.push_back(std::isfinite(v) ? v : 0);
+    mean.cost += path.cost / static_cast<double>(pixels.size() - 1);
+    mean.vertices += path.vertices;
+    mean.survivors += path.survivors;
+  }
+  mean.variance = mean_without_largest(variances, kUncountedPaths) + spread.value_or(0);
+  return mean;
+}
+
+/// Runs the paths of `pixels` that `plan` says with the field of `context`, some at a time, and
+/// adds what they taught. Gives what they cost, in rays of a hierarchy.
 double teach(WaveContext context, const TrainingMeans& means, std::span<const uint32_t> pixels,
-             uint32_t first, uint32_t samples, const GuideGrid& grid, const PictureTiles* tiles,
-             Lessons& lessons, const std::function<bool()>& stopped) {
-  const GuideView none;
-  const auto reader_of = [&](std::span<const uint32_t> some) {
-    return BounceReader(some, first, samples, context.settings->max_depth, grid,
-                        context.guide ? *context.guide : none, tiles);
-  };
+             const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped) {
   // Integrators keep vertices where somebody reads them when they are made.
-  BounceReader nobody = reader_of({});
+  BounceReader nobody({}, plan);
   context.histories = &nobody;
   const std::unique_ptr<Integrator> integrator = make_integrator(
       context.settings->integrator, context, means.lanes, means.threads, means.wave_size);
   PassRunner runner(*integrator, means.threads, means.wave_size);
-  const size_t step = std::max<size_t>(1, kPathsAtOnce / samples);
+  const size_t step = std::max<size_t>(1, kPathsAtOnce / plan.samples);
+  lessons.bounces.clear();
   lessons.luminances.clear();
+  lessons.paths.clear();
   for (size_t at = 0; at < pixels.size() && !stopped(); at += step) {
     const auto some = pixels.subspan(at, std::min(step, pixels.size() - at));
-    PassPlan plan;
-    plan.pixels.assign(some.begin(), some.end());
-    plan.batches.push_back({0, plan.pixels.size(), first, samples});
-    BounceReader reader = reader_of(plan.pixels);
+    PassPlan pass;
+    pass.pixels.assign(some.begin(), some.end());
+    pass.batches.push_back({0, pass.pixels.size(), plan.first, plan.samples});
+    BounceReader reader(pass.pixels, plan);
     context.histories = &reader;
-    runner.run(plan, stopped);
-    reader.append_to(lessons.records, lessons.dark);
-    const auto brought = reader.luminances();
-    lessons.luminances.insert(lessons.luminances.end(), brought.begin(), brought.end());
+    runner.run(pass, stopped);
+    reader.append_to(lessons);
   }
   return cost_of(*integrator, means, context.accel->has_list(), context.guide != nullptr);
 }
@@ -228,7 +159,8 @@ Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
   for (const uint32_t seed : kTrialSeeds) {
     settings.seed = seed;
     Lessons lessons;
-    trial.cost += teach(context, means, pixels, 0, kTrialSamples, grid, nullptr, lessons, stopped);
+    const LessonPlan plan{0, kTrialSamples, 0, grid, {}, nullptr, {}, 1};
+    trial.cost += teach(context, means, pixels, plan, lessons, stopped);
     if (stopped()) return {};
     const double sign = seed == kTrialSeeds[0] ? 1 : -1;
     for (size_t i = 0; i < pixels.size(); ++i)
@@ -239,11 +171,7 @@ Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
     const double d = differences[i] * tiles.inverse_scale(pixels[i]) / kTrialSamples;
     differences[i] = std::isfinite(d) ? d * d : 0;
   }
-  std::sort(differences.begin(), differences.end());
-  const auto counted =
-      static_cast<std::ptrdiff_t>(static_cast<double>(differences.size()) * (1 - kUncounted));
-  trial.error = std::accumulate(differences.begin(), differences.begin() + counted, 0.0) /
-                static_cast<double>(std::max<std::ptrdiff_t>(counted, 1));
+  trial.error = mean_without_largest(differences, kUncounted);
   return trial;
 }
 
@@ -286,6 +214,9 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   auto field = std::make_unique<const GuideField>(grid);
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
   std::optional<PictureTiles> tiles;
+  const CostSnapshot shading = model_costs(scene);
+  const PathCosts costs{context.accel->has_list() ? kListRay : 1.0, guides ? kGuidedRays : 0,
+                        &shading};
   Lessons lessons;
   uint32_t first_sample = 0;
   for (uint32_t round = 0; round < kTrainingRounds; ++round) {
@@ -296,21 +227,37 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
     GuideView view = field->view();
     if (tiles) tiles->apply(view);
     context.guide = &view;
-    teach(context, means, pixels, first_sample, samples, grid, tiles ? &*tiles : nullptr, lessons,
-          stopped);
+    const LessonPlan plan{first_sample,
+                          samples,
+                          settings.max_depth,
+                          grid,
+                          view,
+                          tiles ? &*tiles : nullptr,
+                          costs,
+                          settings.roulette_depth};
+    teach(context, means, pixels, plan, lessons, stopped);
     if (stopped()) return {};
     first_sample += samples;
     out.statistics.paths += lessons.luminances.size();
     ++out.statistics.rounds;
-    if (!tiles) {
-      std::vector<uint32_t> of_paths;
-      for (const uint32_t pixel : pixels) of_paths.insert(of_paths.end(), samples, pixel);
-      tiles.emplace(settings, of_paths, lessons.luminances);
-    }
+    std::vector<uint32_t> of_paths;
+    for (const uint32_t pixel : pixels) of_paths.insert(of_paths.end(), samples, pixel);
+    if (!tiles) tiles.emplace(settings, of_paths, lessons.luminances);
     auto next =
         std::make_unique<GuideField>(grid, lessons.records, scene.materials().size(), is_first,
                                      guides, size_t{settings.learn_memory_mb} << 20);
-    next->count_dark(lessons.dark);
+    std::optional<double> spread;
+    if (round + 1 == kTrainingRounds && tiles->is_lit()) {
+      GuideView taught = next->view();
+      tiles->apply(taught);
+      const auto few = some_pixels(order, budget / kSpreadShare / (2 * kTrialSamples));
+      spread = 0.5 * kTrialSamples *
+               try_out(context, settings, &taught, means, few, *tiles, grid, stopped).error;
+      if (stopped()) return {};
+    }
+    const PathLesson mean = mean_path(lessons, of_paths, *tiles, spread);
+    if (mean.vertices > 0) out.statistics.survival = mean.survivors / mean.vertices;
+    next->weigh_bounces(lessons.bounces, mean);
     field = std::move(next);
   }
   out.statistics.field_bytes = field->bytes();

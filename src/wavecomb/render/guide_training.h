@@ -26,6 +26,9 @@ struct GuideStatistics {
   uint64_t field_bytes = 0;
   /// Of Guiding::kAuto: efficiency of some pixels with the field to the same without; 0: not known.
   double gain = 0;
+  /// Of the roulette that was learned, as training expects it: the share of vertices from which
+  /// paths go on.
+  double survival = 1;
   bool used = false;  ///< whether the picture is guided, or its roulette told, by the field
   double seconds = 0;
 };

@@ -8,7 +8,7 @@
 
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/integrate/path_state.h"
-#include "wavecomb/learn/guide.h"
+#include "wavecomb/learn/worth.h"
 #include "wavecomb/schedule/cost_snapshot.h"
 
 namespace wavecomb {
@@ -49,27 +49,18 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
 }
 
-/// How much likelier a path goes on than what it is expected to bring, as a share of the picture's
-/// brightness at its pixel; and the least that it goes on with (docs/decisions/guiding.md).
-inline constexpr float kEfficientGain = 8.f, kLeastSurvival = 0.1f;
-
-/// Roulette after a vertex; `u` in [0, 1). By throughput; or, where it was learned what bounces
-/// bring, by that: with T the largest component of the throughput at arrival, E what bounces of the
-/// place bring of a throughput of 1, and I the brightness of the picture at the pixel,
-///   q = kEfficientGain T E / I,
-/// the expected contribution over the pixel's value (Vorba and Krivanek, "Adjoint-Driven Russian
-/// Roulette and Splitting", 2016, eq. 8), times a gain. The throughput after a guided bounce says
-/// nothing of what it will bring: it is least where most light comes from.
+/// Roulette after a vertex; `u` in [0, 1). By throughput; or, where it was learned what bounces are
+/// worth, by that (learn/worth.h). The throughput after a guided bounce says nothing of what it
+/// will bring: it is least where most light comes from. `arrived`: luminance of the throughput at
+/// the vertex.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
                              const F& arrived, const F& u, VertexResult<F>& out) {
   if (!v.settings.roulette || v.depth + 1 < v.settings.roulette_depth) return;
   const F largest = max_component(out.next.throughput);
   F q = min(F(largest * out.next.eta_scale * kRouletteGain), F(1.f));
-  if (v.settings.efficient && v.guide && v.guide->tiles) [[unlikely]] {
-    const F expected = arrived * v.path.eta_scale * v.path.importance * place.mean;
-    q = select(place.known, clamp(F(expected * kEfficientGain), F(kLeastSurvival), F(1.f)), q);
-  }
+  if (v.settings.efficient && v.guide && v.guide->tiles) [[unlikely]]
+    q = select(place.known, worthwhile_survival<F>(place, F(arrived * v.path.importance)), q);
   out.alive = out.alive & (u < q);
   out.next.throughput *= F(1.f / max(q, F(1e-10f)));
 }
