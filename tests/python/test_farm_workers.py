@@ -19,6 +19,7 @@ from test_texture_limit import MOVING_CAMERA, textured, write_image
 from wavecomb import farm
 from wavecomb.farm.files import write_json
 from wavecomb.farm.folder import DONE, TODO
+from wavecomb.version import version
 
 pytestmark = [needs("wavecomb._core"), pytest.mark.slow]
 
@@ -127,7 +128,7 @@ def test_a_foreign_worker_is_refused(stage: Path, tmp_path: Path) -> None:
     folder = farm.submit(stage, tmp_path / "a.exr", size=(8, 8), spp=1, strict=False)
     write_json(
         folder.path / "class.json",
-        {"version": "0.1.0", "isa": "avx9", "library": "1", "probe": "2"},
+        {"version": version(), "isa": "avx9", "library": "1", "probe": "2"},
     )
     done = run("farm", "worker", folder.path)
     assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
