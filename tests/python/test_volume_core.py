@@ -8,22 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from voxels import bricks
 
 from wavecomb import _core
 
 IDENTITY = np.eye(4)
 SIZE = 24
-
-
-def bricks(voxels: Any) -> tuple[Any, Any]:
-    """Origins and values of a cube of voxels, whose edge is a multiple of 8."""
-    n = voxels.shape[0] // 8
-    origins = 8 * np.array(list(np.ndindex(n, n, n)), np.int32)
-    parts = voxels.reshape(n, 8, n, 8, n, 8, *voxels.shape[3:])
-    order = (0, 2, 4, 1, 3, 5, *range(6, parts.ndim))
-    return origins, np.ascontiguousarray(parts.transpose(order)).reshape(
-        -1, 8, 8, 8, *voxels.shape[3:]
-    )
 
 
 def grid_of(voxels: Any, lo: float, hi: float) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from agreement import assert_agree, batches
+from voxels import bricks
 
 pytestmark = pytest.mark.slow
 
@@ -29,15 +30,6 @@ def tints() -> Any:
     """Albedos that differ along x, y and z."""
     ramp = np.linspace(0.3, 0.95, VOXELS, dtype=np.float32)
     return np.stack(np.meshgrid(ramp, ramp, ramp, indexing="ij"), axis=-1)
-
-
-def bricks(voxels: Any) -> tuple[Any, Any]:
-    """Origins and values of bricks, as _core.VolumeGrid takes them."""
-    n, rest = VOXELS // 8, voxels.shape[3:]
-    parts = voxels.reshape(n, 8, n, 8, n, 8, *rest)
-    parts = parts.transpose(0, 2, 4, 1, 3, 5, *range(6, parts.ndim))
-    origins = 8 * np.array(list(np.ndindex(n, n, n)), np.int32)
-    return origins, np.ascontiguousarray(parts).reshape(-1, 8, 8, 8, *rest)
 
 
 def in_cube(voxels: Any) -> Any:
