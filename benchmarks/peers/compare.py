@@ -3,6 +3,7 @@
 
     benchmarks/peers/setup                      # once: Cycles, in an environment of its own
     python benchmarks/peers/compare.py --rounds 5 --plain --stages cornell,mixed,dragon,room
+    python benchmarks/peers/compare.py --stages smoke-200,fog-cornell --max-depth 24
     python benchmarks/peers/compare.py --stages shot.usd          # or any stage of meshes
     python benchmarks/peers/compare.py --quick                    # does it run?
 
@@ -35,28 +36,31 @@ from typing import Any
 
 import numpy as np
 from noise import Noise
-from renderers import RENDERERS, ROOT, Job
+from renderers import RENDERERS, ROOT, USUAL, Job
 from report import commit, machine, summary, tables
 from speed import rounds
+from stages import VOLUMES
 
 SCENES = ("cornell", "mixed", "dragon", "room")
+STAGES = (*SCENES, *VOLUMES)
 
 
 def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
     """Writes a generated stage where it is missing, and the arrays of any."""
-    from recording import record
+    from recording import record, write_volumes
+    from stages import write_stage
 
-    from wavecomb.scenes import write_scene
-
-    if scene in SCENES:
+    if scene in STAGES:
         stage = args.cache / f"{label(scene, args)}.usdc"
         if not stage.exists():
-            write_scene(scene, stage, aspect=1.0, plain=args.plain)
+            stage = write_stage(scene, stage, args.plain)
     else:
         stage = Path(scene)
     recorded = args.cache / f"{label(scene, args)}-recorded"
     # Always anew: the reader may have changed.
-    record(stage).save(recorded)
+    scene_record = record(stage)
+    write_volumes(scene_record, recorded)
+    scene_record.save(recorded)
     digest = hashlib.sha1()
     for file in sorted(recorded.iterdir()):
         digest.update(file.read_bytes())
@@ -65,9 +69,9 @@ def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
 
 def label(scene: str, args: argparse.Namespace) -> str:
     """What a stage is called in tables and files."""
-    if scene not in SCENES:
+    if scene not in STAGES:
         return Path(scene).stem
-    return f"{scene}-plain" if args.plain and scene != "room" else scene
+    return f"{scene}-plain" if args.plain and scene in SCENES and scene != "room" else scene
 
 
 def measure(scene: str, args: argparse.Namespace) -> dict[str, Any]:
@@ -121,7 +125,7 @@ def arguments() -> argparse.Namespace:
         def parse(text: str) -> list[str]:
             names = text.split(",")
             for name in names:
-                if name not in known and not (known is SCENES and Path(name).is_file()):
+                if name not in known and not (known is STAGES and Path(name).is_file()):
                     raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(known)}")
             return names
 
@@ -131,9 +135,9 @@ def arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--stages", type=listed(SCENES), default=list(SCENES), help=",".join(SCENES) + ", or files")
+    add("--stages", type=listed(STAGES), default=list(SCENES), help=",".join(STAGES) + ", or files")
     add("--plain", action="store_true", help="generated stages without names of programs")
-    add("--renderers", type=listed(RENDERERS), default=list(RENDERERS), help=",".join(RENDERERS))
+    add("--renderers", type=listed(RENDERERS), default=list(USUAL), help=",".join(RENDERERS))
     add("--rounds", type=int, default=3)
     add("--threads", type=int, default=2)
     add("--size", type=int, default=600, help="edge of the timed picture, pixels")

@@ -20,6 +20,7 @@ from typing import Any
 import bpy
 import numpy as np
 from cycles_nodes import Images, Nodes, image, make_material
+from cycles_volumes import make_volume
 from mathutils import Matrix as BlenderMatrix
 from numpy.typing import NDArray
 from recorded import INHERIT, Mesh, Recorded
@@ -54,7 +55,8 @@ class CyclesSettings:
 class CyclesScene:
     """A recorded scene in Cycles' hands. There is one at a time: Blender has one main database."""
 
-    def __init__(self, recorded: Recorded, settings: CyclesSettings) -> None:
+    def __init__(self, recorded: Recorded, settings: CyclesSettings, folder: Path) -> None:
+        """``folder``: where the files of volumes are."""
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.recorded = recorded
         self.scene = bpy.context.scene
@@ -66,6 +68,8 @@ class CyclesScene:
             if light["kind"] != "dome":
                 self._lamp(light)
         self._geometry()
+        for volume in recorded.volumes:
+            self._object("volume", make_volume(volume, folder, self._images), volume["to_world"])
         self._camera(settings)
 
     def render(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
@@ -124,6 +128,8 @@ class CyclesScene:
         bounces = settings.max_depth - 1
         cycles.max_bounces = bounces
         cycles.diffuse_bounces = cycles.glossy_bounces = bounces
+        cycles.volume_bounces = bounces
+        cycles.volume_biased = False
         cycles.transmission_bounces = cycles.transparent_max_bounces = bounces
         cycles.min_light_bounces = cycles.min_transparent_bounces = 0
 

@@ -35,9 +35,9 @@ class Nodes:
                 socket.default_value = value
         return node
 
-    def out(self, kind: str, socket: Any) -> None:
+    def out(self, kind: str, socket: Any, use: str = "Surface") -> None:
         """The output node of a material or world."""
-        self.tree.links.new(socket, self.add(kind).inputs["Surface"])
+        self.tree.links.new(socket, self.add(kind).inputs[use])
 
     def vector(self, operation: str, *operands: Any) -> Any:
         """Component-wise arithmetic."""

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from mitsuba_media import Media
 from recorded import INHERIT, Mesh, Placed, Recorded
 
 Matrix = NDArray[np.float64]
@@ -91,6 +92,7 @@ class PeerSettings:
         rr_depth: Vertices before roulette; by default none.
         instancing: Shape groups, as far as Mitsuba allows them; else all is copied.
         sampler: Mitsuba's name of one.
+        integrator: Mitsuba's name of one, where there are volumes.
     """
 
     width: int
@@ -99,6 +101,7 @@ class PeerSettings:
     rr_depth: int = 1_000_000
     instancing: bool = False
     sampler: str = "independent"
+    integrator: str = "volpathmis"
 
 
 class MitsubaScene:
@@ -110,15 +113,19 @@ class MitsubaScene:
         self.settings = settings
         self._bsdfs: dict[int, Any] = {}
         self._textures: dict[str, Any] = {}
+        media = Media(mi, recorded)
         scene: dict[str, Any] = {
             "type": "scene",
+            **media.entries,
             "integrator": {
-                "type": "path",
+                "type": settings.integrator if recorded.volumes else "path",
                 "max_depth": settings.max_depth + 1,
                 "rr_depth": settings.rr_depth,
             },
             "sensor": self._sensor(),
         }
+        if media.of_camera is not None:
+            scene["sensor"]["medium"] = {"type": "ref", "id": media.of_camera}
         for k, light in enumerate(recorded.lights):
             scene[f"light{k}"] = self._light(light)
         scene.update(self._geometry())

@@ -58,6 +58,7 @@ class Recorded:
     meshes: list[Mesh] = field(default_factory=list)
     groups: list[Group] = field(default_factory=lambda: [Group()])
     lights: list[dict[str, Any]] = field(default_factory=list)
+    volumes: list[dict[str, Any]] = field(default_factory=list)
     camera: dict[str, Any] = field(default_factory=dict)
     bounds: Matrix = field(default_factory=lambda: np.zeros((2, 3)))
 
@@ -96,12 +97,28 @@ class Recorded:
                 return [plain(v) for v in value]
             return value
 
-        names = ("textures", "materials", "lights", "camera", "bounds")
+        names = ("textures", "materials", "lights", "volumes", "camera", "bounds")
         scene = {name: plain(getattr(self, name)) for name in names}
         scene["meshes"] = [plain(vars(mesh)) for mesh in self.meshes]
         scene["groups"] = [plain(asdict(group)) for group in self.groups]
         # Last: a folder with a scene.json is whole.
         (folder / "scene.json").write_text(json.dumps(scene))
+
+
+def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
+    """All voxels of a recorded grid, with a border of its background: values by x, y, z, and a
+    transform of rows from the unit cube, whose equal cells they are, to object space.
+    """
+    origins, values = grid["origins"], grid["values"]
+    edge = values.shape[1]
+    first = origins.min(axis=0) - 1
+    counts = origins.max(axis=0) + edge + 1 - first
+    made = np.full((*counts, *values.shape[4:]), grid["background"], np.float32)
+    for (x, y, z), brick in zip(origins - first, values, strict=True):
+        made[x : x + edge, y : y + edge, z : z + edge] = brick
+    cells = np.diag([*counts.astype(float), 1.0])
+    cells[3, :3] = first - 0.5
+    return made, cells @ grid["index_to_object"]
 
 
 def load(folder: Path) -> Recorded:

@@ -6,6 +6,7 @@ Other renderers are fed from the record, so that they get the very arrays that W
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,14 @@ from recorded import INHERIT, Group, Mesh, Recorded
 
 from wavecomb import _core
 from wavecomb.usd import load_stage
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """A grid as the native builder has it, and what it was made of."""
+
+    native: _core.VolumeGrid
+    arrays: dict[str, Any]
 
 
 class RecordingBuilder(Recorded):
@@ -111,6 +120,27 @@ class RecordingBuilder(Recorded):
         """Passes the light of a mesh on; peers get its material alone."""
         return self.native.add_mesh_light(transform, material_sync, **options)
 
+    def make_volume_grid(
+        self,
+        origins: NDArray[np.int32],
+        values: NDArray[Any],
+        index_to_object: NDArray[np.float64],
+        background: float = 0.0,
+        name: str = "",
+    ) -> _Grid:
+        """A grid for ``add_volume``, which keeps it."""
+        native = _core.VolumeGrid(origins, values, index_to_object, background, name)
+        arrays = {"origins": origins, "values": values, "background": background,
+                  "index_to_object": np.asarray(index_to_object, np.float64)}  # fmt: skip
+        return _Grid(native, arrays)
+
+    def add_volume(self, to_world: NDArray[Any], **options: Any) -> int:
+        """Keeps a volume."""
+        kept = {k: v.arrays if isinstance(v, _Grid) else v for k, v in options.items()}
+        self.volumes.append({"to_world": np.asarray(to_world, np.float64), **kept})
+        given = {k: v.native if isinstance(v, _Grid) else v for k, v in options.items()}
+        return self.native.add_volume(to_world, **given)
+
     def set_camera(self, transform: NDArray[Any], **options: Any) -> None:
         """Keeps the camera."""
         self.camera = {"transform": np.asarray(transform, np.float64), **options}
@@ -128,3 +158,17 @@ def record(stage: Path) -> RecordingBuilder:
     factory: Any = RecordingBuilder
     recorded: Any = load_stage(stage, builder_factory=factory).scene
     return recorded
+
+
+def write_volumes(recorded: Recorded, folder: Path) -> None:
+    """Writes the densities of volumes as .vdb files, which Cycles reads, and names these in them."""
+    from wavecomb import vdb
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, volume in enumerate(recorded.volumes):
+        grid = volume.get("density")
+        if grid is not None:
+            volume["file"] = f"volume{number}.vdb"
+            vdb.write(folder / volume["file"], [
+                {"name": "density", **{k: v for k, v in grid.items() if k != "background"}}
+            ])  # fmt: skip

@@ -45,9 +45,16 @@ RENDERERS = {
     "mitsuba-llvm-multijitter": Renderer(
         "mitsuba", {"variant": "llvm_ad_rgb", "sampler": "multijitter"}, warm=True
     ),
+    "mitsuba-llvm-volpath": Renderer(
+        "mitsuba",
+        {"variant": "llvm_ad_rgb", "sampler": "multijitter", "integrator": "volpath"},
+        warm=True,
+    ),
     "cycles": Renderer("cycles", {"light_tree": True}, (9, 36)),
     "cycles-no-tree": Renderer("cycles", {"light_tree": False}, (9, 36)),
 }
+USUAL = tuple(name for name in RENDERERS if name != "mitsuba-llvm-volpath")
+"""Without that for volumes alone."""
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def open_cycles(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     from cycles_bridge import CyclesScene, CyclesSettings
 
     settings = CyclesSettings(args.size, args.size, args.max_depth, args.threads, **options)
-    scene = CyclesScene(load(args.recorded), settings)
+    scene = CyclesScene(load(args.recorded), settings, args.recorded)
     return (
         lambda spp, seed: (scene.render(spp, seed), spp, None),
         {"version": bpy.app.version_string, "settings": vars(settings)},
