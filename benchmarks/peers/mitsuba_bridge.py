@@ -19,8 +19,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from mitsuba_media import Media
+from numpy.typing import NDArray
 from recorded import INHERIT, Mesh, Placed, Recorded
 
 Matrix = NDArray[np.float64]

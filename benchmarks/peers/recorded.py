@@ -106,8 +106,10 @@ class Recorded:
 
 
 def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
-    """All voxels of a recorded grid, with a border of its background: values by x, y, z, and a
-    transform of rows from the unit cube, whose equal cells they are, to object space.
+    """All voxels of a recorded grid, with a border of its background.
+
+    Returns values by x, y, z, and a transform of rows from the unit cube, whose equal cells they
+    are, to object space.
     """
     origins, values = grid["origins"], grid["values"]
     edge = values.shape[1]

@@ -161,7 +161,7 @@ def record(stage: Path) -> RecordingBuilder:
 
 
 def write_volumes(recorded: Recorded, folder: Path) -> None:
-    """Writes the densities of volumes as .vdb files, which Cycles reads, and names these in them."""
+    """Writes densities of volumes as .vdb files, which Cycles reads, and names these there."""
     from wavecomb import vdb
 
     folder.mkdir(parents=True, exist_ok=True)

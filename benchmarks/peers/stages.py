@@ -44,7 +44,7 @@ def write_stage(name: str, path: Path, plain: bool) -> Path:
 
 
 def _fill(stage: Usd.Stage, thickness: float) -> None:
-    """Fog in all of a stage, but not at its walls: rays of Mitsuba that cross into fog start a little farther."""
+    """Fog in all of a stage but at its walls, which rays of Mitsuba that leave it would miss."""
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
     low, high = np.array(box.GetMin()), np.array(box.GetMax())
