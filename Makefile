@@ -7,6 +7,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 
 BUILD := build/editable
+# Sources of the core are compiled by sixes: a clean build is quicker, an edit dearer. OFF for who edits them.
+BATCH ?= ON
 # Of make test-asan: ON, or all.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
@@ -47,7 +49,8 @@ build/.setup-test: build/.setup
 build/.configured: build/.setup $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
 	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
-	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON
+	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON \
+	  --config-settings=cmake.define.WAVECOMB_BATCH=$(BATCH)
 	@touch $@
 
 build/.built: build/.configured $(NATIVE_INPUTS)
