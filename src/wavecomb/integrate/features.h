@@ -20,7 +20,8 @@ enum Feature : uint32_t {
   kJoined = 64,       ///< paths from the lights, which share in the weights of the camera's
 };
 /// Renders that are joined by paths from the lights have kernels of their own.
-inline constexpr uint32_t kPlain = kNotes, kEverything = 63 | kBelow, kJoint = kEverything | kJoined;
+inline constexpr uint32_t kPlain = kNotes, kEverything = 63 | kBelow,
+                          kJoint = kEverything | kJoined;
 
 /// Whether there are plain kernels and least variants for packets of F: for the widest ones.
 /// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.

@@ -171,8 +171,8 @@ class PathTracer {
     }
   }
 
-  /// Walks on from a ray that led below a surface; false: nothing comes of it. What is not below the
-  /// surface that it left goes on as it was.
+  /// Walks on from a ray that led below a surface; false: nothing comes of it. What is not below
+  /// the surface that it left goes on as it was.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& came_out) {
     const bool is_own = hit.inst == path.receiver;

@@ -168,10 +168,8 @@ class Volumes {
   static Walk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
                             const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput) {
     const Way<F> way = Way<F>(sampler, key, depth, VertexSet::kFlight).branch(0x51ee9u);
-    return {o,      d,        throughput,
-            F(throughput.x + throughput.y + throughput.z),
-            F(0.f), F(0.f),   way.seed,
-            UInt<F>(0u)};
+    return {o,      d,      throughput, F(throughput.x + throughput.y + throughput.z),
+            F(0.f), F(0.f), way.seed,   UInt<F>(0u)};
   }
   /// A ray that sees from outside where a walk has ended.
   template <typename F>
@@ -208,14 +206,12 @@ class Volumes {
       path.receiver = U(0u);
       store_row<PathRow, F>(wave.pool.paths, slot, path, below);
       const U material = material_below<F>(inst, geom, load<U>(hits.prim + i), own);
-      const Mask<F> walks =
-          own & (walk_medium<F>(scene.walks, material, own).extinction.x > 0.f);
+      const Mask<F> walks = own & (walk_medium<F>(scene.walks, material, own).extinction.x > 0.f);
       const F time = scene.has_motion
                          ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, walks)
                          : F(0.f);
-      walkers.add<F>(
-          begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput),
-          lane_index<F>() + static_cast<uint32_t>(i), slot, inst, material, time, walks);
+      walkers.add<F>(begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput),
+                     lane_index<F>() + static_cast<uint32_t>(i), slot, inst, material, time, walks);
     }
     all_counts_.walks += walkers.size();
     walkers.run<F>(scene, *context_.accel, context_.traversal_width,

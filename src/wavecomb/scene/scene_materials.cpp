@@ -130,7 +130,8 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     }
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
-    variants.push_back(least_variant(m.program, parts_of(m, *graphs, textures, exit_material != kInheritMaterial)));
+    variants.push_back(least_variant(
+        m.program, parts_of(m, *graphs, textures, exit_material != kInheritMaterial)));
     wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();

@@ -98,7 +98,7 @@ struct SceneGeometry {
   std::vector<MeshMotion> mesh_motions;
   std::vector<MatrixStep> steps;  ///< of all instances that move
   std::vector<VolumeRecord> volume_records;
-  uint32_t first_volume_material = 0;       ///< VolumeView::first_material
+  uint32_t first_volume_material = 0;  ///< VolumeView::first_material
   /// WalkView::exit_material; kInheritMaterial: no material had a radius, and nobody can walk.
   uint32_t exit_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "wavecomb/graph/graph.h"
+#include "wavecomb/graph/parameters.h"
 #include "wavecomb/scene/material_data.h"
 
 namespace wavecomb {
@@ -31,8 +32,7 @@ WalkKind walk_kind(const Material& m, const GraphSet& graphs) {
 
 float single_albedo(float color, float anisotropy) {
   const float a = std::clamp(color, 0.f, 1.f);
-  const float s =
-      4.09712f + 4.20863f * a - std::sqrt(9.59217f + a * (41.6808f + 17.7126f * a));
+  const float s = 4.09712f + 4.20863f * a - std::sqrt(9.59217f + a * (41.6808f + 17.7126f * a));
   return std::clamp((1 - s * s) / (1 - anisotropy * s * s), 0.f, 1.f);
 }
 

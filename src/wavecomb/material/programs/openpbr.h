@@ -21,7 +21,8 @@ namespace wavecomb {
 ///
 /// Opaque and thin-walled surfaces are alike from both sides. A solid that transmits is seen from
 /// inside without fuzz and without the coat's reflection. What is scattered below the surface is
-/// diffuse, or, where light walks there, enters as a diffuse lobe to the other side (medium/walk.h).
+/// diffuse, or, where light walks there, enters as a diffuse lobe to the other side
+/// (medium/walk.h).
 ///
 /// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
 /// show no others.
@@ -303,8 +304,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
 
   /// What the coat's own reflections make of the colour below it.
   Color<F> darkened(const View& v, const F& z) const {
-    const Color<F> albedo =
-        base_.metal_f0() * base_.metal + (diffuse_ + seen_back_) * base_.opaque + Color<F>(base_.glass);
+    const Color<F> albedo = base_.metal_f0() * base_.metal +
+                            (diffuse_ + seen_back_) * base_.opaque + Color<F>(base_.glass);
     const F spread = fma(F(1.f - base_.opaque), base_.roughness, base_.opaque);
     return coat_.darkened(z, albedo, spread, v.base.inside);
   }
@@ -382,7 +383,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   OpenPbrCoat<F> coat_;
   F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
   Color<F> fuzz_color_, diffuse_, back_;
-  Color<F> seen_back_;      ///< of what is behind `back_`: the colour that comes back
+  Color<F> seen_back_;  ///< of what is behind `back_`: the colour that comes back
   Mask<F> walks_{false};
 };
 
