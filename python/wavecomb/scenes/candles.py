@@ -13,7 +13,7 @@ from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.shapes import placed, turned
 from wavecomb.scenes.stage import StageWriter
 
-_FLAME = (260.0, 130.0, 42.0)
+_FLAME = (95.0, 48.0, 16.0)
 _CANDLES = (
     ("Tall", (-5.2, 0.0, -0.5), 2.6, 15.0),
     ("Middle", (1.2, 0.0, -2.6), 3.1, 10.5),
@@ -87,4 +87,4 @@ def build_candles(writer: StageWriter, options: SceneOptions) -> None:
     writer.bind(writer.mesh("/World/Objects/Ball", marble).GetPrim(), "Marble")
     writer.rect_light("Window", (-6.0, 24.0, 22.0), 14.0, 14.0, (1.6, 2.0, 2.8), -45.0)
     writer.dome_light("Sky", 30.0, 0.05)
-    writer.camera((0.0, 11.5, 27.0), (0.0, 6.6, 0.0), 40.0, options.aspect or 4.0 / 3.0)
+    writer.camera((0.0, 13.0, 37.0), (-0.4, 7.4, 0.0), 36.0, options.aspect or 4.0 / 3.0)
