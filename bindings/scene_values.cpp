@@ -39,7 +39,9 @@ using Members = std::vector<std::pair<const char*, Value Class::*>>;
 #define WAVECOMB_NUMBER(kind, name, standard, least, most) WAVECOMB_NUMBER_##kind(name)
 #define WAVECOMB_COLOUR(kind, name, standard, least, most) WAVECOMB_COLOUR_##kind(name)
 const Members<OpenPbr, Vec3<float>> kOpenPbrColors{
-    {"transmission_color", &OpenPbr::transmission_color}, WAVECOMB_OPENPBR_INPUTS(WAVECOMB_COLOUR)};
+    {"transmission_color", &OpenPbr::transmission_color},
+    {"subsurface_radius", &OpenPbr::subsurface_radius},
+    WAVECOMB_OPENPBR_INPUTS(WAVECOMB_COLOUR)};
 const Members<OpenPbr, float> kOpenPbrNumbers{{"transmission_depth", &OpenPbr::transmission_depth},
                                               WAVECOMB_OPENPBR_INPUTS(WAVECOMB_NUMBER)};
 const Members<OpenPbr, bool> kOpenPbrSwitches{{"thin_walled", &OpenPbr::thin_walled}};

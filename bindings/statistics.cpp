@@ -156,6 +156,9 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   counts["volume_steps"] = s.volume_counts.steps;
   counts["volume_collisions"] = s.volume_counts.collisions;
   counts["volume_lanes"] = s.volume_counts.lanes;
+  counts["walks"] = s.walks;
+  counts["walk_steps"] = s.walk_steps;
+  counts["walk_lanes"] = s.walk_lanes;
   d["counts"] = counts;
   const auto rate = [&](uint64_t n) {
     return s.render_s > 0 ? static_cast<double>(n) / s.render_s : 0.0;

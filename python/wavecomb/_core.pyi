@@ -214,9 +214,10 @@ class SceneBuilder:
         82 degrees (black: none given, untinted).
         openpbr, for the program of that name: diffuse_roughness, specular_weight, anisotropy,
         rotation (turns), transmission_weight, transmission_color, transmission_depth,
-        subsurface_weight, subsurface_color, subsurface_anisotropy, fuzz_weight, fuzz_color,
-        fuzz_roughness, coat_color, coat_ior, coat_darkening, film_weight, film_thickness
-        (nanometres), film_ior, thin_walled. Its coat takes clearcoat and clearcoat_roughness.
+        subsurface_weight, subsurface_color, subsurface_radius (mean free paths; 0: diffuse),
+        subsurface_anisotropy, fuzz_weight, fuzz_color, fuzz_roughness, coat_color, coat_ior,
+        coat_darkening, film_weight, film_thickness (nanometres), film_ior, thin_walled. Its coat
+        takes clearcoat and clearcoat_roughness.
         """
     def add_mesh(
         self,

@@ -558,7 +558,8 @@ def test_materialx_layers(tmp_path):
     assert layers["thin_walled"] is True
     assert layers["diffuse_roughness"] == 0.125
     told = said(loaded)
-    assert "subsurface scattering" in told and "/Mat" in told
+    assert layers["subsurface_radius"] == (1, 1, 1)
+    assert "/Mat" in told
     assert "transmission_dispersion (ignored)" in told
     assert "diffuse_roughness" not in told
 

@@ -141,6 +141,12 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
                 f"{_percent(counts['volume_collisions'] / steps)} of them collisions, "
                 f"lanes {_percent(steps / counts['volume_lanes'])} full"
             )
+        if counts.get("walks"):
+            steps = counts["walk_steps"]
+            lines.append(
+                f"below surfaces: {steps / counts['walks']:.3g} collisions a walk, "
+                f"lanes {_percent(steps / counts['walk_lanes'])} full"
+            )
         lines.append(
             f"runs of a material {coherence['run_length']:.3g} records; neighbours of one material "
             f"{_percent(coherence['material_homogeneity'])}, at one place of a texture "

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from wavecomb.scenes.candles import build_candles
 from wavecomb.scenes.caustics import build_caustics
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.errors import SceneError
@@ -55,6 +56,7 @@ SCENES: dict[str, SceneInfo] = {
     "smoke": SceneInfo("smoke over an ember, a grid: see --voxels", 1.0, build_smoke),
     "clouds": SceneInfo("clouds over the sea, a grid: see --voxels", 100.0, build_clouds),
     "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),
+    "candles": SceneInfo("wax and marble, below whose surfaces light walks", 0.01, build_candles),
     "caustics": SceneInfo("a glass ball and a gold ring before a small lamp", 0.1, build_caustics),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }

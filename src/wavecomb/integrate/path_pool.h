@@ -21,11 +21,13 @@ template <typename F>
 struct PathRow {
   Vec3<F> o, d;  ///< the ray to be traced
   Color<F> throughput;
-  F pdf;                      ///< density of the bounce that made the ray; 0: delta or camera
+  F pdf;                      ///< density of the bounce that made the ray; 0: delta or camera; less
+                              ///< than that: below a surface, to walk there
   F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
   SampleKey<F> key;
-  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray; below a surface, of
+                     ///< which instance
   WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
 };
 

@@ -54,7 +54,7 @@ template <typename F>
 struct PathState {
   Vec3<F> dir;
   Color<F> throughput;
-  F pdf;  ///< of the bounce before; 0: delta or camera
+  F pdf;  ///< of the bounce before; 0: delta or camera; less: it led below a surface
   F eta_scale;
   F cone_width, cone_spread;
   Vec3<F> o;          ///< origin of the ray that arrived

@@ -24,13 +24,15 @@ struct ReferenceWorker {
   explicit ReferenceWorker(const WaveContext& context)
       : aovs(1, context.film->aovs().layout(), context.aovs),
         history(1, context.kept_vertices()),
-        splats(context.joins_light() ? Wave::kSplats : 0) {}
+        splats(context.joins_light() ? Wave::kSplats : 0),
+        walks(context.scene.walks.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()) {}
   PhaseClock clock;
   Counts counts;
   // Of the path that is traced, in slot 0.
   PathAovs aovs;
   PathHistory history;
   SplatList splats;  ///< of paths from lights
+  SoaBlock walks;    ///< below surfaces
 };
 
 /// Traces paths one after the other, each depth first, through what lies between surfaces.
@@ -102,6 +104,8 @@ class PathTracer {
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
       SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
+      bool came_out = false;
+      if (path.pdf < 0.f && !walk(key, depth, path, hit, came_out)) return depth;
       if constexpr (Media::kAny) {
         if constexpr (Media::kShines)
           if (media_.shines())
@@ -130,7 +134,9 @@ class PathTracer {
       }
       const bool on_surface = hit.inst != kNoSurface;
       const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
-      const uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
+      uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
+      if constexpr (Media::kStreams)
+        if (came_out && on_surface) material = media_.exit_material();
       if (depth == 0 && on_surface)
         aovs_.hit_surface<F>(*context_.camera, kSlot, p, time, hit.inst, hit.geom, material, true);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
@@ -163,6 +169,23 @@ class PathTracer {
       path.importance = importance;
       cone_at_origin = v.next.cone_width;
     }
+  }
+
+  /// Walks on from a ray that led below a surface; false: nothing comes of it. What is not below
+  /// the surface that it left goes on as it was.
+  bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
+            bool& came_out) {
+    const bool is_own = hit.inst == path.receiver;
+    path.pdf = -path.pdf;
+    path.receiver = 0;
+    if constexpr (Media::kStreams) {
+      if (!is_own) return true;
+      const uint32_t material = rays_.material_of(hit, rays_.mesh_of(hit));
+      if (!(context_.scene.walks.media[material].extinction.x > 0)) return true;
+      came_out = media_.walk(key, depth, settings_.sampler, rays_.time(), material, path, hit);
+      return came_out;
+    }
+    return true;
   }
 
   void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {

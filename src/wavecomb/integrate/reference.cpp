@@ -23,9 +23,9 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
   if (task.from_lights) return trace_light_task(context_, *workers_[i], task);
-  const VolumeView& volumes = context_.scene.volumes;
-  if (volumes.count > 0)
-    trace_task(context_, *workers_[i], task, Volumes(volumes, workers_[i]->counts.volumes));
+  ReferenceWorker& worker = *workers_[i];
+  if (context_.has_media())
+    trace_task(context_, worker, task, Volumes(context_, worker.counts, worker.walks));
   else
     trace_task(context_, *workers_[i], task, NoMedia());
 }

@@ -33,6 +33,9 @@ struct Counts {
   uint64_t packets = 0;       ///< shading packets run
   uint64_t packet_lanes = 0;  ///< lanes of those packets, full or not
   VolumeCounts volumes;
+  uint64_t walks = 0;       ///< ways below surfaces
+  uint64_t walk_steps = 0;  ///< rays traced there, which `rays` does not count
+  uint64_t walk_lanes = 0;  ///< lanes that took part, busy or not
   /// Rays, shadow rays and records of each depth (0: camera rays and what they hit).
   std::array<uint64_t, kCountedDepths> rays_at{}, shadow_rays_at{}, records_at{};
 
@@ -60,6 +63,9 @@ struct Counts {
     packets += o.packets;
     packet_lanes += o.packet_lanes;
     volumes.add(o.volumes);
+    walks += o.walks;
+    walk_steps += o.walk_steps;
+    walk_lanes += o.walk_lanes;
     for (size_t d = 0; d < kCountedDepths; ++d) {
       rays_at[d] += o.rays_at[d];
       shadow_rays_at[d] += o.shadow_rays_at[d];

@@ -63,6 +63,8 @@ struct WaveContext {
     return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height));
   }
 
+  /// Whether something lies between surfaces, or light walks below them.
+  bool has_media() const { return scene.volumes.count > 0 || scene.walks.media != nullptr; }
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }
   /// Whether paths keep the class of the surface that they left, where lights are linked.
@@ -91,7 +93,8 @@ struct Wave {
         shadows(capacity),
         columns(3, capacity),
         times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
-        ways(context.scene.volumes.count > 0 ? SoaBlock(kWayColumns, capacity) : SoaBlock()),
+        walks(context.scene.walks.media ? SoaBlock(kWalkColumns, capacity) : SoaBlock()),
+        ways(context.has_media() ? SoaBlock(kWayColumns, capacity) : SoaBlock()),
         sorter(capacity),
         ray_sorter(context.orders_rays() ? capacity : 0),
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
@@ -101,7 +104,7 @@ struct Wave {
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders) {}
-  static constexpr size_t kWayColumns = 10;
+  static constexpr size_t kWayColumns = 11, kWalkColumns = 29;
   static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 
@@ -114,6 +117,7 @@ struct Wave {
   ShadowQueue shadows;
   SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
   SoaBlock times;    ///< of the rays that are traced, where the scene moves
+  SoaBlock walks;    ///< paths below surfaces (medium/walkers.h), where there are any
   SoaBlock ways;     ///< what rays find in volumes (medium/volumes.h), where there are any
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
@@ -128,8 +132,8 @@ struct Wave {
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
-           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + ways.bytes() +
-           splats.bytes();
+           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
+           ways.bytes() + splats.bytes();
   }
 };
 

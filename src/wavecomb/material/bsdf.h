@@ -40,6 +40,7 @@ struct BsdfTraits {
   static constexpr bool kAbsorbs = false;       ///< rays inside lose light: Params::transmittance
   static constexpr bool kHasNonDelta = true;    ///< has lobes that light sampling makes sense for
   static constexpr bool kTransmits = false;     ///< those may lead to the other side
+  static constexpr bool kWalks = false;         ///< light may walk below: has `enters(wo, wi)`
   static constexpr bool kHasTerminator = true;  ///< rays start beyond the terminator of its normals
   static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
   static constexpr bool kReadsIor = false;      ///< the index of refraction says something

@@ -7,6 +7,7 @@
 
 #include "wavecomb/material/params.h"
 #include "wavecomb/scene/openpbr_data.h"
+#include "wavecomb/scene/walk_data.h"
 
 namespace wavecomb {
 
@@ -15,6 +16,7 @@ namespace wavecomb {
 template <typename F>
 struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   F thin_walled;        ///< 0 or 1
+  F walks;              ///< WalkKind
   const float* energy;  ///< EnergyTables
 
   /// fetch_params for this program.
@@ -62,6 +64,7 @@ inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const 
   const auto r = detail::make_reader<R, F>(view.openpbr, record, uniform, active);
   static_cast<OpenPbrInputs<F>&>(p) = r.template row<OpenPbrInputs>();
   p.thin_walled = r[&R::thin_walled];
+  p.walks = r[&R::walks];
   p.energy = view.energy;
   if constexpr (kGraphs) complete_params<F>(view, material, make_point, active, p);
   return p;

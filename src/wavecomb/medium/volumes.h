@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What lies between surfaces: the volumes of a scene.
+/// What lies between surfaces and below them: the volumes of a scene, and the walks of its light.
 #pragma once
 
 #include "wavecomb/integrate/media.h"
+#include "wavecomb/integrate/stages/trace.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/program_list.h"
 #include "wavecomb/medium/tracking.h"
 #include "wavecomb/medium/volume_bsdf.h"
+#include "wavecomb/medium/walkers.h"
+#include "wavecomb/surface/hit.h"
 
 namespace wavecomb {
 
@@ -17,8 +20,51 @@ class Volumes {
   template <typename F>
   using Programs = AppendedProgram<wavecomb::Programs<F>, VolumeBsdf<F>>;
 
-  /// `counts` gets what ways through them take.
-  Volumes(const VolumeView& volumes, VolumeCounts& counts) : volumes_(volumes), counts_(counts) {}
+  /// `counts` gets what ways through them take. `walks`: room for walks, of Walkers::kColumns.
+  Volumes(const WaveContext& context, Counts& counts, const SoaBlock& walks)
+      : context_(context),
+        volumes_(context.scene.volumes),
+        all_counts_(counts),
+        counts_(counts.volumes),
+        walks_(walks) {}
+
+  /// Whether light walks below surfaces.
+  bool has_walks() const { return context_.scene.walks.media != nullptr; }
+  /// Walks of the reference: the path of a ray that led below a surface and hit `hit`, of a
+  /// material. Afterwards the ray, in `path`, and its hit are those of who sees from outside where
+  /// the walk has ended; false: it has ended below.
+  template <typename Hit>
+  bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler, float time,
+            uint32_t material, PathState<float>& path, Hit& hit) const {
+    Walkers walkers(walks_);
+    walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput),
+                       0u, 0u, hit.inst, material, time, true);
+    bool came_out = false;
+    ++all_counts_.walks;
+    walkers.run<float>(context_.scene, *context_.accel, 1,
+                       {&key.pixel_hash, &key.sample, 1, 2 * depth}, all_counts_.walk_steps,
+                       all_counts_.walk_lanes,
+                       [&](bool, uint32_t, const WalkEnd<float>& end, bool came) {
+                         came_out = came;
+                         const Seen<float> seen = from_outside(end);
+                         path.o = seen.o;
+                         path.dir = seen.d;
+                         path.throughput = end.throughput;
+                         hit.t = seen.t;
+                         hit.u = end.u;
+                         hit.v = end.v;
+                         hit.prim = end.prim;
+                         hit.geom = end.geom;
+                         hit.inst = end.inst;
+                       });
+    return came_out;
+  }
+  /// Lanes, of the rays from `i` on, that see where a walk has ended.
+  template <typename F>
+  Mask<F> came_out(const Wave& wave, size_t i) const {
+    return Mask<F>(load<UInt<F>>(wave.ways.uints(kExit) + i) != UInt<F>(0u));
+  }
+  uint32_t exit_material() const { return context_.scene.walks.exit_material; }
 
   template <typename F>
   Flight<F> fly(const Passage<F>& p, const Color<F>& throughput, const Mask<F>& active) const {
@@ -45,6 +91,7 @@ class Volumes {
 
   template <typename F>
   void fly_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
+    walk_all<F>(wave, depth, sampler);
     const RayQueue& q = wave.rays;
     const Flights flights = flights_of(wave);
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
@@ -111,9 +158,112 @@ class Volumes {
     kHero = kRatio + 3,
     kSeed,
     kFirst,
+    kExit,
     kScratch
   };
   static_assert(kScratch + 2 == Wave::kWayColumns);
+  static_assert(Walkers::kColumns == Wave::kWalkColumns);
+
+  template <typename F>
+  static Walk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
+                            const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput) {
+    const Way<F> way = Way<F>(sampler, key, depth, VertexSet::kFlight).branch(0x51ee9u);
+    return {o,      d,      throughput, F(throughput.x + throughput.y + throughput.z),
+            F(0.f), F(0.f), way.seed,   UInt<F>(0u)};
+  }
+  /// A ray that sees from outside where a walk has ended.
+  template <typename F>
+  struct Seen {
+    Vec3<F> o, d;
+    F t;
+  };
+  template <typename F>
+  Seen<F> from_outside(const WalkEnd<F>& end) const {
+    const F t(1e-3f * context_.scene.scale);
+    return {fma(end.d, t, end.p), -end.d, t};
+  }
+
+  /// Walks of all rays of a wave that led below a surface.
+  template <typename F>
+  void walk_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
+    using U = UInt<F>;
+    if (!has_walks()) return;
+    const SceneView& scene = context_.scene;
+    const RayQueue& q = wave.rays;
+    const HitBuffer& hits = wave.hits;
+    uint32_t* const exits = wave.ways.uints(kExit);
+    Walkers walkers(walks_);
+    for (size_t i = 0; i < q.size; i += kWidth<F>) {
+      const Mask<F> active = first_lanes<F>(q.size - i);
+      const U slot = load<U>(q.slot + i);
+      store(exits + i, U(0u));
+      PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, active);
+      const Mask<F> below = active & (path.pdf < 0.f);
+      if (none(below)) continue;
+      const U inst = load<U>(hits.inst + i), geom = load<U>(hits.geom + i);
+      const Mask<F> own = below & Mask<F>(inst == path.receiver);
+      path.pdf = abs(path.pdf);
+      path.receiver = U(0u);
+      store_row<PathRow, F>(wave.pool.paths, slot, path, below);
+      const U material = material_below<F>(inst, geom, load<U>(hits.prim + i), own);
+      const Mask<F> walks = own & (walk_medium<F>(scene.walks, material, own).extinction.x > 0.f);
+      const F time = scene.has_motion
+                         ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, walks)
+                         : F(0.f);
+      walkers.add<F>(begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput),
+                     lane_index<F>() + static_cast<uint32_t>(i), slot, inst, material, time, walks);
+    }
+    all_counts_.walks += walkers.size();
+    walkers.run<F>(scene, *context_.accel, context_.traversal_width,
+                   presence_keys(wave.pool, depth, false), all_counts_.walk_steps,
+                   all_counts_.walk_lanes,
+                   [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end,
+                       const Mask<F>& came) { finish_walks<F>(wave, ended, who, end, came); });
+  }
+  template <typename F>
+  void finish_walks(Wave& wave, const Mask<F>& ended, const UInt<F>& who, const WalkEnd<F>& end,
+                    const Mask<F>& came) const {
+    using U = UInt<F>;
+    const RayQueue& q = wave.rays;
+    const HitBuffer& hits = wave.hits;
+    const Seen<F> seen = from_outside(end);
+    const U slot = gather<U>(q.slot, who, Mask<U>(ended));
+    PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, ended);
+    path.o = seen.o;
+    path.d = seen.d;
+    path.throughput = select<F>(came, end.throughput, Color<F>(F(0.f)));
+    store_row<PathRow, F>(wave.pool.paths, slot, path, ended);
+    const auto real = [&](float* column, const F& x) { scatter<F>(column, x, who, ended); };
+    const auto number = [&](uint32_t* column, const U& x) {
+      scatter<U>(column, x, who, Mask<U>(ended));
+    };
+    const auto three = [&](float* x, float* y, float* z, const Vec3<F>& v) {
+      real(x, v.x);
+      real(y, v.y);
+      real(z, v.z);
+    };
+    three(q.ox, q.oy, q.oz, seen.o);
+    three(q.dx, q.dy, q.dz, seen.d);
+    real(hits.t, seen.t);
+    real(hits.u, end.u);
+    real(hits.v, end.v);
+    number(hits.prim, end.prim);
+    number(hits.geom, end.geom);
+    number(hits.inst, select(Mask<U>(came), end.inst, U(kNoHit)));
+    number(wave.ways.uints(kExit), select(Mask<U>(came), U(1u), U(0u)));
+  }
+  template <typename F>
+  UInt<F> material_below(const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& prim,
+                         const Mask<F>& active) const {
+    using U = UInt<F>;
+    const SceneView& scene = context_.scene;
+    const auto of_instance = [&](auto member) {
+      return gather_member<F>(scene.instances, member, inst, active);
+    };
+    const U mesh = gather<U>(scene.geometry_mesh, of_instance(&InstanceRecord::geometry) + geom,
+                             Mask<U>(active));
+    return hit_material<F>(scene, of_instance(&InstanceRecord::material), mesh, prim, active);
+  }
 
   static Flights flights_of(const Wave& wave) {
     const SoaBlock& c = wave.ways;
@@ -133,8 +283,11 @@ class Volumes {
     store(wave.ways.floats(kFirst) + i, way.r.z);
   }
 
+  const WaveContext& context_;
   const VolumeView volumes_;
+  Counts& all_counts_;
   VolumeCounts& counts_;
+  const SoaBlock& walks_;
 };
 
 }  // namespace wavecomb

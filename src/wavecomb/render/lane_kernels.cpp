@@ -56,8 +56,8 @@ std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveConte
     return std::make_unique<ReferenceIntegrator>(context, threads);
   const LaneKernels kernels = lane_kernels(lanes);
   return std::make_unique<WaveIntegrator>(
-      context, context.scene.volumes.count > 0 ? kernels.run_in_volumes : kernels.run, lanes,
-      threads, wave_size);
+      context, context.has_media() ? kernels.run_in_volumes : kernels.run, lanes, threads,
+      wave_size);
 }
 
 const char* library_name() {

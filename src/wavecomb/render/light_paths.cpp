@@ -37,6 +37,10 @@ void check_light_paths(const Scene& scene) {
   if (scene.camera().projection == Projection::kLatlong)
     throw Error(
         "transport light does not go with latlong cameras; give another camera, or transport path");
+  if (scene.view().walks.media)
+    throw Error(
+        "transport light does not go with light that walks below surfaces; "
+        "render with transport path");
   if (!scene.volumes().empty())
     throw Error("transport light does not go with volumes, such as '" + scene.volumes()[0].name +
                 "'; leave them out, or give transport path");

@@ -64,6 +64,9 @@ void add_up(const PassRunner& runner, const WaveContext& context, const Scene& s
   s.packets = counts.packets;
   s.packet_lanes = counts.packet_lanes;
   s.volume_counts = counts.volumes;
+  s.walks = counts.walks;
+  s.walk_steps = counts.walk_steps;
+  s.walk_lanes = counts.walk_lanes;
   s.rays_at = reached(counts.rays_at);
   s.shadow_rays_at = reached(counts.shadow_rays_at);
   s.records_at = reached(counts.records_at);

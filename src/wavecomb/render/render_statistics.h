@@ -52,6 +52,7 @@ struct RenderStatistics {
   uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
   uint64_t packets = 0, packet_lanes = 0;
   VolumeCounts volume_counts;
+  uint64_t walks = 0, walk_steps = 0, walk_lanes = 0;  ///< of Counts
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
   Sharing sharing;

@@ -130,7 +130,7 @@ uint64_t hash_materials(const Scene& scene) {
 #define WAVECOMB_ADD(kind, name, standard, least, most) h.add(o.name);
       WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)
 #undef WAVECOMB_ADD
-      h.add(o.transmission_color, o.transmission_depth, o.thin_walled);
+      h.add(o.transmission_color, o.transmission_depth, o.subsurface_radius, o.thin_walled);
     }
     for (const TextureUse& use : m.textures) {
       h.add(use.texture, use.channel);

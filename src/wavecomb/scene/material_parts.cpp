@@ -4,10 +4,12 @@
 #include <algorithm>
 
 #include "wavecomb/scene/graph_ranges.h"
+#include "wavecomb/scene/walk_data.h"
 
 namespace wavecomb {
 
-uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const TexturePtr> textures) {
+uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const TexturePtr> textures,
+                  bool may_walk) {
   const DrivenRanges driven = driven_ranges(graphs, m.graph, textures);
   // What a graph drives takes the place of a texture, and that the place of a constant.
   const auto may_pass = [&](const char* parameter, float limit, bool otherwise) {
@@ -36,7 +38,8 @@ uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const Tex
   if (m.program == ProgramId::kOpenPbr) {
     const OpenPbr& o = m.openpbr;
     add(kPasses, above_0("transmission_weight", o.transmission_weight != 0));
-    add(kBacks, o.thin_walled && above_0("subsurface_weight", o.subsurface_weight != 0));
+    const bool walks = may_walk && walk_kind(m, graphs) != WalkKind::kNone;
+    add(kBacks, (o.thin_walled || walks) && above_0("subsurface_weight", o.subsurface_weight != 0));
     add(kFuzzes, above_0("fuzz_weight", o.fuzz_weight != 0));
     add(kFilms, above_0("film_weight", o.film_weight != 0));
     add(kBrushes, above_0("anisotropy", o.anisotropy != 0) || above_0("rotation", o.rotation != 0));

@@ -63,9 +63,10 @@ constexpr ProgramId program_of(uint32_t variant) {
 }
 
 /// Parts that a settled material (settled_material.h) may show: whatever its textures give, and its
-/// graphs within their ranges (graph_ranges.h), which may read `textures`.
+/// graphs within their ranges (graph_ranges.h), which may read `textures`. `may_walk`: light walks
+/// below the surfaces that ask for it.
 uint32_t parts_of(const Material& material, const GraphSet& graphs,
-                  std::span<const TexturePtr> textures);
+                  std::span<const TexturePtr> textures, bool may_walk = false);
 
 /// The cheapest variant of a program that has all of these parts.
 uint32_t least_variant(ProgramId program, uint32_t parts);

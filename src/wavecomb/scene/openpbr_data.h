@@ -18,8 +18,9 @@
 ///                          the bitangent
 ///   transmission_tint      of each crossing
 ///   extinction             of what is inside, one over a unit of length
-///   subsurface_...         approximated as diffuse; of thin walls (1 + anisotropy) / 2 goes
-///   through film_thickness         nanometres
+///   subsurface_...         light that walks below the surface (scene/walk_data.h), where a radius
+///                          is given; else diffuse. Of thin walls (1 + anisotropy) / 2 goes through
+///   film_thickness         nanometres
 #define WAVECOMB_OPENPBR_INPUTS(X)           \
   X(Number, diffuse_roughness, 0, 0, 1)      \
   X(Number, specular_weight, 1, 0, 100)      \
@@ -78,6 +79,9 @@ struct OpenPbr : OpenPbrInputs<float> {
   /// leaves; else it tints each crossing.
   Vec3<float> transmission_color{1, 1, 1};
   float transmission_depth = 0;
+  /// Mean free paths below the surface, by channel, units of length. 0: light leaves where it came
+  /// in.
+  Vec3<float> subsurface_radius{0, 0, 0};
   bool thin_walled = false;
 
   OpenPbr() : OpenPbrInputs<float>{} {
@@ -90,7 +94,8 @@ struct OpenPbr : OpenPbrInputs<float> {
 /// As lanes read it: 32 words.
 struct alignas(64) OpenPbrRecord : OpenPbrInputs<float> {
   float thin_walled;  ///< 0 or 1
-  float pad[2];
+  float walks;        ///< WalkKind
+  float pad;
 };
 static_assert(sizeof(OpenPbrRecord) == 128);
 

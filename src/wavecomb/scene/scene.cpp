@@ -90,6 +90,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                static_cast<uint32_t>(geometry_->volume_records.size()),
                geometry_->first_volume_material,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
+  v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
+             geometry_->exit_material};
   v.has_motion = geometry_->moves();
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -130,8 +132,8 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
       shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
-    new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs,
-                                                           geometry_->textures);
+    new_materials = std::make_shared<const SceneMaterials>(
+        std::move(all), materials_->graphs, geometry_->textures, geometry_->exit_material);
   }
   std::shared_ptr<const SceneTangents> new_tangents = tangents_;
   if (new_materials->wants_tangents != materials_->wants_tangents)

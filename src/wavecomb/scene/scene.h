@@ -14,6 +14,7 @@
 #include "wavecomb/scene/mesh_tangents.h"
 #include "wavecomb/scene/scene_parts.h"
 #include "wavecomb/scene/volume.h"
+#include "wavecomb/scene/walk_data.h"
 
 namespace wavecomb {
 
@@ -33,6 +34,7 @@ struct SceneView {
   LightView lights;
   MotionView motion;
   VolumeView volumes;
+  WalkView walks;
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;

@@ -66,6 +66,7 @@ void check_material(const Material& material, size_t texture_count, size_t graph
   for_each_parameter<Vec3<float>>(
       material, [&](const MaterialParameter&, const Vec3<float>& value) { check(value); });
   check(o.transmission_color);
+  check(o.subsurface_radius);
   std::apply([&](const auto&... input) { (check(input), ...); },
              static_cast<const OpenPbrInputs<float>&>(o).fields());
   if (!good) throw Error(name + " has a parameter that is not finite; give finite numbers");

@@ -125,7 +125,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
                         " instances have a singular transform and were left out");
 
   SceneCounts counts{.meshes = meshes_.size(),
-                     .materials = materials_.size() + 1 + volumes_.size(),
+                     .materials = materials_.size() + 2 + volumes_.size(),
                      .instances = geometry->instances.size(),
                      .placed = groups_[0].meshes.size(),
                      .placements = geometry->placements.size(),
@@ -149,6 +149,17 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     inside.name = volume.name;
     inside.program = ProgramId::kVolume;
     materials_.push_back(inside);
+  }
+  // And where walks below surfaces end.
+  if (std::ranges::any_of(materials_, [](const Material& m) {
+        const Vec3<float>& r = m.openpbr.subsurface_radius;
+        return m.program == ProgramId::kOpenPbr && std::max({r.x, r.y, r.z}) > 0;
+      })) {
+    geometry->exit_material = static_cast<uint32_t>(materials_.size());
+    Material white = fallback;
+    white.name = "below surfaces";
+    white.base_color = {1, 1, 1};
+    materials_.push_back(white);
   }
   for (const Mesh& mesh : meshes_) {
     const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
@@ -182,7 +193,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
         std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})),
-        geometry->textures);
+        geometry->textures, geometry->exit_material);
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
     tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);

@@ -108,7 +108,7 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 }  // namespace
 
 SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_,
-                               std::span<const TexturePtr> textures)
+                               std::span<const TexturePtr> textures, uint32_t exit_material)
     : materials(std::move(all)), graphs(std::move(programs_)) {
   const DenormalsOff denormals_off;  // as kernels have it
   for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
@@ -120,10 +120,18 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     if (m.program == ProgramId::kOpenPbr) {
       records.back().openpbr = static_cast<uint32_t>(openpbr.size());
       openpbr.push_back(make_openpbr_record(m.openpbr));
+      const WalkKind walk =
+          exit_material != kInheritMaterial ? walk_kind(m, *graphs) : WalkKind::kNone;
+      openpbr.back().walks = static_cast<float>(walk);
+      if (walk != WalkKind::kNone) {
+        walks.resize(materials.size());
+        walks[records.size() - 1] = make_walk_medium(m, walk);
+      }
     }
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
-    variants.push_back(least_variant(m.program, parts_of(m, *graphs, textures)));
+    variants.push_back(least_variant(
+        m.program, parts_of(m, *graphs, textures, exit_material != kInheritMaterial)));
     wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();

@@ -19,6 +19,7 @@
 #include "wavecomb/scene/motion.h"
 #include "wavecomb/scene/names.h"
 #include "wavecomb/scene/volume.h"
+#include "wavecomb/scene/walk_data.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
@@ -97,7 +98,9 @@ struct SceneGeometry {
   std::vector<MeshMotion> mesh_motions;
   std::vector<MatrixStep> steps;  ///< of all instances that move
   std::vector<VolumeRecord> volume_records;
-  uint32_t first_volume_material = 0;       ///< VolumeView::first_material
+  uint32_t first_volume_material = 0;  ///< VolumeView::first_material
+  /// WalkView::exit_material; kInheritMaterial: no material had a radius, and nobody can walk.
+  uint32_t exit_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
   bool moves() const { return mesh_motions.size() > 1 || !steps.empty(); }
   AttributeView attributes() const {
@@ -119,9 +122,10 @@ struct SceneGeometry {
 
 /// Materials, and as lanes read them.
 struct SceneMaterials {
-  /// `textures`: those of the scene, which materials and graphs read.
+  /// `textures`: those of the scene, which materials and graphs read. `exit_material`: of
+  /// SceneGeometry.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
-                 std::span<const TexturePtr> textures);
+                 std::span<const TexturePtr> textures, uint32_t exit_material);
 
   std::vector<Material> materials;  ///< as they were told
   std::vector<Material> shaded;     ///< the same, settled (settled_material.h)
@@ -135,6 +139,7 @@ struct SceneMaterials {
   std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
   /// By material; empty where no program has parameters to itself.
   std::vector<ProgramParameterRecord> own;
+  std::vector<WalkMedium<float>> walks;  ///< by material; empty where nobody walks
   bool has_presence = false, has_emission = false;
 };
 

@@ -135,8 +135,13 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     const U first = float_bits<F>(row[0]), inherited = float_bits<F>(row[1]);
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
     U material = hit_material<F>(scene, inherited, mesh, prim, surface);
-    if constexpr (Media::kAny)
+    if constexpr (Media::kAny) {
+      if constexpr (Media::kStreams)
+        if (media.has_walks())
+          material = select(Mask<U>(media.template came_out<F>(wave, i)), U(media.exit_material()),
+                            material);
       material = select(Mask<U>(flight.stopped), flight.material, material);
+    }
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
     if (notes_hits)
       wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,

@@ -28,6 +28,12 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
   out.next.eta_scale = path.eta_scale * b.eta * b.eta;
   out.next.receiver = receiver.normal;
+  if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
+    // What medium/walk.h looks for.
+    const Mask<F> enters = at.bsdf.enters(wo, b.wi);
+    out.next.pdf = select(enters, F(-out.next.pdf), out.next.pdf);
+    out.next.receiver = select(Mask<UInt<F>>(enters), v.hit.inst, out.next.receiver);
+  }
   out.next.cone_width = path.cone_width;
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));

@@ -20,8 +20,9 @@ namespace wavecomb {
 /// and pdf are those of the mixture.
 ///
 /// Opaque and thin-walled surfaces are alike from both sides. A solid that transmits is seen from
-/// inside without fuzz and without the coat's reflection. Subsurface scattering is approximated as
-/// diffuse.
+/// inside without fuzz and without the coat's reflection. What is scattered below the surface is
+/// diffuse, or, where light walks there, enters as a diffuse lobe to the other side
+/// (medium/walk.h).
 ///
 /// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
 /// show no others.
@@ -39,6 +40,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kAbsorbs = (kParts & kPasses) != 0;
   // Not by parts: which lights the tree chooses goes by it.
   static constexpr bool kTransmits = true;
+  static constexpr bool kWalks = kBack;
   static constexpr bool kTextured = (kParts & (kVaries | kBrushes)) != 0;
   using Params = OpenPbrParams<F>;
   /// All, or none: a frame lies along the texture where any of them has one.
@@ -58,14 +60,18 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       fuzz_color_ = p.fuzz_color;
     }
     if constexpr (kCoat) coat_ = OpenPbrCoat<F>(p);
-    // Thin walls let a part of the diffuse light through.
+    // Thin walls let a part of the diffuse light through, and what walks below the surface enters.
     const F sub = p.subsurface_weight;
     Color<F> under = p.subsurface_color;
-    back_ = Color<F>(F(0.f));
+    back_ = seen_back_ = Color<F>(F(0.f));
     if constexpr (kBack) {
-      const F through = F(0.5f * F(1.f + p.subsurface_anisotropy)) * p.thin_walled;
+      walks_ = p.walks > 0.f;
+      const F through =
+          select(walks_, F(1.f), F(F(0.5f * F(1.f + p.subsurface_anisotropy)) * p.thin_walled));
       under = under * F(1.f - through);
-      back_ = p.subsurface_color * F(sub * through);
+      seen_back_ = p.subsurface_color * F(sub * through);
+      const Mask<F> whole = p.walks == F(static_cast<float>(WalkKind::kWhole));
+      back_ = select<F>(whole, Color<F>(sub), seen_back_);
     }
     diffuse_ = lerp(p.base_color, under, sub);
     if constexpr (kTurned) {
@@ -76,7 +82,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   Color<F> albedo() const {
-    const Color<F> c = base_.metal_f0() * base_.metal + (diffuse_ + back_) * base_.opaque +
+    const Color<F> c = base_.metal_f0() * base_.metal + (diffuse_ + seen_back_) * base_.opaque +
                        base_.tint * base_.glass +
                        base_.specular_color * F(F(1.f - base_.metal) * base_.glass_f0);
     return min(c, Color<F>(F(1.f)));
@@ -87,6 +93,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     if constexpr (kCoat) any_lobe = any_lobe | (not_(coat_.smooth) & (coat_.weight > 0.f));
     if constexpr (kFuzz) any_lobe = any_lobe | (fuzz_ > 0.f);
     return any_lobe;
+  }
+
+  /// Lanes whose light goes on below the surface, and walks there.
+  Mask<F> enters(const Vec3<F>& wo, const Vec3<F>& wi) const {
+    if constexpr (!kBack) return Mask<F>(false);
+    return walks_ & (wo.z > 0.f) & (wi.z < 0.f);
   }
 
   /// A coat or a fuzz is seen from outside alone.
@@ -292,8 +304,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
 
   /// What the coat's own reflections make of the colour below it.
   Color<F> darkened(const View& v, const F& z) const {
-    const Color<F> albedo =
-        base_.metal_f0() * base_.metal + (diffuse_ + back_) * base_.opaque + Color<F>(base_.glass);
+    const Color<F> albedo = base_.metal_f0() * base_.metal +
+                            (diffuse_ + seen_back_) * base_.opaque + Color<F>(base_.glass);
     const F spread = fma(F(1.f - base_.opaque), base_.roughness, base_.opaque);
     return coat_.darkened(z, albedo, spread, v.base.inside);
   }
@@ -371,6 +383,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   OpenPbrCoat<F> coat_;
   F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
   Color<F> fuzz_color_, diffuse_, back_;
+  Color<F> seen_back_;  ///< of what is behind `back_`: the colour that comes back
+  Mask<F> walks_{false};
 };
 
 }  // namespace wavecomb

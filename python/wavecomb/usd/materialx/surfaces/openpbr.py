@@ -40,9 +40,22 @@ def layers_of(model: str, inputs: Inputs) -> dict[str, Any]:
         found |= _standard_surface(inputs, found)
     elif model == "gltf_pbr":
         found |= _gltf_pbr(inputs)
-    if found.get("subsurface_weight", 0.0) > 0:
-        inputs.approximated("subsurface scattering (diffuse in its colour)")
+    if model != "gltf_pbr":
+        found["subsurface_radius"] = _free_paths(model, inputs)
+        if found["subsurface_weight"] > 0 and found["transmission_weight"] > 0:
+            what = "subsurface scattering beside transmission (diffuse in its colour)"
+            inputs.approximated(what)
     return found
+
+
+def _free_paths(model: str, i: Inputs) -> Colour:
+    """Mean free paths below the surface, by channel."""
+    if model == "standard_surface":
+        scale, by_channel = i.number("subsurface_scale", 1.0), i.colour("subsurface_radius", WHITE)
+    else:
+        scale = i.number("subsurface_radius", 1.0)
+        by_channel = i.colour("subsurface_radius_scale", (1.0, 0.5, 0.25))
+    return (scale * by_channel[0], scale * by_channel[1], scale * by_channel[2])
 
 
 def _read(row: Row, inputs: Inputs) -> Any:

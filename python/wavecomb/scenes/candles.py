@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Three burning candles and a marble ball on a table: light walks below all of their surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+from pxr import Gf, Sdf, UsdShade
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.caustics import ball
+from wavecomb.scenes.materials import Colour
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.shapes import placed, turned
+from wavecomb.scenes.stage import StageWriter
+
+_FLAME = (95.0, 48.0, 16.0)
+_CANDLES = (
+    ("Tall", (-5.2, 0.0, -0.5), 2.6, 15.0),
+    ("Middle", (1.2, 0.0, -2.6), 3.1, 10.5),
+    ("Low", (4.4, 0.0, 2.6), 3.4, 5.6),
+)
+"""Names, places, radii and heights in centimetres."""
+
+
+def _below(
+    writer: StageWriter, name: str, colour: Colour, radius: Colour, roughness: float, ior: float
+) -> None:
+    """An OpenPBR surface below which all light walks; ``radius``: mean free paths by channel."""
+    path = f"/World/Looks/{name}"
+    material = UsdShade.Material.Define(writer.stage, path)
+    shader = UsdShade.Shader.Define(writer.stage, f"{path}/Surface")
+    shader.CreateIdAttr("ND_open_pbr_surface_surfaceshader")
+    longest = max(radius)
+    kinds = Sdf.ValueTypeNames
+    for key, kind, value in (
+        ("base_color", kinds.Color3f, Gf.Vec3f(*colour)),
+        ("specular_roughness", kinds.Float, roughness),
+        ("specular_ior", kinds.Float, ior),
+        ("subsurface_weight", kinds.Float, 1.0),
+        ("subsurface_color", kinds.Color3f, Gf.Vec3f(*colour)),
+        ("subsurface_radius", kinds.Float, longest),
+        ("subsurface_radius_scale", kinds.Color3f, Gf.Vec3f(*(r / longest for r in radius))),
+    ):
+        shader.CreateInput(key, kind).Set(value)
+    terminal = material.CreateSurfaceOutput("mtlx")
+    terminal.ConnectToSource(shader.CreateOutput("out", kinds.Token))
+    writer.own_material(name, material)
+
+
+def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radius: float,
+            height: float, columns: int) -> None:  # fmt: skip
+    """Wax with a rim about a shallow pool, a wick, and a flame that is a lamp, too."""
+    rim = 0.12 * radius
+    profile = np.array([
+        (0.0, 0.0), (0.97 * radius, 0.0), (radius, 0.03 * radius), (radius, height - rim),
+        (0.96 * radius, height - 0.3 * rim), (0.88 * radius, height), (0.8 * radius, height - rim),
+        (0.62 * radius, height - 2.2 * rim), (0.3 * radius, height - 2.7 * rim),
+        (0.0, height - 2.8 * rim),
+    ])  # fmt: skip
+    wax = placed(turned(profile, columns, 6), at)
+    writer.bind(writer.mesh(f"/World/Objects/{name}_Wax", wax).GetPrim(), "Wax")
+    bottom = height - 3.2 * rim
+    wick = np.array([(0.0, bottom), (0.12, bottom), (0.1, height + 0.45), (0.0, height + 0.5)])
+    made = placed(turned(wick, 12, 2), at)
+    writer.bind(writer.mesh(f"/World/Objects/{name}_Wick", made).GetPrim(), "Wick")
+    t = np.linspace(0.0, 1.0, 17)
+    flame = np.stack([0.42 * np.sin(np.pi * t) * (1.0 - 0.55 * t), height + 0.35 + 2.6 * t], axis=1)
+    flame[[0, -1], 0] = 0.0
+    made = placed(turned(flame, 24, 1), at)
+    writer.bind(writer.mesh(f"/World/Objects/{name}_Flame", made).GetPrim(), "Flame")
+
+
+def build_candles(writer: StageWriter, options: SceneOptions) -> None:
+    """The table, the candles and the ball, in a dim room."""
+    writer.material("Table", looks.plastic((0.17, 0.08, 0.045), 0.3))
+    writer.material("Wick", looks.diffuse((0.03, 0.025, 0.02)))
+    writer.material("Flame", looks.emissive(_FLAME))
+    _below(writer, "Wax", (0.93, 0.83, 0.66), (0.9, 0.45, 0.22), 0.35, 1.44)
+    _below(writer, "Marble", (0.78, 0.8, 0.74), (0.5, 0.62, 0.44), 0.12, 1.5)
+    half = 40.0
+    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
+    writer.polygons("/World/Set/Table", corners, [[0, 1, 2, 3]], "Table")
+    columns = 8 * options.teapot_level
+    for name, at, radius, height in _CANDLES:
+        _candle(writer, name, at, radius, height, columns)
+    marble = placed(ball(2.1, options.teapot_level), (-1.6, 2.1, 3.4))
+    writer.bind(writer.mesh("/World/Objects/Ball", marble).GetPrim(), "Marble")
+    writer.rect_light("Window", (-6.0, 24.0, 22.0), 14.0, 14.0, (1.6, 2.0, 2.8), -45.0)
+    writer.dome_light("Sky", 30.0, 0.05)
+    writer.camera((0.0, 13.0, 37.0), (-0.4, 7.4, 0.0), 36.0, options.aspect or 4.0 / 3.0)

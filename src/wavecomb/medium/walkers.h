@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Walks below surfaces side by side: all take a step at a time, and those that have ended make
+/// room, so that lanes stay full.
+#pragma once
+
+#include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/core/soa.h"
+#include "wavecomb/medium/walk.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Where a walk has come to the surface.
+template <typename F>
+struct WalkEnd {
+  Vec3<F> p, d;  ///< the point, and the direction that the walk came in
+  Color<F> throughput;
+  F u, v;
+  UInt<F> prim, geom, inst;
+};
+
+/// Walks, side by side; columns of a block that somebody else has.
+///
+/// Contract: each walk draws its own random numbers and no other's, so that neither order nor
+/// number of lanes shows.
+class Walkers {
+ public:
+  static constexpr size_t kColumns = 29;
+  explicit Walkers(const SoaBlock& block) : c_(block) {}
+
+  size_t size() const { return size_; }
+
+  /// Takes over walks in the active lanes. `who`: what `finish` is told; `slot`: of the path.
+  template <typename F>
+  void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const UInt<F>& inst,
+           const UInt<F>& material, const F& time, const Mask<F>& active) {
+    size_ += put<F>(size_, {w, who, slot, inst, material, time}, active);
+  }
+
+  /// Walks until none is left. `keys`: of the paths' slots, whose salt is that of the ray that
+  /// entered. finish(lanes, who, end, came): walks that have ended, of which those in `came` have
+  /// come to the surface.
+  template <typename F, typename Finish>
+  void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+           PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
+    using U = UInt<F>;
+    const uint32_t salt = keys.salt;
+    for (uint32_t step = 0; size_ > 0; ++step) {
+      for (size_t i = 0; i < size_; i += kWidth<F>) {
+        Row<F> row = get<F>(i);
+        const Mask<F> active = first_lanes<F>(size_ - i);
+        begin_flight<F>(walk_medium<F>(scene.walks, row.material, active), row.walk);
+        store(c_.floats(kRest) + i, row.walk.rest);
+      }
+      keys.salt = salt + 0x10000u * (step + 1);
+      accel.intersect({c_.floats(kO), c_.floats(kO + 1), c_.floats(kO + 2), c_.floats(kD),
+                       c_.floats(kD + 1), c_.floats(kD + 2), c_.floats(kRest), c_.uints(kSlot),
+                       size_, scene.has_motion ? c_.floats(kTime) : nullptr},
+                      {c_.floats(kHitT), c_.floats(kHitU), c_.floats(kHitV), c_.uints(kHitPrim),
+                       c_.uints(kHitGeom), c_.uints(kHitInst)},
+                      width, false, keys);
+      steps += size_;
+      size_t left = 0;
+      for (size_t i = 0; i < size_; i += kWidth<F>) {
+        lanes += kWidth<F>;
+        const Mask<F> active = first_lanes<F>(size_ - i);
+        Row<F> row = get<F>(i);
+        Walk<F>& w = row.walk;
+        const U inst = load<U>(c_.uints(kHitInst) + i);
+        const F hit_t = load<F>(c_.floats(kHitT) + i);
+        const Mask<F> own = active & Mask<F>(inst == row.inst);
+        const Mask<F> collides = active & Mask<F>(inst == U(kNoHit));
+        // What else there is does not stop a walk.
+        const Mask<F> passes = active & not_(own) & not_(collides);
+        Walk<F> after = w;
+        const F t = select(own, hit_t, w.rest);
+        const Mask<F> goes_on =
+            end_flight<F>(walk_medium<F>(scene.walks, row.material, active), t, collides, after);
+        if (any(passes)) {
+          const F past = hit_t * 1.0001f + scene.scale * 1e-6f;
+          after.o = select<F>(passes, fma(w.d, past, w.o), after.o);
+          after.d = select<F>(passes, w.d, after.d);
+          after.throughput = select<F>(passes, w.throughput, after.throughput);
+          after.gone = select(passes, F(w.gone + past), after.gone);
+          after.rest = select(passes, max(F(w.rest - past), F(1e-30f)), after.rest);
+          after.number = select(Mask<U>(passes), w.number, after.number);
+        }
+        const Mask<F> ended = active & not_(passes) & not_(goes_on);
+        if (any(ended)) {
+          const WalkEnd<F> end{after.o,
+                               after.d,
+                               after.throughput,
+                               load<F>(c_.floats(kHitU) + i),
+                               load<F>(c_.floats(kHitV) + i),
+                               load<U>(c_.uints(kHitPrim) + i),
+                               load<U>(c_.uints(kHitGeom) + i),
+                               inst};
+          finish(ended, row.who, end, Mask<F>(ended & own));
+        }
+        row.walk = after;
+        left += put<F>(left, row, active & not_(ended));
+      }
+      size_ = left;
+    }
+  }
+
+ private:
+  enum Column : size_t {
+    kO,
+    kD = kO + 3,
+    kThroughput = kD + 3,
+    kFirst = kThroughput + 3,
+    kGone,
+    kRest,
+    kSeed,
+    kNumber,
+    kWho,
+    kSlot,
+    kInst,
+    kMaterial,
+    kTime,
+    kHitT,
+    kHitU,
+    kHitV,
+    kHitPrim,
+    kHitGeom,
+    kHitInst,
+    kEnd
+  };
+  static_assert(kEnd <= kColumns);
+
+  template <typename F>
+  struct Row {
+    Walk<F> walk;
+    UInt<F> who, slot, inst, material;
+    F time;
+  };
+
+  template <typename F>
+  Row<F> get(size_t i) const {
+    using U = UInt<F>;
+    const auto real = [&](size_t column) { return load<F>(c_.floats(column) + i); };
+    const auto number = [&](size_t column) { return load<U>(c_.uints(column) + i); };
+    const auto three = [&](size_t column) {
+      return Vec3<F>(real(column), real(column + 1), real(column + 2));
+    };
+    return {{three(kO), three(kD), three(kThroughput), real(kFirst), real(kGone), real(kRest),
+             number(kSeed), number(kNumber)},
+            number(kWho),
+            number(kSlot),
+            number(kInst),
+            number(kMaterial),
+            real(kTime)};
+  }
+  /// Puts the active lanes side by side from `i` on; returns how many. What lies behind them, up to
+  /// a packet, may be overwritten.
+  template <typename F>
+  size_t put(size_t i, const Row<F>& row, const Mask<F>& active) {
+    using U = UInt<F>;
+    size_t n = 0;
+    const auto real = [&](size_t column, const F& x) {
+      n = compress_store<F>(c_.floats(column) + i, x, active);
+    };
+    const auto number = [&](size_t column, const U& x) {
+      compress_store<U>(c_.uints(column) + i, x, Mask<U>(active));
+    };
+    const auto three = [&](size_t column, const Vec3<F>& x) {
+      real(column, x.x);
+      real(column + 1, x.y);
+      real(column + 2, x.z);
+    };
+    const Walk<F>& w = row.walk;
+    three(kO, w.o);
+    three(kD, w.d);
+    three(kThroughput, w.throughput);
+    real(kFirst, w.first);
+    real(kGone, w.gone);
+    real(kRest, w.rest);
+    real(kTime, row.time);
+    number(kSeed, w.seed);
+    number(kNumber, w.number);
+    number(kWho, row.who);
+    number(kSlot, row.slot);
+    number(kInst, row.inst);
+    number(kMaterial, row.material);
+    return n;
+  }
+
+  const SoaBlock& c_;
+  size_t size_ = 0;
+};
+
+}  // namespace wavecomb

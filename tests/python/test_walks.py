@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Light that walks below surfaces: colours of flat walls, closed forms, furnaces, schedules."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.polynomial.legendre import leggauss
+
+import wavecomb
+from wavecomb import _core
+
+FACES = np.array(
+    [
+        *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
+        *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
+    ],
+    np.uint32,
+)
+
+
+def box(builder: Any, low: Any, high: Any, material: int) -> None:
+    """A closed box."""
+    ends = np.array([low, high], np.float32)
+    corners = [[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    mesh = builder.add_mesh(np.array(corners, np.float32), FACES, material=material)
+    builder.add_to_group(0, mesh)
+
+
+def skin(builder: Any, **values: Any) -> int:
+    """A material below whose surface all light walks."""
+    layers = {"subsurface_weight": 1.0, "specular_weight": 0.0, "subsurface_radius": (1, 1, 1)}
+    return int(builder.add_material("openpbr", openpbr={**layers, **values}))
+
+
+def slab(depth: float, spp: int = 64, size: int = 24, **values: Any) -> Any:
+    """A wide slab under even light of radiance 1 from everywhere, seen from above: its pixels."""
+    builder = wavecomb.SceneBuilder()
+    half = 400.0
+    box(builder, (-half, -half, -depth), (half, half, 0.0), skin(builder, **values))
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1))
+    camera = np.eye(4)
+    camera[3, 2] = 5.0
+    builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
+    settings = _core.Settings(
+        width=size, height=size, spp=spp, max_depth=2, filter="box", filter_width=1.0
+    )
+    result = _core.render(builder.build(), settings, None, None, None)
+    return result.beauty.reshape(-1, 3).astype(np.float64)
+
+
+def chandrasekhar(albedo: float) -> float:
+    """Spherical albedo of an isotropic half-space: 1 - 2 sqrt(1 - a) int mu H(mu) dmu."""
+    nodes, weights = leggauss(64)
+    mu, w = 0.5 * (nodes + 1), 0.5 * weights
+    h = np.ones_like(mu)
+    for _ in range(2000):
+        inner = (w * mu * h)[None, :] / (mu[:, None] + mu[None, :])
+        h = 1 / (np.sqrt(1 - albedo) + 0.5 * albedo * inner.sum(axis=1))
+    return float(1 - 2 * np.sqrt(1 - albedo) * (w * mu * h).sum())
+
+
+def single_albedo(color: float) -> float:
+    """That which the core takes (scene/walk_data.h)."""
+    s = 4.09712 + 4.20863 * color - np.sqrt(9.59217 + 41.6808 * color + 17.7126 * color**2)
+    return float(1 - s * s)
+
+
+def test_a_half_space_is_chandrasekhars() -> None:
+    """Within 0.5 % and noise, by channel: light that arrives evenly, isotropic collisions."""
+    colors = (0.3, 0.6, 0.9)
+    seen = slab(200.0, spp=256, subsurface_color=colors)
+    for channel, color in enumerate(colors):
+        exact = chandrasekhar(single_albedo(color))
+        mean, error = seen[:, channel].mean(), seen[:, channel].std() / np.sqrt(len(seen))
+        assert abs(mean - exact) < 0.005 * exact + 3.5 * error
+        assert error < 0.005
+
+
+@pytest.mark.parametrize(
+    ("anisotropy", "off"), [(0.0, 0.01), (0.3, 0.01), (0.6, 0.01), (-0.3, 0.03)]
+)
+def test_a_flat_wall_has_the_colour_asked_for(anisotropy: float, off: float) -> None:
+    """Within 1 %, and noise; where collisions send light back, the approximation is worse."""
+    colors = (0.2, 0.5, 0.85)
+    seen = slab(300.0, spp=192, subsurface_color=colors, subsurface_anisotropy=anisotropy)
+    for channel, color in enumerate(colors):
+        mean, error = seen[:, channel].mean(), seen[:, channel].std() / np.sqrt(len(seen))
+        assert abs(mean - color) < off * color + 3.5 * error
+
+
+@pytest.mark.parametrize("depth", [0.5, 3.0])
+def test_white_walks_lose_nothing(depth: float) -> None:
+    """A furnace of colour 1, whose mean free paths differ by channel, within 0.5 %."""
+    seen = slab(
+        depth, spp=256, subsurface_color=(1, 1, 1), subsurface_radius=(2.0, 1.0, 0.25),
+        subsurface_anisotropy=0.3,
+    )  # fmt: skip
+    for channel in range(3):
+        mean, error = seen[:, channel].mean(), seen[:, channel].std() / np.sqrt(len(seen))
+        assert abs(mean - 1.0) < 0.005 + 3.5 * error
+        assert error < 0.01
+
+
+def test_a_clear_slab_shows_what_lies_below() -> None:
+    """All light of a clear slab comes from the floor below it."""
+    builder = wavecomb.SceneBuilder()
+    thin = skin(builder, subsurface_color=(0.5, 0.5, 0.5), subsurface_radius=(1e4, 1e4, 1e4))
+    box(builder, (-40, -40, -0.01), (40, 40, 0.0), thin)
+    floor = builder.add_material("emissive", emission=(1.0, 2.0, 3.0))
+    box(builder, (-400, -400, -2.0), (400, 400, -1.0), floor)
+    camera = np.eye(4)
+    camera[3, 2] = 5.0
+    builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
+    settings = _core.Settings(width=16, height=16, spp=64, max_depth=3, filter="box")
+    seen = _core.render(builder.build(), settings, None, None, None).beauty.reshape(-1, 3)
+    # A white Lambertian exit over a floor of even radiance.
+    assert np.allclose(seen.mean(axis=0), (1.0, 2.0, 3.0), rtol=0.01)
+
+
+def scene() -> Any:
+    """A box of skin with a coat, one within it, a floor, a lamp and a sky."""
+    builder = wavecomb.SceneBuilder()
+    values = {
+        "subsurface_color": (0.9, 0.5, 0.3),
+        "subsurface_radius": (0.3, 0.1, 0.05),
+        "subsurface_weight": 0.8,
+        "specular_weight": 1.0,
+        "subsurface_anisotropy": 0.4,
+    }
+    box(builder, (-1, -1, -6), (1, 0.5, -4.5), skin(builder, **values))
+    inner = builder.add_material("diffuse", base_color=(0.1, 0.8, 0.1))
+    box(builder, (-0.2, -0.4, -5.4), (0.2, 0.0, -5.0), inner)
+    wax = skin(builder, subsurface_color=(0.95, 0.9, 0.7), subsurface_radius=(0.5, 0.4, 0.2))
+    box(builder, (1.2, -1, -6), (1.5, 1.0, -5.5), wax)
+    grey = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+    box(builder, (-5, -1.2, -9), (5, -1.0, -2), grey)
+    lamp = np.eye(4)
+    lamp[3, :3] = (1.5, 2.5, -4.0)
+    builder.add_light("sphere", lamp, color=(30, 28, 25), radius=0.4)
+    builder.add_light("dome", np.eye(4), color=(0.2, 0.25, 0.3))
+    builder.set_camera(np.eye(4), window=(-0.45, 0.45, -0.3, 0.3))
+    return builder.build()
+
+
+def test_one_picture_for_all_schedules() -> None:
+    """Lanes, waves, threads, policies, packets and the reference: the same bits."""
+    made = scene()
+
+    def render(**settings: Any) -> Any:
+        return wavecomb.render(made, size=(45, 30), spp=4, max_depth=6, **settings)
+
+    first = render()
+    counts = first.stats["counts"]
+    assert counts["walks"] > 100 and counts["walk_steps"] > 2 * counts["walks"]
+    for other in (
+        {"integrator": "reference"},
+        {"lanes": 1},
+        {"wave_size": 256},
+        {"wave_size": 1024, "threads": 2},
+        {"policy": "material"},
+        {"ray_order": "morton-octant"},
+    ):
+        assert np.array_equal(render(**other).beauty, first.beauty), other
+
+
+def test_lanes_stay_full() -> None:
+    """Walks that have ended make room."""
+    counts = wavecomb.render(scene(), size=(160, 120), spp=4).stats["counts"]
+    assert counts["walk_steps"] > 0.9 * counts["walk_lanes"]
+
+
+def test_a_radius_that_is_not_finite_is_told() -> None:
+    """One line that names the material."""
+    builder = wavecomb.SceneBuilder()
+    with pytest.raises(ValueError, match=r"skin.*finite"):
+        builder.add_material(
+            "openpbr", name="skin", openpbr={"subsurface_radius": (float("nan"), 1.0, 1.0)}
+        )
