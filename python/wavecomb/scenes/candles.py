@@ -87,4 +87,4 @@ def build_candles(writer: StageWriter, options: SceneOptions) -> None:
     writer.bind(writer.mesh("/World/Objects/Ball", marble).GetPrim(), "Marble")
     writer.rect_light("Window", (-6.0, 24.0, 22.0), 14.0, 14.0, (1.6, 2.0, 2.8), -45.0)
     writer.dome_light("Sky", 30.0, 0.05)
-    writer.camera((0.0, 13.0, 37.0), (-0.4, 7.4, 0.0), 36.0, options.aspect or 4.0 / 3.0)
+    writer.camera((0.0, 13.0, 37.0), (-0.4, 8.2, 0.0), 38.0, options.aspect or 4.0 / 3.0)
