@@ -49,6 +49,19 @@ TEST(CostTracker, TakeMovesMeasurementsAndLeavesCounts) {
   EXPECT_DOUBLE_EQ(sum.ns()[0], 30) << "nothing is taken twice";
 }
 
+TEST(CostTracker, WhatIsBesideIsAShareOfEachTimedRecord) {
+  CostTracker sum(2), worker(2);
+  worker.count(Ids{0, 0, 0, 0, 1});
+  worker.charge(Ids{0, 0}, 40);  // two of four
+  worker.charge_beside(0, 100);  // of all four
+  sum.take(worker);
+  EXPECT_DOUBLE_EQ(sum.ns()[0], 40 + 2 * 25);
+  worker.count(Ids{0, 0});
+  worker.charge(Ids{0}, 10);
+  sum.take(worker);
+  EXPECT_DOUBLE_EQ(sum.ns()[0], 90 + 10) << "what was beside is taken once";
+}
+
 TEST(CostTracker, TimesFewBatches) {
   CostTracker tracker(1);
   int large = 0, small = 0;

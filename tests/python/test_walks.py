@@ -120,6 +120,49 @@ def test_a_clear_slab_shows_what_lies_below() -> None:
     assert np.allclose(seen.mean(axis=0), (1.0, 2.0, 3.0), rtol=0.01)
 
 
+def third_exponential_integral(x: float) -> float:
+    """E_3(x), by substitution: int_0^1 mu exp(-x / mu) dmu."""
+    nodes, weights = leggauss(96)
+    mu, w = 0.5 * (nodes + 1), 0.5 * weights
+    return float((w * mu * np.exp(-x / mu)).sum())
+
+
+def test_a_black_slab_lets_through_what_misses_all_collisions() -> None:
+    """2 E_3(extinction depth) of light that enters evenly, by channel, within 0.5 % and noise."""
+    radius = (1.0, 0.6, 0.3)
+    depth = 0.5
+    seen = slab(depth, spp=512, subsurface_color=(0, 0, 0), subsurface_radius=radius)
+    for channel, free_path in enumerate(radius):
+        exact = 2.0 * third_exponential_integral(depth / free_path)
+        mean, error = seen[:, channel].mean(), seen[:, channel].std() / np.sqrt(len(seen))
+        assert abs(mean - exact) < 0.005 * exact + 3.5 * error
+        assert error < 0.01
+
+
+def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
+    """Chords of light that enters evenly have density l / (2 R^2); fine facets are a sphere."""
+    from wavecomb.scenes.caustics import ball
+
+    radius, free_paths = 1.0, (2.0, 1.0, 0.5)
+    builder = wavecomb.SceneBuilder()
+    material = skin(builder, subsurface_color=(0, 0, 0), subsurface_radius=free_paths)
+    mesh = ball(radius, 24)
+    number = builder.add_mesh(mesh.points, mesh.faces.astype(np.uint32), material=material)
+    builder.add_to_group(0, number)
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1))
+    camera = np.eye(4)
+    camera[3, 2] = 5.0
+    builder.set_camera(camera, projection="orthographic", window=(-0.5, 0.5, -0.5, 0.5))
+    settings = _core.Settings(width=24, height=24, spp=256, max_depth=2, filter="box")
+    pixels = _core.render(builder.build(), settings, None, None, None).beauty.reshape(-1, 3)
+    for channel, free_path in enumerate(free_paths):
+        x = 2.0 * radius / free_path
+        exact = 2.0 * (1.0 - (1.0 + x) * np.exp(-x)) / x**2
+        seen = pixels[:, channel].astype(np.float64)
+        mean, error = seen.mean(), seen.std() / np.sqrt(len(seen))
+        assert abs(mean - exact) < 0.01 * exact + 3.5 * error
+
+
 def scene() -> Any:
     """A box of skin with a coat, one within it, a floor, a lamp and a sky."""
     builder = wavecomb.SceneBuilder()
@@ -164,6 +207,22 @@ def test_one_picture_for_all_schedules() -> None:
         {"ray_order": "morton-octant"},
     ):
         assert np.array_equal(render(**other).beauty, first.beauty), other
+
+
+def test_guided_bounces_keep_the_mean() -> None:
+    """A field is learned of walks' ends as of all that is diffuse."""
+    made = scene()
+
+    def mean(guiding: str, seed: int) -> Any:
+        picture = wavecomb.render(
+            made, size=(30, 20), spp=64, max_depth=5, seed=seed, guiding=guiding, filter="box"
+        )
+        return np.asarray(picture.beauty, np.float64).mean(axis=(0, 1))
+
+    off = np.array([mean("off", seed) for seed in range(6)])
+    on = np.array([mean("on", seed) for seed in range(6, 12)])
+    error = np.sqrt(off.var(axis=0, ddof=1) / 6 + on.var(axis=0, ddof=1) / 6)
+    assert np.all(np.abs(off.mean(axis=0) - on.mean(axis=0)) < 4.5 * error)
 
 
 def test_lanes_stay_full() -> None:

@@ -2,6 +2,11 @@
 /// What lies between surfaces and below them: the volumes of a scene, and the walks of its light.
 #pragma once
 
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <span>
+
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/stages/trace.h"
 #include "wavecomb/integrate/wave.h"
@@ -213,12 +218,41 @@ class Volumes {
       walkers.add<F>(begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput),
                      lane_index<F>() + static_cast<uint32_t>(i), slot, inst, material, time, walks);
     }
+    if (walkers.size() == 0) return;
     all_counts_.walks += walkers.size();
-    walkers.run<F>(scene, *context_.accel, context_.traversal_width,
-                   presence_keys(wave.pool, depth, false), all_counts_.walk_steps,
-                   all_counts_.walk_lanes,
-                   [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end,
-                       const Mask<F>& came) { finish_walks<F>(wave, ended, who, end, came); });
+    const auto start = PhaseClock::Clock::now();
+    if (context_.measures_costs) std::fill(wave.scratch.begin(), wave.scratch.end(), 0.f);
+    walkers.run<F>(
+        scene, *context_.accel, context_.traversal_width, presence_keys(wave.pool, depth, false),
+        all_counts_.walk_steps, all_counts_.walk_lanes,
+        [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end, const Mask<F>& came) {
+          finish_walks<F>(wave, ended, who, end, came);
+          if (context_.measures_costs) count_collisions<F>(wave.scratch, end, ended);
+        });
+    if (context_.measures_costs)
+      charge_walks(
+          wave, std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count());
+  }
+  /// Adds what walks that have ended took to their materials.
+  template <typename F>
+  static void count_collisions(std::span<float> of_material, const WalkEnd<F>& end,
+                               const Mask<F>& ended) {
+    constexpr size_t kLanes = kWidth<F>;
+    alignas(64) uint32_t material[kLanes], collisions[kLanes];
+    store(material, end.material);
+    store(collisions, end.collisions);
+    for (uint32_t bits = lane_bits<F>(ended); bits != 0; bits &= bits - 1) {
+      const auto lane = static_cast<size_t>(std::countr_zero(bits));
+      of_material[material[lane]] += static_cast<float>(collisions[lane] + 1);
+    }
+  }
+  /// Charges the time of walks to their materials, by collisions, which Wave::scratch has.
+  static void charge_walks(Wave& wave, double ns) {
+    double all = 0;
+    for (const float steps : wave.scratch) all += double{steps};
+    for (size_t m = 0; m < wave.scratch.size(); ++m)
+      if (wave.scratch[m] > 0)
+        wave.costs.charge_beside(static_cast<uint32_t>(m), ns * double{wave.scratch[m]} / all);
   }
   template <typename F>
   void finish_walks(Wave& wave, const Mask<F>& ended, const UInt<F>& who, const WalkEnd<F>& end,

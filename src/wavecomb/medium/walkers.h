@@ -17,6 +17,7 @@ struct WalkEnd {
   Color<F> throughput;
   F u, v;
   UInt<F> prim, geom, inst;
+  UInt<F> material, collisions;
 };
 
 /// Walks, side by side; columns of a block that somebody else has.
@@ -94,7 +95,9 @@ class Walkers {
                                load<F>(c_.floats(kHitV) + i),
                                load<U>(c_.uints(kHitPrim) + i),
                                load<U>(c_.uints(kHitGeom) + i),
-                               inst};
+                               inst,
+                               row.material,
+                               w.number};
           finish(ended, row.who, end, Mask<F>(ended & own));
         }
         row.walk = after;

@@ -16,10 +16,17 @@ namespace wavecomb {
 class CostTracker {
  public:
   explicit CostTracker(size_t materials = 0)
-      : ns_(materials), timed_(materials), seen_(materials) {}
+      : ns_(materials),
+        beside_ns_(materials),
+        timed_(materials),
+        seen_(materials),
+        seen_before_(materials) {}
 
   /// A timed batch: `ns` for records of these materials.
   void charge(std::span<const uint32_t> materials, double ns);
+  /// What records of a material cost beside their shading, whether that is timed or not: `ns` for
+  /// some of those that have been counted.
+  void charge_beside(uint32_t material, double ns) { beside_ns_[material] += ns; }
   /// Counts records, timed or not.
   void count(std::span<const uint32_t> materials) {
     for (uint32_t m : materials) ++seen_[m];
@@ -33,12 +40,13 @@ class CostTracker {
   std::span<const double> ns() const { return ns_; }
   std::span<const uint64_t> timed() const { return timed_; }
   std::span<const uint64_t> seen() const { return seen_; }
-  /// Adds the other's measurements, and empties it but for `seen`.
+  /// Adds the other's measurements, and empties it but for `seen`. Its timed records get what all
+  /// cost beside, on the mean.
   void take(CostTracker& other);
 
  private:
-  std::vector<double> ns_;
-  std::vector<uint64_t> timed_, seen_;
+  std::vector<double> ns_, beside_ns_;
+  std::vector<uint64_t> timed_, seen_, seen_before_;
   uint32_t large_ = 0, small_ = 0;
 };
 
