@@ -163,11 +163,12 @@ nb::dict aovs_dict(nb::handle owner) {
 
 /// The rows of WAVECOMB_AOVS.
 nb::list aov_table() {
-  static constexpr const char* kKinds[] = {"mean",     "mean_of_hits", "nearest",
-                                           "coverage", "groups",       "sum"};
+  static constexpr const char* kKinds[] = {"mean",   "mean_of_hits", "nearest", "coverage",
+                                           "groups", "expressions",  "sum"};
   static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kSum) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
+    if (aov.kind == AovKind::kExpressions) continue;  // they have names of their own
     nb::dict row;
     row["name"] = aov.name;
     row["channels"] = aov.channels;

@@ -41,6 +41,21 @@ uint32_t add_geometry_set(SceneBuilder& builder, const std::map<std::string, std
   return builder.add_geometry_set(std::move(set));
 }
 
+void add_visibility(SceneBuilder& builder, const std::string& path,
+                    const std::map<std::string, bool>& rays) {
+  VisibilityRule rule{path};
+  for (const auto& [name, value] : rays) {
+    const uint32_t bit = choose<uint32_t>("kind of rays", name,
+                                          {{"camera", kSeenByCamera},
+                                           {"shadow", kSeenByShadowRays},
+                                           {"bounces", kSeenByBounces},
+                                           {"holdout", kHeldOut}});
+    rule.said |= bit;
+    if (value) rule.bits |= bit;
+  }
+  builder.add_visibility(std::move(rule));
+}
+
 uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector<float> horizontal,
                  const Array<float>& candela) {
   IesProfile profile{std::move(vertical), std::move(horizontal), {}};
@@ -151,6 +166,7 @@ void bind_scene(nb::module_& m) {
       .def("add_light", &add_light, "kind"_a, "transform"_a, "values"_a)
       .def("add_mesh_light", &add_mesh_light, "transform"_a, "material_sync"_a, "values"_a)
       .def("add_geometry_set", &add_geometry_set, "rules"_a)
+      .def("add_visibility", &add_visibility, "path"_a, "rays"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
       .def("set_camera", &set_camera, "transform"_a, "values"_a)
       .def("build", &SceneBuilder::build, nb::call_guard<nb::gil_scoped_release>());

@@ -24,25 +24,41 @@ namespace {
 
 /// Before the name of a light group, in names of AOVs and of layers.
 constexpr const char* kLightPrefix = "light_";
+/// Before a light path expression, "lpe:NAME=EXPRESSION".
+constexpr const char* kExpressionPrefix = "lpe:";
 
-/// Settings::aovs and light_groups as names.
+/// Settings::aovs, light_groups and expressions as names.
 std::vector<std::string> aov_names(const Settings& s) {
   std::vector<std::string> names = s.aovs.names();
-  if (s.light_groups.empty()) return names;
-  names.erase(std::remove(names.begin(), names.end(), "light_groups"), names.end());
+  if (!s.light_groups.empty()) std::erase(names, "light_groups");
   for (const std::string& group : s.light_groups) names.push_back(kLightPrefix + group);
+  for (const NamedExpression& one : s.expressions)
+    names.push_back(kExpressionPrefix + one.name + "=" + one.text);
   return names;
+}
+
+/// "lpe:NAME=EXPRESSION" as a name and a text.
+NamedExpression to_expression(const std::string& aov) {
+  const std::string rest = aov.substr(std::string(kExpressionPrefix).size());
+  const size_t equals = rest.find('=');
+  if (equals == std::string::npos)
+    throw Error("AOV '" + aov + "' has no expression; write lpe:NAME=EXPRESSION");
+  return {rest.substr(0, equals), rest.substr(equals + 1)};
 }
 
 /// "light_groups" stands for all of them, "light_NAME" for one.
 void set_aovs(Settings& s, const std::vector<std::string>& names) {
   AovSet set{0};
   std::vector<std::string> groups;
+  std::vector<NamedExpression> expressions;
   bool all_groups = false;
   for (const std::string& name : names) {
     if (name != "light_groups" && name.starts_with(kLightPrefix)) {
       groups.push_back(name.substr(std::string(kLightPrefix).size()));
       set.bits |= static_cast<uint32_t>(Aov::kLightGroups);
+    } else if (name.starts_with(kExpressionPrefix)) {
+      expressions.push_back(to_expression(name));
+      set.bits |= static_cast<uint32_t>(Aov::kExpressions);
     } else {
       const Aov aov = AovSet::parse(name);
       all_groups |= aov == Aov::kLightGroups;
@@ -51,6 +67,7 @@ void set_aovs(Settings& s, const std::vector<std::string>& names) {
   }
   s.aovs = set;
   s.light_groups = all_groups ? std::vector<std::string>{} : groups;
+  s.expressions = std::move(expressions);
 }
 
 /// None, or (x0, y0, x1, y1).

@@ -415,6 +415,9 @@ class SceneBuilder:
     def add_geometry_set(self, rules: dict[str, str]) -> int:
         """A set for lights, by the rules of a UsdCollectionMembershipQuery: prim paths to
         exclude, explicit or expand."""
+    def add_visibility(self, path: str, rays: dict[str, bool]) -> None:
+        """Which rays see a prim and what is below it that says nothing else: "camera", "shadow",
+        "bounces"; and whether it is a "holdout", where camera rays end and bring nothing."""
     def add_volume(
         self,
         to_world: NDArray[Any],
@@ -591,7 +594,8 @@ class Settings:
     """Passes of 1, 1, 2, 4 ... samples: the whole picture is there soon. Default: False."""
     # ---- to here ----
     region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
-    aovs: list[str]  # names of aov_table(); "light_NAME" for one light group
+    # Names of aov_table(); "light_NAME" for one light group, "lpe:NAME=EXPRESSION".
+    aovs: list[str]
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:
         """Raises Error naming the setting and what it may be."""

@@ -122,7 +122,8 @@ def render(
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
             from.
         aovs: What to keep beside the beauty: names of docs/aovs.md, "light_NAME" for a light group,
-            "crypto", "all"; by default a path's render vars, else albedo, normal and depth.
+            "lpe:NAME=EXPRESSION", "crypto", "all"; by default a path's render vars, else albedo,
+            normal and depth.
         checkpoint: File that the state of the render is saved to, now and then and at the end.
         every: Seconds between checkpoints.
         resume: Checkpoint to go on from, of a render with the same stage and settings. The picture

@@ -116,6 +116,7 @@ class LoadOptions:
             settings say, else the first two.
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
         mask: Prims to draw, with all below them, and what they need; by default all.
+        holdouts: Prims that the camera sees as holes, with all below them: black, and alpha 0.
         session_layer: File with opinions that are stronger than the stage's.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
             size of their edges in the picture (docs/subdivision.md).
@@ -193,6 +194,10 @@ class LoadOptions:
         (), "Prim to draw, with all below it and what it needs; may be given again.", "text",
         "--mask", many=True, metavar="PATH", unset="all",
     )  # fmt: skip
+    holdouts: tuple[str, ...] = _row(
+        (), "Prim that the camera sees as a hole, black with alpha 0, and all below it; may be "
+        "given again.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
+    )  # fmt: skip
     session_layer: str | None = _row(
         None, "Layer with opinions stronger than the stage's.", "file", "--session-layer",
         metavar="FILE",
@@ -230,7 +235,7 @@ class LoadOptions:
         plain = dict(changes)
         if plain.get("session_layer") is not None:
             plain["session_layer"] = os.fspath(plain["session_layer"])
-        for name in ("purposes", "mask", "size", "shutter"):
+        for name in ("purposes", "mask", "holdouts", "size", "shutter"):
             if plain.get(name) is not None:
                 plain[name] = tuple(plain[name])
         return replace(options or cls(), **plain)

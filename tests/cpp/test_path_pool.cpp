@@ -140,7 +140,7 @@ TEST(PathAovs, OnlyWhatIsAskedForTakesRoom) {
   const PathAovs none(100, {AovSet{0}}, nullptr), usual(100, {AovSet{}}, nullptr);
   const PathAovs all(100, {AovSet{AovSet::kAll}, 3}, nullptr);
   EXPECT_EQ(none.bytes(), 0u);
-  EXPECT_FALSE(none.wants_hits() || none.wants_vertex(0) || none.wants_groups() ||
+  EXPECT_FALSE(none.wants_hits() || none.wants_vertex(0) || none.wants_lights() ||
                none.wants_cost());
   EXPECT_TRUE(usual.wants_vertex(0));
   EXPECT_FALSE(usual.wants_vertex(1));

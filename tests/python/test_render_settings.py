@@ -44,7 +44,7 @@ def RenderProduct "Two" { token productName = "FOLDER/two.exr"
 def RenderProduct "Deep" { token productType = "deepRaster" }
 def RenderVar "Ci" { string sourceName = "Ci" }
 def RenderVar "z" { string sourceName = "z" }
-def RenderVar "Odd" { string sourceName = "alpha" }
+def RenderVar "Odd" { string sourceName = "curvature" }
 """
 
 
@@ -80,7 +80,7 @@ def test_products_over_settings(tmp_path):
     assert one.aovs == ("beauty", "depth") and two.aovs is None
     lines = "\n".join(report.lines())
     assert "render product of type deepRaster: /Render/Deep" in lines
-    assert "render var 'alpha': /Render/Odd" in lines
+    assert "render var 'curvature': /Render/Odd" in lines
 
 
 def test_what_is_no_good_is_named_and_left_out(tmp_path):
@@ -128,8 +128,9 @@ def test_data_window_without_a_pixel():
         ("C.*", "lpe", "beauty"), ("C.*[LO]", "lpe", "beauty"), ("lpe:C.*[<L.>O]", "raw", "beauty"),
         ("C[<L.>O]", "lpe", "emission"), ("C<..>[<L.>O]", "lpe", "direct"),
         ("C . [LO]", "lpe", "direct"), ("C..+L", "lpe", "indirect"),
-        ("C.*<L.'key'>", "lpe", "light_key"), ("C.<L.'key'>", "lpe", None),
-        ("C<RD>L", "lpe", None), ("a", "raw", None), ("", "raw", None),
+        ("C.*<L.'key'>", "lpe", "light_key"), ("C.<L.'key'>", "lpe", "lpe:V=C.<L.'key'>"),
+        ("C<RD> L", "lpe", "lpe:V=C<RD>L"), ("C<RD", "lpe", None), ("a", "raw", "alpha"),
+        ("diffuse_direct", "raw", "lpe:diffuse_direct=C<RD>[LO]"), ("", "raw", None),
     ],
 )  # fmt: skip
 def test_vars(name, kind, aov):

@@ -21,6 +21,7 @@ class Recorder:
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
         self.grids, self.volumes = [], []
+        self.visibility = []  # (path, rays)
         self.motions = []  # (name of a group, its transforms over the shutter)
 
     def add_texture(self, pixels, *, srgb, wrap_s="repeat", wrap_t="repeat", name=""):
@@ -205,6 +206,9 @@ class Recorder:
     def add_geometry_set(self, rules):
         self.sets.append(dict(rules))
         return len(self.sets) - 1
+
+    def add_visibility(self, path, rays):
+        self.visibility.append((path, rays))
 
     def add_ies(self, vertical, horizontal, candela):
         assert candela.shape == (len(horizontal), len(vertical)) and candela.dtype == np.float32

@@ -11,6 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from wavecomb.run import aovs as aov_names
+from wavecomb.run import expressions
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,14 +23,16 @@ class _AovOption(click.Option):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Names of AOVs."""
-        names = (*aov_names.names(), *aov_names.groups())
+        named = (f"{expressions.PREFIX}{name}" for name in expressions.NAMED)
+        names = (*aov_names.names(), *aov_names.groups(), *named)
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """The option, and its help."""
         self.help = (
             f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
-            f"{aov_names.LIGHT}NAME, crypto, all; beauty is always there (docs/aovs.md).  "
+            f"{aov_names.LIGHT}NAME, lpe:NAME=EXPRESSION, crypto, all; beauty is always there "
+            "(docs/aovs.md).  "
             f"[default: {', '.join(aov_names.DEFAULT[1:])}]"
         )
         return super().get_help_record(ctx)
@@ -111,7 +114,7 @@ class AovOptions:
         layers = [f"{name}00" if name in cryptomatte.LEVELS.values() else name for name in layers]
         check_options(output, () if self.split else layers, self.compression, self.tile)
         if self.split:
-            known = [name for name in aovs if name != "light_groups"]
+            known = [expressions.layer_of(name) for name in aovs if name != "light_groups"]
             for file in split_names(output, known).values():
                 check_writable(file)
 

@@ -14,6 +14,7 @@ from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
+from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
@@ -51,7 +52,7 @@ class Plan:
         from wavecomb.picture.output import split_names
 
         for names in [self.names] if frames is None else map(self.names.at, frames):
-            for file in split_names(names.output, aovs).values():
+            for file in split_names(names.output, [layer_of(name) for name in aovs]).values():
                 self.check_place(replace(names, output=str(file)))
 
     def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ _COLOURS = (
     "guide_albedo",
     "guide_normal",
 )
-"""Layers that are half where halves are asked for, with all that begin with "light_"."""
+"""Layers that are half where halves are asked for, with those of lights and expressions."""
 _EXACT = ("position", "material_id", "instance_id")
 BAND = 64
 """Rows that are made ready and written at once: four blocks of an EXR file."""
@@ -182,7 +182,7 @@ class Sheet:
 
 
 def _may_be_half(layer: str) -> bool:
-    return layer in _COLOURS or layer.startswith("light_")
+    return layer in _COLOURS or layer.startswith(("light_", "lpe_"))
 
 
 def check_options(name: str, layers: Any, compression: str, tile: int) -> None:

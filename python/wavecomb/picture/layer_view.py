@@ -79,7 +79,7 @@ class Shown:
 
 def is_light(layer: str) -> bool:
     """Whether a layer is light: exposure and tone mapping apply."""
-    return layer in RADIANCE or layer.startswith("light_")
+    return layer in RADIANCE or layer.startswith(("light_", "lpe_"))
 
 
 def show_layer(

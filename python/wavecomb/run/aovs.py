@@ -9,6 +9,7 @@ from functools import cache
 
 from wavecomb.core_table import rows_by_name
 from wavecomb.errors import WavecombError
+from wavecomb.run import expressions
 
 DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 """What a picture holds where nothing is asked for."""
@@ -75,7 +76,7 @@ def groups() -> dict[str, tuple[str, ...]]:
 
 
 def expand(asked: Iterable[str]) -> tuple[str, ...]:
-    """AOVs in the order of ``names``, each once, single light groups at the end; beauty is in.
+    """AOVs in the order of ``names``, each once, and what has a name of its own; beauty is in.
 
     >>> expand(["depth", "crypto", "light_key"])
     ('beauty', 'depth', 'crypto_object', 'crypto_material', 'crypto_asset', 'light_key')
@@ -85,17 +86,19 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
     """
     all_names, several = names(), groups()
     wanted: dict[str, None] = {"beauty": None}
-    for name in asked:
-        if name not in all_names and name not in several and not _is_light(name):
+    for name in map(expressions.spelled, asked):
+        is_single = _is_light(name) or expressions.is_expression(name)
+        if name not in all_names and name not in several and not is_single:
             raise WavecombError(
                 f"AOV {name!r} is not known; there are {', '.join(all_names)}, "
-                f"{LIGHT}NAME for the light group NAME, crypto and all"
+                f"{LIGHT}NAME for the light group NAME, lpe:NAME=EXPRESSION, crypto and all"
             )
         wanted.update(dict.fromkeys(several.get(name, (name,))))
     known = tuple(name for name in all_names if name in wanted)
+    kept = [name for name in wanted if name not in all_names]
     if "light_groups" in wanted:
-        return known
-    return known + tuple(name for name in wanted if name not in all_names)
+        kept = [name for name in kept if not _is_light(name)]
+    return known + tuple(kept)
 
 
 def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]:
@@ -106,7 +109,11 @@ def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]
 
 def for_core(aovs: Iterable[str]) -> list[str]:
     """Those that the core has to make room for."""
-    return [name for name in aovs if name in core_aovs() or _is_light(name)]
+    return [
+        name
+        for name in aovs
+        if name in core_aovs() or _is_light(name) or expressions.is_expression(name)
+    ]
 
 
 _SUM_BYTES = {"mean": 8, "mean_of_hits": 8, "nearest": 4, "coverage": 0, "groups": 0, "sum": 8}
@@ -124,6 +131,7 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
         total += 4 * any(row.kind == kind for row in kept)
     total += (64 + 48) * sum(row.kind == "coverage" for row in kept)
     single = sum(map(_is_light, chosen))
+    total += (24 + 12) * sum(map(expressions.is_expression, chosen))
     total += (24 + 12) * (light_groups if "light_groups" in chosen else single)
     if chosen & set(ERRORS):
         total += 48 + 4 + 12

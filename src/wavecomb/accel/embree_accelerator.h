@@ -41,6 +41,7 @@ struct PresenceKeys {
   /// Of shadow rays where lights are linked: 1 + the set of geometry that is in their way, 0: all.
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
+  uint32_t ray_kind = kSeenByCamera;  ///< of RayVisibility
 };
 
 /// Which of equally close hits a hierarchy is built to give.

@@ -9,18 +9,35 @@
 #include "wavecomb/surface/uv.h"
 
 namespace wavecomb {
+namespace {
+
+/// Marks meshes that some kind of ray passes by where some instance places them.
+void mark_unseen(const Scene& scene, std::vector<uint8_t>& filtered) {
+  const SceneGeometry& geometry = *scene.geometry();
+  const SceneView view = scene.view();
+  for (size_t i = 0; i < geometry.instance_records.size(); ++i) {
+    const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
+    const uint32_t* seen = view.visibility + geometry.instance_records[i].emissive;
+    for (size_t g = 0; g < group.meshes.size(); ++g)
+      if ((seen[g] & kSeenByAll) != kSeenByAll) filtered[group.meshes[g]] = 1;
+  }
+}
+
+}  // namespace
 
 std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   const SceneGeometry& geometry = *scene.geometry();
   std::vector<uint8_t> filtered(geometry.meshes.size(), 0);
   if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
-  if (scene.view().lights.links.members || !scene.view().has_presence) return filtered;
+  if (scene.view().lights.links.members) return filtered;
+  if (scene.view().visibility) mark_unseen(scene, filtered);
+  if (!scene.view().has_presence) return filtered;
   const auto needs = [&](uint32_t m) { return scene.material_part()->shaded[m].needs_presence(); };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),
                                      [&](const InstanceRecord& i) { return needs(i.material); });
   for (uint32_t mesh = 0; mesh < filtered.size(); ++mesh)
-    filtered[mesh] = geometry.any_material(mesh, kInheritMaterial, [&](uint32_t m) {
+    filtered[mesh] |= geometry.any_material(mesh, kInheritMaterial, [&](uint32_t m) {
       return m == kInheritMaterial ? inherited : needs(m);
     });
   return filtered;
@@ -53,6 +70,9 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
 
 bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
             float u, float v, uint32_t slot, const PresenceKeys& keys) {
+  if (scene.visibility &&
+      (scene.visibility[scene.instances[instance].emissive + geom] & keys.ray_kind) == 0)
+    return false;
   if (keys.shadow_set && !casts_shadow(scene, instance, geom, slot, keys)) return false;
   return is_present(scene, instance, mesh, prim, u, v, slot, keys);
 }

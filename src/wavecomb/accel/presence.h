@@ -25,8 +25,8 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene);
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
                   const PresenceKeys& keys);
 
-/// Whether the ray of a slot meets triangle `prim` at (u, v): it is present, and for a shadow ray,
-/// in the way of its light.
+/// Whether the ray of a slot meets triangle `prim` at (u, v): its kind sees it, it is present, and
+/// for a shadow ray, in the way of its light.
 bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
             float u, float v, uint32_t slot, const PresenceKeys& keys);
 

@@ -16,12 +16,13 @@ namespace wavecomb {
 
 /// How the samples of a pixel become its value.
 enum class AovKind : uint8_t {
-  kMean,        ///< the mean over its samples
-  kMeanOfHits,  ///< the mean over those that hit something, infinite where none did
-  kNearest,     ///< that of the sample nearest its centre: a mean of these means nothing
-  kCoverage,    ///< ids, and how much of the pixel each covers (Cryptomatte)
-  kGroups,      ///< a layer of means for each light group
-  kSum,         ///< the sum over its samples
+  kMean,         ///< the mean over its samples
+  kMeanOfHits,   ///< the mean over those that hit something, infinite where none did
+  kNearest,      ///< that of the sample nearest its centre: a mean of these means nothing
+  kCoverage,     ///< ids, and how much of the pixel each covers (Cryptomatte)
+  kGroups,       ///< a layer of means for each light group
+  kExpressions,  ///< a layer of means for each light path expression
+  kSum,          ///< the sum over its samples
 };
 
 /// Who finds the value of a path.
@@ -54,7 +55,9 @@ enum class AovSource : uint8_t {
   X(LightGroups, "light_groups", 0, kGroups, kLight, "")                                      \
   X(Cost, "cost", 1, kSum, kTime, "Cost per pixel")                                           \
   X(GuideAlbedo, "guide_albedo", 3, kMean, kGuide, "")                                        \
-  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")
+  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")                                        \
+  X(Alpha, "alpha", 1, kMean, kHit, "Alpha")                                                  \
+  X(Expressions, "lpe", 0, kExpressions, kLight, "")
 // clang-format on
 
 namespace detail {
@@ -135,6 +138,7 @@ struct AovSet {
   bool has(AovSource source) const { return any(aov_bits(source)); }
   bool any(uint32_t mask) const { return (bits & mask) != 0; }
 
+  /// Light path expressions have names of their own.
   std::vector<std::string> names() const;
   /// Throws Error that lists what there is.
   static Aov parse(std::string_view name);
@@ -144,6 +148,7 @@ struct AovSet {
 struct AovLayout {
   AovSet set;
   uint32_t light_groups = 0;  ///< how many are kept
+  uint32_t expressions = 0;   ///< light path expressions
 };
 
 }  // namespace wavecomb

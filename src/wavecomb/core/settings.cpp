@@ -20,7 +20,8 @@ void check_light_paths(const Settings& s) {
   if (s.guiding != Guiding::kOff) refuse("guiding", "guiding off");
   if (s.clamp_indirect > 0) refuse("clamp_indirect", "clamp_indirect 0");
   if (s.cosine_sampling) refuse("cosine_sampling", "none");
-  for (const Aov aov : {Aov::kEmission, Aov::kDirect, Aov::kIndirect, Aov::kLightGroups})
+  for (const Aov aov :
+       {Aov::kEmission, Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
     if (s.aovs.has(aov))
       refuse("the AOV " + std::string(aov_name(aov)) + ", which knows no light of such paths",
              "others");
@@ -31,6 +32,7 @@ void check_light_paths(const Settings& s) {
 void Settings::check() const {
   for (const SettingInfo& setting : setting_table()) setting.check(*this);
   if (joins_light()) check_light_paths(*this);
+  check_expressions(expressions);
   if (uint64_t{width} * height > kMaxPixels)
     throw Error("width x height is " + std::to_string(uint64_t{width} * height) +
                 "; it must be from 1 to " + std::to_string(kMaxPixels));

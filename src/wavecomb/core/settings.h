@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "wavecomb/core/aov.h"
+#include "wavecomb/core/path_expression.h"
 
 namespace wavecomb {
 
@@ -92,7 +93,8 @@ struct Settings {
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
-  std::vector<std::string> light_groups;  ///< of Aov::kLightGroups, by name; empty: all
+  std::vector<std::string> light_groups;     ///< of Aov::kLightGroups, by name; empty: all
+  std::vector<NamedExpression> expressions;  ///< of Aov::kExpressions
   /// Adaptive sampling: a pixel is done when its error is no larger (ErrorMap::error); 0: off.
   float adaptive = 0;
   /// Adaptive sampling until the picture's mean relative error is no larger; 0: off. Not both.

@@ -12,6 +12,8 @@ namespace {
 
 /// Before the names of light groups' layers.
 constexpr const char* kLightPrefix = "light_";
+/// And of light path expressions.
+constexpr const char* kExpressionPrefix = "lpe_";
 
 /// A layer whose pixel i is written by `write(i, pointer)`.
 template <typename Write>
@@ -35,6 +37,7 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixe
       case AovKind::kMean:
       case AovKind::kMeanOfHits:
       case AovKind::kGroups:
+      case AovKind::kExpressions:
       case AovKind::kSum:
         sums_[place_of(row.aov)].resize(pixels * words_of(row));
         break;
@@ -104,26 +107,39 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
     case AovKind::kCoverage:
       return crypto_layer(aov, samples);
     case AovKind::kGroups:
+    case AovKind::kExpressions:
       break;
   }
   return {};
 }
 
-AovLayer AovFilm::group_layer(uint32_t group, const std::string& name,
+AovLayer AovFilm::one_of_many(Aov aov, uint32_t which, std::string name,
                               const std::vector<uint32_t>& samples) const {
-  const std::vector<double>& sums = sums_[place_of(Aov::kLightGroups)];
-  return make_layer(kLightPrefix + name, 3, pixels_, [&](size_t i, float* v) {
+  const std::vector<double>& sums = sums_[place_of(aov)];
+  const size_t words = words_of(row_of(aov));
+  return make_layer(std::move(name), 3, pixels_, [&](size_t i, float* v) {
     for (size_t c = 0; c < 3; ++c)
-      v[c] = static_cast<float>(sums[3 * (i * layout_.light_groups + group) + c] *
-                                inverse_count(samples[i]));
+      v[c] = static_cast<float>(sums[i * words + 3 * which + c] * inverse_count(samples[i]));
   });
 }
 
+template <typename Layer>
+void AovFilm::for_each_of_many(const std::vector<std::string>& many_names,
+                               const Layer& layer) const {
+  const uint32_t groups = layout_.light_groups;
+  for (uint32_t g = 0; layout_.set.has(Aov::kLightGroups) && g < groups; ++g)
+    layer(Aov::kLightGroups, g, kLightPrefix + many_names[g]);
+  for (uint32_t e = 0; layout_.set.has(Aov::kExpressions) && e < layout_.expressions; ++e)
+    layer(Aov::kExpressions, e, kExpressionPrefix + many_names[groups + e]);
+}
+
 AovLayer AovFilm::layer(const std::string& name, const std::vector<uint32_t>& samples,
-                        const std::vector<std::string>& group_names) const {
-  if (layout_.set.has(Aov::kLightGroups))
-    for (uint32_t g = 0; g < layout_.light_groups; ++g)
-      if (name == kLightPrefix + group_names[g]) return group_layer(g, group_names[g], samples);
+                        const std::vector<std::string>& many_names) const {
+  AovLayer found;
+  for_each_of_many(many_names, [&](Aov aov, uint32_t which, const std::string& one) {
+    if (name == one) found = one_of_many(aov, which, one, samples);
+  });
+  if (!found.name.empty()) return found;
   for (const AovRow& row : kAovs)
     if (name == row.name) return layer(row.aov, samples);
   return {};
@@ -139,13 +155,13 @@ AovLayer AovFilm::take(Aov aov, const std::vector<uint32_t>& samples) {
 }
 
 std::vector<AovLayer> AovFilm::finish(const std::vector<uint32_t>& samples,
-                                      const std::vector<std::string>& group_names) && {
+                                      const std::vector<std::string>& many_names) && {
   std::vector<AovLayer> out;
   for (const AovRow& row : kAovs) {
     if (!layout_.set.has(row.aov)) continue;
-    if (row.kind == AovKind::kGroups)
-      for (uint32_t g = 0; g < layout_.light_groups; ++g)
-        out.push_back(group_layer(g, group_names[g], samples));
+    for_each_of_many(many_names, [&](Aov aov, uint32_t which, const std::string& name) {
+      if (aov == row.aov) out.push_back(one_of_many(aov, which, name, samples));
+    });
     AovLayer layer = take(row.aov, samples);
     if (!layer.values.empty()) out.push_back(std::move(layer));
   }

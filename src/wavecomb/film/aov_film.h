@@ -45,7 +45,7 @@ class AovFilm {
   // ---- one sample's values ----------------------------------------------------------------------
 
   /// Sums of an AOV that is a mean or a sum, by channel; null where it is not kept. Those of light
-  /// groups stand side by side.
+  /// groups stand side by side, and those of expressions.
   double* sums(Aov aov, size_t pixel) {
     std::vector<double>& all = sums_[place_of(aov)];
     return all.empty() ? nullptr : all.data() + pixel * words_of(row_of(aov));
@@ -82,18 +82,18 @@ class AovFilm {
 
   // ---- layers -----------------------------------------------------------------------------------
 
-  /// The layer of an AOV, but for light groups; no values where it is not kept. `samples` is by
-  /// pixel.
+  /// The layer of an AOV that has one alone; no values where it is not kept. `samples` is by pixel.
   AovLayer layer(Aov aov, const std::vector<uint32_t>& samples) const;
-  /// The same by name, "light_NAME" among them; no name where it is not kept.
+  /// The same by name, "light_NAME" and "lpe_NAME" among them; no name where it is not
+  /// kept. `many_names`: of the light groups that are kept, then of the expressions.
   AovLayer layer(const std::string& name, const std::vector<uint32_t>& samples,
-                 const std::vector<std::string>& group_names) const;
+                 const std::vector<std::string>& many_names) const;
   /// The layer of an AOV, whose sums are freed.
   AovLayer take(Aov aov, const std::vector<uint32_t>& samples);
   /// All that are kept and were not taken, and the end of the film: sums are freed as soon as they
   /// were used. Light groups are called "light_" and their name.
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
-                               const std::vector<std::string>& group_names) &&;
+                               const std::vector<std::string>& many_names) &&;
   size_t bytes() const;
   /// Runs block(name, values) for each vector of sums, for checkpoints.
   template <typename Block>
@@ -112,11 +112,16 @@ class AovFilm {
   static uint32_t level_index(Aov level) { return place_of(level) - place_of(Aov::kCryptoObject); }
   /// Sums of a pixel.
   size_t words_of(const AovRow& row) const {
-    return row.kind == AovKind::kGroups ? 3 * layout_.light_groups : row.channels;
+    if (row.kind == AovKind::kGroups) return 3 * layout_.light_groups;
+    return row.kind == AovKind::kExpressions ? 3 * layout_.expressions : row.channels;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
-  AovLayer group_layer(uint32_t group, const std::string& name,
+  /// Layer `which` of the light groups or the expressions.
+  AovLayer one_of_many(Aov aov, uint32_t which, std::string name,
                        const std::vector<uint32_t>& samples) const;
+  /// Runs layer(aov, which, name) for each of those.
+  template <typename Layer>
+  void for_each_of_many(const std::vector<std::string>& many_names, const Layer& layer) const;
 
   AovLayout layout_;
   size_t pixels_ = 0;

@@ -68,7 +68,7 @@ std::vector<Film::Block> Film::blocks() {
   return out;
 }
 
-Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
+Film::Layers Film::finish(const std::vector<std::string>& many_names) && {
   Layers layers;
   layers.beauty = beauty();
   layers.samples = samples();
@@ -79,7 +79,7 @@ Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
   layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
   layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;
   layers.depth = aovs_.take(Aov::kDepth, layers.samples).values;
-  layers.aovs = std::move(aovs_).finish(layers.samples, light_groups);
+  layers.aovs = std::move(aovs_).finish(layers.samples, many_names);
   return layers;
 }
 

@@ -90,8 +90,8 @@ class Film {
   };
   /// The means, and the end of the film: sums are freed as soon as they were used, for sums and
   /// layers together are the most memory that a small scene needs.
-  /// `light_groups` are names of the groups kept.
-  Layers finish(const std::vector<std::string>& light_groups) &&;
+  /// `many_names`: AovFilm::layer's.
+  Layers finish(const std::vector<std::string>& many_names) &&;
 
  private:
   Region window_;

@@ -5,7 +5,7 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/layer_ids.h"
-#include "wavecomb/integrate/path_pool.h"
+#include "wavecomb/light/kinds.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -19,7 +19,11 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials need none of it; positions of objects do.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);
-  if (!layout.set.has(Aov::kLightGroups)) return;
+  if (layout.set.has(Aov::kLightGroups)) keep_groups(scene, settings);
+  if (layout.set.has(Aov::kExpressions)) keep_expressions(scene, settings);
+}
+
+void AovTables::keep_groups(const Scene& scene, const Settings& settings) {
   const std::vector<std::string>& there = scene.light_groups();
   if (settings.light_groups.empty()) {
     kept_names = there;
@@ -42,6 +46,24 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
   kept_group = scene.groups_of_lights();
   for (uint32_t& group : kept_group) group = place[group];
   layout.light_groups = static_cast<uint32_t>(kept_names.size());
+}
+
+void AovTables::keep_expressions(const Scene& scene, const Settings& settings) {
+  automaton = PathAutomaton(settings.expressions, scene.light_groups());
+  layout.expressions = automaton.expressions;
+  for (const NamedExpression& one : settings.expressions) kept_names.push_back(one.name);
+  const std::vector<uint32_t> groups = scene.groups_of_lights();
+  const std::vector<uint8_t> objects = scene.lights_of_objects();
+  const LightSet& set = scene.light_set();
+  for (size_t i = 0; i < groups.size(); ++i) {
+    const bool is_dome =
+        i < set.first_triangle() && set.records[i].kind == static_cast<uint32_t>(LightKind::kDome);
+    const PathEnd end = is_dome      ? PathEnd::kBackground
+                        : objects[i] ? PathEnd::kObject
+                                     : PathEnd::kLight;
+    end_of_light.push_back(path_end(end, groups[i]));
+  }
+  end_of_light.push_back(path_end(PathEnd::kObject, 0));
 }
 
 }  // namespace wavecomb

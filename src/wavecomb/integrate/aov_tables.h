@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "wavecomb/core/lanes.h"
+#include "wavecomb/core/path_expression.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/aov_film.h"
 
@@ -23,7 +24,10 @@ struct AovTables {
   CryptoTables crypto;
   /// By light: where its group is kept among the film's, or kNoGroup.
   std::vector<uint32_t> kept_group;
-  std::vector<std::string> kept_names;  ///< of the film's groups
+  /// Of the film's groups, then of its expressions.
+  std::vector<std::string> kept_names;
+  PathAutomaton automaton;             ///< of the expressions
+  std::vector<uint32_t> end_of_light;  ///< PathExpressions'; empty where there are none
   /// The cost AOV is what the model says, which is reproducible, instead of time.
   bool models_cost = false;
 
@@ -42,6 +46,10 @@ struct AovTables {
 
   /// Throws Error for a light group that the scene does not have.
   AovTables(const Scene& scene, const Settings& settings);
+
+ private:
+  void keep_groups(const Scene& scene, const Settings& settings);
+  void keep_expressions(const Scene& scene, const Settings& settings);
 };
 
 }  // namespace wavecomb

@@ -15,13 +15,13 @@ inline UInt<F> kept_group(const uint32_t* kept, const UInt<F>& light, const Mask
   return select(known, gather<U>(kept, light, known), U(kNoGroup));
 }
 
-/// Splits what environment_emission gives by light: runs add(group, colour) for each infinite light
-/// whose group is kept. The shares are cut by the same factor as their sum is, so that they add up
-/// to it.
-template <typename F, typename Add>
+/// Splits what environment_emission gives by light: runs add(light, colour) for each infinite light
+/// that is_wanted(light). The shares are cut by the same factor as their sum is, so that they add
+/// up to it.
+template <typename F, typename IsWanted, typename Add>
 inline void split_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
-                              const uint32_t* kept, const PathState<F>& path, const Mask<F>& active,
-                              const Add& add) {
+                              const PathState<F>& path, const Mask<F>& active,
+                              const IsWanted& is_wanted, const Add& add) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> all =
       path.throughput * escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
@@ -31,11 +31,10 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
   const F y = luminance(all);
   const F scale = limit > 0 ? select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f)) : F(1.f);
   for (uint32_t i = 0; i < scene.lights.infinite_count; ++i) {
-    const uint32_t group = kept[i];
-    if (group == kNoGroup) continue;
+    if (!is_wanted(i)) continue;
     const Color<F> le = infinite_light_radiance<F>(scene.lights, i, path.o, path.dir, path.pdf,
                                                    delta, active, depth == 0, path.link);
-    add(group, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
+    add(i, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
   }
 }
 

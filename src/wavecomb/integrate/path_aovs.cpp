@@ -78,6 +78,15 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       }
     });
   }
+  if (expressions_) {
+    double* sums = film.sums(Aov::kExpressions, pixel);
+    for_each_slot([&](uint32_t slot) {
+      const float* found = expressions_.sums(slot);
+      for (uint32_t i = 0; i < 3 * layout_.expressions; ++i) sums[i] += double{found[i]};
+    });
+  }
+  if (alpha_)
+    for_each_slot([&](uint32_t slot) { film.add(Aov::kAlpha, pixel, alpha_.rows + slot); });
   if (guides_) {
     double* albedo = film.sums(Aov::kGuideAlbedo, pixel);
     double* normal = film.sums(Aov::kGuideNormal, pixel);

@@ -24,6 +24,7 @@
 #include "wavecomb/integrate/aov_tables.h"
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/light_groups.h"
+#include "wavecomb/integrate/path_expressions.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/integrate/phase_clock.h"
@@ -93,12 +94,15 @@ class PathAovs {
     rows(centre_, set.has(AovKind::kNearest), 1);
     for (Block& part : parts_) rows(part, set.any(AovSet::kParts), kRadianceWords);
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
+    if (layout.expressions > 0)
+      expressions_ = PathExpressions(capacity, tables->automaton, tables->end_of_light);
+    rows(alpha_, set.has(Aov::kAlpha), 1);
     rows(cost_ns_, set.has(Aov::kCost), 1);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
   }
 
   size_t bytes() const {
-    size_t n = 0;
+    size_t n = expressions_.bytes();
     for (const Block* block : blocks()) n += block->bytes();
     return n;
   }
@@ -107,7 +111,8 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_}) block->zero(slots);
+    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_}) block->zero(slots);
+    expressions_.clear(slots);
     if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
     const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit, kNothingHit};
     for (uint32_t i = 0; hits_ && i < slots; ++i)
@@ -124,6 +129,12 @@ class PathAovs {
   // ---- first hits -------------------------------------------------------------------------------
 
   bool wants_hits() const { return hits_ || depth_; }
+  bool wants_alpha() const { return bool(alpha_); }
+  /// The camera's rays of the active lanes have met something that covers what is behind.
+  template <typename F>
+  void cover(const UInt<F>& slot, const Mask<F>& active) const {
+    wavecomb::scatter<F>(alpha_.rows, F(1.f), slot, active);
+  }
 
   /// The camera's ray has met the shape of light `light` at `p`.
   template <typename F>
@@ -155,12 +166,15 @@ class PathAovs {
   VertexAovs<F> wanted(uint32_t depth) const {
     VertexAovs<F> v;
     v.wants_uv = depth == 0 && layout_.set.has(Aov::kUv);
-    v.wants_lights = bool(groups_);
+    v.wants_lights = wants_lights();
+    v.wants_events = bool(expressions_);
     v.uv = {F(0.f), F(0.f)};
     return v;
   }
   /// Whether that is anything at all.
-  bool wants_vertex(uint32_t depth) const { return (depth == 0 && vertex_) || guides_ || groups_; }
+  bool wants_vertex(uint32_t depth) const {
+    return (depth == 0 && vertex_) || guides_ || wants_lights();
+  }
 
   /// A vertex was shaded, which `path` had reached.
   template <typename F>
@@ -178,13 +192,30 @@ class PathAovs {
 
   // ---- light ------------------------------------------------------------------------------------
 
-  bool wants_groups() const { return bool(groups_); }
+  /// Whether it is to be known which light brings what.
+  bool wants_lights() const { return groups_ || expressions_; }
   /// Where the group of the lanes' lights is kept, or kNoGroup.
   template <typename F>
   UInt<F> group_of(const UInt<F>& light, const Mask<F>& active) const {
+    if (!groups_) return UInt<F>(kNoGroup);
     return kept_group<F>(tables_->kept_group.data(), light, active);
   }
-  /// Light of `group` has reached the paths in the active lanes' slots, which are distinct.
+  const PathExpressions& expressions() const { return expressions_; }
+  /// Light `light`, or kNoLight, has met the paths in the active lanes' slots, which are distinct.
+  template <typename F>
+  void add_light(const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
+                 const Mask<F>& active) const {
+    if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
+    if (expressions_) expressions_.add<F>(slot, light, c, active);
+  }
+  /// The light samples of the last vertices have brought `c`, of a light of `group`.
+  template <typename F>
+  void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
+                  const Mask<F>& active) const {
+    if (groups_) add<F>(slot, group, c, active);
+    if (expressions_) expressions_.add_lit<F>(slot, c, active);
+  }
+  /// The same for light of `group` and the groups alone.
   template <typename F>
   void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
            const Mask<F>& active) const {
@@ -195,10 +226,12 @@ class PathAovs {
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
                        const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
-    split_environment<F>(scene, settings, depth, tables_->kept_group.data(), path, active,
-                         [&](uint32_t group, const Color<F>& share) {
-                           add<F>(slot, UInt<F>(group), share, active);
-                         });
+    split_environment<F>(
+        scene, settings, depth, path, active,
+        [&](uint32_t light) { return expressions_ || tables_->kept_group[light] != kNoGroup; },
+        [&](uint32_t light, const Color<F>& share) {
+          add_light<F>(slot, UInt<F>(light), share, active);
+        });
   }
 
   /// Keeps the radiance of slots below `slots` as a part: it holds all light that scattering
@@ -248,6 +281,7 @@ class PathAovs {
     };
     for (const Block& part : parts_) scale(part, kRadianceWords);
     scale(groups_, kRadianceWords * layout_.light_groups);
+    expressions_.scale(exposure, slots);
   }
   /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
@@ -272,9 +306,9 @@ class PathAovs {
     size_t bytes() const { return owner.bytes(); }
   };
 
-  std::array<const Block*, 9> blocks() const {
+  std::array<const Block*, 10> blocks() const {
     return {&vertex_,   &depth_,  &hits_,    &centre_, &parts_[0],
-            &parts_[1], &groups_, &cost_ns_, &guides_};
+            &parts_[1], &groups_, &cost_ns_, &guides_, &alpha_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -332,6 +366,8 @@ class PathAovs {
   std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
   Block groups_;                ///< radiance by light group, a slot's groups side by side
   Block cost_ns_, guides_;
+  Block alpha_;  ///< 1 where the camera's ray has met something that covers
+  PathExpressions expressions_;
 };
 
 }  // namespace wavecomb

@@ -83,11 +83,21 @@ struct VertexResult {
   F bsdf_pdf;
 };
 
+/// What a scattering does: its kind, a PathEvent, and what share of it is diffuse, by colour. What
+/// is not is glossy, or of a mirror.
+template <typename F>
+struct ScatteringNote {
+  UInt<F> event;
+  Color<F> diffuse;
+  Mask<F> is_delta;
+};
+
 /// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
 /// and values that live to the end of shading cost registers.
 template <typename F>
 struct VertexAovs {
   bool wants_uv = false, wants_lights = false;  ///< asked for; the others are always given
+  bool wants_events = false;                    ///< and what scatters; goes with wants_lights
   Color<F> albedo;
   Vec3<F> normal;
   Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
@@ -97,6 +107,9 @@ struct VertexAovs {
   // choice was made.
   Vec3<F> lit_at;
   F light_weight;
+  // With wants_events: of light from the light sample and along the bounce, how it is scattered
+  // here (steps/note_events.h).
+  ScatteringNote<F> lit, bounce;
 };
 
 /// What guides a denoiser.
@@ -141,6 +154,7 @@ struct Vertex {
   /// What AOVs are to be given; null where nothing is.
   VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
   bool wants_lights() const { return notes() && aovs->wants_lights; }
+  bool wants_events() const { return notes() && aovs->wants_events; }
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 
@@ -172,6 +186,17 @@ template <typename F>
 inline UInt<F> placed_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                                const Mask<F>& active) {
   return gather_member<F>(scene.instances, &InstanceRecord::emissive, inst, active) + geom;
+}
+
+/// Lanes whose camera ray ends at geometry `geom` of instance `inst` and brings nothing, where
+/// visibility is told.
+template <typename F>
+inline Mask<F> held_out(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                        const Mask<F>& active) {
+  using U = UInt<F>;
+  const U seen =
+      gather<U>(scene.visibility, placed_geometry<F>(scene, inst, geom, active), Mask<U>(active));
+  return active & Mask<F>((seen & static_cast<uint32_t>(kHeldOut)) != U(0u));
 }
 
 /// The class that linking knows geometry `geom` of instance `inst` by.

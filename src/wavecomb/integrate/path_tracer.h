@@ -122,17 +122,22 @@ class PathTracer {
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
       if (hit.inst == kNoHit) {
         radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
-        if (aovs_.wants_groups())
+        if (aovs_.wants_lights())
           aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
         return depth;
       }
       const Vec3<F> p = fma(path.dir, hit.t, path.o);
       if (hit.inst == kLightShape) {
+        if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
         if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
         add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
         return depth;
       }
       const bool on_surface = hit.inst != kNoSurface;
+      if (depth == 0 && on_surface && scene.visibility &&
+          held_out<F>(scene, hit.inst, hit.geom, true))
+        return depth;
+      if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
       const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
       uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
       if constexpr (Media::kStreams)
@@ -151,6 +156,8 @@ class PathTracer {
             first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
       add(aovs.emitter, v.emitted);
+      if (aovs.wants_events && (v.alive || v.has_shadow))
+        aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
       aovs_.vertex<F>(depth, kSlot, aovs, path, true);
       if (history_) history_.vertex<F>(depth, kSlot, path, hit.t, material, v, radiance(), true);
       aovs_.end_depth(depth, radiance(), 1);
@@ -160,7 +167,7 @@ class PathTracer {
         const bool links = context_.scene.lights.links.members != nullptr;
         is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
                                   links ? &v.shadow_set : nullptr);
-        if (is_free) add_direct(key, depth, v, aovs.lit_by);
+        if (is_free) add_direct(key, depth, v, aovs_.group_of<F>(aovs.lit_by, true));
       }
       if (!probes_.empty() && aovs.light_weight >= 0.f)
         note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
@@ -200,19 +207,20 @@ class PathTracer {
   /// Light `light`, or kNoLight, has brought `c`.
   void add(uint32_t light, const Color<F>& c) {
     radiance_.sum += c;
-    if (aovs_.wants_groups()) aovs_.add<F>(kSlot, aovs_.group_of<F>(light, true), c, true);
+    if (aovs_.wants_lights()) aovs_.add_light<F>(kSlot, light, c, true);
   }
 
-  /// What the free shadow ray of `v` brings, as much of it as comes through.
+  /// What the free shadow ray of `v` brings, of a light of `group`, as much as comes through.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
-                  uint32_t light) {
+                  uint32_t group) {
     Color<F> c = v.direct;
     if constexpr (Media::kAny) {
       const F t = v.shadow_tfar * (1.f / kShadowReach);
       c = c * media_.template transmittance<F>(
                   {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t}, true);
     }
-    add(light, c);
+    radiance_.sum += c;
+    if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
     if (history_) history_.light<F>(depth, kSlot, c, true);
   }
 

@@ -35,6 +35,7 @@ class SingleRays {
   SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth) {
     SingleHit h;
     keys_.salt = 2 * depth;
+    keys_.ray_kind = ray_kind(depth, false);
     keys_.shadow_set = nullptr;
     context_.accel->intersect(span(o, d, tfar), {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1,
                               false, keys_);
@@ -48,6 +49,7 @@ class SingleRays {
                 const uint32_t* shadow_set) {
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
+    keys_.ray_kind = ray_kind(depth, true);
     keys_.shadow_set = shadow_set;
     context_.accel->occluded(span(o, d, tfar), &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);

@@ -7,6 +7,7 @@
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/integrate/steps/join.h"
+#include "wavecomb/integrate/steps/note_events.h"
 #include "wavecomb/integrate/steps/sample_light.h"
 #include "wavecomb/integrate/steps/scatter.h"
 #include "wavecomb/integrate/steps/survive.h"
@@ -54,6 +55,10 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, joint, receiver, out);
   survive<F>(v, place, luminance(at.throughput), r_light.w, out);
+  if (v.wants_events()) [[unlikely]]
+    note_events<std::remove_cvref_t<decltype(at.bsdf)>, F>(v.scene.lights, at.bsdf, frame, wo,
+                                                           out.shadow_d, out.next.dir, out.next.pdf,
+                                                           out.has_shadow, *v.aovs);
   return out;
 }
 

@@ -200,6 +200,10 @@ uint64_t hash_lights(const Scene& scene) {
       h.add_bytes(entry.path.data(), entry.path.size());
       h.add(entry.rule);
     }
+  for (const VisibilityRule& rule : scene.geometry()->visibility) {
+    h.add_bytes(rule.path.data(), rule.path.size());
+    h.add(rule.said, rule.bits);
+  }
   for (const IesProfile& p : scene.geometry()->profiles) {
     h.add_array(std::span<const float>(p.vertical));
     h.add_array(std::span<const float>(p.horizontal));

@@ -8,9 +8,7 @@
 #include "wavecomb/scene/scene_limits.h"
 
 namespace wavecomb {
-namespace {
 
-/// The path without the numbers of point instances: "/Forest/Leaves" of "/Forest[12]/Leaves".
 std::string without_numbers(std::string_view path) {
   std::string out;
   bool inside = false;
@@ -21,8 +19,6 @@ std::string without_numbers(std::string_view path) {
   }
   return out;
 }
-
-}  // namespace
 
 bool GeometrySet::contains(std::string_view path) const {
   for (std::string_view at = path;;) {

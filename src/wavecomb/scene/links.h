@@ -14,6 +14,9 @@ namespace wavecomb {
 
 class ObjectNames;
 
+/// The path without the numbers of point instances: "/Forest/Leaves" of "/Forest[12]/Leaves".
+std::string without_numbers(std::string_view path);
+
 /// What a path of a collection says, as UsdCollectionMembershipQuery's rules.
 enum class PathRule : uint8_t { kExclude, kExplicit, kExpand };
 

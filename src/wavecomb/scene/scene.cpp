@@ -101,9 +101,19 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
 }
 
 void Scene::link() {
-  if (geometry_->sets.empty()) return;
-  links_ = std::make_shared<const SceneLinks>(ObjectNames(*this), geometry_->sets);
-  view_.lights.links = links_->view();
+  if (geometry_->sets.empty() && geometry_->visibility.empty()) return;
+  const ObjectNames names(*this);
+  if (!geometry_->sets.empty()) {
+    links_ = std::make_shared<const SceneLinks>(names, geometry_->sets);
+    view_.lights.links = links_->view();
+  }
+  std::vector<uint32_t> visibility = object_visibility(*this, names);
+  if (visibility.empty()) return;
+  // Light that is aimed at is found by bounces, too: their weights count on each other.
+  for (size_t i = 0; i < lights_->emissive.size(); ++i)
+    if (lights_->emissive[i] != kNoLight) visibility[i] |= kSeenByBounces;
+  visibility_ = std::make_shared<const std::vector<uint32_t>>(std::move(visibility));
+  view_.visibility = visibility_->data();
 }
 
 std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threads) const {
@@ -150,9 +160,12 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
                                                        lights_.get());
     });
   }
-  return std::shared_ptr<const Scene>(new Scene(geometry_, std::move(new_materials),
-                                                std::move(new_lights), std::move(new_tangents),
-                                                links_, edit.camera.value_or(camera_)));
+  std::shared_ptr<Scene> scene(new Scene(geometry_, std::move(new_materials), std::move(new_lights),
+                                         std::move(new_tangents), links_,
+                                         edit.camera.value_or(camera_)));
+  scene->visibility_ = visibility_;
+  scene->view_.visibility = view_.visibility;
+  return scene;
 }
 
 uint64_t Scene::unique_triangles() const {

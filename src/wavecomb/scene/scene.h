@@ -13,6 +13,7 @@
 #include "wavecomb/scene/camera.h"
 #include "wavecomb/scene/mesh_tangents.h"
 #include "wavecomb/scene/scene_parts.h"
+#include "wavecomb/scene/visibility.h"
 #include "wavecomb/scene/volume.h"
 #include "wavecomb/scene/walk_data.h"
 
@@ -28,6 +29,8 @@ struct SceneView {
   const uint32_t* emissive_lights = nullptr;
   /// Likewise the record of a mesh light, or kNoLight. Null where there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
+  /// Likewise RayVisibility. Null where all rays see everything.
+  const uint32_t* visibility = nullptr;
   const uint32_t* material_program = nullptr;
   const uint32_t* material_variant = nullptr;  ///< material_parts.h
   MaterialView materials;
@@ -84,6 +87,9 @@ class Scene {
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
   /// Index into light_groups() of every light that kernels know, triangles last.
   std::vector<uint32_t> groups_of_lights() const;
+  /// Of the same lights: 1 where one is the glow of an object's material, and no light of the
+  /// stage.
+  std::vector<uint8_t> lights_of_objects() const;
   /// The ways from the world to the instances, and the names on them.
   const std::vector<Placement>& placements() const { return geometry_->placements; }
   const NameTable& names() const { return geometry_->names; }
@@ -122,14 +128,20 @@ class Scene {
         std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
         std::shared_ptr<const SceneTangents> tangents, std::shared_ptr<const SceneLinks> links,
         const Camera& camera);
-  /// Works out which objects are in which sets.
+  /// Works out which objects are in which sets, and which rays see them.
   void link();
+  /// A value for every light that kernels know: of_input(light) of the stage's, of_run(triangles)
+  /// of those of meshes.
+  template <typename T, typename OfInput, typename OfRun>
+  std::vector<T> for_all_lights(const OfInput& of_input, const OfRun& of_run) const;
 
   std::shared_ptr<const SceneGeometry> geometry_;
   std::shared_ptr<const SceneMaterials> materials_;
   std::shared_ptr<const SceneLights> lights_;
   std::shared_ptr<const SceneTangents> tangents_;
   std::shared_ptr<const SceneLinks> links_;  ///< null where there are no sets
+  /// SceneView::visibility; null where all rays see everything.
+  std::shared_ptr<const std::vector<uint32_t>> visibility_;
   Camera camera_;
   SceneView view_;
 };
@@ -187,6 +199,8 @@ class SceneBuilder {
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
   /// A set for Light::light_link and shadow_link.
   uint32_t add_geometry_set(GeometrySet set);
+  /// Says which rays see a prim and what is below it. Of two rules for one path the later counts.
+  void add_visibility(VisibilityRule rule);
   /// A profile for Shaping::ies.
   uint32_t add_ies(IesProfile profile);
   uint32_t add_light(Light light);
@@ -234,6 +248,7 @@ class SceneBuilder {
   std::vector<TexturePtr> textures_;
   std::vector<IesProfile> profiles_;
   std::vector<GeometrySet> sets_;
+  std::vector<VisibilityRule> visibility_;
   std::vector<Light> lights_, mesh_lights_;
   std::vector<Volume> volumes_;
   std::vector<std::string> light_groups_{kOtherLights};

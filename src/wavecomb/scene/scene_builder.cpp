@@ -169,6 +169,10 @@ uint32_t SceneBuilder::add_geometry_set(GeometrySet set) {
   return static_cast<uint32_t>(sets_.size() - 1);
 }
 
+void SceneBuilder::add_visibility(VisibilityRule rule) {
+  visibility_.push_back(std::move(rule));
+}
+
 uint32_t SceneBuilder::add_light(Light light) {
   check_light(light, {textures_.size(), profiles_.size(), sets_.size()});
   lights_.push_back(std::move(light));

@@ -180,6 +180,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->textures = std::move(textures_);
   geometry->profiles = std::move(profiles_);
   geometry->sets = std::move(sets_);
+  geometry->visibility = std::move(visibility_);
   geometry->mesh_lights = std::move(mesh_lights_);
   geometry->volumes = std::move(volumes_);
   geometry->light_groups = std::move(light_groups_);

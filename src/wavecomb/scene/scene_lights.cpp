@@ -127,7 +127,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
       if (!shines) continue;
       sources.push_back({triangle_count, &mesh, mesh_id, static_cast<uint32_t>(i), &record,
                          &to_world, mesh_light});
-      triangle_groups.push_back({static_cast<uint32_t>(triangle_count), mesh.light_group});
+      triangle_groups.push_back(
+          {static_cast<uint32_t>(triangle_count), mesh.light_group, mesh.mesh_light != kNoLight});
       triangle_count += mesh.triangle_count();
     }
   }
@@ -161,19 +162,31 @@ uint64_t SceneLights::tree_bytes() const {
   return bytes_of(set.tree) + late_bytes_;
 }
 
-std::vector<uint32_t> Scene::groups_of_lights() const {
+template <typename T, typename OfInput, typename OfRun>
+std::vector<T> Scene::for_all_lights(const OfInput& of_input, const OfRun& of_run) const {
   const LightSet& set = lights_->set;
   const auto& runs = lights_->triangle_groups;
-  std::vector<uint32_t> groups(set.size());
-  for (size_t i = 0; i < lights().size(); ++i) groups[set.of_input[i]] = lights()[i].group;
+  std::vector<T> values(set.size());
+  for (size_t i = 0; i < lights().size(); ++i) values[set.of_input[i]] = of_input(lights()[i]);
   for (size_t run = 0; run < runs.size(); ++run) {
     const size_t first = set.first_triangle() + runs[run].first;
     const size_t end =
-        run + 1 < runs.size() ? set.first_triangle() + runs[run + 1].first : groups.size();
-    std::fill(groups.begin() + static_cast<std::ptrdiff_t>(first),
-              groups.begin() + static_cast<std::ptrdiff_t>(end), runs[run].group);
+        run + 1 < runs.size() ? set.first_triangle() + runs[run + 1].first : values.size();
+    std::fill(values.begin() + static_cast<std::ptrdiff_t>(first),
+              values.begin() + static_cast<std::ptrdiff_t>(end), of_run(runs[run]));
   }
-  return groups;
+  return values;
+}
+
+std::vector<uint32_t> Scene::groups_of_lights() const {
+  return for_all_lights<uint32_t>([](const Light& light) { return light.group; },
+                                  [](const SceneLights::TriangleGroup& run) { return run.group; });
+}
+
+std::vector<uint8_t> Scene::lights_of_objects() const {
+  return for_all_lights<uint8_t>(
+      [](const Light& /*light*/) { return uint8_t{0}; },
+      [](const SceneLights::TriangleGroup& run) { return uint8_t{!run.is_light}; });
 }
 
 }  // namespace wavecomb

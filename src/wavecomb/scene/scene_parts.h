@@ -18,6 +18,7 @@
 #include "wavecomb/scene/mesh.h"
 #include "wavecomb/scene/motion.h"
 #include "wavecomb/scene/names.h"
+#include "wavecomb/scene/visibility.h"
 #include "wavecomb/scene/volume.h"
 #include "wavecomb/scene/walk_data.h"
 #include "wavecomb/texture/texture.h"
@@ -79,6 +80,7 @@ struct SceneGeometry {
   std::vector<TexturePtr> textures;
   std::vector<IesProfile> profiles;
   std::vector<GeometrySet> sets;
+  std::vector<VisibilityRule> visibility;
   std::vector<Light> mesh_lights;  ///< Mesh::mesh_light
   std::vector<Volume> volumes;
   std::vector<std::string> light_groups;
@@ -162,6 +164,7 @@ struct SceneLights {
   /// Of the triangle lights from `first` on, up to those of the next entry.
   struct TriangleGroup {
     uint32_t first, group;
+    bool is_light;  ///< of a mesh light, and not of a material that glows
   };
   std::vector<TriangleGroup> triangle_groups;
 

@@ -313,6 +313,7 @@ CALLS: dict[str, Call] = {
         "volumes",
     ),
     "add_geometry_set": Call({"rules": named(text)}, {}, "sets"),
+    "add_visibility": Call({"path": text, "rays": named(flag)}),
     "add_ies": Call(
         {"vertical": many(number), "horizontal": many(number), "candela": array(_FLOATS, 2)},
         {},

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.load_options import LoadOptions
@@ -43,6 +43,7 @@ from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.named_files import keep_to
 from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
+from wavecomb.usd.stage.ray_visibility import RayVisibility
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.traverse import Traversal
@@ -284,7 +285,10 @@ def _read(
     links = LinkTable(builder)
     lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, seen.blur, report)
-    traversal = Traversal(time, seen.purposes, lights, report, motion, seen.binding_purposes)
+    traversal = Traversal(
+        time, seen.purposes, lights, report, motion, seen.binding_purposes,
+        RayVisibility(builder, report),
+    )  # fmt: skip
     if choice.options.texture_limit is not None and textures.store is None:
         _limit_textures(stage, traversal, seen, choice, textures, report)
     view = None
@@ -301,6 +305,7 @@ def _read(
     )  # fmt: skip
     world = groups_of.world()
     lit = materials.glows or has_lights or groups_of.mesh_lights.any or groups_of.volumes.glow
+    _hold_out(stage, choice.options.holdouts, builder)
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     volumes = add_volumes(world, builder, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
@@ -319,6 +324,14 @@ def _read(
         cache.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
     return chosen, light_paths, None if motion is None else motion.shutter, outline, volumes
+
+
+def _hold_out(stage: Usd.Stage, paths: tuple[str, ...], builder: _core.SceneBuilder) -> None:
+    """Makes holdouts of prims. Raises WavecombError for a path that leads to none."""
+    for path in paths:
+        if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
+            raise WavecombError(f"--holdout {path}: there is no such prim")
+        builder.add_visibility(path, {"holdout": True})
 
 
 def _limit_textures(

@@ -7,7 +7,9 @@ import re
 
 from pxr import UsdRender
 
+from wavecomb import _core
 from wavecomb.run import aovs as aov_names
+from wavecomb.run import expressions
 from wavecomb.usd.looks.network import word
 
 _NAMES = {
@@ -17,6 +19,7 @@ _NAMES = {
     "depth": ("z", "Z", "linearDepth", "cameraDepth"),
     "position": ("P", "Pworld", "__Pworld"),
     "uv": ("st", "UV", "texcoord"),
+    "alpha": ("a", "A", "Alpha"),
     "instance_id": ("instanceId", "id"),
     "material_id": ("materialId",),
     "samples": ("sampleCount", "samplecount"),
@@ -47,25 +50,36 @@ def aov_of(prim: UsdRender.Var) -> str | None:
     name = word(prim.GetSourceNameAttr().Get())
     kind = word(prim.GetSourceTypeAttr().Get(), "raw")
     if kind == "lpe" or name.startswith(("lpe:", "color lpe:")):
-        return _of_expression(name.rpartition("lpe:")[2])
+        return _of_expression(name.rpartition("lpe:")[2], prim.GetPrim().GetName())
     if kind == "primvar" or name.startswith("primvars:"):
         return "uv" if name.removeprefix("primvars:") in ("st", "uv") else None
     if name in aov_names.names() or name == "crypto" or name.startswith(aov_names.LIGHT):
         return name
+    if name not in _AOV_OF and name in expressions.NAMED:
+        return expressions.spelled(expressions.PREFIX + name)
     return _AOV_OF.get(name)
 
 
-def _of_expression(text: str) -> str | None:
-    """The AOV of a light path expression.
+def _of_expression(text: str, name: str) -> str | None:
+    """The AOV of a light path expression; None where it is none.
 
-    >>> [_of_expression(text) for text in ("C.*", "C<..>[<L.>O]", "C.*<L.'key'>", "C<RD>L")]
-    ['beauty', 'direct', 'light_key', None]
+    What is no other AOV is called by the name of its var.
+
+    >>> [_of_expression(text, "a") for text in ("C.*", "C<..>[<L.>O]", "C.*<L.'key'>", "C<RD>L")]
+    ['beauty', 'direct', 'light_key', 'lpe:a=C<RD>L']
     """
     text = "".join(text.split())
     if text == "C.*":
         return "beauty"
     group = _GROUP.fullmatch(text)
-    if group is not None:
-        return aov_names.LIGHT + group["group"] if group["events"] == ".*" else None
+    if group is not None and group["events"] == ".*":
+        return aov_names.LIGHT + group["group"]
     whole = _EXPRESSION.fullmatch(text)
-    return None if whole is None else _PARTS.get(whole["events"])
+    if whole is not None and whole["events"] in _PARTS:
+        return _PARTS[whole["events"]]
+    aov = expressions.as_aov(text, name)
+    try:
+        _core.Settings(aovs=[aov]).check()
+    except _core.Error:
+        return None
+    return aov

@@ -21,6 +21,8 @@ from wavecomb.usd.looks.assign import Draw, Parent
 from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.looks.network import word
 from wavecomb.usd.stage.instancing import sound
+from wavecomb.usd.stage.ray_visibility import NAMES as RAY_NAMES
+from wavecomb.usd.stage.ray_visibility import RayVisibility
 from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]
@@ -67,14 +69,16 @@ class Traversal:
         report: LoadReport,
         motion: Motion | None = None,
         binding_purposes: Sequence[str] = BINDING_PURPOSES,
+        rays: RayVisibility | None = None,
     ) -> None:
-        """``motion``: what is followed while the shutter is open; None: it is not."""
+        """``motion``: what is followed while the shutter is open. ``rays``: who is told of them."""
         self.time = time
         self.binding_purposes = tuple(binding_purposes)
         self.purposes = frozenset(purposes)
         self.lights = lights
         self.report = report
         self.motion = motion
+        self.rays = rays
         self.skeletons = Skeletons(report)
         self.xforms = UsdGeom.XformCache(time)
         self._kinds: dict[str, str] = {}
@@ -150,6 +154,8 @@ class Traversal:
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
                 ):
                     continue
+                if self.rays is not None and not RAY_NAMES.isdisjoint(names):
+                    self.rays.read(prim)
                 if "purpose" in names:
                     authored = prim.GetAttribute("purpose")
                     if authored.HasAuthoredValue():

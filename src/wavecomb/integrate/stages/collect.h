@@ -70,8 +70,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
                 clamp_limit(settings, depth));
             const Mask<F> bright = active & not_(is_black(c));
             add_radiance<F>(wave.pool.radiance, slot, c, bright);
-            if (wave.aovs.wants_groups())
-              wave.aovs.add<F>(slot, wave.aovs.group_of<F>(U(kNoLight), bright), c, bright);
+            if (wave.aovs.wants_lights()) wave.aovs.add_light<F>(slot, U(kNoLight), c, bright);
           }
         if constexpr (Media::kStreams)
           flight = media.template flight<F>(wave, i, path.throughput);
@@ -103,14 +102,15 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         c = select<F>(shape, shape_emission<F>(scene, settings, depth, light, t, state, shape), c);
       }
       add_radiance<F>(wave.pool.radiance, slot, c, ended & not_(is_black(c)));
-      if (wave.aovs.wants_groups()) {
+      if (wave.aovs.wants_lights()) {
         if (any(missed)) wave.aovs.add_environment<F>(scene, settings, depth, slot, state, missed);
-        if (any(shape))
-          wave.aovs.add<F>(slot, wave.aovs.group_of<F>(load<U>(hits.geom + i), shape), c, shape);
+        if (any(shape)) wave.aovs.add_light<F>(slot, load<U>(hits.geom + i), c, shape);
       }
     }
     if (!kFromLights && context.joins_light() && depth == 0) [[unlikely]]
       begin_ratios<F>(wave, context, slot, o, d, t, surface);
+    if (!kFromLights && depth == 0 && scene.visibility) [[unlikely]]
+      surface = surface & not_(held_out<F>(scene, inst, load<U>(hits.geom + i), surface));
     const bool notes_hits = !kFromLights && depth == 0 && wave.aovs.wants_hits();
     const auto time = [&] {
       return context.camera->moves()
@@ -126,6 +126,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       else
         return surface;
     };
+    if (!kFromLights && depth == 0 && wave.aovs.wants_alpha())
+      wave.aovs.cover<F>(slot, shape | recorded());
     if (none(recorded())) continue;
 
     const U prim = load<U>(hits.prim + i);

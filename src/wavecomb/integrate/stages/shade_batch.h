@@ -52,9 +52,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
     U lit_by(0u);
     if (V::has(kNotes) && aovs.wants_lights) {
-      wave.aovs.template add<F>(slot, wave.aovs.template group_of<F>(aovs.emitter, emits),
-                                v.emitted, emits);
+      wave.aovs.template add_light<F>(slot, aovs.emitter, v.emitted, emits);
       lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
+      if (aovs.wants_events)
+        wave.aovs.expressions().template scatter<F>(depth, slot, path.key, aovs, v.has_shadow,
+                                                    Mask<F>(v.alive | v.has_shadow));
     }
     if (is_watched) {
       if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);

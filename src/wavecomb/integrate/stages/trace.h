@@ -53,6 +53,7 @@ inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool sha
   const auto* path = reinterpret_cast<const PathRow<float>*>(pool.paths);
   PresenceKeys keys{&path->key.pixel_hash, &path->key.sample, kRowWords<PathRow>,
                     2 * depth + (shadow ? 1u : 0u)};
+  keys.ray_kind = ray_kind(depth, shadow);
   if (linked) {
     keys.shadow_set = &reinterpret_cast<const ShadowRow<float>*>(pool.shadows)->set;
     keys.shadow_stride = kRowWords<ShadowRow>;
@@ -101,7 +102,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   const ShadowQueue& q = wave.shadows;
   occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
   if constexpr (Media::kStreams) media.template pass_all<F>(wave, depth, context.settings->sampler);
-  const bool is_watched = wave.aovs.wants_groups() || wave.history;
+  const bool is_watched = wave.aovs.wants_lights() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
@@ -120,10 +121,10 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
     }
     add_radiance<F>(wave.pool.radiance, slot, c, active);
     if (is_watched) {
-      if (wave.aovs.wants_groups())
-        wave.aovs.add<F>(slot,
-                         gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active),
-                         c, active);
+      if (wave.aovs.wants_lights())
+        wave.aovs.add_direct<F>(
+            slot, gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active), c,
+            active);
       if (wave.history) wave.history.light<F>(depth, slot, c, active);
     }
   }

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which kinds of rays see a prim, and holdouts, as renderers author them (docs/visibility.md)."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from pxr import Usd
+
+from wavecomb import _core
+from wavecomb.usd.stage.report import LoadReport
+
+_FLAGS = {
+    "primvars:wavecomb:visibility:camera": "camera",
+    "primvars:wavecomb:visibility:shadow": "shadow",
+    "primvars:wavecomb:visibility:bounces": "bounces",
+    "primvars:wavecomb:holdout": "holdout",
+    "primvars:arnold:visibility:camera": "camera",
+    "primvars:arnold:visibility:shadow": "shadow",
+    "primvars:arnold:matte": "holdout",
+    "primvars:karma:object:holdoutmode": "holdout",
+    "primvars:ri:attributes:visibility:camera": "camera",
+    "primvars:ri:attributes:visibility:transmission": "shadow",
+    "primvars:ri:attributes:visibility:indirect": "bounces",
+    "primvars:ri:attributes:trace:holdout": "holdout",
+    "primvars:ri:attributes:Ri:Matte": "holdout",
+}
+"""Attributes that say one thing: what is not 0 is true."""
+_ARNOLD_BOUNCES = tuple(
+    f"primvars:arnold:visibility:{kind}"
+    for kind in ("diffuse_reflect", "specular_reflect", "diffuse_transmit", "specular_transmit")
+)
+_KARMA = "primvars:karma:object:rendervisibility"
+_KARMA_KINDS = {
+    "primary": "camera",
+    "shadow": "shadow",
+    "diffuse": "bounces",
+    "reflect": "bounces",
+    "refract": "bounces",
+}
+NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA})
+"""All attributes that are read here."""
+
+
+class RayVisibility:
+    """Tells the scene which rays see which prims."""
+
+    def __init__(self, builder: _core.SceneBuilder, report: LoadReport) -> None:
+        self._builder = builder
+        self._report = report
+
+    def read(self, prim: Usd.Prim) -> None:
+        """Reads what a prim says; call it for prims that author one of ``NAMES``."""
+        rays = {
+            kind: bool(value)
+            for name, kind in _FLAGS.items()
+            if (value := _value(prim, name)) is not None
+        }
+        bounces = [value for name in _ARNOLD_BOUNCES if (value := _value(prim, name)) is not None]
+        if bounces:
+            whole = len(bounces) == len(_ARNOLD_BOUNCES) and not any(bounces)
+            if not whole and not all(bounces):
+                self._report.missing("visibility by kinds of bounces", prim.GetPath())
+            rays["bounces"] = not whole
+        mask = _value(prim, _KARMA)
+        if mask is not None:
+            rays |= self._karma(str(mask), prim)
+        if rays:
+            self._builder.add_visibility(self._report.place(str(prim.GetPath())), rays)
+
+    def _karma(self, mask: str, prim: Usd.Prim) -> dict[str, bool]:
+        """What a mask of Karma says: "primary|shadow", "-primary", "*"."""
+        words = [word for word in re.split(r"[|&,\s]+|(?=-)", mask) if word]
+        left_out = bool(words) and all(word.startswith("-") for word in words)
+        kinds = {word.removeprefix("-") for word in words}
+        if "*" in kinds:
+            kinds = set(_KARMA_KINDS)
+        if not kinds <= _KARMA_KINDS.keys():
+            self._report.missing(f"visibility {mask!r}", prim.GetPath())
+            return {}
+        seen = {kind: (kind in kinds) != left_out for kind in _KARMA_KINDS}
+        bounces = [seen[kind] for kind, ours in _KARMA_KINDS.items() if ours == "bounces"]
+        if any(bounces) and not all(bounces):
+            self._report.missing("visibility by kinds of bounces", prim.GetPath())
+        return {"camera": seen["primary"], "shadow": seen["shadow"], "bounces": any(bounces)}
+
+
+def _value(prim: Usd.Prim, name: str) -> Any:
+    attribute = prim.GetAttribute(name)
+    return attribute.Get() if attribute else None

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Radiance of paths by light path expressions (core/path_expression.h). Run only where there are
+/// any.
+///
+/// A path carries a state for each of its three colours. Where a scattering is partly diffuse, the
+/// share s of a colour, that colour goes on as diffuse with probability s, by one number of the
+/// vertex for all three, and else as glossy. Whatever light comes then is added whole to what the
+/// state says, so that the layers of a partition add up to the beauty, and each has the mean that
+/// its lobes bring. Light samples are split by s itself: they need no choice.
+#pragma once
+
+#include <array>
+#include <cstring>
+
+#include "wavecomb/core/fields.h"
+#include "wavecomb/core/hash.h"
+#include "wavecomb/core/path_expression.h"
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/soa.h"
+#include "wavecomb/integrate/path_state.h"
+
+namespace wavecomb {
+
+/// What a path keeps of itself.
+template <typename F>
+struct ExpressionRow {
+  UInt<F> states;  ///< of the three colours, ten bits each
+  // Of the light sample under way: the states that it found, its event, its end, and the share of
+  // it that is diffuse.
+  UInt<F> lit_states, lit_event, lit_end;
+  Color<F> lit_diffuse;
+  WAVECOMB_FIELDS(states, lit_states, lit_event, lit_end, lit_diffuse)
+};
+static_assert(PathAutomaton::kMostStates <= 1024);
+
+/// Contract: owned by one PathAovs; slots below the capacity. Light in the active lanes' slots,
+/// which are distinct.
+class PathExpressions {
+ public:
+  PathExpressions() = default;
+  /// `end_of_light`: path_end of each light, and at the end that of what is no light.
+  PathExpressions(size_t capacity, const PathAutomaton& automaton,
+                  const std::vector<uint32_t>& end_of_light)
+      : automaton_(&automaton),
+        end_of_light_(end_of_light.data()),
+        lights_(static_cast<uint32_t>(end_of_light.size() - 1)),
+        words_(3 * automaton.expressions),
+        rows_(1, capacity * kRowWords<ExpressionRow>),
+        sums_(1, capacity * words_) {}
+
+  explicit operator bool() const { return automaton_ != nullptr; }
+  size_t bytes() const { return rows_.bytes() + sums_.bytes(); }
+  /// Radiance of a path in `slot`, rgb, expression by expression.
+  const float* sums(size_t slot) const { return sums_.floats(0) + slot * words_; }
+
+  /// Forgets the paths in slots below `slots`.
+  void clear(size_t slots) {
+    if (!*this) return;
+    std::memset(rows_.floats(0), 0, slots * kRowWords<ExpressionRow> * sizeof(float));
+    std::memset(sums_.floats(0), 0, slots * words_ * sizeof(float));
+  }
+  void scale(float factor, size_t slots) const {
+    for (size_t i = 0; *this && i < slots * words_; ++i) sums_.floats(0)[i] *= factor;
+  }
+
+  /// Light `light`, or kNoLight, has reached the paths.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void add(const UInt<F>& slot, const UInt<F>& light,
+                                        const Color<F>& c, const Mask<F>& active) const {
+    if (none(active)) return;
+    const UInt<F> states = load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
+    add_to<F>(slot, states, end_of<F>(light, active), c, active);
+  }
+
+  /// A vertex was shaded: `v` says how it scatters. `has_shadow`: where a light sample is under
+  /// way.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void scatter(uint32_t depth, const UInt<F>& slot,
+                                            const SampleKey<F>& key, const VertexAovs<F>& v,
+                                            const Mask<F>& has_shadow,
+                                            const Mask<F>& active) const {
+    using U = UInt<F>;
+    ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
+    row.lit_states = row.states;
+    row.lit_event = v.lit.event;
+    row.lit_diffuse = v.lit.diffuse;
+    row.lit_end = end_of<F>(v.lit_by, has_shadow);
+    const U path = hash_u32<U>(key.pixel_hash, key.sample);
+    const F u = unit_float<F>(hash_u32<U>(path, U(0x2c1b3c6du + depth)));
+    U states(0u);
+    for_each_colour<F>(v.bounce.diffuse, [&](uint32_t c, const F& share) {
+      const U lobe = select(Mask<U>(v.bounce.is_delta), U(kSingularEvent),
+                            select(Mask<U>(Mask<F>(u < share)), U(kDiffuseEvent), U(kGlossyEvent)));
+      states = states | (next<F>(state_of<F>(row.states, c), v.bounce.event, lobe, active)
+                         << (kStateBits * c));
+    });
+    row.states = states;
+    store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
+  }
+
+  /// The light sample under way has brought `c`.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void add_lit(const UInt<F>& slot, const Color<F>& c,
+                                            const Mask<F>& active) const {
+    using U = UInt<F>;
+    if (none(active)) return;
+    const ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
+    const Color<F> diffuse = c * row.lit_diffuse;
+    const auto add_part = [&](uint32_t lobe, const Color<F>& part) {
+      U states(0u);
+      for (uint32_t i = 0; i < 3; ++i)
+        states = states | (next<F>(state_of<F>(row.lit_states, i), row.lit_event, U(lobe), active)
+                           << (kStateBits * i));
+      add_to<F>(slot, states, row.lit_end, part, active);
+    };
+    add_part(kDiffuseEvent, diffuse);
+    add_part(kGlossyEvent, c - diffuse);
+  }
+
+ private:
+  static constexpr uint32_t kStateBits = 10, kStateMask = 1023;
+
+  template <typename F, typename Each>
+  static void for_each_colour(const Color<F>& c, const Each& each) {
+    each(0, c.x);
+    each(1, c.y);
+    each(2, c.z);
+  }
+  template <typename F>
+  static UInt<F> state_of(const UInt<F>& states, uint32_t colour) {
+    return (states >> (kStateBits * colour)) & kStateMask;
+  }
+  /// The state after a scattering; one in a volume has no lobes.
+  template <typename F>
+  UInt<F> next(const UInt<F>& state, const UInt<F>& event, const UInt<F>& lobe,
+               const Mask<F>& active) const {
+    using U = UInt<F>;
+    const U volume(static_cast<uint32_t>(PathEvent::kVolume));
+    const U at =
+        state * PathAutomaton::kNextWords + event + select(Mask<U>(event == volume), U(0u), lobe);
+    return gather<U>(automaton_->next.data(), at, Mask<U>(active));
+  }
+  template <typename F>
+  UInt<F> end_of(const UInt<F>& light, const Mask<F>& active) const {
+    using U = UInt<F>;
+    return gather<U>(end_of_light_, select(Mask<U>(light == U(kNoLight)), U(lights_), light),
+                     Mask<U>(active));
+  }
+  /// Adds `c`, colour by colour, to the expressions that hold what ends so in such states.
+  template <typename F>
+  void add_to(const UInt<F>& slot, const UInt<F>& states, const UInt<F>& end, const Color<F>& c,
+              const Mask<F>& active) const {
+    using U = UInt<F>;
+    for_each_colour<F>(c, [&](uint32_t colour, const F& value) {
+      const U at = state_of<F>(states, colour) * automaton_->ends + end;
+      const U matched = select(Mask<U>(active),
+                               gather<U>(automaton_->matched.data(), at, Mask<U>(active)), U(0u));
+      for (uint32_t e = 0; e < automaton_->expressions; ++e) {
+        const Mask<F> here = active & Mask<F>(((matched >> e) & 1u) != U(0u));
+        if (none(here)) continue;
+        const U word = slot * words_ + (3 * e + colour);
+        const F before = gather<F>(sums_.floats(0), word, here);
+        wavecomb::scatter<F>(sums_.floats(0), F(before + value), word, here);
+      }
+    });
+  }
+
+  const PathAutomaton* automaton_ = nullptr;
+  const uint32_t* end_of_light_ = nullptr;
+  uint32_t lights_ = 0, words_ = 0;
+  SoaBlock rows_, sums_;
+};
+
+}  // namespace wavecomb

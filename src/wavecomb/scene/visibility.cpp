@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/visibility.h"
+
+#include <algorithm>
+#include <map>
+#include <string_view>
+
+#include "wavecomb/scene/links.h"
+#include "wavecomb/scene/names.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+namespace {
+
+using Rules = std::map<std::string, VisibilityRule, std::less<>>;
+
+/// The path of the prim above; empty at the top.
+std::string_view above(std::string_view path) {
+  const size_t slash = path.rfind('/');
+  return slash == std::string_view::npos ? std::string_view() : path.substr(0, slash);
+}
+
+/// What is said of the object that is seen as `placed`, whose mesh is called `own` in a group of
+/// root `root`: of it and the prims above it the nearest counts.
+uint32_t visibility_of(const Rules& rules, std::string_view placed, std::string_view own,
+                       std::string_view root) {
+  uint32_t said = 0, bits = 0;
+  const auto listen = [&](std::string_view path) {
+    const auto rule = rules.find(path);
+    if (rule == rules.end()) return;
+    bits |= rule->second.bits & rule->second.said & ~said;
+    said |= rule->second.said;
+  };
+  for (; !placed.empty(); placed = above(placed), own = above(own)) {
+    listen(placed);
+    if (own.size() > root.size() && own != placed) listen(own);
+  }
+  return bits | (kSeenByAll & ~said);
+}
+
+}  // namespace
+
+std::vector<uint32_t> object_visibility(const Scene& scene, const ObjectNames& names) {
+  const SceneGeometry& geometry = *scene.geometry();
+  if (geometry.visibility.empty()) return {};
+  Rules by_path;
+  for (const VisibilityRule& rule : geometry.visibility) {
+    VisibilityRule& whole = by_path[rule.path];
+    whole.bits = (whole.bits & ~rule.said) | (rule.bits & rule.said);
+    whole.said |= rule.said;
+  }
+  std::vector<uint32_t> all;
+  for (size_t i = 0; i < geometry.instance_records.size(); ++i) {
+    const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
+    for (const uint32_t mesh : group.meshes) {
+      const std::string placed = without_numbers(names.object(static_cast<uint32_t>(all.size())));
+      all.push_back(visibility_of(by_path, placed, geometry.meshes[mesh].name, group.root));
+    }
+  }
+  if (std::all_of(all.begin(), all.end(), [](uint32_t v) { return v == kSeenByAll; })) return {};
+  return all;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/core/path_expression.h"
+
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+const std::vector<std::string> kKeys{"other", "key"};
+/// A letter for each event, and for each end by key: lights, domes, objects.
+constexpr std::string_view kEventLetters = "abcdefv", kEndLetters = "lgoLGO";
+
+/// An expression, and the same as a regular expression over those letters.
+struct Pair {
+  const char *expression, *regex;
+};
+constexpr Pair kPairs[] = {
+    {"C.*", ".*"},
+    {"C<RD>.*", "a.*"},
+    {"C[LO]", "[lgoLGO]"},
+    {"CB", "[gG]"},
+    {"C.*<L.'key'>", ".*[LG]"},
+    {"C.*[^<L.'key'>]", ".*[^LG]"},
+    {"C[^D]*D+[LO]", "[^ad]*[ad]+[lgoLGO]"},
+    {"C<R[GS]>(<T.><T.>)*.", "[bc]([def][def])*."},
+    {"C.{1,2}O", ".{1,2}[oO]"},
+    {"CV?<.S>{2,}.", "v?[cf]{2,}."},
+    {"C(D|S|V)+L", "([ad]|[cf]|v)+[lgLG]"},
+    {"C < T D > . *", "d.*"},
+};
+
+/// Where the automaton is after some events.
+uint32_t state_after(const PathAutomaton& a, const std::vector<uint32_t>& events) {
+  uint32_t state = 0;
+  for (const uint32_t e : events) state = a.next[state * PathAutomaton::kNextWords + e];
+  return state;
+}
+
+std::string message_of(const std::string& name, const std::string& text) {
+  try {
+    check_expressions(std::vector<NamedExpression>{{name, text}});
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(PathExpression, MatchesAsARegularExpressionDoes) {
+  std::vector<NamedExpression> all;
+  std::vector<std::regex> regexes;
+  for (const Pair& pair : kPairs) {
+    all.push_back({"e" + std::to_string(all.size()), pair.expression});
+    regexes.emplace_back(pair.regex);
+  }
+  const PathAutomaton automaton(all, kKeys);
+  ASSERT_EQ(automaton.expressions, all.size());
+  ASSERT_EQ(automaton.ends, kEndLetters.size());
+  for (uint32_t length = 0; length <= 3; ++length) {
+    uint32_t count = 1;
+    for (uint32_t i = 0; i < length; ++i) count *= kPathEvents;
+    for (uint32_t number = 0; number < count; ++number) {
+      std::vector<uint32_t> events;
+      std::string text;
+      for (uint32_t i = 0, rest = number; i < length; ++i, rest /= kPathEvents) {
+        events.push_back(rest % kPathEvents);
+        text += kEventLetters[events.back()];
+      }
+      const uint32_t state = state_after(automaton, events);
+      for (uint32_t end = 0; end < automaton.ends; ++end)
+        for (size_t e = 0; e < all.size(); ++e)
+          ASSERT_EQ(automaton.matched[state * automaton.ends + end] >> e & 1u,
+                    std::regex_match(text + kEndLetters[end], regexes[e]))
+              << all[e].text << " and " << text << kEndLetters[end];
+    }
+  }
+}
+
+TEST(PathExpression, IsTheLeastAutomaton) {
+  const auto states = [](const char* text) {
+    return PathAutomaton(std::vector<NamedExpression>{{"a", text}}, kKeys).states();
+  };
+  EXPECT_EQ(states("C.*"), 1u);
+  EXPECT_EQ(states("C[LO]"), 2u);  // and where nothing can match any more
+  EXPECT_EQ(states("C(.|.)*.*(D*.*)*"), 1u);
+  EXPECT_EQ(states("C<RD>.*[LO]"), 3u);
+}
+
+TEST(PathExpression, PartitionsCoverEveryPathOnce) {
+  const PathAutomaton a(
+      std::vector<NamedExpression>{
+          {"emission", "C[LO]"}, {"diffuse", "CD.*[LO]"}, {"other", "C[^D].*[LO]"}},
+      kKeys);
+  for (uint32_t s = 0; s < a.states(); ++s)
+    for (uint32_t end = 0; end < a.ends; ++end) {
+      const uint32_t bits = a.matched[s * a.ends + end];
+      EXPECT_TRUE(bits == 1 || bits == 2 || bits == 4) << s << " " << end;
+    }
+}
+
+TEST(PathExpression, ErrorsNameThePlace) {
+  EXPECT_EQ(message_of("a", "C<RX>L"),
+            "light path expression a=C<RX>L: at character 4 ('X'): there is no such letter here; "
+            "there are . D G S");
+  EXPECT_EQ(message_of("a", "C(D|"),
+            "light path expression a=C(D|: at its end: something to match is missing");
+  EXPECT_NE(message_of("a", "C)").find("character 2 (')'): ')' closes nothing"), std::string::npos);
+  EXPECT_NE(message_of("a", "C<RDL").find("'>' is missing"), std::string::npos);
+  EXPECT_NE(message_of("a", "C[DS").find("']' is missing"), std::string::npos);
+  EXPECT_NE(message_of("a", "C{3,2}").find("counts down"), std::string::npos);
+  EXPECT_NE(message_of("a", "C{99}").find("at most 64"), std::string::npos);
+  EXPECT_NE(message_of("a", "<RD>L").find("write C first"), std::string::npos);
+  EXPECT_NE(message_of("a b", "C.*").find("letters, digits and underscores"), std::string::npos);
+  EXPECT_NE(message_of("a", "CsL").find("straight"), std::string::npos);
+  EXPECT_NE(message_of("a", std::string(200, '(')).find("nested too deep"), std::string::npos);
+  EXPECT_EQ(message_of("a", "C.*<L.'nobody'>"), "");  // groups are known with the scene
+  EXPECT_THROW(PathAutomaton(std::vector<NamedExpression>{{"a", "C.*<L.'nobody'>"}}, kKeys), Error);
+  EXPECT_THROW(check_expressions(std::vector<NamedExpression>{{"a", "C.*"}, {"a", "CL"}}), Error);
+}
+
+TEST(PathExpression, TooMuchIsRefused) {
+  const std::vector<NamedExpression> wide{{"a", "C.*D.{10}[LO]"}};
+  EXPECT_THROW(PathAutomaton(wide, kKeys), Error);
+}
+
+}  // namespace
+}  // namespace wavecomb
