@@ -48,6 +48,9 @@ _COLOURS = (
     "denoised",
     "guide_albedo",
     "guide_normal",
+    "by_bounces",
+    "by_light_samples",
+    "by_light_paths",
 )
 """Layers that are half where halves are asked for, with all that begin with "light_"."""
 _EXACT = ("position", "material_id", "instance_id")

@@ -30,6 +30,7 @@ enum class AovSource : uint8_t {
   kVertex,  ///< the first vertex, once it was shaded
   kGuide,   ///< the last vertex that guides a denoiser
   kLight,   ///< the light that reaches the path
+  kWay,     ///< the same by the techniques that found it
   kTime,    ///< the clock
 };
 
@@ -54,7 +55,10 @@ enum class AovSource : uint8_t {
   X(LightGroups, "light_groups", 0, kGroups, kLight, "")                                      \
   X(Cost, "cost", 1, kSum, kTime, "Cost per pixel")                                           \
   X(GuideAlbedo, "guide_albedo", 3, kMean, kGuide, "")                                        \
-  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")
+  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")                                        \
+  X(ByBounces, "by_bounces", 3, kMean, kWay, "Found by bounces")                              \
+  X(ByLightSamples, "by_light_samples", 3, kMean, kWay, "Found by light samples")             \
+  X(ByLightPaths, "by_light_paths", 3, kMean, kWay, "Found by light paths")
 // clang-format on
 
 namespace detail {

@@ -27,6 +27,16 @@ std::vector<float> Film::beauty() const {
   return out;
 }
 
+void Film::note_light_paths() {
+  if (splats_.empty()) return;
+  for (size_t i = 0; i < pixels_.size(); ++i) {
+    double* sums = aovs_.sums(Aov::kByLightPaths, i);
+    if (!sums) return;
+    const std::array<double, 3> mean = splats_.mean(i);
+    for (size_t c = 0; c < 3; ++c) sums[c] = mean[c] * pixels_[i].samples;
+  }
+}
+
 std::vector<float> Film::albedo() const {
   return aovs_.layer(Aov::kAlbedo, samples()).values;
 }
@@ -73,6 +83,7 @@ Film::Layers Film::finish(const std::vector<std::string>& light_groups) && {
   layers.beauty = beauty();
   layers.samples = samples();
   layers.variance = variance();
+  note_light_paths();
   release(errors_);
   release(pixels_);
   splats_ = {};

@@ -46,6 +46,8 @@ class Film {
   void keep_splats(FixedPoint unit, size_t paths = 0) {
     splats_ = SplatLayer(pixels_.size(), unit, paths);
   }
+  /// Brings the AOV of light paths, where it is kept, to what splats tell now.
+  void note_light_paths();
   SplatLayer& splats() { return splats_; }
   const SplatLayer& splats() const { return splats_; }
   /// Number of a pixel of the picture, row by row of the window.

@@ -95,6 +95,7 @@ class PathAovs {
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
     rows(cost_ns_, set.has(Aov::kCost), 1);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
+    rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
   }
 
   size_t bytes() const {
@@ -107,7 +108,8 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_}) block->zero(slots);
+    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &light_samples_})
+      block->zero(slots);
     if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
     const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit, kNothingHit};
     for (uint32_t i = 0; hits_ && i < slots; ++i)
@@ -191,6 +193,12 @@ class PathAovs {
     const Mask<F> kept = active & Mask<F>(group != UInt<F>(kNoGroup));
     if (any(kept)) add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, kept);
   }
+  bool wants_light_samples() const { return bool(light_samples_); }
+  /// Light samples have brought the paths in the active lanes' slots, which are distinct, `c`.
+  template <typename F>
+  void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+    add_radiance<F>(light_samples_.rows, slot, c, active);
+  }
   /// The environment's light has reached the paths of the active lanes.
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
@@ -248,6 +256,7 @@ class PathAovs {
     };
     for (const Block& part : parts_) scale(part, kRadianceWords);
     scale(groups_, kRadianceWords * layout_.light_groups);
+    scale(light_samples_, kRadianceWords);
   }
   /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
@@ -272,9 +281,9 @@ class PathAovs {
     size_t bytes() const { return owner.bytes(); }
   };
 
-  std::array<const Block*, 9> blocks() const {
+  std::array<const Block*, 10> blocks() const {
     return {&vertex_,   &depth_,  &hits_,    &centre_, &parts_[0],
-            &parts_[1], &groups_, &cost_ns_, &guides_};
+            &parts_[1], &groups_, &cost_ns_, &guides_, &light_samples_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -332,6 +341,7 @@ class PathAovs {
   std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
   Block groups_;                ///< radiance by light group, a slot's groups side by side
   Block cost_ns_, guides_;
+  Block light_samples_;  ///< radiance that light samples brought
 };
 
 }  // namespace wavecomb

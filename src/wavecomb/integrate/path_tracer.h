@@ -190,6 +190,7 @@ class PathTracer {
                   {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t}, true);
     }
     add(light, c);
+    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);
     if (history_) history_.light<F>(depth, kSlot, c, true);
   }
 

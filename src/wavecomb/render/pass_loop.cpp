@@ -64,6 +64,7 @@ void PassLoop::run() {
     const auto halted = [this] { return watch_.halted() || is_late(); };
     runner_.run(plan, halted);
     if (!from_lights.batches.empty()) runner_.run(from_lights, halted, true);
+    film_.note_light_paths();
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
     for (uint32_t i = 0; i < runner_.threads(); ++i)
