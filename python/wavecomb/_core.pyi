@@ -539,7 +539,7 @@ class Settings:
     """The picture is its region alone, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
     """How paths end early. Each is unbiased, but another estimate. Default: auto."""
-    transport: Literal["path", "light"]
+    transport: Literal["path", "light", "auto"]
     """Where paths begin. Default: path."""
     roulette_depth: int
     """The first vertex at which a path may end early. Default: 2."""

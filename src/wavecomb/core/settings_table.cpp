@@ -164,7 +164,10 @@ std::vector<SettingInfo> work_settings() {
                             {{"path", "From the camera alone."},
                              {"light",
                               "And as many from the lights, joined by their densities: for "
-                              "caustics of small lights."}},
+                              "caustics of small lights."},
+                             {"auto",
+                              "From the lights, too, where it pays, as some pixels before the "
+                              "first pass find out."}},
                             "Where paths begin."),
       number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
                                  "The first vertex at which a path may end early."),

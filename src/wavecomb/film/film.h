@@ -41,10 +41,10 @@ class Film {
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
-  /// Keeps splats from now on, in units of `unit`, of `paths` numbers of paths; the beauty is then
-  /// the pixel's mean and theirs.
-  void keep_splats(FixedPoint unit, size_t paths = 0) {
-    splats_ = SplatLayer(pixels_.size(), unit, paths);
+  /// Keeps splats from now on, in units of `unit`, of `paths` numbers of paths, `scale` a sample;
+  /// the beauty is then the pixel's mean and theirs.
+  void keep_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
+    splats_ = SplatLayer(pixels_.size(), unit, paths, scale);
   }
   /// Brings the AOV of light paths, where it is kept, to what splats tell now.
   void note_light_paths();
