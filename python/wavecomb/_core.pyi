@@ -541,6 +541,8 @@ class Settings:
     """How paths end early. Each is unbiased, but another estimate. Default: auto."""
     transport: Literal["path", "light", "auto"]
     """Where paths begin. Default: path."""
+    firefly: Literal["keep", "reweight"]
+    """What becomes of samples much brighter than others. Default: keep."""
     roulette_depth: int
     """The first vertex at which a path may end early. Default: 2."""
     light_selection: Literal["auto", "tree", "power"]

@@ -33,6 +33,8 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
         return f"--noise {settings['noise']:g}: is of the whole picture"
     if settings.get("allocate", "even") != "even":
         return f"--allocate {settings['allocate']}: shares samples out over the whole picture"
+    if settings.get("firefly", "keep") != "keep":
+        return f"--firefly {settings['firefly']}: looks at the pixels around each"
     return ""
 
 

@@ -48,6 +48,7 @@ _COLOURS = (
     "denoised",
     "guide_albedo",
     "guide_normal",
+    "unbiased",
     "by_bounces",
     "by_light_samples",
     "by_light_paths",

@@ -18,7 +18,7 @@ Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
 """Linear Rec.709, (height, width, 3), to 8-bit codes."""
 
 RADIANCE = (
-    *("beauty", "denoised", "emission", "direct", "indirect"),
+    *("beauty", "denoised", "unbiased", "emission", "direct", "indirect"),
     *("by_bounces", "by_light_samples", "by_light_paths"),
 )
 """Shown with exposure and tone mapping, as are light groups."""

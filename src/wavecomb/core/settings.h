@@ -24,6 +24,9 @@ enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// Where paths begin: at the camera, or as many at the lights, too, joined by multiple importance
 /// sampling (docs/light-paths.md). kAuto: the second where it pays (render/transport_choice.h).
 enum class Transport : uint8_t { kPath, kLight, kAuto };
+/// What becomes of samples that are so bright that too few of them are there to be trusted: they
+/// stay, or count as far as they are (film/cascades.h).
+enum class Firefly : uint8_t { kKeep, kReweight };
 /// How the light is chosen that a vertex is lit by: by its power alone, or by tree for the vertex
 /// (light/light_tree.h). kAuto: by tree where there are lights enough for it to pay.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
@@ -91,6 +94,7 @@ struct Settings {
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
+  Firefly firefly = Firefly::kKeep;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
   std::vector<std::string> light_groups;  ///< of Aov::kLightGroups, by name; empty: all
   /// Adaptive sampling: a pixel is done when its error is no larger (ErrorMap::error); 0: off.

@@ -169,6 +169,13 @@ std::vector<SettingInfo> work_settings() {
                               "From the lights, too, where it pays, as some pixels before the "
                               "first pass find out."}},
                             "Where paths begin."),
+      choice<&S::firefly>(
+          "firefly", "Fireflies",
+          {{"keep", "They stay: nothing is biased."},
+           {"reweight",
+            "Samples count as far as others are as bright: darker where they are few. The "
+            "layer unbiased has them all."}},
+          "What becomes of samples much brighter than others."),
       number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
                                  "The first vertex at which a path may end early."),
       choice<&S::light_selection>(

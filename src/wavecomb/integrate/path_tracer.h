@@ -254,6 +254,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
       sum.g += radiance.y;
       sum.b += radiance.z;
       ++sum.samples;
+      if (film.has_cascades()) film.cascades().add(film.index(x, y), &radiance.x);
       worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
     }
     film.pixel(x, y) = sum;

@@ -30,6 +30,8 @@ namespace {
 /// that a pass adds.
 constexpr uint32_t kDefaultWaveSize = 4096;
 constexpr uint32_t kPassSamples = 16;
+/// The darkest layer of cascades (film/cascades.h), over the brightness of the scene.
+constexpr float kDarkestShare = 0x1p-12f;
 
 uint32_t thread_count(const Settings& settings) {
   return settings.threads != 0 ? settings.threads
@@ -270,6 +272,8 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
                      double{light_share.paths()});
   }
+  if (settings.firefly == Firefly::kReweight)
+    film.keep_cascades(scene_brightness(scene) * kDarkestShare);
   PassState pass;
   if (options.resume) options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();

@@ -169,6 +169,7 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
   small.region.reset();
   small.crop = false;
   small.time_limit = 0;
+  small.firefly = Firefly::kKeep;
   small.costs = CostSource::kModel;
   small.aovs.bits = 0;
   small.light_groups.clear();
