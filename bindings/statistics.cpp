@@ -104,6 +104,18 @@ nb::object guiding_dict(const GuideStatistics& s) {
   return d;
 }
 
+nb::object transport_dict(const std::optional<TransportChoice>& choice) {
+  if (!choice) return nb::none();
+  nb::dict d;
+  const bool is_light = choice->transport == Transport::kLight;
+  d["chosen"] = is_light ? "light" : "path";
+  d["why"] = choice->why;
+  d["light_paths"] = is_light ? choice->share.paths() : 0.f;
+  d["gain"] = choice->gain > 0 ? nb::cast(choice->gain) : nb::none();
+  d["seconds"] = choice->seconds;
+  return d;
+}
+
 nb::dict light_calibration_dict(const LightShares& s) {
   nb::dict d;
   d["seconds"] = s.seconds;
@@ -184,6 +196,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   d["light_calibration"] = light_calibration_dict(s.light_calibration);
   d["allotment"] = allotment_dict(s.allotment);
   d["guiding"] = guiding_dict(s.guiding);
+  d["transport"] = transport_dict(s.transport);
   nb::list without_paths;
   for (const std::string& name : s.lights_without_paths) without_paths.append(name);
   d["lights_without_paths"] = without_paths;

@@ -59,18 +59,22 @@ set(core_warnings -Wfloat-conversion)
 set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <limits> <memory> <numeric>
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 
-# wavecomb_lane_units(VAR WIDTH): units of WIDTH lanes, made in the build tree: one for each *.lanes.cpp, and one
-# for each program, out of program.lanes.cpp.in, and another out of joint.lanes.cpp.in. They differ from one width to the next by WAVECOMB_LANES. With
-# PLAIN, the plain kernels of all variants, too, out of variant.lanes.cpp.in.
-function(wavecomb_lane_units var width plain)
+# wavecomb_lane_units(VAR WIDTH IS_WIDEST PLAIN): units of WIDTH lanes, made in the build tree: one for each
+# *.lanes.cpp, and one for each program, out of program.lanes.cpp.in. They differ from one width to the next by
+# WAVECOMB_LANES. Of the widest lanes and of scalars alone (the reference integrator's), another for each program
+# out of joint.lanes.cpp.in. With PLAIN, the plain kernels of all variants, too, out of variant.lanes.cpp.in.
+function(wavecomb_lane_units var width is_widest plain)
   set(folder "${PROJECT_BINARY_DIR}/lanes")
   set(units "")
   foreach(program IN LISTS programs)
     configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/program.lanes.cpp.in"
       "${folder}/${program}_${width}.cpp" @ONLY)
-    configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/joint.lanes.cpp.in"
-      "${folder}/joint_${program}_${width}.cpp" @ONLY)
-    list(APPEND units "${folder}/${program}_${width}.cpp" "${folder}/joint_${program}_${width}.cpp")
+    list(APPEND units "${folder}/${program}_${width}.cpp")
+    if(is_widest OR width EQUAL 1)
+      configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/joint.lanes.cpp.in"
+        "${folder}/joint_${program}_${width}.cpp" @ONLY)
+      list(APPEND units "${folder}/joint_${program}_${width}.cpp")
+    endif()
   endforeach()
   set(index 0)
   foreach(row IN LISTS variants)
@@ -109,6 +113,7 @@ function(wavecomb_add_core name flags)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
   target_precompile_headers(${name} PRIVATE ${wavecomb_pch})
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 6)
+  list(GET widths -1 widest)
   list(REMOVE_ITEM widths 1)
   set(packets "")
   get_target_property(plain ${flags} WAVECOMB_PLAIN)
@@ -117,10 +122,14 @@ function(wavecomb_add_core name flags)
     if(width EQUAL plain)
       set(is_plain ON)
     endif()
-    wavecomb_lane_units(units ${width} ${is_plain})
+    set(is_widest OFF)
+    if(width EQUAL widest)
+      set(is_widest ON)
+    endif()
+    wavecomb_lane_units(units ${width} ${is_widest} ${is_plain})
     list(APPEND packets ${units})
   endforeach()
-  wavecomb_lane_units(scalar 1 OFF)
+  wavecomb_lane_units(scalar 1 OFF OFF)
   foreach(kind IN ITEMS packets scalar)
     set(lanes ${name}_${kind})
     if(NOT ${kind})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Skips that CI does not allow, and tests that take minutes; see parts.py."""
+"""Skips that CI does not allow, tests that take minutes (see parts.py), what files share."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import parts
@@ -37,6 +38,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     from xdist.scheduler import WorkStealingScheduling
 
     return WorkStealingScheduling(config, log)
+
+
+@pytest.fixture(scope="session")
+def caustics(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The stage of that name, a coarse one."""
+    from wavecomb.scenes import write_scene
+
+    path = tmp_path_factory.mktemp("caustics") / "caustics.usdc"
+    write_scene("caustics", path, teapot_level=6)
+    return path
 
 
 @pytest.fixture

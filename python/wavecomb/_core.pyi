@@ -543,8 +543,10 @@ class Settings:
     """The picture is its region alone, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
     """How paths end early. Each is unbiased, but another estimate. Default: auto."""
-    transport: Literal["path", "light"]
+    transport: Literal["path", "light", "auto"]
     """Where paths begin. Default: path."""
+    firefly: Literal["keep", "reweight"]
+    """What becomes of samples much brighter than others. Default: keep."""
     roulette_depth: int
     """The first vertex at which a path may end early. Default: 2."""
     light_selection: Literal["auto", "tree", "power"]

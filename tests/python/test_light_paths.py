@@ -108,7 +108,7 @@ def test_a_resumed_picture_is_that_which_nothing_stopped(stages: Any, tmp_path: 
         ({"cosine_sampling": True}, "cosine_sampling"),
         ({"aovs": ("direct",)}, "AOV direct"),
         ({"aovs": ("light_groups",)}, "AOV light_groups"),
-        ({"transport": "bdpt"}, "must be one of path, light"),
+        ({"transport": "bdpt"}, "must be one of path, light, auto"),
     ],
     ids=lambda x: str(x)[:30],
 )

@@ -87,7 +87,7 @@ def test_every_stage_is_complete(stage: Usd.Stage) -> None:
     name = Path(stage.GetRootLayer().realPath).stem
     prims = list(stage.Traverse())
     assert sum(prim.IsA(UsdGeom.Camera) for prim in prims) == 1
-    assert any(prim.IsA(UsdLux.BoundableLightBase) for prim in prims)
+    assert any(prim.HasAPI(UsdLux.LightAPI) for prim in prims)
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if prim.IsA(UsdGeom.Mesh):
             bound, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()

@@ -31,7 +31,7 @@ class _AovOption(click.Option):
         """The option, and its help."""
         self.help = (
             f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
-            f"{aov_names.LIGHT}NAME, lpe:NAME=EXPRESSION, crypto, all; beauty is always there "
+            f"{aov_names.LIGHT}NAME, lpe:NAME=EXPRESSION, crypto, techniques, all; beauty is always there "
             "(docs/aovs.md).  "
             f"[default: {', '.join(aov_names.DEFAULT[1:])}]"
         )

@@ -96,6 +96,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         lines.append(line)
     elif settings.get("guiding") == "auto":
         lines.append("not guided: too few samples to find out whether that pays")
+    if transport := stats.get("transport"):
+        lines.append(_transport_line(transport))
     lines += [
         f"light {name} is sampled by camera paths only"
         for name in stats.get("lights_without_paths", ())
@@ -107,6 +109,18 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
             line += f"; mean relative error {_percent(stats['error'])}"
         lines.append(line)
     return lines
+
+
+def _transport_line(chosen: Mapping[str, Any]) -> str:
+    """What ``--transport auto`` chose, and why."""
+    line = f"transport {chosen['chosen']}"
+    if chosen["chosen"] == "light":
+        line += f", {chosen['light_paths']:g} light paths for each camera path"
+    line += f": {chosen['why']}"
+    if chosen["gain"] is not None:
+        line += f" in {chosen['seconds']:.2f} s, light paths promise "
+        line += f"{chosen['gain']:.2f} times the efficiency"
+    return line
 
 
 def light_line(calibration: Mapping[str, Any]) -> str | None:

@@ -33,6 +33,8 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
         return f"--noise {settings['noise']:g}: is of the whole picture"
     if settings.get("allocate", "even") != "even":
         return f"--allocate {settings['allocate']}: shares samples out over the whole picture"
+    if settings.get("firefly", "keep") != "keep":
+        return f"--firefly {settings['firefly']}: looks at the pixels around each"
     return ""
 
 
@@ -40,7 +42,7 @@ def is_better_whole(settings: Mapping[str, Any]) -> bool:
     """Whether each tile costs much beside its own pixels: a border, a field, all light paths."""
     return (
         bool(settings.get("adaptive"))
-        or settings.get("transport") == "light"
+        or settings.get("transport") in ("light", "auto")
         or settings.get("guiding", "off") != "off"
         or (settings.get("roulette") == "efficient")
     )

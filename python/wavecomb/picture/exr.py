@@ -48,6 +48,10 @@ _COLOURS = (
     "denoised",
     "guide_albedo",
     "guide_normal",
+    "unbiased",
+    "by_bounces",
+    "by_light_samples",
+    "by_light_paths",
 )
 """Layers that are half where halves are asked for, with those of lights and expressions."""
 _EXACT = ("position", "material_id", "instance_id")

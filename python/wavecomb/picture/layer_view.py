@@ -17,7 +17,10 @@ from wavecomb.picture.colour_maps import colour_map
 Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
 """Linear Rec.709, (height, width, 3), to 8-bit codes."""
 
-RADIANCE = ("beauty", "denoised", "emission", "direct", "indirect")
+RADIANCE = (
+    *("beauty", "denoised", "unbiased", "emission", "direct", "indirect"),
+    *("by_bounces", "by_light_samples", "by_light_paths"),
+)
 """Shown with exposure and tone mapping, as are light groups."""
 _COLOURS = ("albedo", "guide_albedo")
 _NORMALS = ("normal", "guide_normal")

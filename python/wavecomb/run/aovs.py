@@ -18,6 +18,8 @@ GUIDES = ("guide_albedo", "guide_normal")
 """For denoisers: of what is seen, also in mirrors and through clear glass."""
 ERRORS = ("error", "variance")
 LIGHT = "light_"
+TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
+"""What each way to find light brought; their sum is the beauty."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ def names() -> tuple[str, ...]:
 
 def groups() -> dict[str, tuple[str, ...]]:
     """Names that stand for several."""
-    return {"all": names(), "crypto": of_kind("coverage")}
+    return {"all": names(), "crypto": of_kind("coverage"), "techniques": TECHNIQUES}
 
 
 def expand(asked: Iterable[str]) -> tuple[str, ...]:
@@ -91,7 +93,7 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
         if name not in all_names and name not in several and not is_single:
             raise WavecombError(
                 f"AOV {name!r} is not known; there are {', '.join(all_names)}, "
-                f"{LIGHT}NAME for the light group NAME, lpe:NAME=EXPRESSION, crypto and all"
+                f"{LIGHT}NAME for the light group NAME, lpe:NAME=EXPRESSION, crypto, techniques and all"
             )
         wanted.update(dict.fromkeys(several.get(name, (name,))))
     known = tuple(name for name in all_names if name in wanted)

@@ -82,6 +82,8 @@ def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
         return "--time-limit"
     if settings.allocate != "even":
         return f"--allocate {settings.allocate}"
+    if settings.firefly != "keep":
+        return f"--firefly {settings.firefly}"
     if keeps_error(settings):
         return "a picture with errors (--adaptive, --noise, --aov error, --aov variance)"
     if any(name in aov_names.of_kind("coverage") for name in aovs):

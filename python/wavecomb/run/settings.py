@@ -18,6 +18,8 @@ MAX_EDGE = 65536
 MAX_SPP = 1 << 24
 # Of an adaptive render: sums and layers of errors, and what measuring them takes.
 _ERROR_BYTES_PER_PIXEL = 100
+# Of a reweighted one: its cascades, and the unbiased layer.
+_CASCADE_BYTES_PER_PIXEL = 96 + 12
 
 
 def prepare(
@@ -104,6 +106,7 @@ def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1
     others = [name for name in aovs if name not in aov_names.ERRORS]
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
+    each += _CASCADE_BYTES_PER_PIXEL * (settings.firefly != "keep")
     width, height = picture_size(settings)
     return width * height * each
 

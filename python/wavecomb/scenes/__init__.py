@@ -14,6 +14,7 @@ from typing import Any
 
 from wavecomb.scenes.candles import build_candles
 from wavecomb.scenes.caustics import build_caustics
+from wavecomb.scenes.clear_stages import build_lens, build_pool, build_prism
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.heavy import build_heavy
@@ -58,6 +59,9 @@ SCENES: dict[str, SceneInfo] = {
     "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),
     "candles": SceneInfo("wax and marble, below whose surfaces light walks", 0.01, build_candles),
     "caustics": SceneInfo("a glass ball and a gold ring before a small lamp", 0.1, build_caustics),
+    "pool": SceneInfo("waves on a pool under the sun", 1.0, build_pool),
+    "lens": SceneInfo("a lens that shows a small lamp on a wall", 0.1, build_lens),
+    "prism": SceneInfo("a prism in the sun beside a matt wall", 0.1, build_prism),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""

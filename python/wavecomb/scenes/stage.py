@@ -282,6 +282,24 @@ class StageWriter:
         light.CreateColorAttr(_vec([v / peak for v in radiance]))
         light.AddTranslateOp().Set(Gf.Vec3d(*position))
 
+    def sun(self, name: str, way: Sequence[float], angle: float, radiant: Sequence[float]) -> None:
+        """Adds a distant light.
+
+        Args:
+            name: Of the prim.
+            way: Direction that its light travels, (3,).
+            angle: That it is seen under, degrees.
+            radiant: Irradiance of what faces it, rgb.
+        """
+        light = UsdLux.DistantLight.Define(self.stage, f"/World/Lights/{name}")
+        peak = max(radiant)
+        light.CreateAngleAttr(angle)
+        light.CreateNormalizeAttr(True)
+        light.CreateIntensityAttr(peak)
+        light.CreateColorAttr(_vec([v / peak for v in radiant]))
+        turn = Gf.Rotation(Gf.Vec3d(0, 0, -1), Gf.Vec3d(*way))
+        light.AddTransformOp().Set(Gf.Matrix4d().SetRotate(turn))
+
     def dome_light(self, name: str, turn_degrees: float, intensity: float = 1.0) -> None:
         """Adds an environment with the procedural sky, 1024 x 512 at full texture size."""
         file, asset = self._texture_path("sky.exr")

@@ -31,6 +31,7 @@ enum class AovSource : uint8_t {
   kVertex,  ///< the first vertex, once it was shaded
   kGuide,   ///< the last vertex that guides a denoiser
   kLight,   ///< the light that reaches the path
+  kWay,     ///< the same by the techniques that found it
   kTime,    ///< the clock
 };
 
@@ -57,6 +58,9 @@ enum class AovSource : uint8_t {
   X(GuideAlbedo, "guide_albedo", 3, kMean, kGuide, "")                                        \
   X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")                                        \
   X(Alpha, "alpha", 1, kMean, kHit, "Alpha")                                                  \
+  X(ByBounces, "by_bounces", 3, kMean, kWay, "Found by bounces")                              \
+  X(ByLightSamples, "by_light_samples", 3, kMean, kWay, "Found by light samples")             \
+  X(ByLightPaths, "by_light_paths", 3, kMean, kWay, "Found by light paths")                   \
   X(Expressions, "lpe", 0, kExpressions, kLight, "")
 // clang-format on
 

@@ -6,32 +6,27 @@
 
 namespace wavecomb {
 
-namespace {
-
-/// What paths from the lights do not go with.
-void check_light_paths(const Settings& s) {
-  const auto refuse = [](const std::string& what, const std::string& instead) {
-    throw Error("transport light does not go with " + what + "; give " + instead +
-                ", or transport path");
-  };
+LightPathRefusal light_path_refusal(const Settings& s) {
   if (s.keeps_error())
-    refuse("adaptive, noise, allocate and error, which see what paths from the camera bring alone",
-           "none of them");
-  if (s.guiding != Guiding::kOff) refuse("guiding", "guiding off");
-  if (s.clamp_indirect > 0) refuse("clamp_indirect", "clamp_indirect 0");
-  if (s.cosine_sampling) refuse("cosine_sampling", "none");
+    return {"adaptive, noise, allocate and error, which see what paths from the camera bring alone",
+            "none of them"};
+  if (s.guiding != Guiding::kOff) return {"guiding", "guiding off"};
+  if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
+  if (s.cosine_sampling) return {"cosine_sampling", "none"};
   for (const Aov aov :
        {Aov::kEmission, Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
     if (s.aovs.has(aov))
-      refuse("the AOV " + std::string(aov_name(aov)) + ", which knows no light of such paths",
-             "others");
+      return {"the AOV " + std::string(aov_name(aov)) + ", which knows no light of such paths",
+              "others"};
+  return {};
 }
-
-}  // namespace
 
 void Settings::check() const {
   for (const SettingInfo& setting : setting_table()) setting.check(*this);
-  if (joins_light()) check_light_paths(*this);
+  if (joins_light())
+    if (const LightPathRefusal refusal = light_path_refusal(*this); !refusal.what.empty())
+      throw Error("transport light does not go with " + refusal.what + "; give " + refusal.instead +
+                  ", or transport path or auto");
   check_expressions(expressions);
   if (uint64_t{width} * height > kMaxPixels)
     throw Error("width x height is " + std::to_string(uint64_t{width} * height) +

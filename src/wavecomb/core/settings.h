@@ -23,8 +23,11 @@ constexpr float default_filter_width(FilterKind kind) {
 
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// Where paths begin: at the camera, or as many at the lights, too, joined by multiple importance
-/// sampling (docs/light-paths.md).
-enum class Transport : uint8_t { kPath, kLight };
+/// sampling (docs/light-paths.md). kAuto: the second where it pays (render/transport_choice.h).
+enum class Transport : uint8_t { kPath, kLight, kAuto };
+/// What becomes of samples that are so bright that too few of them are there to be trusted: they
+/// stay, or count as far as they are (film/cascades.h).
+enum class Firefly : uint8_t { kKeep, kReweight };
 /// How the light is chosen that a vertex is lit by: by its power alone, or by tree for the vertex
 /// (light/light_tree.h). kAuto: by tree where there are lights enough for it to pay.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
@@ -92,6 +95,7 @@ struct Settings {
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
+  Firefly firefly = Firefly::kKeep;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
   std::vector<std::string> light_groups;     ///< of Aov::kLightGroups, by name; empty: all
   std::vector<NamedExpression> expressions;  ///< of Aov::kExpressions
@@ -135,5 +139,12 @@ struct Settings {
   /// Throws Error naming the option and what it may be.
   void check() const;
 };
+
+/// What of some settings paths from lights do not go with, and what to give in its place; empty:
+/// there is nothing.
+struct LightPathRefusal {
+  std::string what, instead;
+};
+LightPathRefusal light_path_refusal(const Settings& settings);
 
 }  // namespace wavecomb

@@ -164,8 +164,18 @@ std::vector<SettingInfo> work_settings() {
                             {{"path", "From the camera alone."},
                              {"light",
                               "And as many from the lights, joined by their densities: for "
-                              "caustics of small lights."}},
+                              "caustics of small lights."},
+                             {"auto",
+                              "From the lights, too, where it pays, as some pixels before the "
+                              "first pass find out."}},
                             "Where paths begin."),
+      choice<&S::firefly>(
+          "firefly", "Fireflies",
+          {{"keep", "They stay: nothing is biased."},
+           {"reweight",
+            "Samples count as far as others are as bright: darker where they are few. The "
+            "layer unbiased has them all."}},
+          "What becomes of samples much brighter than others."),
       number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
                                  "The first vertex at which a path may end early."),
       choice<&S::light_selection>(

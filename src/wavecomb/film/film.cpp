@@ -13,6 +13,10 @@ Film::Film(const Region& window, const AovLayout& aovs, bool with_error)
 }
 
 std::vector<float> Film::beauty() const {
+  return means(cascades_.excess(samples()));
+}
+
+std::vector<float> Film::means(const std::vector<float>& excess) const {
   std::vector<float> out(3 * pixels_.size());
   for (size_t i = 0; i < pixels_.size(); ++i) {
     const Pixel& p = pixels_[i];
@@ -22,9 +26,22 @@ std::vector<float> Film::beauty() const {
       const std::array<double, 3> splat = splats_.mean(i);
       for (size_t c = 0; c < 3; ++c) mean[c] += splat[c];
     }
-    for (size_t c = 0; c < 3; ++c) out[3 * i + c] = static_cast<float>(mean[c]);
+    for (size_t c = 0; c < 3; ++c) {
+      if (!excess.empty()) mean[c] -= double{excess[3 * i + c]};
+      out[3 * i + c] = static_cast<float>(mean[c]);
+    }
   }
   return out;
+}
+
+void Film::note_light_paths() {
+  if (splats_.empty()) return;
+  for (size_t i = 0; i < pixels_.size(); ++i) {
+    double* sums = aovs_.sums(Aov::kByLightPaths, i);
+    if (!sums) return;
+    const std::array<double, 3> mean = splats_.mean(i);
+    for (size_t c = 0; c < 3; ++c) sums[c] = mean[c] * pixels_[i].samples;
+  }
 }
 
 std::vector<float> Film::albedo() const {
@@ -65,6 +82,7 @@ std::vector<Film::Block> Film::blocks() {
   aovs_.for_each_block(add);
   add("errors", errors_);
   splats_.for_each_block(add);
+  cascades_.for_each_block(add);
   return out;
 }
 
@@ -73,13 +91,18 @@ Film::Layers Film::finish(const std::vector<std::string>& many_names) && {
   layers.beauty = beauty();
   layers.samples = samples();
   layers.variance = variance();
+  std::vector<float> kept;
+  if (has_cascades()) kept = unbiased();
+  note_light_paths();
   release(errors_);
   release(pixels_);
   splats_ = {};
+  cascades_ = {};
   layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
   layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;
   layers.depth = aovs_.take(Aov::kDepth, layers.samples).values;
   layers.aovs = std::move(aovs_).finish(layers.samples, many_names);
+  if (!kept.empty()) layers.aovs.push_back({"unbiased", 3, std::move(kept)});
   return layers;
 }
 

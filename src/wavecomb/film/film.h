@@ -10,6 +10,7 @@
 
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/aov_film.h"
+#include "wavecomb/film/cascades.h"
 #include "wavecomb/film/error_sums.h"
 #include "wavecomb/film/splats.h"
 
@@ -41,11 +42,18 @@ class Film {
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
-  /// Keeps splats from now on, in units of `unit`, of `paths` numbers of paths; the beauty is then
-  /// the pixel's mean and theirs.
-  void keep_splats(FixedPoint unit, size_t paths = 0) {
-    splats_ = SplatLayer(pixels_.size(), unit, paths);
+  /// Keeps splats from now on, in units of `unit`, of `paths` numbers of paths, `scale` a sample;
+  /// the beauty is then the pixel's mean and theirs.
+  void keep_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
+    splats_ = SplatLayer(pixels_.size(), unit, paths, scale);
   }
+  /// Keeps samples by brightness from now on; the beauty is then reweighted. `darkest`: the
+  /// brightness of their first layer.
+  void keep_cascades(float darkest) { cascades_ = Cascades(window_, darkest); }
+  bool has_cascades() const { return !cascades_.empty(); }
+  Cascades& cascades() { return cascades_; }
+  /// Brings the AOV of light paths, where it is kept, to what splats tell now.
+  void note_light_paths();
   SplatLayer& splats() { return splats_; }
   const SplatLayer& splats() const { return splats_; }
   /// Number of a pixel of the picture, row by row of the window.
@@ -58,11 +66,14 @@ class Film {
   /// Memory of the sums.
   size_t bytes() const {
     return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums) +
-           splats_.bytes();
+           splats_.bytes() + cascades_.bytes();
   }
 
-  /// Means: rgb interleaved; black where a pixel has neither samples nor splats.
+  /// Means: rgb interleaved; black where a pixel has neither samples nor splats. Reweighted, where
+  /// cascades are kept.
   std::vector<float> beauty() const;
+  /// The same, not reweighted.
+  std::vector<float> unbiased() const { return means({}); }
   /// Empty where not kept.
   std::vector<float> albedo() const;
   /// Mean normals, not normalised.
@@ -86,7 +97,7 @@ class Film {
   struct Layers {
     std::vector<float> beauty, albedo, normal, depth, variance;
     std::vector<uint32_t> samples;
-    std::vector<AovLayer> aovs;  ///< of AovFilm::finish
+    std::vector<AovLayer> aovs;  ///< of AovFilm::finish; "unbiased", where it is not the beauty
   };
   /// The means, and the end of the film: sums are freed as soon as they were used, for sums and
   /// layers together are the most memory that a small scene needs.
@@ -94,11 +105,15 @@ class Film {
   Layers finish(const std::vector<std::string>& many_names) &&;
 
  private:
+  /// Means without `excess`, rgb interleaved; empty: nothing.
+  std::vector<float> means(const std::vector<float>& excess) const;
+
   Region window_;
   std::vector<Pixel> pixels_;
   AovFilm aovs_;
   std::vector<ErrorSums> errors_;
   SplatLayer splats_;  ///< empty where none are kept
+  Cascades cascades_;  ///< likewise
 };
 
 }  // namespace wavecomb

@@ -59,9 +59,9 @@ class SplatLayer {
   static constexpr double kLeastCoarse = 0x1p40;
 
   SplatLayer() = default;
-  /// `paths`: how many numbers of paths there are, each of which stands for one path a sample.
-  SplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0)
-      : unit_(unit), sums_(pixels), samples_(paths) {}
+  /// `paths`: how many numbers of paths there are, each of which stands for `scale` paths a sample.
+  SplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1)
+      : unit_(unit), sums_(pixels), samples_(paths), scale_(scale) {}
 
   bool empty() const { return sums_.empty(); }
   /// Adds the splats of `list` with atomic additions.
@@ -98,7 +98,7 @@ class SplatLayer {
     std::array<double, 3> out{};
     if (paths_[0] == 0) return out;
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
-    const auto numbers = static_cast<double>(std::max<size_t>(1, samples_.size()));
+    const auto numbers = scale_ * static_cast<double>(std::max<size_t>(1, samples_.size()));
     for (size_t c = 0; c < 3; ++c)
       out[c] = (unit_.to_double(sums_[pixel][c]) + coarse.to_double(sums_[pixel][c + 3])) *
                numbers / static_cast<double>(paths_[0]);
@@ -124,6 +124,7 @@ class SplatLayer {
   std::vector<Sum> sums_;
   std::vector<int64_t> paths_ = std::vector<int64_t>(1);
   std::vector<uint32_t> samples_;
+  double scale_ = 1;
 };
 
 }  // namespace wavecomb

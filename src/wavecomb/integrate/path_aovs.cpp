@@ -96,6 +96,15 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       if (normal) add_to(normal, row.normal);
     });
   }
+  if (light_samples_) {
+    double* sampled = film.sums(Aov::kByLightSamples, pixel);
+    double* bounced = film.sums(Aov::kByBounces, pixel);
+    for_each_slot([&](uint32_t slot) {
+      const float* row = light_samples_.rows + slot * kRadianceWords;
+      for (size_t c = 0; c < 3 && sampled; ++c) sampled[c] += double{row[c]};
+      add_difference(bounced, radiance + slot * kRadianceWords, row);
+    });
+  }
   if (cost_ns_)
     for_each_slot([&](uint32_t slot) { film.add(Aov::kCost, pixel, cost_ns_.rows + slot); });
 }

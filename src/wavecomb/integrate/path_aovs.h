@@ -99,6 +99,7 @@ class PathAovs {
     rows(alpha_, set.has(Aov::kAlpha), 1);
     rows(cost_ns_, set.has(Aov::kCost), 1);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
+    rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
   }
 
   size_t bytes() const {
@@ -111,7 +112,8 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_}) block->zero(slots);
+    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_})
+      block->zero(slots);
     expressions_.clear(slots);
     if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
     const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit, kNothingHit};
@@ -222,6 +224,12 @@ class PathAovs {
     const Mask<F> kept = active & Mask<F>(group != UInt<F>(kNoGroup));
     if (any(kept)) add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, kept);
   }
+  bool wants_light_samples() const { return bool(light_samples_); }
+  /// Light samples have brought the paths in the active lanes' slots, which are distinct, `c`.
+  template <typename F>
+  void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+    add_radiance<F>(light_samples_.rows, slot, c, active);
+  }
   /// The environment's light has reached the paths of the active lanes.
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
@@ -282,6 +290,7 @@ class PathAovs {
     for (const Block& part : parts_) scale(part, kRadianceWords);
     scale(groups_, kRadianceWords * layout_.light_groups);
     expressions_.scale(exposure, slots);
+    scale(light_samples_, kRadianceWords);
   }
   /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
@@ -306,9 +315,9 @@ class PathAovs {
     size_t bytes() const { return owner.bytes(); }
   };
 
-  std::array<const Block*, 10> blocks() const {
+  std::array<const Block*, 11> blocks() const {
     return {&vertex_,   &depth_,  &hits_,    &centre_, &parts_[0],
-            &parts_[1], &groups_, &cost_ns_, &guides_, &alpha_};
+            &parts_[1], &groups_, &cost_ns_, &guides_, &alpha_,   &light_samples_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -368,6 +377,7 @@ class PathAovs {
   Block cost_ns_, guides_;
   Block alpha_;  ///< 1 where the camera's ray has met something that covers
   PathExpressions expressions_;
+  Block light_samples_;  ///< radiance that light samples brought
 };
 
 }  // namespace wavecomb

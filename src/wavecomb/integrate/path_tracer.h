@@ -221,6 +221,7 @@ class PathTracer {
     }
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
+    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);
     if (history_) history_.light<F>(depth, kSlot, c, true);
   }
 
@@ -284,6 +285,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
       sum.g += radiance.y;
       sum.b += radiance.z;
       ++sum.samples;
+      if (film.has_cascades()) film.cascades().add(film.index(x, y), &radiance.x);
       worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
     }
     film.pixel(x, y) = sum;

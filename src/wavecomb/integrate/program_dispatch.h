@@ -86,13 +86,16 @@ template <typename F, typename List>
 inline constexpr auto kShadeBatch = detail::batch_kernels<F, kEverything>(List{});
 template <typename F, typename List>
 inline constexpr auto kShadeVertex = detail::vertex_kernels<F, kEverything>(List{});
+/// The lanes of kernels where paths start at lights, too: the widest of the library, whatever those
+/// of the wave are. So they are compiled once, and for the reference.
+using JointLanes = Lanes<WAVECOMB_MAX_LANES>;
 /// The same where paths from lights share in the weights, and for those paths.
-template <typename F>
-inline constexpr auto kShadeJointBatch = detail::batch_kernels<F, kJoint>(Programs<F>{});
+inline constexpr auto kShadeJointBatch =
+    detail::batch_kernels<JointLanes, kJoint>(Programs<JointLanes>{});
+inline constexpr auto kShadeLightBatch =
+    detail::light_batch_kernels<JointLanes>(Programs<JointLanes>{});
 template <typename F>
 inline constexpr auto kShadeJointVertex = detail::vertex_kernels<F, kJoint>(Programs<F>{});
-template <typename F>
-inline constexpr auto kShadeLightBatch = detail::light_batch_kernels<F>(Programs<F>{});
 template <typename F>
 inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
 /// Plain kernels by variant; only where kHasPlain.

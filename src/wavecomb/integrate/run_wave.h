@@ -70,7 +70,7 @@ struct LightPaths {
     wavecomb::collect<F, NoMedia, true>(wave, context, settings, depth, NoMedia());
   }
   static const auto& kernels(const WaveContext& /*context*/, const ShadeSettings& /*settings*/) {
-    return kShadeLightBatch<F>;
+    return kShadeLightBatch;
   }
   static void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
     splat<F>(wave, context, depth);

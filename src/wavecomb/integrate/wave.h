@@ -55,12 +55,14 @@ struct WaveContext {
   const GuideView* guide = nullptr;    ///< guides bounces, or is to be learned; null: neither
   bool discards = false;               ///< paths are for `histories` alone, and the film gets none
   const SplatFilter* splat_filter = nullptr;  ///< of paths from lights; null: there are none
+  float light_paths = 1;  ///< that start there for each of a pixel's, over the picture's pixels
 
   /// Whether paths start at lights, too.
   bool joins_light() const { return splat_filter != nullptr; }
-  /// One over how many start there for each of a pixel's: as many as the picture has pixels.
+  /// One over how many start there for each of a pixel's.
   float light_path_share() const {
-    return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height));
+    return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
+                  light_paths);
   }
 
   /// Whether something lies between surfaces, or light walks below them.

@@ -24,6 +24,10 @@ Bounds shape_bounds(const PlacedShape& shape) {
   return box;
 }
 
+bool sends_paths_itself(const LightRecord& record) {
+  return record.sampled_only == 0 && record.light_link == kNoSet;
+}
+
 float farthest(const Bounds& box, const Vec3<float>& from) {
   const float x = std::max(std::abs(box.lo.x - from.x), std::abs(box.hi.x - from.x));
   const float y = std::max(std::abs(box.lo.y - from.y), std::abs(box.hi.y - from.y));
@@ -33,26 +37,33 @@ float farthest(const Bounds& box, const Vec3<float>& from) {
 
 }  // namespace
 
-void check_light_paths(const Scene& scene) {
+LightPathRefusal light_path_refusal(const Scene& scene) {
   if (scene.camera().projection == Projection::kLatlong)
-    throw Error(
-        "transport light does not go with latlong cameras; give another camera, or transport path");
+    return {"latlong cameras", "another camera"};
   if (scene.view().walks.media)
-    throw Error(
-        "transport light does not go with light that walks below surfaces; "
-        "render with transport path");
+    return {"light that walks below surfaces", "a stage without subsurface scattering"};
   if (!scene.volumes().empty())
-    throw Error("transport light does not go with volumes, such as '" + scene.volumes()[0].name +
-                "'; leave them out, or give transport path");
+    return {"volumes, such as '" + scene.volumes()[0].name + "'", "a stage without them"};
+  return {};
 }
 
-FixedPoint splat_unit(const Scene& scene) {
+void check_light_paths(const Scene& scene) {
+  if (const LightPathRefusal refusal = light_path_refusal(scene); !refusal.what.empty())
+    throw Error("transport light does not go with " + refusal.what + "; give " + refusal.instead +
+                ", or transport path or auto");
+}
+
+float scene_brightness(const Scene& scene) {
   const double radius = double{scene.view().scale};
   const double pi = 3.14159265358979323846;
   const double brightness =
       scene.light_set().total_power * double{scene.camera().exposure} / (pi * pi * radius * radius);
   const int exponent = brightness > 0 && std::isfinite(brightness) ? std::ilogb(brightness) + 1 : 0;
-  return {exponent - 44};
+  return std::ldexp(1.f, std::clamp(exponent, -100, 100));
+}
+
+FixedPoint splat_unit(const Scene& scene) {
+  return {std::ilogb(scene_brightness(scene)) - 44};
 }
 
 void send_paths(const Scene& scene, LightView& view) {
@@ -69,13 +80,17 @@ void send_paths(const Scene& scene, LightView& view) {
       view.reach = std::max(view.reach, farthest(shape_bounds(shape), centre) * kRoom);
 }
 
+bool sends_paths(const Scene& scene) {
+  const LightSet& set = scene.light_set();
+  return !set.triangles.empty() ||
+         std::any_of(set.records.begin(), set.records.end(), sends_paths_itself);
+}
+
 std::vector<std::string> lights_without_paths(const Scene& scene) {
   std::vector<std::string> names;
   const LightSet& set = scene.light_set();
   for (size_t i = 0; i < scene.lights().size(); ++i) {
-    const LightRecord& record = set.records[set.of_input[i]];
-    if (record.sampled_only != 0 || record.light_link != kNoSet)
-      names.push_back(scene.lights()[i].name);
+    if (!sends_paths_itself(set.records[set.of_input[i]])) names.push_back(scene.lights()[i].name);
   }
   for (const Light& light : scene.geometry()->mesh_lights) names.push_back(light.name);
   return names;

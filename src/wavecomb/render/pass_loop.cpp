@@ -10,12 +10,14 @@
 
 namespace wavecomb {
 
-PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass, Film& film,
-                   PassRunner& runner, RenderCosts& costs, Watch& watch)
+PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
+                   LightPathShare light_share, Film& film, PassRunner& runner, RenderCosts& costs,
+                   Watch& watch)
     : settings_(settings),
       rules_{settings.spp, settings.min_spp,     settings.is_adaptive(), settings.time_limit > 0,
              step,         settings.progressive, pilot_samples(settings)},
       pass_(std::move(pass)),
+      light_share_(light_share),
       film_(film),
       runner_(runner),
       costs_(costs),
@@ -64,6 +66,7 @@ void PassLoop::run() {
     const auto halted = [this] { return watch_.halted() || is_late(); };
     runner_.run(plan, halted);
     if (!from_lights.batches.empty()) runner_.run(from_lights, halted, true);
+    film_.note_light_paths();
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
     for (uint32_t i = 0; i < runner_.threads(); ++i)
@@ -77,7 +80,7 @@ void PassLoop::run() {
 PassPlan PassLoop::light_plan() const {
   if (light_order_.empty()) return {};
   PassState pass;
-  pass.target = pass_.target;
+  pass.target = light_share_.samples(pass_.target);
   return plan_pass(light_order_, {0, 0, settings_.width, settings_.height},
                    film_.splats().samples(), pass);
 }

@@ -11,6 +11,7 @@
 #include "wavecomb/core/clock.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/render/allotment.h"
+#include "wavecomb/render/light_paths.h"
 #include "wavecomb/render/pass_plan.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
@@ -36,9 +37,9 @@ struct RenderStatus {
 class PassLoop {
  public:
   /// `pass`: of the film, where it comes from a checkpoint. `step`: samples a pixel that a pass of
-  /// a render that is not adaptive adds.
-  PassLoop(const Settings& settings, uint32_t step, PassState pass, Film& film, PassRunner& runner,
-           RenderCosts& costs, Watch& watch);
+  /// a render that is not adaptive adds. `light_share`: of paths from lights, where there are any.
+  PassLoop(const Settings& settings, uint32_t step, PassState pass, LightPathShare light_share,
+           Film& film, PassRunner& runner, RenderCosts& costs, Watch& watch);
 
   void run();
   RenderStatus status() const;
@@ -57,6 +58,7 @@ class PassLoop {
   const Settings& settings_;
   PassRules rules_;
   PassState pass_;
+  LightPathShare light_share_;
   Film& film_;
   PassRunner& runner_;
   RenderCosts& costs_;

@@ -14,6 +14,7 @@
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
+#include "wavecomb/render/transport_choice.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/texture/tile_store.h"
 
@@ -73,6 +74,7 @@ struct RenderStatistics {
   AllotmentFacts allotment;
   GuideStatistics guiding;
   std::vector<std::string> lights_without_paths;  ///< where others send some
+  std::optional<TransportChoice> transport;       ///< of Transport::kAuto
   std::optional<StoreStatistics> texture_store;   ///< where textures have a limit
 };
 

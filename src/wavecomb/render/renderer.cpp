@@ -20,70 +20,15 @@
 #include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/light_paths.h"
+#include "wavecomb/render/render_setup.h"
+#include "wavecomb/render/transport_choice.h"
 #include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb {
 namespace {
 
-/// Paths a wave holds unless told otherwise (docs/decisions/wave-size.md), and samples of a pixel
-/// that a pass adds.
-constexpr uint32_t kDefaultWaveSize = 4096;
-constexpr uint32_t kPassSamples = 16;
-
-uint32_t thread_count(const Settings& settings) {
-  return settings.threads != 0 ? settings.threads
-                               : static_cast<uint32_t>(tbb::info::default_concurrency());
-}
-
-/// A wave is no larger than what keeps every worker busy a few times over.
-uint32_t wave_size_for(const Settings& settings, uint64_t pixels) {
-  const uint64_t total = settings.spp * pixels;
-  const uint64_t share = std::max<uint64_t>(64, total / (uint64_t{thread_count(settings)} * 4));
-  return static_cast<uint32_t>(
-      std::min<uint64_t>(settings.wave_size != 0 ? settings.wave_size : kDefaultWaveSize, share));
-}
-
-/// Samples of a pass that is not adaptive: at least enough for a wave to be full when the picture
-/// is smaller than a wave.
-uint32_t pass_step(const Settings& settings, uint64_t pixels, uint32_t wave_size) {
-  const auto fill = static_cast<uint32_t>((wave_size + pixels - 1) / pixels);
-  return std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});
-}
-
-/// The policies that `name` stands for: one, or those that "adaptive" chooses among, "none" first.
-std::vector<std::unique_ptr<SchedulingPolicy>> choose_policies(const std::string& name) {
-  std::vector<std::unique_ptr<SchedulingPolicy>> policies;
-  if (name == "adaptive")
-    for (const char* one : {"none", "code", "material", "texture", "texture-locality"})
-      policies.push_back(make_policy(one));
-  else
-    policies.push_back(make_policy(name));
-  return policies;
-}
-
-/// The grid over the scene for Morton codes.
-OrderGrid order_grid(const Bounds& bounds) {
-  OrderGrid grid;
-  if (bounds.empty()) return grid;
-  const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
-  const float hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
-  for (int i = 0; i < 3; ++i) {
-    grid.lo[i] = lo[i];
-    grid.scale[i] = hi[i] > lo[i] ? 1024.f / (hi[i] - lo[i]) : 0.f;
-  }
-  return grid;
-}
-
-/// Names of what the Cryptomatte layers among `layers` hold.
-std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
-                                             const std::vector<AovLayer>& layers) {
-  std::vector<CryptoManifest> manifests;
-  for (const AovLayer& layer : layers)
-    for (const Aov level : {Aov::kCryptoObject, Aov::kCryptoMaterial, Aov::kCryptoAsset})
-      if (layer.name == aov_name(level))
-        manifests.push_back({layer.name, crypto_manifest(scene, level, crypto_ids(layer))});
-  return manifests;
-}
+/// The darkest layer of cascades (film/cascades.h), over the brightness of the scene.
+constexpr float kDarkestShare = 0x1p-12f;
 
 }  // namespace
 
@@ -99,7 +44,13 @@ struct WavefrontRenderer::Impl {
   double build_s = 0;
   RenderStatistics statistics;
   CostProfile profile;  ///< after the last render
-  LightCalibrationCache light_calibrations;
+  LightCalibrationCache light_calibrations, trial_calibrations;
+
+  /// Renders with settings whose transport is chosen.
+  Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
+                 LightCalibrationCache& calibrations, Watch& watch);
+  /// A small picture, for choose_transport; ends where `outer` is stopped.
+  TransportTrial try_out(const Settings& settings, const Watch& outer);
 };
 
 namespace {
@@ -198,11 +149,44 @@ const CostProfile& WavefrontRenderer::cost_profile() const {
   return impl_->profile;
 }
 
+TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, const Watch& outer) {
+  RenderOptions options;
+  options.progress = [&](const RenderStatus&) {
+    return outer.stopped() ? Request::kStop : Request::kGoOn;
+  };
+  Watch watch(options.interval_s);
+  TransportTrial trial;
+  Picture picture = render(settings, {}, options, trial_calibrations, watch);
+  trial.beauty = std::move(picture.beauty);
+  for (AovLayer& layer : picture.aovs)
+    if (layer.name == aov_name(Aov::kByLightPaths)) trial.by_light_paths = std::move(layer.values);
+  trial.rays = statistics.rays + statistics.shadow_rays;
+  trial.records = statistics.records;
+  return trial;
+}
+
 Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions& options) {
   settings.check();
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
-  const Scene& scene = *impl_->scene;
+  if (settings.transport != Transport::kAuto)
+    return impl_->render(settings, {}, options, impl_->light_calibrations, watch);
+  const TransportChoice choice = choose_transport(
+      *impl_->scene, settings, [&](const Settings& s) { return impl_->try_out(s, watch); },
+      [&] { return watch.stopped(); });
+  Settings chosen = settings;
+  chosen.transport = choice.transport;
+  if (chosen.time_limit > 0)
+    chosen.time_limit = std::max(1e-6f, chosen.time_limit - static_cast<float>(choice.seconds));
+  Picture picture = impl_->render(chosen, choice.share, options, impl_->light_calibrations, watch);
+  impl_->statistics.transport = choice;
+  return picture;
+}
+
+Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
+                                        const RenderOptions& options,
+                                        LightCalibrationCache& calibrations, Watch& watch) {
+  const Scene& scene = *this->scene;
   const uint32_t lanes = choose_lanes(settings.lanes);
   const LaneKernels kernels = lane_kernels(lanes);
   const uint32_t threads = thread_count(settings);
@@ -231,8 +215,11 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const SplatFilter splat_filter(filter, settings.rendered());
   if (settings.joins_light()) {
     check_light_paths(scene);
-    film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height);
+    film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
+                     double{light_share.paths()});
   }
+  if (settings.firefly == Firefly::kReweight)
+    film.keep_cascades(scene_brightness(scene) * kDarkestShare);
   PassState pass;
   if (options.resume) options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();
@@ -243,7 +230,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   scene_view.materials.energy = energy_tables(scene.materials());
   WaveContext context{
       scene_view,
-      impl_->accel.get(),
+      accel.get(),
       &settings,
       &camera,
       policies,
@@ -252,27 +239,28 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
       &costs.roulette,
       order_grid(scene.bounds()),
       &film,
-      settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, impl_->accel->native_width()),
+      settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, accel->native_width()),
       wants_position,
       costs.measures(),
       options.recorder,
       &aovs};
 
   if (settings.joins_light()) context.splat_filter = &splat_filter;
+  context.light_paths = light_share.paths();
   const Clock::time_point start = Clock::now();
   const std::unique_ptr<Integrator> integrator =
       make_integrator(settings.integrator, context, lanes, threads, wave_size);
   PassRunner runner(*integrator, threads, wave_size);
-  PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), film, runner,
-                costs, watch);
+  PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), light_share,
+                film, runner, costs, watch);
   const LightCalibration* lights = nullptr;
   std::vector<std::string> without_paths;
   if (settings.joins_light()) without_paths = lights_without_paths(scene);
   GuideTraining training;
   GuideView guide;
   const auto work = [&] {
-    lights = &impl_->light_calibrations.get(impl_->scene, *impl_->accel, scene_view, settings,
-                                            [&] { return watch.stopped(); });
+    lights = &calibrations.get(this->scene, *accel, scene_view, settings,
+                               [&] { return watch.stopped(); });
     lights->weighed.apply(context.scene.lights);
     if (settings.joins_light()) send_paths(scene, context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
@@ -285,9 +273,9 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     loop.run();
   };
   // The workers stand still meanwhile.
-  const auto statistics = [&] {
+  const auto taken = [&] {
     RenderStatistics s;
-    s.build_s = impl_->build_s;
+    s.build_s = build_s;
     s.render_s = seconds_since(start);
     s.first_samples_s = runner.first_samples_s();
     s.threads = threads;
@@ -302,7 +290,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     s.lights_without_paths = without_paths;
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();
-    s.accelerator_bytes = impl_->accel->bytes();
+    s.accelerator_bytes = accel->bytes();
     s.film_bytes = film.bytes();
     if (lights) s.light_calibration = light_shares(*lights);
     s.peak_rss_bytes = peak_rss_bytes();
@@ -316,7 +304,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   const auto snapshot = [&](bool finished) {
     check_textures();
     if (options.snapshot)
-      options.snapshot({film, loop.pass(), loop.status(), finished, aovs.kept_names, statistics});
+      options.snapshot({film, loop.pass(), loop.status(), finished, aovs.kept_names, taken});
   };
   const tbb::global_control parallelism(
       tbb::global_control::max_allowed_parallelism,
@@ -337,8 +325,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   if (options.progress && !watch.stopped()) options.progress(loop.status());
   snapshot(true);
 
-  RenderStatistics& s = impl_->statistics = statistics();
-  impl_->profile = costs.profile();
+  RenderStatistics& s = statistics = taken();
+  profile = costs.profile();
   if (!options.wants_picture) return {window.width(), window.height(), {}, {}, {}, {}, {}};
   ErrorMap error;
   error.mean_relative = std::numeric_limits<double>::infinity();

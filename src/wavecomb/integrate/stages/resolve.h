@@ -46,6 +46,8 @@ inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask
     const size_t end = slot + task.samples;
     Film::Pixel& pixel = film.pixel(x, y);
     if (film.has_error()) detail::add_errors(radiance, slot, end, pixel, film.error(x, y));
+    for (size_t s = slot; film.has_cascades() && s < end; ++s)
+      film.cascades().add(film.index(x, y), radiance + s * kRadianceWords);
     double sum[kRadianceWords] = {pixel.r, pixel.g, pixel.b};
     detail::add_rows(radiance, slot, end, sum);
     pixel = {sum[0], sum[1], sum[2], pixel.samples + task.samples};

@@ -73,7 +73,7 @@ template <typename F, typename Media>
 const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
                                            const ShadeSettings& settings) {
   if constexpr (!Media::kAny)
-    if (context.joins_light()) return kShadeJointBatch<F>;
+    if (context.joins_light()) return kShadeJointBatch;
   if constexpr (kHasPlain<F> && !Media::kAny)
     if (is_plain(context, settings)) return kShadePlain<F>;
   return kShadeBatch<F, typename Media::template Programs<F>>;

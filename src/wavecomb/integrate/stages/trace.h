@@ -102,7 +102,8 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   const ShadowQueue& q = wave.shadows;
   occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
   if constexpr (Media::kStreams) media.template pass_all<F>(wave, depth, context.settings->sampler);
-  const bool is_watched = wave.aovs.wants_lights() || wave.history;
+  const bool is_watched =
+      wave.aovs.wants_lights() || wave.aovs.wants_light_samples() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
@@ -125,6 +126,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
         wave.aovs.add_direct<F>(
             slot, gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active), c,
             active);
+      if (wave.aovs.wants_light_samples()) wave.aovs.add_light_sample<F>(slot, c, active);
       if (wave.history) wave.history.light<F>(depth, slot, c, active);
     }
   }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Whether paths start at the lights, too, of Transport::kAuto, and how many.
+///
+/// Not where they do not go with the settings or the scene, nor where no surface is clear or glossy
+/// or no light sends paths. Elsewhere a small picture of the whole view is rendered before the
+/// first pass, twice either way. With the error e of a sample and its cost c, by rays and vertices
+/// at fixed costs, the efficiency of light paths to that without is
+///   e c / ((e_camera + e_light / s) (c_camera + s c_light)),
+/// s how many of them there are for each camera path, a power of two.
+/// Nothing of it depends on seed, region, threads, waves or lanes; so parts of a picture, a resumed
+/// one and merged ones are rendered alike. Its samples are not in the picture.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/render/light_paths.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// What was chosen, and why.
+struct TransportChoice {
+  Transport transport = Transport::kPath;
+  LightPathShare share;  ///< of Transport::kLight
+  std::string why;       ///< the rest of a sentence about what was chosen
+  double gain = 0;       ///< expected efficiency to that without light paths; 0: not looked at
+  double seconds = 0;
+};
+
+/// A small picture.
+struct TransportTrial {
+  std::vector<float> beauty;          ///< rgb
+  std::vector<float> by_light_paths;  ///< the part of it that light paths found; empty: none
+  uint64_t rays = 0, records = 0;     ///< that it took
+};
+using RenderTrial = std::function<TransportTrial(const Settings&)>;
+
+/// Whether anything in the scene reflects or passes light sharply enough for caustics.
+bool focuses_light(const Scene& scene);
+
+/// Chooses for `settings`, rendering by `render`. `stopped`: give up; what comes back is then of no
+/// use.
+TransportChoice choose_transport(const Scene& scene, const Settings& settings,
+                                 const RenderTrial& render, const std::function<bool()>& stopped);
+
+// ---- for tests ----
+
+/// What trials tell of pictures without and with light paths, two of each, of `width` columns.
+struct TransportGain {
+  double gain = 0;  ///< the best efficiency to that without
+  LightPathShare share;
+};
+TransportGain transport_gain(const TransportTrial (&without)[2], const TransportTrial (&with)[2],
+                             uint32_t width, double longer);
+
+}  // namespace wavecomb
