@@ -15,6 +15,7 @@ from typing import Any
 from wavecomb.scenes.caustics import build_caustics
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
 from wavecomb.scenes.lights import build_lights
 from wavecomb.scenes.mixed import build_dragon, build_mixed
@@ -56,6 +57,8 @@ SCENES: dict[str, SceneInfo] = {
     "clouds": SceneInfo("clouds over the sea, a grid: see --voxels", 100.0, build_clouds),
     "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),
     "caustics": SceneInfo("a glass ball and a gold ring before a small lamp", 0.1, build_caustics),
+    "fur": SceneInfo("a striped, furry egg: see --strands", 0.1, build_fur),
+    "head": SceneInfo("a head of brown hair: see --strands", 0.1, build_head),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""
