@@ -196,6 +196,13 @@ class SceneBuilder:
         conductor_k: tuple[float, float, float] = (0, 0, 0),
         specular_workflow: bool = False,
         presence: bool = False,
+        azimuthal_roughness: float = 0.3,
+        scale_tt: float = 0.5,
+        scale_trt: float = 2,
+        cuticle_tilt: float = 0,
+        tint_r: float = 1,
+        tint_tt: float = 1,
+        tint_trt: float = 1,
         # ---- to here ----
         openpbr: dict[str, Any] = {},
         textures: dict[str, dict[str, Any]] = {},

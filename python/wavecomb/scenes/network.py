@@ -50,6 +50,35 @@ class Network:
         out = shader.CreateOutput("out", Sdf.ValueTypeNames.Token)
         self.material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
 
+    def hair(self, absorption: str, roughness: dict[str, Any], **inputs: Any) -> None:
+        """Ends the network in hair.
+
+        Args:
+            absorption: The node that gives it, without types: ``chiang_hair_absorption_from_color``
+                or ``deon_hair_absorption_from_melanin``.
+            roughness: Inputs of ``chiang_hair_roughness``, as ``node`` takes them.
+            **inputs: Those of the absorption's node.
+        """
+        nodes = {}
+        for name, kind, given in (
+            ("Absorption", absorption, inputs),
+            ("Roughness", "chiang_hair_roughness", roughness),
+            ("Hair", "chiang_hair_bsdf", {}),
+            ("Surface", "surface", {}),
+        ):
+            nodes[name] = UsdShade.Shader.Define(self._stage, f"{self._path}/{name}")
+            self._fill(nodes[name], f"ND_{kind}", given)
+        colour = nodes["Absorption"].CreateOutput("absorption", _TYPES["vector3"])
+        hair = nodes["Hair"]
+        hair.CreateInput("absorption_coefficient", _TYPES["vector3"]).ConnectToSource(colour)
+        for lobe in ("R", "TT", "TRT"):
+            width = nodes["Roughness"].CreateOutput(f"roughness_{lobe}", _TYPES["vector2"])
+            hair.CreateInput(f"roughness_{lobe}", _TYPES["vector2"]).ConnectToSource(width)
+        bsdf = hair.CreateOutput("out", Sdf.ValueTypeNames.Token)
+        nodes["Surface"].CreateInput("bsdf", Sdf.ValueTypeNames.Token).ConnectToSource(bsdf)
+        out = nodes["Surface"].CreateOutput("out", Sdf.ValueTypeNames.Token)
+        self.material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
+
     def _fill(self, shader: UsdShade.Shader, definition: str, inputs: dict[str, Any]) -> None:
         shader.CreateIdAttr(definition)
         for name, value in inputs.items():

@@ -30,9 +30,11 @@ class SceneOptions:
         shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
             which is none, geometrically.
         lights: How many ``lights`` has.
+        strands: How many ``fur`` and ``head`` have.
         voxels: Along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
-            the metallic workflow, no program named. ``heavy`` has no such form, ``spread`` none of
+            the metallic workflow, no program named. ``heavy`` has no such form, nor has hair,
+            ``spread`` none of
             a ``shader_cost`` above 1.
     """
 
@@ -48,6 +50,7 @@ class SceneOptions:
     texture_mb: float = 16.0
     shader_cost: float = 1.0
     lights: int = 1000
+    strands: int = 100_000
     voxels: int = 160
     plain: bool = False
 
@@ -57,6 +60,8 @@ class SceneOptions:
             raise SceneError(f"aspect must be from 0.01 to 100, not {self.aspect}")
         if not 16 <= self.voxels <= 4096:
             raise SceneError(f"voxels must be from 16 to 4096, not {self.voxels}")
+        if not 1 <= self.strands <= 20_000_000:
+            raise SceneError(f"strands must be from 1 to 20000000, not {self.strands}")
         if self.seed < 0:
             raise SceneError(f"seed must not be negative: {self.seed}")
 

@@ -17,6 +17,7 @@ from pxr import Usd, UsdShade
 
 from wavecomb.usd.graphs.expressions import Expressions
 from wavecomb.usd.graphs.node import Value
+from wavecomb.usd.looks.network import shader_id, source_of
 from wavecomb.usd.stage.unread import unread_mtlx
 
 if TYPE_CHECKING:
@@ -31,6 +32,9 @@ ABSENT = "MaterialX without the Python package materialx (pip install materialx)
 
 MODELS = ("standard_surface", "open_pbr_surface", "gltf_pbr")
 """Shading models that are read."""
+
+HAIR = "chiang_hair"
+"""The model of a ``surface`` whose BSDF is a ``chiang_hair_bsdf``."""
 
 
 def is_there() -> bool:
@@ -103,6 +107,16 @@ def model_of(identifier: str) -> str:
     return next((name for name in MODELS if identifier.startswith(f"ND_{name}")), "")
 
 
+def hair_bsdf(shader: UsdShade.Shader) -> UsdShade.Shader | None:
+    """The ``chiang_hair_bsdf`` of a ``surface`` node, or of itself; None of other shaders."""
+    identifier = shader_id(shader)
+    if identifier == "ND_surface":
+        source = source_of(shader, "bsdf", Usd.TimeCode.Default())
+        shader = UsdShade.Shader() if source is None or source.shader is None else source.shader
+        identifier = shader_id(shader)
+    return shader if identifier.startswith("ND_chiang_hair_bsdf") else None
+
+
 def surface(
     material: Usd.Prim,
     time: Usd.TimeCode,
@@ -120,12 +134,16 @@ def surface(
         textures: Of the scene.
         report: Is told what is not supported.
         shader: The surface shader.
-        model: One of ``MODELS``.
+        model: One of ``MODELS``, or ``HAIR``.
         values: Constants of the shader in place of what the stage says.
     """
     if not is_there():
         report.missing(f"{ABSENT}: drawn grey", material.GetPath())
         return None
+    if model == HAIR:
+        from wavecomb.usd.materialx.surfaces.hair import HairReader
+
+        return HairReader(material, time, textures, report).read(shader)
     from wavecomb.usd.materialx.surfaces.reader import MaterialXReader
 
     return MaterialXReader(material, time, textures, report, values).read(shader, model)
@@ -135,10 +153,10 @@ def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
     """Inputs of a shading model that are read, by name, in MaterialX's order; none without it.
 
     Args:
-        model: One of ``MODELS``.
+        model: One of ``MODELS``; of ``HAIR`` none are known.
         identifier: The shader's, which may name an older version.
     """
-    if not is_there():
+    if model == HAIR or not is_there():
         return {}
     from wavecomb.usd.materialx.surfaces import inputs
 

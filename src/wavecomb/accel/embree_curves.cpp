@@ -20,7 +20,7 @@ CurveHits meet(const CurveGeometry& curves, RTCRayN* ray, unsigned n, unsigned i
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
   return intersect_curve(*curves.mesh, prim, o, d, RTCRayN_tfar(ray, n, i), curves.is_filtered,
-                         RTCRayN_time(ray, n, i));
+                         RTCRayN_time(ray, n, i), curves.is_fibre);
 }
 
 /// Calls found(i, hit) with the first hit of each of a packet's rays that is there for its path.

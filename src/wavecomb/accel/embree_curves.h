@@ -13,6 +13,7 @@ struct CurveGeometry {
   const Mesh* mesh;
   uint32_t id;       ///< of the mesh
   bool is_filtered;  ///< some of it may be partly present
+  bool is_fibre;     ///< rays meet it from outside alone
 };
 
 /// A committed geometry of a mesh of curves or points, to be released by the caller.

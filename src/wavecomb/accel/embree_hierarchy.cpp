@@ -58,6 +58,7 @@ EmbreeHierarchy::EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeH
       device_(origin ? origin->device_ : std::make_shared<EmbreeDevice>()),
       filtered_(rule != HitRule::kEmbree ? filtered_meshes(scene)
                                          : std::vector<uint8_t>(geometry_->meshes.size(), 0)),
+      fibres_(fibre_meshes(scene)),
       shapes_(light_shapes(scene)) {
   const std::lock_guard lock(device_->building);
   tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
@@ -94,7 +95,8 @@ size_t EmbreeHierarchy::bytes() const {
 
 bool EmbreeHierarchy::fits(const Scene& scene) const {
   return light_shapes(scene) == shapes_ &&
-         (rule_ == HitRule::kEmbree || filtered_meshes(scene) == filtered_);
+         (rule_ == HitRule::kEmbree || filtered_meshes(scene) == filtered_) &&
+         fibre_meshes(scene) == fibres_;
 }
 
 void EmbreeHierarchy::check(const char* doing) const {
@@ -120,7 +122,7 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
   if (mesh.is_curved()) {
     auto& curves = curves_[mesh_id];
     curves = std::make_shared<const CurveGeometry>(
-        CurveGeometry{&mesh, mesh_id, filtered_[mesh_id] != 0});
+        CurveGeometry{&mesh, mesh_id, filtered_[mesh_id] != 0, fibres_[mesh_id] != 0});
     return make_curve_geometry(device(), *curves, rule_);
   }
   RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -185,7 +187,8 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   const auto& groups = geometry_->groups;
   const auto& instances = geometry_->instances;
   const auto is_kept = [&](uint32_t mesh) {
-    return origin && origin->filtered_[mesh] == filtered_[mesh];
+    return origin && origin->filtered_[mesh] == filtered_[mesh] &&
+           origin->fibres_[mesh] == fibres_[mesh];
   };
   if (origin) {
     padded_ = origin->padded_;

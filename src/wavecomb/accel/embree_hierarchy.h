@@ -54,6 +54,7 @@ class EmbreeHierarchy {
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
   std::vector<uint8_t> filtered_;    ///< by mesh: some of it may be partly present
+  std::vector<uint8_t> fibres_;      ///< by mesh: it is met from outside alone
   std::vector<PlacedShape> shapes_;  ///< by record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;

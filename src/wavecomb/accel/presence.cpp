@@ -43,6 +43,29 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   return filtered;
 }
 
+std::vector<uint8_t> fibre_meshes(const Scene& scene) {
+  const SceneGeometry& geometry = *scene.geometry();
+  const auto& materials = scene.material_part()->shaded;
+  std::vector<uint8_t> fibres(geometry.meshes.size(), 0);
+  if (std::none_of(materials.begin(), materials.end(),
+                   [](const Material& m) { return m.program == ProgramId::kHair; }))
+    return fibres;
+  const auto is_other = [&](uint32_t m) { return materials[m].program != ProgramId::kHair; };
+  // What instances hand on to meshes that have no material: the world is instance 0.
+  std::vector<uint8_t> group_hands_on(geometry.groups.size(), 0), mesh_gets(fibres.size(), 0);
+  for (size_t i = 0; i < geometry.instance_records.size(); ++i)
+    if (is_other(geometry.instance_records[i].material))
+      group_hands_on[i == 0 ? 0 : geometry.instances[i - 1].group] = 1;
+  for (size_t g = 0; g < group_hands_on.size(); ++g)
+    for (const uint32_t mesh : geometry.groups[g].meshes) mesh_gets[mesh] |= group_hands_on[g];
+  for (uint32_t mesh = 0; mesh < fibres.size(); ++mesh)
+    fibres[mesh] = geometry.meshes[mesh].is_curved() &&
+                   !geometry.any_material(mesh, kInheritMaterial, [&](uint32_t m) {
+                     return m == kInheritMaterial ? mesh_gets[mesh] != 0 : is_other(m);
+                   });
+  return fibres;
+}
+
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
                   const PresenceKeys& keys) {
   const uint32_t set = keys.shadow_set[size_t{slot} * keys.shadow_stride];

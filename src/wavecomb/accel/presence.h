@@ -20,6 +20,10 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
 /// instance wears it, or it is not in the way of every light.
 std::vector<uint8_t> filtered_meshes(const Scene& scene);
 
+/// By mesh: 1 for curves and points that are all hair, by whatever instance they are worn. What
+/// goes on inside of a fibre is its BSDF's, so rays meet such meshes from outside alone.
+std::vector<uint8_t> fibre_meshes(const Scene& scene);
+
 /// Whether geometry `geom` of an instance is in the way of the shadow ray of a slot, by what the
 /// keys say of linking.
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,

@@ -63,13 +63,14 @@ class SegmentTest {
     Bezier::line(normal_);
   }
 
-  /// `all`: hits behind the first are wanted too.
-  void run(bool all) {
+  /// `all`: hits behind the first are wanted too; `outside`: none from inside.
+  void run(bool all, bool outside) {
     if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
     const int halvings = depth();
     side_ = -1;
     search(curve_, 0, 1, halvings);
-    if (mesh_.is_ribbon() || !(may_be_inside_ || (all && hits_.begin() != hits_.end()))) return;
+    if (mesh_.is_ribbon() || outside || !(may_be_inside_ || (all && hits_.begin() != hits_.end())))
+      return;
     side_ = 1;
     search(curve_, 0, 1, halvings);
   }
@@ -300,11 +301,12 @@ class SegmentTest {
 };
 
 void intersect_sphere(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
-                      float tfar, CurveHits& hits) {
+                      float tfar, bool outside, CurveHits& hits) {
   const V c = ray.point(widen(points.position(prim)));
   const double r = mesh.radii[prim], h = r * r - c.x * c.x - c.y * c.y;
   if (!(h >= 0) || r == 0) return;
   for (const double side : {-1.0, 1.0}) {
+    if (outside && side > 0) break;
     const double z = c.z + side * std::sqrt(h), t = z / ray.length;
     if (!(t > 0 && t <= tfar)) continue;
     const Vec3<float> n = narrow(ray.back({-c.x, -c.y, z - c.z}));
@@ -331,14 +333,14 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
 }
 
 CurveHits intersect_curve(const Mesh& mesh, uint32_t prim, const float (&origin)[3],
-                          const float (&dir)[3], float tfar, bool all, float time) {
+                          const float (&dir)[3], float tfar, bool all, float time, bool outside) {
   const RaySpace ray(origin, dir);
   const PointsAt points(mesh, time);
   CurveHits hits;
   if (mesh.primitive == Primitive::kSphere)
-    intersect_sphere(mesh, prim, points, ray, tfar, hits);
+    intersect_sphere(mesh, prim, points, ray, tfar, outside, hits);
   else
-    SegmentTest(mesh, prim, points, ray, tfar, hits).run(all);
+    SegmentTest(mesh, prim, points, ray, tfar, hits).run(all, outside);
   return hits;
 }
 

@@ -43,8 +43,10 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 
 /// Hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of primitive `prim` of a
 /// mesh of curves or points: the first, or `all`. Where a tube goes on in the next segment, the end
-/// that lies in it is not hit. `time`: in [0, 1] over the mesh's steps.
+/// that lies in it is not hit. `time`: in [0, 1] over the mesh's steps. `outside`: what is met from
+/// inside is left out.
 CurveHits intersect_curve(const Mesh& mesh, uint32_t prim, const float (&origin)[3],
-                          const float (&dir)[3], float tfar, bool all, float time = 0);
+                          const float (&dir)[3], float tfar, bool all, float time = 0,
+                          bool outside = false);
 
 }  // namespace wavecomb

@@ -148,6 +148,7 @@ WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>
   out.v.direct = Color<F>(F(0.f));
   out.v.has_shadow = Mask<F>(false);
   out.v.alive = Mask<F>(false);
+  if constexpr (Bsdf::kOnFibre) return out;
   const auto at = interact<Bsdf, F>(v);
   const auto place = detail::lit_place<Bsdf, F>(v, at);
   const Sample4<F> r_light =

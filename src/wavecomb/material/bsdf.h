@@ -45,6 +45,9 @@ struct BsdfTraits {
   static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
   static constexpr bool kReadsIor = false;      ///< the index of refraction says something
   static constexpr bool kOnSurface = true;      ///< shades hits; or else it has an `interact`
+  /// Scatters as a whole fibre does, about an axis: its frame has x along it (curve/fibre.h), both
+  /// sides are one, and paths from lights do not go there, since it is not reciprocal.
+  static constexpr bool kOnFibre = false;
 
   /// What depends on wo alone, as the functions below take it: wo, unless a program says more.
   template <typename Wo>

@@ -6,6 +6,7 @@
 #include "wavecomb/material/programs/dielectric.h"
 #include "wavecomb/material/programs/diffuse.h"
 #include "wavecomb/material/programs/emissive.h"
+#include "wavecomb/material/programs/hair.h"
 #include "wavecomb/material/programs/metal.h"
 #include "wavecomb/material/programs/openpbr.h"
 #include "wavecomb/material/programs/plastic.h"

@@ -127,7 +127,7 @@ static_assert(sizeof(TextureUseRecord) == 64);
 struct alignas(16) ProgramParameterRecord {
   float value[kMaxProgramParameters];
 };
-static_assert(sizeof(ProgramParameterRecord) == 16);
+static_assert(sizeof(ProgramParameterRecord) == 4 * kMaxProgramParameters);
 
 /// What kernels need of all materials. Uses are at `material * kInputCount + input`.
 struct MaterialView {

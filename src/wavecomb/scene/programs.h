@@ -10,7 +10,7 @@
 namespace wavecomb {
 
 /// Most parameters that one program can have to itself.
-inline constexpr size_t kMaxProgramParameters = 4;
+inline constexpr size_t kMaxProgramParameters = 8;
 
 /// A number that materials of one program alone can be told. Its name is unlike those of all
 /// others.
@@ -29,14 +29,17 @@ struct ProgramParameter {
 /// are X, and P where the class may be had with some of its parts alone (scene/material_parts.h).
 /// CMake reads this list, too: two spaces and a row on each line. A new one comes last, since
 /// fingerprints have the ids.
-#define WAVECOMB_PROGRAMS(X, P)        \
-  X(diffuse, Diffuse, false, 60)       \
-  X(metal, Metal, false, 75)           \
-  X(dielectric, Dielectric, false, 70) \
-  X(plastic, Plastic, false, 85)       \
-  X(emissive, Emissive, true, 20)      \
-  P(principled, Principled, true, 110) \
-  P(openpbr, OpenPbr, true, 300)
+#define WAVECOMB_PROGRAMS(X, P)                                                             \
+  X(diffuse, Diffuse, false, 60)                                                            \
+  X(metal, Metal, false, 75)                                                                \
+  X(dielectric, Dielectric, false, 70)                                                      \
+  X(plastic, Plastic, false, 85)                                                            \
+  X(emissive, Emissive, true, 20)                                                           \
+  P(principled, Principled, true, 110)                                                      \
+  P(openpbr, OpenPbr, true, 300)                                                            \
+  X(hair, Hair, false, 350, {"azimuthal_roughness", 0.3f, 0, 1}, {"scale_tt", 0.5f, 0, 10}, \
+    {"scale_trt", 2, 0, 10}, {"cuticle_tilt", 0, -90, 90}, {"tint_r", 1, 0, 1},             \
+    {"tint_tt", 1, 0, 1}, {"tint_trt", 1, 0, 1})
 
 /// Likewise the programs of what lies between surfaces (integrate/media.h). No mesh can wear them,
 /// and each stands in the room of what it is for.

@@ -119,6 +119,7 @@ class Assigner:
             otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
         """
         surface = None if draw.material is None else self.table.surface(draw.material)
+        self._tell_of_hair(draw, mesh)
         if surface is not None and not draw.subsets and _is_alike(surface):
             return Worn(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
@@ -130,6 +131,19 @@ class Assigner:
             worn.by_face = self._subsets(draw, mesh.topology, worn.material, primvars)
         worn.reads = primvars.read
         return worn
+
+    def _tell_of_hair(self, draw: Draw, mesh: MeshArrays | CurveArrays) -> None:
+        """Says where hair is worn by what is no tube."""
+        worn = (draw.material, *draw.subset_materials)
+        if not any(m is not None and self.table.surface(m).program == "hair" for m in worn):
+            return
+        if isinstance(mesh, MeshArrays):
+            what = "hair on a mesh (as tubes along its texture's u)"
+        elif mesh.kind.endswith("ribbon"):
+            what = "hair on ribbons (each point as of a round fibre)"
+        else:
+            return
+        self.report.missing(what, draw.prim.GetPath())
 
     def _subsets(
         self, draw: Draw, topology: Topology, base: int, primvars: _Primvars

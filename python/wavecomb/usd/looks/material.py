@@ -80,6 +80,8 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
             return PREVIEW, candidate
         if model := mtlx.model_of(name):
             return model, candidate
+        if (hair := mtlx.hair_bsdf(candidate)) is not None:
+            return mtlx.HAIR, hair
     return "", shader
 
 

@@ -71,7 +71,7 @@ class Surface:
 
     Attributes:
         name: For messages.
-        program: diffuse, metal, dielectric, plastic, emissive, principled or openpbr.
+        program: diffuse, metal, dielectric, plastic, emissive, principled, openpbr or hair.
         parameters: Keyword arguments of ``SceneBuilder.add_material``.
         textures: By parameter, as ``SceneBuilder.add_material`` takes them.
         uv_names: Primvars that hold texture coordinates, first use first.

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "wavecomb/core/frame.h"
+#include "wavecomb/curve/fibre.h"
 #include "wavecomb/graph/hit_point.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/material/params.h"
@@ -142,7 +143,7 @@ WAVECOMB_INLINE SurfacePlace<Bsdf, F>::SurfacePlace(const Vertex<F, kFeatures>& 
                                        UInt<F>(0u))),
       textured(Bsdf::kTextured && any(reads_texture)),
       s(setup_surface<F, v.has(kCurves), v.has(kMotion)>(
-          v.scene, v.hit, v.path.dir, textured || (v.notes() && v.aovs->wants_uv),
+          v.scene, v.hit, v.path.dir, textured || Bsdf::kOnFibre || (v.notes() && v.aovs->wants_uv),
           Bsdf::kHasTerminator, v.active)) {}
 
 template <typename Bsdf, typename F>
@@ -178,6 +179,7 @@ WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::bumped(const Vec3<F>& n,
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {
+  if constexpr (Bsdf::kOnFibre) return fibre_frame<F>(v.scene, v.hit, s, v.path.dir, v.active);
   if (!Bsdf::kTextured || !this->textured) return make_frame<F>(s.ns);
   const Vec3<F>& dir = v.path.dir;
   Vec3<F> n = s.ns;
@@ -243,6 +245,7 @@ WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::origin(const Vec3<F>& dir) 
 template <typename Bsdf, typename F>
 WAVECOMB_INLINE Mask<F> SurfaceInteraction<Bsdf, F>::is_consistent(const Vec3<F>& world,
                                                                    const Vec3<F>& local) const {
+  if constexpr (Bsdf::kOnFibre) return Mask<F>(true);
   return F(dot(world, s.ng) * local.z) > 0.f;
 }
 

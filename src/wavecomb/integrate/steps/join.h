@@ -12,7 +12,8 @@
 /// pixel's, and D the light's (light/emission.h). R is one number, of which each vertex multiplies
 /// in its own. At a delta lobe the ratio of densities is that of the solid angles,
 ///   p<- / p-> = |w z| / (|l z| eta^2),   z the shading normal, eta that of w -> l.
-/// R is 0 where paths from lights do not go: x_1 a mirror, a normal that is bent towards who looks.
+/// R is 0 where paths from lights do not go: x_1 a mirror, a normal that is bent towards who looks,
+/// a fibre.
 #pragma once
 
 #include "wavecomb/integrate/steps/interact.h"
@@ -50,6 +51,7 @@ struct JointVertex {
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const Interaction& at,
                                             const Frame<F>& frame) {
+  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f)};
   const Vec3<F>& dir = v.path.dir;
   const F seen = dot(at.s.ng, dir);
   const Frame<F> unbent = at.unbent_frame(v);

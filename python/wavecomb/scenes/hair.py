@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fur and hair: strands that grow on smooth bodies, combed and bent, as cubic curves.
+
+All strands of a body grow at once, step by step, in numbers; 100,000 take about a second.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, UsdGeom, Vt
+
+from wavecomb.scenes import materials as looks
+from wavecomb.scenes.head_shape import HEAD_LEVEL, head_mesh, head_radius, is_scalp
+from wavecomb.scenes.mesh import FloatArray
+from wavecomb.scenes.network import Network
+from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.shapes import turned
+from wavecomb.scenes.stage import StageWriter
+
+_HAIR_POINTS, _FUR_POINTS = 9, 5
+_HAIR_WIDTH, _FUR_WIDTH = 0.0016, 0.008
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
+
+
+def _sphere(rng: np.random.Generator, count: int) -> FloatArray:
+    return _unit(rng.normal(size=(count, 3)))
+
+
+def _waves(p: FloatArray, frequency: float, seed: float) -> FloatArray:
+    """A smooth field of vectors about 0, (n, 3)."""
+    turns = np.array([[1.0, 0.7, -0.4], [-0.6, 1.1, 0.5], [0.3, -0.8, 1.2]]) * frequency
+    return np.sin(p @ turns.T + seed * np.array([1.0, 2.3, 4.1]))
+
+
+def add_strands(
+    writer: StageWriter,
+    path: str,
+    strands: FloatArray,
+    width: float,
+    material: str,
+    primvars: dict[str, tuple[str, FloatArray]],
+) -> None:
+    """Adds strands (n, points, 3), root first, that run out into points.
+
+    Args:
+        writer: Of the stage.
+        path: Of the curves.
+        strands: Their points.
+        width: At the root.
+        material: That they wear.
+        primvars: By name, interpolation (uniform or varying) and values: numbers, or colours.
+    """
+    count, points = strands.shape[:2]
+    flat = strands.reshape(-1, 3).astype(np.float32)
+    taper = 1.0 - 0.75 * np.linspace(0.0, 1.0, points) ** 2
+    widths = np.tile((width * taper).astype(np.float32), count)
+    prim = UsdGeom.BasisCurves.Define(writer.stage, path)
+    prim.CreateTypeAttr(UsdGeom.Tokens.cubic)
+    prim.CreateBasisAttr(UsdGeom.Tokens.catmullRom)
+    prim.CreateWrapAttr(UsdGeom.Tokens.pinned)
+    prim.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(count, points, np.int32)))
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(flat))
+    prim.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths))
+    prim.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    prim.CreateExtentAttr([Gf.Vec3f(*map(float, end)) for end in (flat.min(0), flat.max(0))])
+    api = UsdGeom.PrimvarsAPI(prim)
+    types = Sdf.ValueTypeNames
+    for name, (interpolation, values) in primvars.items():
+        wide = values.ndim == 2
+        kind = types.Color3fArray if wide else types.FloatArray
+        array: Any = Vt.Vec3fArray if wide else Vt.FloatArray
+        made = api.CreatePrimvar(name, kind, interpolation)
+        made.Set(array.FromNumpy(np.ascontiguousarray(values, np.float32)))
+    writer.bind(prim.GetPrim(), material)
+
+
+def _lamps(writer: StageWriter, strength: float) -> None:
+    """A key light, and one from behind that shines through hair."""
+    key, rim = (x * strength for x in (26.0, 30.0))
+    writer.rect_light("Key", (-3.0, 5.5, 5.0), 2.4, 2.4, (key, 0.95 * key, 0.88 * key), -48.0)
+    writer.rect_light("Rim", (2.2, 4.4, -4.6), 2.6, 2.6, (0.9 * rim, 0.95 * rim, rim), -136.0)
+    writer.sphere_light("Fill", (5.0, 2.0, 4.0), 0.8, (6.0, 6.4, 7.0))
+
+
+def _floor(writer: StageWriter, height: float) -> None:
+    writer.material("Floor", looks.diffuse((0.16, 0.17, 0.19)))
+    h = 12.0
+    floor = np.array([[-h, height, h], [h, height, h], [h, height, -h], [-h, height, -h]])
+    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Floor")
+
+
+def _egg(d: FloatArray) -> FloatArray:
+    """Points of an egg about the origin in directions ``d``."""
+    return d * np.array([0.95, 1.15, 0.95]) * (1.0 + 0.12 * d[..., 1:2] * (d[..., 1:2] - 1.0))
+
+
+def fur_strands(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
+    """Strands of the egg, (count, points, 3), and the directions that they stand in."""
+    d = _sphere(rng, count)
+    p = _egg(d)
+    length = 0.22 * rng.uniform(0.7, 1.15, (count, 1))
+    step = length / (_FUR_POINTS - 1)
+    down = np.array([0.0, -1.0, 0.0])
+    comb = down + 0.5 * np.cross(d, down) + 0.35 * _waves(d, 6.0, 1.7)
+    comb -= d * (d * comb).sum(1, keepdims=True)
+    frizz = rng.normal(scale=0.16, size=(count, 3))
+    places = [p]
+    for k in range(_FUR_POINTS - 1):
+        bend = (k + 0.6) / _FUR_POINTS
+        p = p + step * _unit(d + 1.5 * bend * comb + frizz * (0.4 + bend))
+        places.append(p)
+    return np.stack(places, axis=1), d
+
+
+def build_fur(writer: StageWriter, options: SceneOptions) -> None:
+    """An egg with stripes of dark and light fur, lighter at the tips."""
+    rng = np.random.default_rng([options.seed, 21])
+    writer.material("Skin", looks.diffuse((0.16, 0.10, 0.07)))
+    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 65)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(65)], axis=1)
+    profile = _egg(ring)[:, :2]
+    profile[[0, -1], 0] = 0.0
+    body = turned(profile, 96, 1)
+    writer.bind(writer.mesh("/World/Objects/Body", body).GetPrim(), "Skin")
+    strands, d = fur_strands(rng, options.strands)
+    stripe = np.sin(11.0 * d[:, 1] + 1.6 * _waves(d, 3.0, 0.4)[:, 0])
+    light = 1.0 / (1.0 + np.exp(-7.0 * (stripe + 0.15)))
+    shade = rng.uniform(0.8, 1.1, len(d))[:, None]
+    dark, pale = np.array([0.07, 0.045, 0.03]), np.array([0.80, 0.50, 0.24])
+    colour = np.clip((dark + (pale - dark) * light[:, None]) * shade, 0.0, 1.0)
+    along = np.tile(np.linspace(0.0, 1.0, _FUR_POINTS), len(d))
+    add_strands(
+        writer,
+        "/World/Objects/Fur",
+        strands,
+        _FUR_WIDTH,
+        _fur(writer),
+        {"furColor": ("uniform", colour), "along": ("varying", along)},
+    )
+    _floor(writer, -1.38)
+    _lamps(writer, 1.8)
+    writer.camera((0.0, 1.0, 6.4), (0.0, -0.08, 0.0), 30.0, options.aspect or 1.0)
+
+
+def _fur(writer: StageWriter) -> str:
+    """Its colour of each strand, paler towards the tip."""
+    net = Network(writer.stage, "/World/Looks/Fur")
+    own = net.node(
+        "geompropvalue", "color3",
+        geomprop=("string", "furColor"), default=("color3", (0.5, 0.3, 0.2)),
+    )  # fmt: skip
+    along = net.node("geompropvalue", "float", geomprop=("string", "along"))
+    share = net.node("multiply", "float", in1=along, in2=("float", 0.45))
+    colour = net.node("mix", "color3", bg=own, fg=("color3", (0.92, 0.84, 0.7)), mix=share)
+    net.hair(
+        "chiang_hair_absorption_from_color",
+        {"longitudinal": ("float", 0.28), "azimuthal": ("float", 0.35)},
+        color=colour,
+        azimuthal_roughness=("float", 0.35),
+    )
+    return writer.own_material("Fur", net.material)
+
+
+def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
+    """Strands of the head, (count, points, 3): parted, combed to both sides, hanging."""
+    roots = np.zeros((0, 3))
+    while len(roots) < count:
+        d = _sphere(rng, 2 * count)
+        roots = np.concatenate([roots, d[is_scalp(d, rng.random(len(d)))]])
+    d = roots[:count]
+    p = d * head_radius(d)[:, None]
+    side = np.where(d[:, :1] > 0.10, 1.0, -1.0) * np.clip(0.75 + 0.9 * d[:, 2:], 0.06, 1.0)
+    length = 1.7 * rng.uniform(0.82, 1.06, (count, 1)) * (1.0 + 0.10 * _waves(d, 5.0, 0.9)[:, :1])
+    step = length / (_HAIR_POINTS - 1)
+    lift = 1.02 + 0.11 * rng.random((count, 1)) ** 1.5
+    comb = np.concatenate([side, np.full_like(side, 0.1), np.full_like(side, -0.45)], axis=1)
+    comb -= d * (d * comb).sum(1, keepdims=True)
+    frizz = rng.normal(scale=0.05, size=(count, 3))
+    waves = _waves(d, 9.0, 2.2)
+    heading = 0.5 * d + 0.8 * comb
+    phase = 5.0 * _waves(d, 7.0, 3.3)[:, :1]
+    places = [p]
+    for k in range(_HAIR_POINTS - 1):
+        t = (k + 1.0) / (_HAIR_POINTS - 1)
+        curl = 0.30 * t * np.sin(2.2 * math.pi * t + phase) * waves
+        heading = _unit(heading) + np.array([0.0, -0.8, 0.0]) + 0.3 * comb * (1.0 - t)
+        q = p + step * _unit(heading + curl + frizz)
+        # Outside of the head, and not far from it; below, as wide as it is.
+        out = np.linalg.norm(q, axis=1, keepdims=True)
+        way = q / np.maximum(out, 1e-9)
+        near = head_radius(way)[:, None] * (lift if k else 1.0 + 0.5 * (lift - 1.0))
+        most = np.where(q[:, 1:2] > -0.45, near * 1.07, np.inf)
+        q = way * np.clip(out, near, most)
+        wide = np.linalg.norm(q[:, ::2], axis=1, keepdims=True)
+        q[:, ::2] *= np.minimum(1.0, 0.95 * lift / np.maximum(wide, 1e-9))
+        heading = q - p
+        p = p + step * _unit(heading)
+        places.append(p)
+    return np.stack(places, axis=1)
+
+
+def build_head(writer: StageWriter, options: SceneOptions) -> None:
+    """A smooth head without a face to speak of, and its hair."""
+    rng = np.random.default_rng([options.seed, 22])
+    writer.material("Head", looks.diffuse((0.46, 0.34, 0.27)))
+    writer.bind(writer.mesh("/World/Objects/Head", head_mesh(HEAD_LEVEL)).GetPrim(), "Head")
+    neck = turned(
+        [(0.0, -2.5), (1.0, -2.5), (0.9, -2.2), (0.5, -1.7), (0.45, -1.0), (0.42, -0.5),
+         (0.0, -0.45)], 64,
+    )  # fmt: skip
+    neck = type(neck)(
+        neck.points + np.array([0.0, 0.0, -0.16], np.float32), neck.faces, neck.normals, neck.uv
+    )
+    writer.bind(writer.mesh("/World/Objects/Neck", neck).GetPrim(), "Head")
+    melanin = np.clip(rng.normal(0.52, 0.07, options.strands), 0.1, 0.95)
+    add_strands(
+        writer,
+        "/World/Objects/Hair",
+        hair_strands(rng, options.strands),
+        _HAIR_WIDTH,
+        _brown(writer),
+        {"melanin": ("uniform", melanin)},
+    )
+    _floor(writer, -2.5)
+    _lamps(writer, 1.8)
+    writer.camera((2.3, 0.5, 6.6), (0.0, -0.55, 0.0), 32.0, options.aspect or 1.0)
+
+
+def _brown(writer: StageWriter) -> str:
+    """Melanin of each strand."""
+    net = Network(writer.stage, "/World/Looks/Hair")
+    melanin = net.node(
+        "geompropvalue", "float", geomprop=("string", "melanin"), default=("float", 0.5)
+    )
+    net.hair(
+        "deon_hair_absorption_from_melanin",
+        {"longitudinal": ("float", 0.25), "azimuthal": ("float", 0.3)},
+        melanin_concentration=melanin,
+        melanin_redness=("float", 0.35),
+    )
+    return writer.own_material("Hair", net.material)

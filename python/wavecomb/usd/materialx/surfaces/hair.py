@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX's ``chiang_hair_bsdf``, as the program "hair".
+
+The program takes a colour and roughnesses (docs/hair.md); the node takes absorption, and variances
+and scales of its lobes. What a node drives is turned round by a graph.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from pxr import Usd, UsdShade
+
+from wavecomb.usd.graphs.node import Value, fit, is_constant, numbers
+from wavecomb.usd.graphs.surface import Drivers
+from wavecomb.usd.looks.network import colour, number, pair, shader_id, source_of, value_of
+from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materialx.nodes.hair import color_divisor
+from wavecomb.usd.materialx.nodes.network import Networks
+
+if TYPE_CHECKING:
+    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.stage.report import LoadReport
+
+_LOBES = {"R": (0.1, 0.1), "TT": (0.05, 0.05), "TRT": (0.2, 0.2)}
+"""Lobes, with the defaults of their roughnesses."""
+_LUMA = (0.2126, 0.7152, 0.0722)
+
+
+def variance(roughness: float) -> float:
+    """Of a lobe along the fibre, by longitudinal roughness (Chiang et al. 2016, eq. 7)."""
+    r = roughness
+    return float((0.726 * r + 0.812 * r**2 + 3.7 * r**20) ** 2)
+
+
+def scale(roughness: float) -> float:
+    """Of a lobe about the fibre, by azimuthal roughness, as MaterialX has it (eq. 8)."""
+    r = roughness
+    return float(0.265 * r + 1.194 * r**2 + 5.372 * r**22)
+
+
+def _inverse(function: Any, wanted: float) -> float:
+    """The roughness in [0.001, 1] at which a rising function comes nearest to a value."""
+    low, high = 0.001, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if function(middle) < wanted else (low, middle)
+    return 0.5 * (low + high)
+
+
+class HairReader:
+    """Reads one ``chiang_hair_bsdf``."""
+
+    def __init__(
+        self,
+        material: Usd.Prim,
+        time: Usd.TimeCode,
+        textures: TextureTable,
+        report: LoadReport,
+    ) -> None:
+        self.material = material
+        self.time = time
+        self.report = report
+        self.drivers = Drivers(Networks(material, time, textures, report))
+
+    def read(self, shader: UsdShade.Shader) -> Surface:
+        """The surface; what it cannot show is said."""
+        parameters: dict[str, Any] = {}
+        self._put(parameters, "ior", self.drivers.value(shader, "ior", "ior") or (1.55,))
+        if parameters.get("ior", 1.55) < 1.0:
+            self.report.warn("ior of hair below 1: set to 1.55", self.material.GetPath())
+            parameters["ior"] = 1.55
+        self._roughness(parameters, shader)
+        self._colour(parameters, shader)
+        # MaterialX's angle turns the other way, and 0.5 of it is no tilt.
+        angle = self._number(shader, "cuticle_angle", 0.5)
+        parameters["cuticle_tilt"] = min(max(90.0 - 180.0 * angle, -90.0), 90.0)
+        for lobe in _LOBES:
+            parameters[f"tint_{lobe.lower()}"] = self._tint(shader, f"tint_{lobe}")
+        for name in ("normal", "curve_direction"):
+            if source_of(shader, name, self.time) is not None:
+                self._missing(f"MaterialX chiang_hair_bsdf input {name} (the curve's own)")
+        return Surface(
+            str(self.material.GetPath()),
+            "hair",
+            parameters,
+            self.drivers.textured,
+            self.drivers.uv_names,
+            graph=self.drivers.graph(),
+        )
+
+    def _put(self, parameters: dict[str, Any], name: str, value: Value) -> None:
+        constant = self.drivers.put(name, value)
+        if constant is not None:
+            parameters[name] = constant if len(constant) > 1 else constant[0]
+
+    def _roughness(self, parameters: dict[str, Any], shader: UsdShade.Shader) -> None:
+        """Roughnesses: those of one helper as they are, else from variances and scales."""
+        helper = self._helper(shader)
+        if helper is not None:
+            along = self.drivers.value(helper, "longitudinal", "roughness") or (0.1,)
+            low = self.drivers.networks.make.op(
+                "clamp", fit(along, 1), numbers(0.001), numbers(1.0)
+            )
+            self._put(parameters, "roughness", low)
+            about = self._number(helper, "azimuthal", 0.2)
+            parameters["scale_tt"] = self._number(helper, "scale_TT", 0.5)
+            parameters["scale_trt"] = self._number(helper, "scale_TRT", 2.0)
+        else:
+            pairs = {lobe: self._pair(shader, lobe) for lobe in _LOBES}
+            scales = {s for _, s in pairs.values()}
+            if max(scales) > min(scales):
+                self._missing(
+                    "MaterialX chiang_hair_bsdf lobes of different azimuthal roughness "
+                    "(that of roughness_R for all)"
+                )
+            v, s = pairs["R"]
+            parameters["roughness"] = _inverse(variance, v)
+            about = _inverse(scale, s)
+            parameters["scale_tt"] = math.sqrt(pairs["TT"][0] / v)
+            parameters["scale_trt"] = math.sqrt(pairs["TRT"][0] / v)
+        parameters["azimuthal_roughness"] = min(max(about, 0.001), 1.0)
+        for name in ("scale_tt", "scale_trt"):
+            parameters[name] = min(max(parameters[name], 0.0), 10.0)
+
+    def _helper(self, shader: UsdShade.Shader) -> UsdShade.Shader | None:
+        """The ``chiang_hair_roughness`` that all lobes come from; None where there is none."""
+        found = []
+        for lobe in _LOBES:
+            source = source_of(shader, f"roughness_{lobe}", self.time)
+            node = None if source is None else source.shader
+            if node is None or not shader_id(node).startswith("ND_chiang_hair_roughness"):
+                return None
+            found.append(node)
+        return found[0] if len({node.GetPath() for node in found}) == 1 else None
+
+    def _pair(self, shader: UsdShade.Shader, lobe: str) -> tuple[float, float]:
+        """Variance and scale of a lobe; MaterialX's clamps."""
+        source = source_of(shader, f"roughness_{lobe}", self.time)
+        given = None if source is None else source.value
+        if source is not None and source.shader is not None:
+            if shader_id(source.shader).startswith("ND_chiang_hair_roughness"):
+                factor = {"R": 1.0, "TT": self._number(source.shader, "scale_TT", 0.5),
+                          "TRT": self._number(source.shader, "scale_TRT", 2.0)}[lobe]  # fmt: skip
+                along = min(max(self._number(source.shader, "longitudinal", 0.1), 0.001), 1.0)
+                about = min(max(self._number(source.shader, "azimuthal", 0.2), 0.001), 1.0)
+                given = (variance(along) * factor**2, scale(about))
+            else:
+                self._missing(
+                    f"MaterialX chiang_hair_bsdf input roughness_{lobe} by a node (its default)"
+                )
+        v, s = pair(given, _LOBES[lobe])
+        return min(max(v, 0.001), 1.0), min(max(s, 0.001), 1.0)
+
+    def _colour(self, parameters: dict[str, Any], shader: UsdShade.Shader) -> None:
+        """The colour whose absorption, at the roughness of the hair, is what is asked for."""
+        about = parameters["azimuthal_roughness"]
+        name = "absorption_coefficient"
+        source = source_of(shader, name, self.time)
+        node = None if source is None else source.shader
+        if node is not None and shader_id(node).startswith("ND_chiang_hair_absorption_from_color"):
+            given = value_of(node, "azimuthal_roughness", self.time, 0.2)
+            if abs(number(given, 0.2) - about) < 1e-6:
+                value = self.drivers.value(node, "color", "base_color") or (1.0,)
+                self._put(parameters, "base_color", fit(value, 3))
+                return
+        absorption = fit(self.drivers.value(shader, name, "base_color") or (0.0,), 3)
+        m = self.drivers.networks.make
+        root = m.op("sqrt", m.op("max", absorption, numbers(0.0)))
+        value = m.op("exp", m.op("multiply", root, numbers(-color_divisor(about))))
+        self._put(parameters, "base_color", value)
+
+    def _number(self, shader: UsdShade.Shader, name: str, default: float) -> float:
+        """An input that is one number for all."""
+        value = self.drivers.value(shader, name, "roughness")
+        if value is None:
+            return default
+        if not is_constant(value):
+            what = f"MaterialX {shader_id(shader).removeprefix('ND_')} input {name} by a node"
+            self._missing(f"{what} (its default)")
+            return default
+        return float(value[0])  # type: ignore[arg-type]
+
+    def _tint(self, shader: UsdShade.Shader, name: str) -> float:
+        """A tint, which has no colour here."""
+        source = source_of(shader, name, self.time)
+        if source is None:
+            return 1.0
+        white = (1.0, 1.0, 1.0)
+        value = self.drivers.value(shader, name, "base_color")
+        if value is None or not is_constant(value):
+            self._missing(f"MaterialX chiang_hair_bsdf input {name} by a node (white)")
+            return 1.0
+        rgb = colour(fit(value, 3), white)
+        if max(rgb) - min(rgb) > 1e-4:
+            self._missing(f"MaterialX chiang_hair_bsdf input {name} in a colour (its luminance)")
+        return min(max(sum(a * b for a, b in zip(rgb, _LUMA, strict=True)), 0.0), 1.0)
+
+    def _missing(self, what: str) -> None:
+        self.report.missing(what, self.material.GetPath())

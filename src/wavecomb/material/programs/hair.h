@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program "hair": fibres of hair and fur (material/lobes/fibre.h), as MaterialX's
+/// `chiang_hair_bsdf` has them (docs/hair.md).
+#pragma once
+
+#include <algorithm>
+
+#include "wavecomb/material/bsdf.h"
+#include "wavecomb/material/lobes/fibre.h"
+
+namespace wavecomb {
+
+/// base_color is what hair of many fibres looks like (Chiang et al. 2016, 4.2), roughness that
+/// along the fibre. What is its own, in the order of its row (scene/programs.h):
+/// azimuthal_roughness, scale_tt, scale_trt (of the longitudinal width of TT and TRT), cuticle_tilt
+/// (degrees, towards the root), tint_r, tint_tt, tint_trt.
+///
+/// Light goes through: the BSDF is of the whole fibre, and rays that go on meet fibres from outside
+/// alone (accel/presence.h). It has no two sides and no cosine: |cos theta_i| is in it. It is not
+/// reciprocal: where a fibre is met, h, is what wo says.
+template <typename F>
+class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
+  using Viewed = ViewedBsdf<HairBsdf<F>, F>;
+
+ public:
+  static constexpr ProgramId kProgram = ProgramId::kHair;
+  static constexpr bool kReadsIor = true;
+  static constexpr bool kTransmits = true;
+  static constexpr bool kOnFibre = true;
+  static constexpr bool kHasTerminator = false;
+  static constexpr uint32_t kInputs = input_bit(Input::kBaseColor) | input_bit(Input::kRoughness);
+  using View = typename Fibre<F>::View;
+
+  HairBsdf(const OwnShadingParams<F>& p, bool /*schlick*/) : base_(p.base_color) {
+    enum Own : uint8_t { kAzimuthal, kScaleTt, kScaleTrt, kTilt, kTintR, kTintTt, kTintTrt };
+    const F about = max(p.own[kAzimuthal], F(kLeastRoughness));
+    const F v = fibre_variance(max(p.roughness, F(kLeastRoughness)));
+    fibre_.ior = max(p.ior, F(1.f));
+    fibre_.variance = {v, v * sqr(p.own[kScaleTt]), v * sqr(p.own[kScaleTrt])};
+    fibre_.scale = fibre_scale(about);
+    fibre_.tilt = p.own[kTilt] * (1.f / 360.f);
+    fibre_.tint = {p.own[kTintR], p.own[kTintTt], p.own[kTintTrt]};
+    const F divisor = 1.f / fibre_color_divisor(about);
+    const auto absorption = [&](const F& c) {
+      return sqr(F(log(clamp(c, F(kDarkest), F(1.f))) * divisor));
+    };
+    fibre_.absorption = {absorption(base_.x), absorption(base_.y), absorption(base_.z)};
+  }
+
+  Color<F> albedo() const { return base_; }
+  Mask<F> has_non_delta() const { return Mask<F>(true); }
+  View view(const Vec3<F>& wo) const { return fibre_.view(wo); }
+  F delta_probability(const View& /*view*/) const { return F(0.f); }
+
+  BsdfEval<F> eval(const View& view, const Vec3<F>& wi) const {
+    BsdfEval<F> e;
+    fibre_.eval(view, wi, e.f_cos, e.pdf);
+    return e;
+  }
+
+  /// All of it counts as specular.
+  Color<F> diffuse_f_cos(const View& /*view*/, const Vec3<F>& /*wi*/) const {
+    return Color<F>(F(0.f));
+  }
+
+  BsdfSample<F> sample(const View& view, const F& u_lobe, const F& u, const F& v) const {
+    BsdfSample<F> s = empty_sample<F>();
+    const Vec3<F> wi = normalize(fibre_.sample(view, u_lobe, u, v));
+    const BsdfEval<F> e = eval(view, wi);
+    const Mask<F> there = (e.pdf > 1e-20f) & is_finite(e.pdf);
+    s.wi = select<F>(there, wi, s.wi);
+    s.pdf = select(there, e.pdf, F(0.f));
+    s.weight = select<F>(there, e.f_cos * F(1.f / select(there, e.pdf, F(1.f))), Color<F>(F(0.f)));
+    return s;
+  }
+
+  using Viewed::delta_probability, Viewed::eval, Viewed::diffuse_f_cos, Viewed::sample;
+
+ private:
+  /// Below this, lobes are narrower than what floats tell apart.
+  static constexpr float kLeastRoughness = 0.02f;
+  static constexpr float kDarkest = 1e-12f;
+  Color<F> base_;
+  Fibre<F> fibre_;
+};
+
+}  // namespace wavecomb
