@@ -3,6 +3,7 @@
 #include "wavecomb/render/renderer.h"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -59,6 +60,33 @@ nb::object pick_at(const WavefrontRenderer& renderer, float x, float y, uint32_t
   return d;
 }
 
+nb::object learned_at(const WavefrontRenderer& renderer, float x, float y, uint32_t width,
+                      uint32_t height) {
+  std::optional<LearnedPlace> found;
+  {
+    const nb::gil_scoped_release release;
+    found = renderer.learned(x, y, width, height);
+  }
+  if (!found) return nb::none();
+  static constexpr const char* kAxes[kGuideAxes] = {"+x", "-x", "+y", "-y", "+z", "-z"};
+  nb::dict d;
+  d["axis"] = kAxes[found->axis];
+  d["density"] = nb::none();
+  if (found->known) {
+    auto* own = new std::vector<float>(std::move(found->density));
+    const nb::capsule owner(own,
+                            [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+    const size_t shape[2] = {kGuideSide, kGuideSide};
+    d["density"] = nb::cast(nb::ndarray<nb::numpy, float>(own->data(), 2, shape, owner));
+    d["guided_share"] = found->guided_share;
+    d["survival"] = found->survival;
+  }
+  nb::list lights;
+  for (const auto& [name, share] : found->light_shares) lights.append(nb::make_tuple(name, share));
+  d["light_shares"] = lights;
+  return d;
+}
+
 }  // namespace
 
 void bind_renderer(nb::module_& m) {
@@ -74,5 +102,6 @@ void bind_renderer(nb::module_& m) {
            "interval"_a = 0.1, "picture"_a = true)
       .def("stop", &WavefrontRenderer::stop)
       .def("twin", &WavefrontRenderer::twin)
-      .def("pick", &pick_at, "x"_a, "y"_a, "width"_a, "height"_a);
+      .def("pick", &pick_at, "x"_a, "y"_a, "width"_a, "height"_a)
+      .def("learned", &learned_at, "x"_a, "y"_a, "width"_a, "height"_a);
 }

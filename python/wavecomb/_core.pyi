@@ -765,6 +765,17 @@ class Renderer:
         distance; of a surface also material (id), material_name, instance (from 1, as the AOV),
         normal and uv; of a light's shape light (index).
         """
+    def learned(self, x: float, y: float, width: int, height: int) -> dict[str, Any] | None:
+        """What the render that goes on, or else the last one, has learned of the surface that
+        ``pick`` finds there; None where there is none, or before anything was learned.
+
+        axis: which way the surface faces, "+x" ... "-z". density: directions that guided bounces
+        take, per steradian, (16, 16) float32, rows of Clarberg's square (learn/directions.h); None
+        where the field has no region there; else also guided_share (of bounces) and survival (of
+        the learned roulette at throughput 1, 0 where it is not known). light_shares: names of
+        lights and emissive meshes with the probability of their choice there, largest first,
+        counted in 4,096 choices.
+        """
 
 class RayRecording:
     """The rays of one render, kept and traced again; for benchmarks/limit.py."""

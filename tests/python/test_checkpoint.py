@@ -69,6 +69,7 @@ class StopAt:
         {"adaptive": 0.04, "spp": 1024},
         {"allocate": "error", "spp": 200},
         {"allocate": "efficiency", "spp": 200},
+        {"allocate": "error", "guiding": "on", "roulette": "efficient", "spp": 120},
         pytest.param({"spp": 700}, marks=pytest.mark.long),
         pytest.param({"noise": 0.015, "spp": 4096}, marks=pytest.mark.long),
         pytest.param({"adaptive": 0.02, "spp": 4096}, marks=pytest.mark.long),

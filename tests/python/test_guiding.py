@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 import wavecomb
 from wavecomb.cli import main
+from wavecomb.picture.directions import density_map, map_directions
 from wavecomb.picture.image import read_image
 from wavecomb.scenes import write_scene
 
@@ -215,3 +216,46 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     limited = {**part, "spp": 2**20, "threads": 2}
     assert render(cornell, time_limit=5.0, **limited).stats["guiding"] is None
     assert render(cornell, time_limit=60.0, **limited).stats["guiding"]["paths"] > 250_000
+
+
+def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
+    renderer = _core.Renderer(cornell)
+    place = (0.3 * SIZE, 0.5 * SIZE, SIZE, SIZE)
+    assert renderer.learned(*place) is None, "before there was a render"
+    renderer.render(_core.Settings(width=SIZE, height=SIZE, spp=SPP, guiding="on"))
+    learned = renderer.learned(*place)
+    density = learned["density"]
+    assert density.shape == (16, 16) and density.min() > 0
+    assert density.mean() * 4 * np.pi == pytest.approx(1, rel=2e-3)
+    assert 0 <= learned["guided_share"] <= 0.75
+    # Light comes from the side that the surface faces.
+    up, ahead = np.eye(3)[1], np.eye(3)[2]
+    vectors, _ = map_directions(up, ahead, 64)
+    values, _ = density_map(density, up, ahead, 64)
+    weights = values * np.sqrt(1 - np.clip(vectors @ up, -1, 1) ** 2)
+    n = np.array(renderer.pick(*place)["normal"])
+    assert (
+        learned["axis"] == ("+" if n[np.abs(n).argmax()] > 0 else "-") + "xyz"[np.abs(n).argmax()]
+    )
+    assert weights[vectors @ n > 0].sum() > 0.9 * weights.sum()
+    assert sum(share for _, share in learned["light_shares"]) == pytest.approx(1, abs=1e-6)
+    renderer.render(_core.Settings(width=SIZE, height=SIZE, spp=4))
+    assert renderer.learned(*place)["density"] is None
+
+
+@pytest.mark.parametrize("weights", ["power", "calibrated"])
+def test_shares_of_lights_are_those_of_the_render(mixed: Any, weights: str) -> None:
+    """By power, shares are the same for all places, and the statistics have them."""
+    renderer = _core.Renderer(mixed)
+    settings = _core.Settings(
+        width=SIZE, height=SIZE, spp=1, light_selection="power", light_weights=weights
+    )
+    calibration = renderer.render(settings).stats["light_calibration"]
+    places = [(0.5 * SIZE, y * SIZE, SIZE, SIZE) for y in (0.6, 0.9)]
+    shares = [renderer.learned(*place)["light_shares"] for place in places]
+    assert shares[0] == shares[1]
+    assert sum(share for _, share in shares[0]) == pytest.approx(1, abs=1e-6)
+    if weights == "calibrated":
+        told = sorted((part["share"] for part in calibration["shares"]), reverse=True)
+        found = [share for _, share in shares[0]]
+        assert found == pytest.approx(told[: len(found)], abs=1e-3)

@@ -32,6 +32,7 @@ from wavecomb.gui.shortcuts import ShortcutsDialog
 from wavecomb.gui.status import StatusLine
 from wavecomb.gui.viewport.display_bar import DisplayBar
 from wavecomb.gui.viewport.inspector import Inspector
+from wavecomb.gui.viewport.learned_panel import LearnedPanel
 from wavecomb.gui.viewport.render_bar import RenderBar
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.view_history import ViewHistory
@@ -195,8 +196,11 @@ class MainWindow(QMainWindow):
         session.state_changed.connect(self._state_changed)
         session.setup_changed.connect(self._setup_changed)
         session.saved.connect(lambda path: self.status.showMessage(f"wrote {path}", 5000))
-        viewport.hovered.connect(self.inspector.hover)
-        viewport.picked.connect(self.inspector.pick)
+        learned = self.docks["learned"].widget()
+        assert isinstance(learned, LearnedPanel)
+        for panel in (self.inspector, learned):
+            viewport.hovered.connect(panel.hover)
+            viewport.picked.connect(panel.pick)
         viewport.region_mode_changed.connect(self.actions_by_name["region"].setChecked)
         actions, edits = self.actions_by_name, self.scene.edits.history.stack
         HistoryActions(edits, actions["undo"], actions["redo"], self)

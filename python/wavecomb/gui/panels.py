@@ -13,6 +13,7 @@ from wavecomb.gui.compare.window import CompareWindow
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.scheduling.panel import SchedulingPanel
 from wavecomb.gui.scheduling.plots_panel import PlotsPanel
+from wavecomb.gui.viewport.learned_panel import LearnedPanel
 from wavecomb.gui.viewport.session import Session
 
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
@@ -46,6 +47,7 @@ def make_panels(session: Session) -> list[Panel]:
     return [
         Panel("scene", "Scene", ScenePanel(session), _LEFT),
         Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),
+        Panel("learned", "Learned", LearnedPanel(session), _RIGHT),
         Panel("plots", "Plots", PlotsPanel(session), _BOTTOM, hidden=True),
         Panel("bench", "Bench", bench, _BOTTOM, hidden=True),
         Panel("compare", "Compare", compare, _BOTTOM, hidden=True),

@@ -42,6 +42,8 @@ class LightCalibrationCache {
   const LightCalibration& get(const std::shared_ptr<const Scene>& scene,
                               const EmbreeAccelerator& accel, const SceneView& view,
                               const Settings& settings, const std::function<bool()>& stopped);
+  /// What get() gave last; null before.
+  std::shared_ptr<const LightCalibration> last() const { return last_; }
 
  private:
   std::weak_ptr<const Scene> scene_;

@@ -47,6 +47,7 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
   if (hit.inst == kNoHit) return std::nullopt;
 
   Pick out;
+  out.dir = ray.d;
   const ObjectNames names(scene);
   uint32_t object;
   if (hit.inst == kLightShape) {

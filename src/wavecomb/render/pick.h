@@ -21,6 +21,7 @@ struct Pick {
   uint32_t instance = 0;         ///< into SceneView::instances
   Vec3<float> position, normal;  ///< world space; the unit shading normal
   Vec2<float> uv;
+  Vec3<float> dir;     ///< of the ray that met it
   float depth = 0;     ///< along the camera's axis
   float distance = 0;  ///< from the camera
 };

@@ -37,7 +37,8 @@ struct WavefrontRenderer::Impl {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeAccelerator> accel;
   uint64_t version = 0;
-  Watch* watch = nullptr;  ///< of the render that goes on
+  std::shared_ptr<const Learned> learned;  ///< of the last render that was not stopped before
+  Watch* watch = nullptr;                  ///< of the render that goes on
   mutable std::mutex mutex;
 
   uint32_t threads = 0;
@@ -139,6 +140,17 @@ std::optional<Pick> WavefrontRenderer::pick(float x, float y, uint32_t width,
   const auto accel = impl_->accel;
   lock.unlock();
   return wavecomb::pick(*scene, *accel, x, y, width, height);
+}
+
+std::optional<LearnedPlace> WavefrontRenderer::learned(float x, float y, uint32_t width,
+                                                       uint32_t height) const {
+  const std::optional<Pick> seen = pick(x, y, width, height);
+  std::unique_lock lock(impl_->mutex);
+  const auto learned = impl_->learned;
+  lock.unlock();
+  if (!seen || seen->light != kNoLight || !learned) return std::nullopt;
+  const Vec3<float> n = dot(seen->normal, seen->dir) > 0 ? -seen->normal : seen->normal;
+  return look_up(*learned, {seen->position, n, seen->material});
 }
 
 const RenderStatistics& WavefrontRenderer::statistics() const {
@@ -256,7 +268,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   const LightCalibration* lights = nullptr;
   std::vector<std::string> without_paths;
   if (settings.joins_light()) without_paths = lights_without_paths(scene);
-  GuideTraining training;
+  auto training = std::make_shared<const GuideTraining>();
   GuideView guide;
   const auto work = [&] {
     lights = &calibrations.get(this->scene, *accel, scene_view, settings,
@@ -264,11 +276,16 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     lights->weighed.apply(context.scene.lights);
     if (settings.joins_light()) send_paths(scene, context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
-    training =
-        train_guide(context, scene, {lanes, threads, wave_size}, [&] { return watch.stopped(); });
-    if (training.field) {
-      guide = view_of(training);
+    training = std::make_shared<const GuideTraining>(
+        train_guide(context, scene, {lanes, threads, wave_size}, [&] { return watch.stopped(); }));
+    if (training->field) {
+      guide = view_of(*training);
       context.guide = &guide;
+    }
+    if (!watch.stopped()) {
+      const std::lock_guard lock(impl_->mutex);
+      impl_->learned = std::make_shared<const Learned>(Learned{
+          impl_->scene, scene_view.lights.by_tree, impl_->light_calibrations.last(), training});
     }
     loop.run();
   };
@@ -286,7 +303,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     s.resumed_samples = status.resumed_samples;
     s.error = status.error;
     s.allotment = loop.allotment();
-    s.guiding = training.statistics;
+    s.guiding = training->statistics;
     s.lights_without_paths = without_paths;
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();

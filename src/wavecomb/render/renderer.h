@@ -12,6 +12,7 @@
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/integrate/ray_recorder.h"
+#include "wavecomb/render/learned.h"
 #include "wavecomb/render/pass_loop.h"
 #include "wavecomb/render/pick.h"
 #include "wavecomb/render/process_memory.h"
@@ -95,6 +96,9 @@ class WavefrontRenderer {
   uint64_t version() const;
   /// wavecomb::pick for the scene as it is.
   std::optional<Pick> pick(float x, float y, uint32_t width, uint32_t height) const;
+  /// What the render that goes on, or else the last one, has learned of the surface that pick()
+  /// finds. Nothing where there is none, or before anything was learned.
+  std::optional<LearnedPlace> learned(float x, float y, uint32_t width, uint32_t height) const;
 
   /// Costs after the last render().
   const CostProfile& cost_profile() const;

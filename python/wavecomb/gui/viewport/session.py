@@ -325,6 +325,13 @@ class Session(QObject):
             return None
         return renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
 
+    def learned(self, x: float, y: float) -> dict[str, Any] | None:
+        """What the render has learned of the surface there, as ``Renderer.learned`` gives it."""
+        renderer = self._live.renderer
+        if renderer is None:
+            return None
+        return renderer.learned(float(x), float(y), self.setup.width, self.setup.height)
+
     def select(self, path: str | None) -> None:
         """Chooses a prim by its path; None: nothing."""
         if path != self.selection:

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A map of all directions in false colours, with a mark."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.viewport.qimages import to_qimage
+from wavecomb.picture.layer_view import heat
+
+
+class DirectionsView(QWidget):
+    """Shows an array of twice as many columns as rows; nothing until ``show_map``."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(name)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumHeight(theme.em(6))
+        self._image: QImage | None = None
+        self._mark: tuple[float, float] | None = None
+
+    @property
+    def image(self) -> QImage | None:
+        """What is shown."""
+        return self._image
+
+    def sizeHint(self) -> QSize:
+        """Twice as wide as high."""
+        return QSize(theme.em(20), theme.em(10))
+
+    def show_map(
+        self, values: NDArray[Any] | None, mark: tuple[float, float] | None = None
+    ) -> None:
+        """Draws values from 0 to their largest, and a ring.
+
+        Args:
+            values: (height, 2 height); None: nothing.
+            mark: Place of the ring, from 0 to 1 each way.
+        """
+        self._image, self._mark = None, mark
+        if values is not None:
+            self._image = to_qimage(heat(values, "", 0.0, max(float(values.max()), 1e-30)).pixels)
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draws the map as large as there is room for, and the ring."""
+        if self._image is None:
+            return
+        wide = min(self.width(), 2 * self.height())
+        left, top = 0.5 * (self.width() - wide), 0.5 * (self.height() - 0.5 * wide)
+        area = QRectF(left, top, wide, 0.5 * wide)
+        with QPainter(self) as painter:
+            painter.drawImage(area, self._image)
+            if self._mark is None:
+                return
+            place = QPointF(
+                area.x() + self._mark[0] * area.width(), area.y() + self._mark[1] * area.height()
+            )
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            for colour, width in ((Qt.GlobalColor.black, 3.0), (Qt.GlobalColor.white, 1.4)):
+                painter.setPen(QPen(colour, width))
+                painter.drawEllipse(place, 0.4 * theme.em(), 0.4 * theme.em())

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the render has learned of the surface under the cursor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QCheckBox, QLabel, QVBoxLayout, QWidget
+
+from wavecomb.gui import theme
+from wavecomb.gui.scheduling.plots import Bar, Bars
+from wavecomb.gui.viewport.directions_view import DirectionsView
+from wavecomb.gui.viewport.orbit import UPS
+from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.picture.directions import density_map, map_point
+
+_LATER_MS = 40
+_HEIGHT = 128
+MOST_LIGHTS = 12
+"""Lights that have bars; the others are one."""
+
+
+def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
+    """What is said of the field at a place, or why there is none.
+
+    Args:
+        setup: Of the render.
+        learned: As ``Renderer.learned`` gives it.
+    """
+    if learned is None:
+        return "Point at a surface of a render that goes on or has ended."
+    if learned["density"] is not None:
+        density = learned["density"]
+        text = (
+            f"Faces {learned['axis']}; {learned['guided_share']:.0%} of bounces are guided; "
+            f"most light from where the density is {density.max():.2f} per steradian "
+            f"(even: {1 / (2 * np.pi):.2f})."
+        )
+        if learned["survival"] > 0:
+            text += f" Learned roulette: {min(learned['survival'], 1.0):.2f} at throughput 1."
+        return text
+    if setup.guiding == "off" and setup.roulette != "efficient":
+        return "Bounces are not guided: choose Guiding in the Scheduling panel."
+    return "No field here: too few samples to learn from, or it does not pay."
+
+
+def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list[tuple[str, float]]:
+    """The largest shares, and what is left as one.
+
+    >>> light_rows([("a", 0.5), ("b", 0.3), ("c", 0.2)], 2)
+    [('a', 0.5), ('2 others', 0.5)]
+    """
+    if len(shares) <= most:
+        return list(shares)
+    rest = shares[most - 1 :]
+    return [*shares[: most - 1], (f"{len(rest)} others", sum(share for _, share in rest))]
+
+
+class LearnedPanel(QWidget):
+    """Follows the cursor over the viewport, or stays at the pixel that was clicked.
+
+    Attributes:
+        learned: What is shown, as ``Renderer.learned`` gives it.
+    """
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("learned")
+        self._session = session
+        self._pixel: tuple[int, int] | None = None
+        self.learned: dict[str, Any] | None = None
+        self.note = QLabel(field_text(session.setup, None))
+        self.note.setObjectName("learned.note")
+        self.note.setWordWrap(True)
+        self.map = DirectionsView("learned.map")
+        self.map.setAccessibleName("Directions that guided bounces take")
+        self.map.setToolTip(
+            "All directions: up is up, the middle is where the camera looks, right is right. "
+            "The ring is the surface's normal."
+        )
+        self.lights = Bars("learned_lights", "Lights chosen here, %")
+        self.lights.setAccessibleName("Lights chosen here")
+        self.lights.setMinimumHeight(theme.em(7))
+        self.follow = QCheckBox("Follow the cursor")
+        self.follow.setObjectName("learned.follow")
+        self.follow.setToolTip("Off: what is shown stays that of the pixel that was clicked last")
+        self.follow.setAccessibleName("Follow the cursor with what was learned")
+        self.follow.setChecked(True)
+        layout = QVBoxLayout(self)
+        margin = theme.em(0.3)
+        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.addWidget(self.note)
+        layout.addWidget(self.map, 2)
+        layout.addWidget(self.lights, 3)
+        layout.addWidget(self.follow)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(_LATER_MS)
+        self._timer.timeout.connect(self._fill)
+        session.frame.connect(lambda frame: self._soon())
+
+    def hover(self, pixel: tuple[int, int] | None) -> None:
+        """The cursor is over this pixel."""
+        if self.follow.isChecked() and pixel is not None:
+            self.pick(pixel)
+
+    def pick(self, pixel: tuple[int, int]) -> None:
+        """This pixel was clicked."""
+        self._pixel = pixel
+        self._soon()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Catches up: nothing is looked up while the panel is hidden."""
+        super().showEvent(event)
+        self._soon()
+
+    def _soon(self) -> None:
+        if self.isVisible() and not self._timer.isActive():
+            self._timer.start()
+
+    def _fill(self) -> None:
+        session, pixel = self._session, self._pixel
+        if pixel is None:
+            return
+        setup = session.setup
+        x, y = min(pixel[0], setup.width - 1) + 0.5, min(pixel[1], setup.height - 1) + 0.5
+        self.learned = session.learned(x, y)
+        self.note.setText(field_text(setup, self.learned))
+        self._draw_map(session.pick(x, y))
+        self._draw_lights()
+
+    def _draw_map(self, hit: dict[str, Any] | None) -> None:
+        pose = self._session.pose
+        density = self.learned["density"] if self.learned is not None else None
+        if density is None or pose is None or hit is None or "normal" not in hit:
+            self.map.show_map(None)
+            return
+        up = np.array(UPS[self._session.up_axis])
+        values, axes = density_map(density, up, -pose.back, _HEIGHT)
+        normal = np.array(hit["normal"])
+        if normal @ (np.array(hit["position"]) - pose.position) > 0.0:
+            normal = -normal
+        self.map.show_map(values, map_point(normal, axes))
+
+    def _draw_lights(self) -> None:
+        rows = light_rows(self.learned["light_shares"] if self.learned is not None else [])
+        bars = [
+            Bar(k, 0.7, 0.0, 100.0 * share, theme.series(0), f"{name}: {100.0 * share:.2f} %")
+            for k, (name, share) in enumerate(rows)
+        ]
+        self.lights.show_bars([name for name, _ in rows], bars)
