@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
-from pxr import Gf, Sdf, UsdShade
 
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.caustics import ball
 from wavecomb.scenes.materials import Colour
+from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.shapes import placed, turned
 from wavecomb.scenes.stage import StageWriter
@@ -22,29 +22,30 @@ _CANDLES = (
 """Names, places, radii and heights in centimetres."""
 
 
-def _below(
-    writer: StageWriter, name: str, colour: Colour, radius: Colour, roughness: float, ior: float
-) -> None:
-    """An OpenPBR surface below which all light walks; ``radius``: mean free paths by channel."""
-    path = f"/World/Looks/{name}"
-    material = UsdShade.Material.Define(writer.stage, path)
-    shader = UsdShade.Shader.Define(writer.stage, f"{path}/Surface")
-    shader.CreateIdAttr("ND_open_pbr_surface_surfaceshader")
+def below_surface(
+    writer: StageWriter, name: str, colour: Colour, radius: Colour, **inputs: float
+) -> str:
+    """An OpenPBR surface below which light walks.
+
+    Args:
+        writer: Of the stage.
+        name: Of the material.
+        colour: Of a flat wall of it.
+        radius: Mean free paths by channel, in units of the stage.
+        **inputs: Numbers of the shader.
+    """
+    net = Network(writer.stage, f"/World/Looks/{name}")
     longest = max(radius)
-    kinds = Sdf.ValueTypeNames
-    for key, kind, value in (
-        ("base_color", kinds.Color3f, Gf.Vec3f(*colour)),
-        ("specular_roughness", kinds.Float, roughness),
-        ("specular_ior", kinds.Float, ior),
-        ("subsurface_weight", kinds.Float, 1.0),
-        ("subsurface_color", kinds.Color3f, Gf.Vec3f(*colour)),
-        ("subsurface_radius", kinds.Float, longest),
-        ("subsurface_radius_scale", kinds.Color3f, Gf.Vec3f(*(r / longest for r in radius))),
-    ):
-        shader.CreateInput(key, kind).Set(value)
-    terminal = material.CreateSurfaceOutput("mtlx")
-    terminal.ConnectToSource(shader.CreateOutput("out", kinds.Token))
-    writer.own_material(name, material)
+    net.surface(
+        "ND_open_pbr_surface_surfaceshader",
+        base_color=("color3", colour),
+        subsurface_weight=("float", 1.0),
+        subsurface_color=("color3", colour),
+        subsurface_radius=("float", longest),
+        subsurface_radius_scale=("color3", [r / longest for r in radius]),
+        **{key: ("float", value) for key, value in inputs.items()},
+    )
+    return writer.own_material(name, net.material)
 
 
 def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radius: float,
@@ -75,16 +76,17 @@ def build_candles(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Table", looks.plastic((0.17, 0.08, 0.045), 0.3))
     writer.material("Wick", looks.diffuse((0.03, 0.025, 0.02)))
     writer.material("Flame", looks.emissive(_FLAME))
-    _below(writer, "Wax", (0.93, 0.83, 0.66), (0.9, 0.45, 0.22), 0.35, 1.44)
-    _below(writer, "Marble", (0.78, 0.8, 0.74), (0.5, 0.62, 0.44), 0.12, 1.5)
+    wax, marble = {"specular_roughness": 0.35, "specular_ior": 1.44}, {"specular_roughness": 0.12}
+    below_surface(writer, "Wax", (0.93, 0.83, 0.66), (0.9, 0.45, 0.22), **wax)
+    below_surface(writer, "Marble", (0.78, 0.8, 0.74), (0.5, 0.62, 0.44), **marble)
     half = 40.0
     corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
     writer.polygons("/World/Set/Table", corners, [[0, 1, 2, 3]], "Table")
     columns = 8 * options.teapot_level
     for name, at, radius, height in _CANDLES:
         _candle(writer, name, at, radius, height, columns)
-    marble = placed(ball(2.1, options.teapot_level), (-1.6, 2.1, 3.4))
-    writer.bind(writer.mesh("/World/Objects/Ball", marble).GetPrim(), "Marble")
+    made = placed(ball(2.1, options.teapot_level), (-1.6, 2.1, 3.4))
+    writer.bind(writer.mesh("/World/Objects/Ball", made).GetPrim(), "Marble")
     writer.rect_light("Window", (-6.0, 24.0, 22.0), 14.0, 14.0, (1.6, 2.0, 2.8), -45.0)
     writer.dome_light("Sky", 30.0, 0.05)
     writer.camera((0.0, 13.0, 37.0), (-0.4, 8.2, 0.0), 38.0, options.aspect or 4.0 / 3.0)

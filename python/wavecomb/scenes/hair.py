@@ -13,6 +13,7 @@ import numpy as np
 from pxr import Gf, Sdf, UsdGeom, Vt
 
 from wavecomb.scenes import materials as looks
+from wavecomb.scenes.candles import below_surface
 from wavecomb.scenes.head_shape import HEAD_LEVEL, head_mesh, head_radius, is_scalp
 from wavecomb.scenes.mesh import FloatArray
 from wavecomb.scenes.network import Network
@@ -208,7 +209,10 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
 def build_head(writer: StageWriter, options: SceneOptions) -> None:
     """A smooth head without a face to speak of, and its hair."""
     rng = np.random.default_rng([options.seed, 22])
-    writer.material("Head", looks.diffuse((0.46, 0.34, 0.27)))
+    # Skin under a thin film of grease; mean free paths in decimetres.
+    skin = {"specular_roughness": 0.48, "specular_ior": 1.4, "coat_weight": 0.25,
+            "coat_roughness": 0.3, "coat_ior": 1.45}  # fmt: skip
+    below_surface(writer, "Head", (0.76, 0.5, 0.38), (0.037, 0.014, 0.007), **skin)
     writer.bind(writer.mesh("/World/Objects/Head", head_mesh(HEAD_LEVEL)).GetPrim(), "Head")
     neck = turned(
         [(0.0, -2.5), (1.0, -2.5), (0.9, -2.2), (0.5, -1.7), (0.45, -1.0), (0.42, -0.5),
