@@ -18,6 +18,7 @@ import random
 from pathlib import Path
 from typing import Any
 
+import everything
 import numpy as np
 from sitting import (
     RESULTS,
@@ -41,6 +42,7 @@ GENERATED: dict[str, dict[str, Any]] = {
     "mixed": {"plain": True},
     "dragon": {"plain": True},
     "heavy": {"materials": 64, "texture_mb": 64.0, "triangles": 200_000},
+    "everything": {},
 }
 FIXED = ("none", "program", "code", "material", "texture-locality")
 WAVES = (512, 0, 65_536)
@@ -82,6 +84,9 @@ def _arguments() -> argparse.Namespace:
 def _stage(name: str, options: dict[str, Any] | None, args: argparse.Namespace) -> Any:
     if options is None:
         return wavecomb.load(name)
+    if name == "everything":
+        path = args.folder / "everything.usda"
+        return wavecomb.load(path if path.exists() else everything.write(path))
     return wavecomb.load(stage_file(args.folder / f"{name}.usdc", name, **options))
 
 

@@ -23,7 +23,7 @@ from cycles_nodes import Images, Nodes, image, make_material
 from cycles_volumes import make_volume
 from mathutils import Matrix as BlenderMatrix
 from numpy.typing import NDArray
-from recorded import INHERIT, Mesh, Recorded
+from recorded import INHERIT, Curves, Mesh, Recorded
 
 Matrix = NDArray[np.float64]
 
@@ -112,6 +112,7 @@ class CyclesScene:
         scene.view_settings.view_transform = "Raw"
         scene.view_settings.look = "None"
         cycles.device = "CPU"
+        scene.cycles_curves.shape = "THICK"
         cycles.use_denoising = False
         cycles.use_adaptive_sampling = False
         cycles.use_guiding = False
@@ -248,6 +249,8 @@ class CyclesScene:
         return made
 
     def _mesh(self, mesh: Mesh, inherited: int) -> Any:
+        if mesh.curves is not None:
+            return self._curves(mesh, mesh.curves, inherited)
         made = bpy.data.meshes.new(mesh.name or "mesh")
         count, corners = len(mesh.indices), mesh.indices.reshape(-1)
         made.vertices.add(len(mesh.positions))
@@ -275,6 +278,16 @@ class CyclesScene:
             place = "CORNER" if mesh.normals.ndim == 3 else "POINT"
             own = made.attributes.new("custom_normal", "FLOAT_VECTOR", place)
             own.data.foreach_set("vector", np.ascontiguousarray(mesh.normals, np.float32).ravel())
+        return made
+
+    def _curves(self, mesh: Mesh, curves: Curves, inherited: int) -> Any:
+        points, counts = curves.strands()
+        made = bpy.data.hair_curves.new(mesh.name or "curves")
+        made.add_curves(counts.tolist())
+        made.set_types(type="CATMULL_ROM" if curves.kind.startswith("cubic") else "POLY")
+        made.points.foreach_set("position", np.ascontiguousarray(mesh.positions[points]).ravel())
+        made.points.foreach_set("radius", np.ascontiguousarray(curves.radii[points]))
+        made.materials.append(self._material(inherited))
         return made
 
     def _material(self, number: int) -> Any:

@@ -133,6 +133,8 @@ def make_material(recorded: Recorded, number: int, images: Images) -> Any:
         "dielectric": _dielectric,
         "plastic": _principled,
         "principled": _principled,
+        "openpbr": _openpbr,
+        "hair": _hair,
     }
     surface = makers[m["program"]](nodes, m) if m["program"] in makers else None
     emission = m.get("emission", (0.0, 0.0, 0.0))
@@ -212,4 +214,49 @@ def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
         **_normal(nodes, m),
     )
     node.distribution = "MULTI_GGX"
+    return node.outputs[0]
+
+
+def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
+    """Base, specular, coat and what is below; without film, fuzz and transmission."""
+    layers = m.get("openpbr", {})
+    below = float(layers.get("subsurface_weight", 0.0))
+    radius = np.asarray(layers.get("subsurface_radius", (0.0,) * 3), np.float64)
+    colour = layers.get("subsurface_color") if below > 0 else None
+    node = nodes.add(
+        "ShaderNodeBsdfPrincipled",
+        Base_Color=colour or nodes.parameter(m, "base_color", (0.8,) * 3),
+        Roughness=_roughness(nodes, m),
+        Metallic=nodes.parameter(m, "metallic", 0.0),
+        IOR=float(m.get("ior", 1.5)),
+        Coat_Weight=float(m.get("clearcoat", 0.0)),
+        Coat_Roughness=float(m.get("clearcoat_roughness", 0.0)),
+        Coat_IOR=float(layers.get("coat_ior", 1.6)),
+        Subsurface_Weight=below if radius.any() else 0.0,
+        Subsurface_Radius=tuple(float(r) for r in radius),
+        Subsurface_Scale=1.0,
+        Subsurface_Anisotropy=float(layers.get("subsurface_anisotropy", 0.0)),
+        **_normal(nodes, m),
+    )
+    node.subsurface_method = "RANDOM_WALK"
+    return node.outputs[0]
+
+
+def _hair(nodes: Nodes, m: dict[str, Any]) -> Any:
+    """Fibres by the colour of many; what graphs say of each strand is left out."""
+    node = nodes.tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+    node.model = "CHIANG"
+    node.parametrization = "COLOR"
+    values = {
+        "Color": (*(float(v) for v in m.get("base_color", (0.18,) * 3)), 1.0),
+        "Roughness": float(m.get("roughness", 0.5)),
+        "Radial Roughness": float(m.get("azimuthal_roughness", 0.3)),
+        "Coat": 0.0,
+        "IOR": float(m.get("ior", 1.5)),
+        "Offset": 0.0,
+        "Random Roughness": 0.0,
+    }
+    for name, value in values.items():
+        if name in node.inputs:
+            node.inputs[name].default_value = value
     return node.outputs[0]

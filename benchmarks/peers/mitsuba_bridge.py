@@ -298,6 +298,8 @@ class MitsubaScene:
 
     def _parts(self, mesh: Mesh, inherited: int, transform: Matrix, name: str) -> dict[str, Any]:
         """A mesh, cut by material."""
+        if mesh.curves is not None:
+            raise NotImplementedError("curves")
         if mesh.face_materials is None:
             return {name: self._mesh(mesh, None, inherited, transform, name)}
         parts = {}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,26 @@ Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Curves:
+    """What ``SceneBuilder.add_curves`` is given beside what a mesh is; points are positions."""
+
+    kind: str
+    segments: NDArray[np.uint32]
+    radii: NDArray[np.float32]
+
+    def strands(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Points that curves pass through, by number, and how many each curve has."""
+        ahead = 3 if self.kind.startswith("cubic") else 1
+        first = (self.segments & 0x3FFFFFFF).astype(np.int64)
+        ends = (self.segments & (1 << 30)) == 0
+        count = np.diff(np.flatnonzero(np.concatenate([[True], ends])))
+        rows = np.stack([first, np.where(ends, first + ahead, -1)], axis=1).ravel()
+        return rows[rows >= 0], count + 1
+
+
+@dataclass(frozen=True)
 class Mesh:
-    """Arguments of ``SceneBuilder.add_mesh``."""
+    """Arguments of ``SceneBuilder.add_mesh``; of curves, with ``curves`` and no triangles."""
 
     positions: NDArray[np.float32]
     indices: NDArray[np.uint32]
@@ -30,6 +48,7 @@ class Mesh:
     face_materials: NDArray[np.uint32] | None
     material: int
     name: str
+    curves: Curves | None = None
 
 
 @dataclass(frozen=True)
@@ -99,7 +118,10 @@ class Recorded:
 
         names = ("textures", "materials", "lights", "volumes", "camera", "bounds")
         scene = {name: plain(getattr(self, name)) for name in names}
-        scene["meshes"] = [plain(vars(mesh)) for mesh in self.meshes]
+        scene["meshes"] = [
+            plain({**vars(mesh), "curves": vars(mesh.curves) if mesh.curves else None})
+            for mesh in self.meshes
+        ]
         scene["groups"] = [plain(asdict(group)) for group in self.groups]
         # Last: a folder with a scene.json is whole.
         (folder / "scene.json").write_text(json.dumps(scene))
@@ -135,6 +157,9 @@ def load(folder: Path) -> Recorded:
 
     scene = rich(json.loads((folder / "scene.json").read_text()))
     meshes = [Mesh(**mesh) for mesh in scene.pop("meshes")]
+    for k, mesh in enumerate(meshes):
+        if mesh.curves is not None:
+            meshes[k] = replace(mesh, curves=Curves(**mesh.curves))  # type: ignore[arg-type]
     groups = [
         Group(g["meshes"], [(c, t, m) for c, t, m in g["children"]]) for g in scene.pop("groups")
     ]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from recorded import INHERIT, Group, Mesh, Recorded
+from recorded import INHERIT, Curves, Group, Mesh, Recorded
 
 from wavecomb import _core
 from wavecomb.usd import load_stage
@@ -71,6 +71,22 @@ class RecordingBuilder(Recorded):
             **labels,
         )
         self.meshes.append(Mesh(positions, indices, normals, uvs, face_materials, material, name))
+        return number
+
+    def add_curves(
+        self,
+        kind: str,
+        positions: NDArray[np.float32],
+        segments: NDArray[np.uint32],
+        radii: NDArray[np.float32],
+        **options: Any,
+    ) -> int:
+        """Keeps curves as a mesh without triangles; normals of ribbons are left out."""
+        number = self.native.add_curves(kind, positions, segments, radii, **options)
+        none = np.zeros((0, 3), np.uint32)
+        inherited, name = options.get("material", INHERIT), options.get("name", "")
+        curves = Curves(kind, segments, radii)
+        self.meshes.append(Mesh(positions, none, None, None, None, inherited, name, curves))
         return number
 
     def make_surfaces(self, descriptions: list[dict[str, Any]], threads: int = 0) -> list[Any]:
