@@ -31,8 +31,8 @@ class _AovOption(click.Option):
         """The option, and its help."""
         self.help = (
             f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
-            f"{aov_names.LIGHT}NAME, lpe:NAME=EXPRESSION, crypto, techniques, all; beauty is always there "
-            "(docs/aovs.md).  "
+            f"{aov_names.LIGHT}NAME, lpe:NAME=EXPRESSION, crypto, techniques, all; "
+            "beauty is always there (docs/aovs.md).  "
             f"[default: {', '.join(aov_names.DEFAULT[1:])}]"
         )
         return super().get_help_record(ctx)

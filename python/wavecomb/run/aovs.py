@@ -93,7 +93,8 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
         if name not in all_names and name not in several and not is_single:
             raise WavecombError(
                 f"AOV {name!r} is not known; there are {', '.join(all_names)}, "
-                f"{LIGHT}NAME for the light group NAME, lpe:NAME=EXPRESSION, crypto, techniques and all"
+                f"{LIGHT}NAME for the light group NAME, lpe:NAME=EXPRESSION, crypto, "
+                "techniques and all"
             )
         wanted.update(dict.fromkeys(several.get(name, (name,))))
     known = tuple(name for name in all_names if name in wanted)

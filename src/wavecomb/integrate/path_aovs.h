@@ -316,8 +316,8 @@ class PathAovs {
   };
 
   std::array<const Block*, 11> blocks() const {
-    return {&vertex_,   &depth_,  &hits_,    &centre_, &parts_[0],
-            &parts_[1], &groups_, &cost_ns_, &guides_, &alpha_,   &light_samples_};
+    return {&vertex_, &depth_,   &hits_,   &centre_, &parts_[0],     &parts_[1],
+            &groups_, &cost_ns_, &guides_, &alpha_,  &light_samples_};
   }
 
   /// In place of where an AOV's value is kept.
