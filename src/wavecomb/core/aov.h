@@ -31,6 +31,7 @@ enum class AovSource : uint8_t {
   kGuide,   ///< the last vertex that guides a denoiser
   kLight,   ///< the light that reaches the path
   kTime,    ///< the clock
+  kBounce,  ///< all bounces of the path
 };
 
 /// X(enumerator, name, channels, kind, source, title): a bit each, in this order. Channels are 0
@@ -54,7 +55,9 @@ enum class AovSource : uint8_t {
   X(LightGroups, "light_groups", 0, kGroups, kLight, "")                                      \
   X(Cost, "cost", 1, kSum, kTime, "Cost per pixel")                                           \
   X(GuideAlbedo, "guide_albedo", 3, kMean, kGuide, "")                                        \
-  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")
+  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")                                        \
+  X(GuidedShare, "guided_share", 1, kMean, kBounce, "Guided share")                           \
+  X(Survival, "survival", 1, kMean, kBounce, "Survival of roulette")
 // clang-format on
 
 namespace detail {

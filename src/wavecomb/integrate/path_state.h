@@ -87,7 +87,8 @@ struct VertexResult {
 /// and values that live to the end of shading cost registers.
 template <typename F>
 struct VertexAovs {
-  bool wants_uv = false, wants_lights = false;  ///< asked for; the others are always given
+  /// Asked for; the others are always given.
+  bool wants_uv = false, wants_lights = false, wants_bounces = false;
   Color<F> albedo;
   Vec3<F> normal;
   Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
@@ -97,6 +98,9 @@ struct VertexAovs {
   // choice was made.
   Vec3<F> lit_at;
   F light_weight;
+  // With wants_bounces: with which probability the field chose the bounce's direction, and with
+  // which roulette lets it go on; survival -1: there was no bounce.
+  F guided, survival;
 };
 
 /// What guides a denoiser.
@@ -141,6 +145,7 @@ struct Vertex {
   /// What AOVs are to be given; null where nothing is.
   VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
   bool wants_lights() const { return notes() && aovs->wants_lights; }
+  bool wants_bounces() const { return notes() && aovs->wants_bounces; }
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 
