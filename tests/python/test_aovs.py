@@ -116,7 +116,10 @@ def test_names_are_expanded() -> None:
 def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> None:
     """A row whose value no path finds would be a layer of nothing."""
     layers = {**picture.layers(), **picture.aovs}
+    assert not layers["guided_share"].any(), "of guided renders: test_guiding.py"
     for name, row in aovs.core_aovs().items():
+        if name == "guided_share":
+            continue
         kept = [n for n in layers if n.startswith("light_")] if row.kind == "groups" else [name]
         for one in kept:
             layer = layers[one]

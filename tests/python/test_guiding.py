@@ -218,6 +218,53 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     assert render(cornell, time_limit=60.0, **limited).stats["guiding"]["paths"] > 250_000
 
 
+LEARNED_AOVS = ("guided_share", "survival")
+
+
+def test_layers_say_what_became_of_bounces(cornell: Any) -> None:
+    plain = render(cornell, aovs=LEARNED_AOVS, roulette="off")
+    assert not plain.aovs["guided_share"].any()
+    assert (plain.aovs["survival"] == 1).all()
+    way: dict[str, Any] = {"guiding": "on", "roulette": "efficient", "aovs": LEARNED_AOVS}
+    both = render(cornell, **way)
+    share, survival = (both.aovs[name] for name in LEARNED_AOVS)
+    # A region leaves a quarter of its bounces to the material at least.
+    assert 0.1 < share.mean() < share.max() <= 0.75
+    assert 0.1 <= survival.min() < survival.mean() < survival.max() <= 1
+    assert np.array_equal(both.beauty, render(cornell, **{**way, "aovs": ()}).beauty)
+    others: list[dict[str, Any]] = [
+        {"lanes": 1, "threads": 1},
+        {"wave_size": 64, "policy": "material", "materialize": "on"},
+        {"integrator": "reference"},
+    ]
+    for other in others:
+        same = render(cornell, **way, **other)
+        for name in LEARNED_AOVS:
+            assert np.array_equal(both.aovs[name], same.aovs[name]), (name, other)
+
+
+def floor(albedo: float) -> Any:
+    """A floor below the horizon, under an even sky: a path has one bounce, or none."""
+    builder = wavecomb.SceneBuilder()
+    quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)
+    material = builder.add_material("diffuse", name="Floor", base_color=(albedo,) * 3)
+    builder.add_to_group(0, builder.add_mesh(points, quad, material=material))
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1), name="Sky")
+    builder.set_camera(np.eye(4), window=(-1.0, 1.0, -1.0, 1.0))
+    return builder.build()
+
+
+def test_survival_is_the_probability_of_roulette() -> None:
+    """After a bounce off an albedo of 0.2 it is min(3 x 0.2, 1); where nothing is hit, 1."""
+    picture = render(
+        floor(0.2), spp=4, filter="box", aovs=("survival",), roulette="throughput", roulette_depth=1
+    )
+    survival = picture.aovs["survival"]
+    assert survival[-1] == pytest.approx(0.6, rel=1e-5)
+    assert (survival[0] == 1).all()
+
+
 def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
     renderer = _core.Renderer(cornell)
     place = (0.3 * SIZE, 0.5 * SIZE, SIZE, SIZE)

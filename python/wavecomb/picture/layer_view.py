@@ -32,6 +32,8 @@ _UNITS = {
     "error": "error of the pixel",
     "variance": "variance, luminance",
     "depth": "depth, scene units",
+    "guided_share": "share of bounces that are guided",
+    "survival": "probability that roulette lets go on",
 }
 _LOGARITHMIC = ("cost", "error", "variance")
 SCALARS = tuple(_UNITS)

@@ -33,6 +33,7 @@ enum class AovSource : uint8_t {
   kLight,   ///< the light that reaches the path
   kWay,     ///< the same by the techniques that found it
   kTime,    ///< the clock
+  kBounce,  ///< all bounces of the path
 };
 
 /// X(enumerator, name, channels, kind, source, title): a bit each, in this order. Channels are 0
@@ -61,6 +62,8 @@ enum class AovSource : uint8_t {
   X(ByBounces, "by_bounces", 3, kMean, kWay, "Found by bounces")                              \
   X(ByLightSamples, "by_light_samples", 3, kMean, kWay, "Found by light samples")             \
   X(ByLightPaths, "by_light_paths", 3, kMean, kWay, "Found by light paths")                   \
+  X(GuidedShare, "guided_share", 1, kMean, kBounce, "Guided share")                           \
+  X(Survival, "survival", 1, kMean, kBounce, "Survival of roulette")                          \
   X(Expressions, "lpe", 0, kExpressions, kLight, "")
 // clang-format on
 

@@ -105,6 +105,16 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       add_difference(bounced, radiance + slot * kRadianceWords, row);
     });
   }
+  if (bounces_) {
+    double* guided = film.sums(Aov::kGuidedShare, pixel);
+    double* survival = film.sums(Aov::kSurvival, pixel);
+    for_each_slot([&](uint32_t slot) {
+      const auto row = load_row<BounceRow, float>(bounces_.rows, slot, true);
+      const bool bounced = row.bounces > 0;
+      if (guided && bounced) *guided += double{row.guided} / double{row.bounces};
+      if (survival) *survival += bounced ? double{row.survived} / double{row.bounces} : 1.0;
+    });
+  }
   if (cost_ns_)
     for_each_slot([&](uint32_t slot) { film.add(Aov::kCost, pixel, cost_ns_.rows + slot); });
 }

@@ -24,6 +24,7 @@
 #include "wavecomb/integrate/aov_tables.h"
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/light_groups.h"
+#include "wavecomb/integrate/path_aov_rows.h"
 #include "wavecomb/integrate/path_expressions.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/path_state.h"
@@ -44,32 +45,6 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
   put(Aov::kNormal, v.normal);
   put(Aov::kUv, v.uv);
 }
-
-/// What the camera's ray met, before it is shaded; kNothingHit where it did not.
-template <typename F>
-struct FirstHitRow {
-  Vec3<F> position;
-  UInt<F> object, material, instance;
-  WAVECOMB_FIELDS(position, object, material, instance)
-};
-
-/// Values that AOVs of the nearest sample have of it: a line for each such row whose source is
-/// kHit.
-template <typename Put>
-inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
-  put(Aov::kPosition, hit.position);
-  put(Aov::kMaterialId, id_value(hit.material));
-  put(Aov::kInstanceId, id_value(hit.instance));
-}
-
-/// Albedo and normal of the last vertex that guides a denoiser.
-template <typename F>
-struct GuideRow {
-  Color<F> albedo;
-  Vec3<F> normal;
-  F is_final;  ///< 1 once a vertex was not clear
-  WAVECOMB_FIELDS(albedo, normal, is_final)
-};
 
 /// Contract: owned by one wave, or one reference integrator; slots below the capacity.
 class PathAovs {
@@ -100,6 +75,7 @@ class PathAovs {
     rows(cost_ns_, set.has(Aov::kCost), 1);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
     rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
+    rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);
   }
 
   size_t bytes() const {
@@ -112,7 +88,8 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_})
+    for (Block* block :
+         {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_, &bounces_})
       block->zero(slots);
     expressions_.clear(slots);
     if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
@@ -170,12 +147,13 @@ class PathAovs {
     v.wants_uv = depth == 0 && layout_.set.has(Aov::kUv);
     v.wants_lights = wants_lights();
     v.wants_events = bool(expressions_);
+    v.wants_bounces = bool(bounces_);
     v.uv = {F(0.f), F(0.f)};
     return v;
   }
   /// Whether that is anything at all.
   bool wants_vertex(uint32_t depth) const {
-    return (depth == 0 && vertex_) || guides_ || wants_lights();
+    return (depth == 0 && vertex_) || guides_ || wants_lights() || bounces_;
   }
 
   /// A vertex was shaded, which `path` had reached.
@@ -190,6 +168,15 @@ class PathAovs {
       });
     }
     if (guides_) store_guides<F>(slot, v, path, active);
+    if (bounces_) add_bounce<F>(slot, v, active);
+  }
+  /// Roulette that is played where a bounce has led, of paths at `depth`, lets them go on with `q`.
+  template <typename F>
+  void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
+    if (!bounces_ || depth == 0) return;
+    BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
+    row.survived += q - 1.f;  // the bounce counts as one that went on
+    store_row<BounceRow, F>(bounces_.rows, slot, row, active);
   }
 
   // ---- light ------------------------------------------------------------------------------------
@@ -315,9 +302,9 @@ class PathAovs {
     size_t bytes() const { return owner.bytes(); }
   };
 
-  std::array<const Block*, 11> blocks() const {
-    return {&vertex_, &depth_,   &hits_,   &centre_, &parts_[0],     &parts_[1],
-            &groups_, &cost_ns_, &guides_, &alpha_,  &light_samples_};
+  std::array<const Block*, 12> blocks() const {
+    return {&vertex_, &depth_,   &hits_,   &centre_, &parts_[0],      &parts_[1],
+            &groups_, &cost_ns_, &guides_, &alpha_,  &light_samples_, &bounces_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -366,6 +353,18 @@ class PathAovs {
                            {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, seen);
   }
 
+  /// The bounce of a vertex, where there is one.
+  template <typename F>
+  void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
+    const Mask<F> there = active & (v.survival >= 0.f);
+    if (none(there)) return;
+    BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, there);
+    row.guided += v.guided;
+    row.survived += v.survival;
+    row.bounces += 1.f;
+    store_row<BounceRow, F>(bounces_.rows, slot, row, there);
+  }
+
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
   Block vertex_, depth_, hits_;
@@ -374,7 +373,7 @@ class PathAovs {
   Block centre_;                ///< squared distance of the sample from the pixel's centre, pixels
   std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
   Block groups_;                ///< radiance by light group, a slot's groups side by side
-  Block cost_ns_, guides_;
+  Block cost_ns_, guides_, bounces_;
   Block alpha_;  ///< 1 where the camera's ray has met something that covers
   PathExpressions expressions_;
   Block light_samples_;  ///< radiance that light samples brought

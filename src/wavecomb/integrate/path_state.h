@@ -96,8 +96,9 @@ struct ScatteringNote {
 /// and values that live to the end of shading cost registers.
 template <typename F>
 struct VertexAovs {
-  bool wants_uv = false, wants_lights = false;  ///< asked for; the others are always given
-  bool wants_events = false;                    ///< and what scatters; goes with wants_lights
+  /// Asked for; the others are always given.
+  bool wants_uv = false, wants_lights = false, wants_bounces = false;
+  bool wants_events = false;  ///< and what scatters; goes with wants_lights
   Color<F> albedo;
   Vec3<F> normal;
   Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
@@ -110,6 +111,9 @@ struct VertexAovs {
   // With wants_events: of light from the light sample and along the bounce, how it is scattered
   // here (steps/note_events.h).
   ScatteringNote<F> lit, bounce;
+  // With wants_bounces: with which probability the field chose the bounce's direction, and with
+  // which roulette lets it go on; survival -1: there was no bounce.
+  F guided, survival;
 };
 
 /// What guides a denoiser.
@@ -155,6 +159,7 @@ struct Vertex {
   VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
   bool wants_lights() const { return notes() && aovs->wants_lights; }
   bool wants_events() const { return notes() && aovs->wants_events; }
+  bool wants_bounces() const { return notes() && aovs->wants_bounces; }
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 

@@ -146,6 +146,7 @@ class PathTracer {
         aovs_.hit_surface<F>(*context_.camera, kSlot, p, time, hit.inst, hit.geom, material, true);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
+        aovs_.survive<F>(depth, kSlot, q, true);
         if (!(cost_aware_number<F>(key, depth) < q)) return depth;
         path.throughput *= 1.f / q;
       }

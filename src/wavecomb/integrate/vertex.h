@@ -31,6 +31,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
     v.aovs->emitter = v.aovs->lit_by = U(kNoLight);
     v.aovs->light_weight = F(-1.f);
   }
+  if (v.wants_bounces()) v.aovs->survival = F(-1.f);
 
   const auto at = interact<Bsdf, F>(v);
   if constexpr (Bsdf::kEmits) out.emitted = emit<Bsdf, F>(v, at);

@@ -92,7 +92,11 @@ def test_the_panel_follows_the_cursor(cornell_window, qtbot):
 def test_heat_maps_of_what_is_learned(cornell_window, qtbot):
     window = cornell_window
     window.session.change(guiding="on", roulette="efficient", allocate="error", spp=16)
-    for layer, words in (("samples", "samples per pixel"),):
+    for layer, words in (
+        ("guided_share", "guided"),
+        ("survival", "roulette"),
+        ("samples", "samples per pixel"),
+    ):
         window.display.choose_layer(layer)
         qtbot.waitUntil(
             lambda layer=layer: (

@@ -150,6 +150,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
                                surface);
     if (cost_aware) {
       const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, state, surface);
+      if (!kFromLights) wave.aovs.survive<F>(depth, slot, q, surface);
       surface = surface & (cost_aware_number<F>(path.key, depth) < q);
       path.throughput *= F(1.f) / q;
       if (none(recorded())) continue;

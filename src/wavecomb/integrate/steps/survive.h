@@ -49,6 +49,16 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
 }
 
+/// Notes for AOVs the bounce that roulette lets go on with probability `q`.
+template <typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void note_bounce(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
+                                 const F& q, const VertexResult<F>& out) {
+  if (!v.wants_bounces()) [[likely]]
+    return;
+  v.aovs->guided = select(place.guided, F(F(1.f) - place.bsdf_share), F(0.f));
+  v.aovs->survival = select(out.alive, q, F(-1.f));
+}
+
 /// Roulette after a vertex; `u` in [0, 1). By throughput; or, where it was learned what bounces are
 /// worth, by that (learn/worth.h). The throughput after a guided bounce says nothing of what it
 /// will bring: it is least where most light comes from. `arrived`: luminance of the throughput at
@@ -56,11 +66,15 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
                              const F& arrived, const F& u, VertexResult<F>& out) {
-  if (!v.settings.roulette || v.depth + 1 < v.settings.roulette_depth) return;
+  if (!v.settings.roulette || v.depth + 1 < v.settings.roulette_depth) {
+    note_bounce<F>(v, place, F(1.f), out);
+    return;
+  }
   const F largest = max_component(out.next.throughput);
   F q = min(F(largest * out.next.eta_scale * kRouletteGain), F(1.f));
   if (v.settings.efficient && v.guide && v.guide->tiles) [[unlikely]]
     q = select(place.known, worthwhile_survival<F>(place, F(arrived * v.path.importance)), q);
+  note_bounce<F>(v, place, q, out);
   out.alive = out.alive & (u < q);
   out.next.throughput *= F(1.f / max(q, F(1e-10f)));
 }
