@@ -261,7 +261,8 @@ TEST(Wave, DepthZeroSeesEmittersOnly) {
 
 Settings with_all_aovs() {
   Settings s = small_settings();
-  s.aovs.bits = AovSet::kAll;
+  s.aovs.bits = AovSet::kAll | Aov::kExpressions;
+  s.expressions = {{"diffuse", "C<RD>.*"}, {"specular", "C<.[GS]>+[LO]"}, {"lamps", "C.*O"}};
   return s;
 }
 

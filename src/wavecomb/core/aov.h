@@ -136,7 +136,9 @@ struct AovSet {
   static constexpr uint32_t kUsual = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
   /// Parts of the beauty: emission + direct + indirect.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
-  static constexpr uint32_t kAll = aov_bits([](const AovRow&) { return true; });
+  /// All that have names of their own.
+  static constexpr uint32_t kAll =
+      aov_bits([](const AovRow& row) { return row.kind != AovKind::kExpressions; });
 
   uint32_t bits = kUsual;
 

@@ -283,9 +283,9 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
       context.guide = &guide;
     }
     if (!watch.stopped()) {
-      const std::lock_guard lock(impl_->mutex);
-      impl_->learned = std::make_shared<const Learned>(Learned{
-          impl_->scene, scene_view.lights.by_tree, impl_->light_calibrations.last(), training});
+      const std::lock_guard lock(mutex);
+      learned = std::make_shared<const Learned>(
+          Learned{this->scene, scene_view.lights.by_tree, calibrations.last(), training});
     }
     loop.run();
   };
