@@ -161,9 +161,9 @@ def _fur(writer: StageWriter) -> str:
     colour = net.node("mix", "color3", bg=own, fg=("color3", (0.92, 0.84, 0.7)), mix=share)
     net.hair(
         "chiang_hair_absorption_from_color",
-        {"longitudinal": ("float", 0.28), "azimuthal": ("float", 0.35)},
+        {"longitudinal": ("float", 0.4), "azimuthal": ("float", 0.5)},
         color=colour,
-        azimuthal_roughness=("float", 0.35),
+        azimuthal_roughness=("float", 0.5),
     )
     return writer.own_material("Fur", net.material)
 
