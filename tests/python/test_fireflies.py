@@ -29,16 +29,16 @@ def test_reweighting_takes_fireflies_and_keeps_the_unbiased_sum(
     caustics: Path, transport: str
 ) -> None:
     stage = wavecomb.load(caustics)
-    keep = render(stage, transport=transport, spp=16)
+    keep = render(stage, transport=transport, spp=64)
     assert "unbiased" not in keep.aovs
-    less = render(stage, transport=transport, spp=16, firefly="reweight")
+    less = render(stage, transport=transport, spp=64, firefly="reweight")
     assert less.aovs["unbiased"].tobytes() == keep.beauty.tobytes()
     taken = keep.beauty - less.beauty
     assert taken.min() >= -1e-6
     if transport == "path":
-        assert taken.max() > 1.0
+        assert taken.max() > 0.1
     for way in ({"lanes": 1, "wave_size": 64}, {"integrator": "reference"}):
-        other = render(stage, transport=transport, spp=16, firefly="reweight", **way)
+        other = render(stage, transport=transport, spp=64, firefly="reweight", **way)
         assert other.beauty.tobytes() == less.beauty.tobytes(), way
 
 

@@ -17,7 +17,7 @@ SIZE = 32
 
 
 def render(stage: Any, **settings: Any) -> wavecomb.Picture:
-    plain: dict[str, Any] = {"size": (SIZE, SIZE), "spp": 4, "transport": "light"}
+    plain: dict[str, Any] = {"size": (SIZE, SIZE), "spp": 64, "transport": "light"}
     return wavecomb.render(stage, **(plain | settings))
 
 
