@@ -32,6 +32,7 @@ class Settings:
     error = crop = False
     region = None
     allocate = "even"
+    firefly = "keep"
 
     def __init__(self, **settings: Any) -> None:
         defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}

@@ -35,7 +35,6 @@ REASONS = {
     "roughness_anisotropy": "inputs of BSDF nodes", "roughness_dual": "inputs of BSDF nodes",
     "glossiness_anisotropy": "inputs of BSDF nodes", "artistic_ior": "inputs of BSDF nodes",
     "standard_surface_to_gltf_pbr": "inputs of BSDF nodes",
-    "deon_hair_absorption_from_melanin": HAIR, "chiang_hair_absorption_from_color": HAIR,
     "chiang_hair_roughness": HAIR,
 }  # fmt: skip
 """Why nodes are only named, by category."""
@@ -133,7 +132,10 @@ def test_defaults_of_primitives_are_the_library_s(category):
         if identifier in ("ND_image_color4", "ND_image_vector4"):
             full.give(default="0, 0, 0, 1")  # a file that is missing is drawn opaque
         for output in patterns()[identifier]:
-            assert bare.value(output) == full.value(output), (identifier, output)
+            ours, theirs = bare.value(output), full.value(output)
+            if all(isinstance(x, float) for x in (*ours, *theirs)):  # worked out of the defaults
+                theirs = pytest.approx(theirs, rel=1e-5)
+            assert ours == theirs, (identifier, output)
 
 
 def test_definitions_are_made_flat_once():

@@ -17,7 +17,7 @@ from wavecomb.scenes import SCENES, SceneError, write_scene
 from wavecomb.scenes import materials as looks
 
 SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
-PLAIN = sorted(set(SCENES) - {"heavy", "smoke", "clouds", "fog", "fur", "head"})
+PLAIN = sorted(set(SCENES) - {"heavy", "smoke", "clouds", "fog", "fur", "head", "candles"})
 NODES = {"UsdPreviewSurface", "UsdUVTexture", "UsdPrimvarReader_float2", "UsdTransform2d"}
 
 
