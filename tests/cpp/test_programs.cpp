@@ -268,6 +268,7 @@ Inputs random_inputs(std::mt19937& rng) {
   p.film_thickness = 2000 * edgy();
   p.film_ior = 1 + edgy();
   p.thin_walled = static_cast<float>(rng() % 2);
+  p.walks = p.thin_walled > 0 ? 0.f : static_cast<float>(rng() % 3);
   const auto any_direction = [&] {
     const double grazing[] = {0, 1e-7, -1e-7, 1e-3, -1e-3, 1, -1};
     const double z = rng() % 4 == 0 ? grazing[rng() % 7] : 2.0 * unit(rng) - 1;
@@ -330,7 +331,8 @@ void expect_packet_equals_scalar(ProgramId id) {
         {&P::film_weight, &Q::film_weight},
         {&P::film_thickness, &Q::film_thickness},
         {&P::film_ior, &Q::film_ior},
-        {&P::thin_walled, &Q::thin_walled}};
+        {&P::thin_walled, &Q::thin_walled},
+        {&P::walks, &Q::walks}};
     for (const auto& [from, to] : numbers)
       p.*to = packet([from = from](const Inputs& i) { return i.params.*from; });
     p.base_color = vec([](const Inputs& i) { return i.params.base_color; });
