@@ -390,6 +390,7 @@ P with_parts(P p, ProgramId program, uint32_t parts) {
   if (lacks(kPasses)) p.transmission_weight = 0;
   if (lacks(kPasses) && program == ProgramId::kPrincipled) p.opacity = 1;
   if (lacks(kBacks)) (p.metallic > 0.5f ? p.thin_walled : p.subsurface_weight) = 0;
+  if (lacks(kBacks)) p.walks = 0;
   if (lacks(kFuzzes)) p.fuzz_weight = 0;
   if (lacks(kFilms)) p.film_weight = 0;
   if (lacks(kBrushes)) p.anisotropy = p.rotation = 0;
