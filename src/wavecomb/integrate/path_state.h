@@ -87,9 +87,9 @@ struct VertexResult {
 /// is not is glossy, or of a mirror.
 template <typename F>
 struct ScatteringNote {
-  UInt<F> event;
-  Color<F> diffuse;
-  Mask<F> is_delta;
+  UInt<F> event{0u};
+  Color<F> diffuse{F(0.f)};
+  Mask<F> is_delta{false};
 };
 
 /// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
