@@ -21,11 +21,11 @@ FACES = np.array(
 )
 
 
-def box(builder: Any, low: Any, high: Any, material: int) -> None:
+def box(builder: Any, low: Any, high: Any, material: int, name: str = "") -> None:
     """A closed box."""
     ends = np.array([low, high], np.float32)
     corners = [[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    mesh = builder.add_mesh(np.array(corners, np.float32), FACES, material=material)
+    mesh = builder.add_mesh(np.array(corners, np.float32), FACES, material=material, name=name)
     builder.add_to_group(0, mesh)
 
 
@@ -163,7 +163,7 @@ def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
         assert abs(mean - exact) < 0.01 * exact + 3.5 * error
 
 
-def scene() -> Any:
+def scene(bounces_see_all: bool = True) -> Any:
     """A box of skin with a coat, one within it, a floor, a lamp and a sky."""
     builder = wavecomb.SceneBuilder()
     values = {
@@ -175,9 +175,11 @@ def scene() -> Any:
     }
     box(builder, (-1, -1, -6), (1, 0.5, -4.5), skin(builder, **values))
     inner = builder.add_material("diffuse", base_color=(0.1, 0.8, 0.1))
-    box(builder, (-0.2, -0.4, -5.4), (0.2, 0.0, -5.0), inner)
+    box(builder, (-0.2, -0.4, -5.4), (0.2, 0.0, -5.0), inner, "/Inner")
     wax = skin(builder, subsurface_color=(0.95, 0.9, 0.7), subsurface_radius=(0.5, 0.4, 0.2))
     box(builder, (1.2, -1, -6), (1.5, 1.0, -5.5), wax)
+    if not bounces_see_all:
+        builder.add_visibility("/Inner", {"bounces": False})
     grey = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
     box(builder, (-5, -1.2, -9), (5, -1.0, -2), grey)
     lamp = np.eye(4)
@@ -207,6 +209,16 @@ def test_one_picture_for_all_schedules() -> None:
         {"ray_order": "morton-octant"},
     ):
         assert np.array_equal(render(**other).beauty, first.beauty), other
+
+
+def test_walks_see_what_bounces_see() -> None:
+    """What no bounce sees is met by no walk, in waves and in the reference alike."""
+    made = scene(bounces_see_all=False)
+    waves = wavecomb.render(made, size=(45, 30), spp=4, max_depth=6)
+    alone = wavecomb.render(made, size=(45, 30), spp=4, max_depth=6, integrator="reference")
+    assert np.array_equal(waves.beauty, alone.beauty)
+    steps = waves.stats["counts"]["walk_steps"]
+    assert steps == alone.stats["counts"]["walk_steps"] > 0
 
 
 def test_guided_bounces_keep_the_mean() -> None:

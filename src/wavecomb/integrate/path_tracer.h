@@ -190,7 +190,8 @@ class PathTracer {
       if (!is_own) return true;
       const uint32_t material = rays_.material_of(hit, rays_.mesh_of(hit));
       if (!(context_.scene.walks.media[material].extinction.x > 0)) return true;
-      came_out = media_.walk(key, depth, settings_.sampler, rays_.time(), material, path, hit);
+      came_out = media_.walk(key, depth, settings_.sampler, rays_.keys(), rays_.time(), material,
+                             path, hit);
       return came_out;
     }
     return true;

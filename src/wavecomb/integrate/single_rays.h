@@ -31,6 +31,8 @@ class SingleRays {
     time_ = time;
   }
   float time() const { return time_; }
+  /// Of the last ray that was traced.
+  const PresenceKeys& keys() const { return keys_; }
 
   SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth) {
     SingleHit h;

@@ -27,28 +27,24 @@ class Volumes {
 
   /// `counts` gets what ways through them take. `walks`: room for walks, of Walkers::kColumns.
   Volumes(const WaveContext& context, Counts& counts, const SoaBlock& walks)
-      : context_(context),
-        volumes_(context.scene.volumes),
-        all_counts_(counts),
-        counts_(counts.volumes),
-        walks_(walks) {}
+      : context_(context), volumes_(context.scene.volumes), counts_(counts), walks_(walks) {}
 
   /// Whether light walks below surfaces.
   bool has_walks() const { return context_.scene.walks.media != nullptr; }
   /// Walks of the reference: the path of a ray that led below a surface and hit `hit`, of a
-  /// material. Afterwards the ray, in `path`, and its hit are those of who sees from outside where
-  /// the walk has ended; false: it has ended below.
+  /// material. `keys`: of that ray. Afterwards the ray, in `path`, and its hit are those of who
+  /// sees from outside where the walk has ended; false: it has ended below.
   template <typename Hit>
-  bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler, float time,
-            uint32_t material, PathState<float>& path, Hit& hit) const {
+  bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
+            const PresenceKeys& keys, float time, uint32_t material, PathState<float>& path,
+            Hit& hit) const {
     Walkers walkers(walks_);
     walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput),
                        0u, 0u, hit.inst, material, time, true);
     bool came_out = false;
-    ++all_counts_.walks;
-    walkers.run<float>(context_.scene, *context_.accel, 1,
-                       {&key.pixel_hash, &key.sample, 1, 2 * depth}, all_counts_.walk_steps,
-                       all_counts_.walk_lanes,
+    ++counts_.walks;
+    walkers.run<float>(context_.scene, *context_.accel, 1, keys, counts_.walk_steps,
+                       counts_.walk_lanes,
                        [&](bool, uint32_t, const WalkEnd<float>& end, bool came) {
                          came_out = came;
                          const Seen<float> seen = from_outside(end);
@@ -73,12 +69,12 @@ class Volumes {
 
   template <typename F>
   Flight<F> fly(const Passage<F>& p, const Color<F>& throughput, const Mask<F>& active) const {
-    return fly_through<F>(volumes_, p, throughput, active, counts_);
+    return fly_through<F>(volumes_, p, throughput, active, counts_.volumes);
   }
   template <typename F>
   Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
     const Way<F> way(p, VertexSet::kShadow);
-    return transmittance_through<F>(volumes_, way, p.o, p.d, p.t, active, counts_);
+    return transmittance_through<F>(volumes_, way, p.o, p.d, p.t, active, counts_.volumes);
   }
 
   bool shines() const { return volumes_.emits; }
@@ -88,7 +84,7 @@ class Volumes {
     const Way<F> way(p, VertexSet::kFlight);
     for (uint32_t i = 0; i < volumes_.count; ++i)
       if (volumes_.volumes[i].emits)
-        sum += emission_of<F>(volumes_, i, way, p.o, p.d, p.t, active, counts_);
+        sum += emission_of<F>(volumes_, i, way, p.o, p.d, p.t, active, counts_.volumes);
     return sum;
   }
 
@@ -118,7 +114,7 @@ class Volumes {
                     wave.ways.uints(kSeed),
                     wave.ways.floats(kFirst),
                     q.size};
-    fly_through<F>(volumes_, ways, flights, wave.ways.floats(kScratch), counts_);
+    fly_through<F>(volumes_, ways, flights, wave.ways.floats(kScratch), counts_.volumes);
   }
   /// Of the rays from `i` on, whose paths have this throughput.
   template <typename F>
@@ -146,7 +142,7 @@ class Volumes {
     const Ways ways{
         q.ox,  q.oy, q.oz, q.dx, q.dy, q.dz, most, wave.ways.uints(kSeed), wave.ways.floats(kFirst),
         q.size};
-    transmittance_through<F>(volumes_, ways, product, counts_);
+    transmittance_through<F>(volumes_, ways, product, counts_.volumes);
   }
   template <typename F>
   Color<F> passed(const Wave& wave, size_t i) const {
@@ -219,12 +215,12 @@ class Volumes {
                      lane_index<F>() + static_cast<uint32_t>(i), slot, inst, material, time, walks);
     }
     if (walkers.size() == 0) return;
-    all_counts_.walks += walkers.size();
+    counts_.walks += walkers.size();
     const auto start = PhaseClock::Clock::now();
     if (context_.measures_costs) std::fill(wave.scratch.begin(), wave.scratch.end(), 0.f);
     walkers.run<F>(
         scene, *context_.accel, context_.traversal_width, presence_keys(wave.pool, depth, false),
-        all_counts_.walk_steps, all_counts_.walk_lanes,
+        counts_.walk_steps, counts_.walk_lanes,
         [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end, const Mask<F>& came) {
           finish_walks<F>(wave, ended, who, end, came);
           if (context_.measures_costs) count_collisions<F>(wave.scratch, end, ended);
@@ -319,8 +315,7 @@ class Volumes {
 
   const WaveContext& context_;
   const VolumeView volumes_;
-  Counts& all_counts_;
-  VolumeCounts& counts_;
+  Counts& counts_;
   const SoaBlock& walks_;
 };
 
