@@ -60,6 +60,11 @@ def test_auto_is_path_where_light_paths_do_not_go(
     assert why in choice["why"] and "\n" not in choice["why"]
 
 
+def test_auto_is_path_where_there_are_holdouts(caustics: Path) -> None:
+    choice = chosen(wavecomb.load(caustics, holdouts=("/World/Objects/Ball",)))
+    assert choice["chosen"] == "path" and "holdouts" in choice["why"]
+
+
 def test_auto_is_path_to_the_bit_in_a_matt_stage(tmp_path: Path) -> None:
     path = tmp_path / "cornell.usda"
     write_scene("cornell", path)

@@ -40,6 +40,8 @@ float farthest(const Bounds& box, const Vec3<float>& from) {
 LightPathRefusal light_path_refusal(const Scene& scene) {
   if (scene.camera().projection == Projection::kLatlong)
     return {"latlong cameras", "another camera"};
+  if (scene.view().visibility)
+    return {"prims that some rays do not see, nor with holdouts", "a stage without them"};
   if (scene.view().walks.media)
     return {"light that walks below surfaces", "a stage without subsurface scattering"};
   if (!scene.volumes().empty())

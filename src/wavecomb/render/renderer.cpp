@@ -217,10 +217,6 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   RenderCosts costs(scene, traits, settings);
   const FilterTable filter(settings.filter, settings.used_filter_width());
   const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
-  if (settings.joins_light() && scene.view().visibility)
-    throw Error(
-        "transport light does not go with prims that some rays do not see, nor with holdouts; give "
-        "transport path");
   const AovTables aovs(scene, settings);
   const Region window = settings.film();
   Film film(window, aovs.layout, settings.keeps_error());
