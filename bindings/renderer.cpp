@@ -33,13 +33,16 @@ void edit(WavefrontRenderer& renderer, const nb::object& camera, const nb::dict&
   renderer.edit(change);
 }
 
+/// What `work` gives, while Python runs on.
+template <typename Work>
+auto released(const Work& work) {
+  const nb::gil_scoped_release release;
+  return work();
+}
+
 nb::object pick_at(const WavefrontRenderer& renderer, float x, float y, uint32_t width,
                    uint32_t height) {
-  std::optional<Pick> found;
-  {
-    const nb::gil_scoped_release release;
-    found = renderer.pick(x, y, width, height);
-  }
+  const std::optional<Pick> found = released([&] { return renderer.pick(x, y, width, height); });
   if (!found) return nb::none();
   const auto triple = [](const Vec3<float>& v) { return nb::make_tuple(v.x, v.y, v.z); };
   nb::dict d;
@@ -62,11 +65,8 @@ nb::object pick_at(const WavefrontRenderer& renderer, float x, float y, uint32_t
 
 nb::object learned_at(const WavefrontRenderer& renderer, float x, float y, uint32_t width,
                       uint32_t height) {
-  std::optional<LearnedPlace> found;
-  {
-    const nb::gil_scoped_release release;
-    found = renderer.learned(x, y, width, height);
-  }
+  std::optional<LearnedPlace> found =
+      released([&] { return renderer.learned(x, y, width, height); });
   if (!found) return nb::none();
   static constexpr const char* kAxes[kGuideAxes] = {"+x", "-x", "+y", "-y", "+z", "-z"};
   nb::dict d;

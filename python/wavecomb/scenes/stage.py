@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
@@ -25,6 +26,13 @@ _INPUT_TYPES = {
     "normal": Sdf.ValueTypeNames.Normal3f,
     "useSpecularWorkflow": Sdf.ValueTypeNames.Int,
 }
+
+
+def _shine(light: Any, colour: Sequence[float]) -> None:
+    """Gives a light its intensity, and a colour whose largest channel is 1."""
+    peak = max(colour)
+    light.CreateIntensityAttr(peak)
+    light.CreateColorAttr(_vec([v / peak for v in colour]))
 
 
 def _vec(values: Sequence[float] | FloatArray) -> Gf.Vec3f:
@@ -263,11 +271,9 @@ class StageWriter:
     ) -> None:
         """Adds a rectangle that emits along its -Z, turned about X; -90 shines straight down."""
         light = UsdLux.RectLight.Define(self.stage, f"/World/Lights/{name}")
-        peak = max(radiance)
         light.CreateWidthAttr(width)
         light.CreateHeightAttr(height)
-        light.CreateIntensityAttr(peak)
-        light.CreateColorAttr(_vec([v / peak for v in radiance]))
+        _shine(light, radiance)
         light.AddTranslateOp().Set(Gf.Vec3d(*position))
         light.AddRotateXOp().Set(tilt_degrees)
 
@@ -276,10 +282,8 @@ class StageWriter:
     ) -> None:
         """Adds a ball that shines."""
         light = UsdLux.SphereLight.Define(self.stage, f"/World/Lights/{name}")
-        peak = max(radiance)
         light.CreateRadiusAttr(radius)
-        light.CreateIntensityAttr(peak)
-        light.CreateColorAttr(_vec([v / peak for v in radiance]))
+        _shine(light, radiance)
         light.AddTranslateOp().Set(Gf.Vec3d(*position))
 
     def sun(self, name: str, way: Sequence[float], angle: float, radiant: Sequence[float]) -> None:
@@ -292,11 +296,9 @@ class StageWriter:
             radiant: Irradiance of what faces it, rgb.
         """
         light = UsdLux.DistantLight.Define(self.stage, f"/World/Lights/{name}")
-        peak = max(radiant)
         light.CreateAngleAttr(angle)
         light.CreateNormalizeAttr(True)
-        light.CreateIntensityAttr(peak)
-        light.CreateColorAttr(_vec([v / peak for v in radiant]))
+        _shine(light, radiant)
         turn = Gf.Rotation(Gf.Vec3d(0, 0, -1), Gf.Vec3d(*way))
         light.AddTransformOp().Set(Gf.Matrix4d().SetRotate(turn))
 

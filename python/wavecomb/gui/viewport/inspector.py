@@ -6,10 +6,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QApplication,
-    QCheckBox,
     QHeaderView,
     QPushButton,
     QTreeWidget,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
+from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session
 
@@ -68,14 +68,11 @@ def seen_rows(hit: dict[str, Any] | None) -> list[tuple[str, str]]:
     return [(label, value_text(hit[key])) for key, label in _SEEN if hit.get(key) is not None]
 
 
-class Inspector(QWidget):
+class Inspector(CursorPanel):
     """Follows the cursor over the viewport, or stays at the pixel that was clicked."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("inspector")
-        self._session = session
-        self._pixel: tuple[int, int] | None = None
+        super().__init__(session, "inspector", _LATER_MS, parent)
         self.tree = QTreeWidget()
         self.tree.setObjectName("inspector.values")
         self.tree.setAccessibleName("Pixel values")
@@ -86,11 +83,8 @@ class Inspector(QWidget):
         self.tree.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        self.follow = QCheckBox("Follow the cursor")
-        self.follow.setObjectName("inspector.follow")
         self.follow.setToolTip("Off: values stay those of the pixel that was clicked last")
         self.follow.setAccessibleName("Follow the cursor")
-        self.follow.setChecked(True)
         self.copy = QPushButton("Copy")
         self.copy.setObjectName("inspector.copy")
         self.copy.setToolTip("Put these values on the clipboard as text")
@@ -102,26 +96,6 @@ class Inspector(QWidget):
         layout.addWidget(self.tree, 1)
         layout.addWidget(self.follow)
         layout.addWidget(self.copy)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(_LATER_MS)
-        self._timer.timeout.connect(self._fill)
-        session.frame.connect(lambda frame: self._soon())
-
-    def hover(self, pixel: tuple[int, int] | None) -> None:
-        """The cursor is over this pixel."""
-        if self.follow.isChecked() and pixel is not None:
-            self._pixel = pixel
-            self._soon()
-
-    def pick(self, pixel: tuple[int, int]) -> None:
-        """This pixel was clicked."""
-        self._pixel = pixel
-        self._soon()
-
-    def _soon(self) -> None:
-        if not self._timer.isActive():
-            self._timer.start()
 
     def rows(self) -> list[tuple[str, str]]:
         """What is shown, group by group."""

@@ -6,12 +6,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QCheckBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.scheduling.plots import Bar, Bars
+from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.directions_view import DirectionsView
 from wavecomb.gui.viewport.orbit import UPS
 from wavecomb.gui.viewport.session import Session, Setup
@@ -59,7 +59,7 @@ def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list
     return [*shares[: most - 1], (f"{len(rest)} others", sum(share for _, share in rest))]
 
 
-class LearnedPanel(QWidget):
+class LearnedPanel(CursorPanel):
     """Follows the cursor over the viewport, or stays at the pixel that was clicked.
 
     Attributes:
@@ -67,10 +67,7 @@ class LearnedPanel(QWidget):
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("learned")
-        self._session = session
-        self._pixel: tuple[int, int] | None = None
+        super().__init__(session, "learned", _LATER_MS, parent)
         self.learned: dict[str, Any] | None = None
         self.note = QLabel(field_text(session.setup, None))
         self.note.setObjectName("learned.note")
@@ -84,11 +81,8 @@ class LearnedPanel(QWidget):
         self.lights = Bars("learned_lights", "Lights chosen here, %")
         self.lights.setAccessibleName("Lights chosen here")
         self.lights.setMinimumHeight(theme.em(7))
-        self.follow = QCheckBox("Follow the cursor")
-        self.follow.setObjectName("learned.follow")
         self.follow.setToolTip("Off: what is shown stays that of the pixel that was clicked last")
         self.follow.setAccessibleName("Follow the cursor with what was learned")
-        self.follow.setChecked(True)
         layout = QVBoxLayout(self)
         margin = theme.em(0.3)
         layout.setContentsMargins(margin, margin, margin, margin)
@@ -96,21 +90,6 @@ class LearnedPanel(QWidget):
         layout.addWidget(self.map, 2)
         layout.addWidget(self.lights, 3)
         layout.addWidget(self.follow)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(_LATER_MS)
-        self._timer.timeout.connect(self._fill)
-        session.frame.connect(lambda frame: self._soon())
-
-    def hover(self, pixel: tuple[int, int] | None) -> None:
-        """The cursor is over this pixel."""
-        if self.follow.isChecked() and pixel is not None:
-            self.pick(pixel)
-
-    def pick(self, pixel: tuple[int, int]) -> None:
-        """This pixel was clicked."""
-        self._pixel = pixel
-        self._soon()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Catches up: nothing is looked up while the panel is hidden."""
@@ -118,8 +97,8 @@ class LearnedPanel(QWidget):
         self._soon()
 
     def _soon(self) -> None:
-        if self.isVisible() and not self._timer.isActive():
-            self._timer.start()
+        if self.isVisible():
+            super()._soon()
 
     def _fill(self) -> None:
         session, pixel = self._session, self._pixel

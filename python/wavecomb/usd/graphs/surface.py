@@ -24,7 +24,12 @@ from wavecomb.usd.graphs.node import (
     nodes_of,
 )
 from wavecomb.usd.graphs.program import Graph, assemble
-from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, TEXTURED_PARAMETERS, SurfaceGraph
+from wavecomb.usd.looks.surface import (
+    COLOUR_PARAMETERS,
+    TEXTURED_PARAMETERS,
+    Surface,
+    SurfaceGraph,
+)
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 
@@ -179,6 +184,17 @@ class Drivers:
         else:
             self._outputs[parameter] = value
         return None
+
+    def surface(self, program: str, parameters: dict[str, Any]) -> Surface:
+        """The surface of the material, with these constants."""
+        return Surface(
+            str(self.networks.material.GetPath()),
+            program,
+            parameters,
+            self.textured,
+            self.uv_names,
+            graph=self.graph(),
+        )
 
     def graph(self) -> SurfaceGraph | None:
         """The graphs of what neither constants nor textures drive; None where that is nothing.

@@ -81,14 +81,7 @@ class HairReader:
         for name in ("normal", "curve_direction"):
             if source_of(shader, name, self.time) is not None:
                 self._missing(f"MaterialX chiang_hair_bsdf input {name} (the curve's own)")
-        return Surface(
-            str(self.material.GetPath()),
-            "hair",
-            parameters,
-            self.drivers.textured,
-            self.drivers.uv_names,
-            graph=self.drivers.graph(),
-        )
+        return self.drivers.surface("hair", parameters)
 
     def _put(self, parameters: dict[str, Any], name: str, value: Value) -> None:
         constant = self.drivers.put(name, value)

@@ -67,14 +67,7 @@ class MaterialXReader:
             self.drivers.networks.uv_names.append("st")  # which way it is brushed
         drive_layers(model_name, layers, inputs.driven, self.drivers)
         inputs.tell_rest()
-        return Surface(
-            str(self.material.GetPath()),
-            "openpbr",
-            parameters,
-            self.drivers.textured,
-            self.drivers.uv_names,
-            graph=self.drivers.graph(),
-        )
+        return self.drivers.surface("openpbr", parameters)
 
     def input(self, shader: UsdShade.Shader, name: str, parameter: str) -> Value | None:
         """What feeds an input of the surface shader; None where nothing does."""
