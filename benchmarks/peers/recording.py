@@ -47,6 +47,10 @@ class RecordingBuilder(Recorded):
         self.materials.append({"program": program, **parameters})
         return self.native.add_material(program, **parameters)
 
+    def add_graph(self, *arrays: Any) -> int:
+        """Passes a graph on; peers get a material's constants."""
+        return self.native.add_graph(*arrays)
+
     def add_mesh(
         self,
         positions: NDArray[np.float32],

@@ -120,6 +120,8 @@ class LoadOptions:
         session_layer: File with opinions that are stronger than the stage's.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
             size of their edges in the picture (docs/subdivision.md).
+        strand_pixels: Curves that are narrower in the picture are thinned out, and the others
+            widened, to no more than that (docs/hair.md); 0: none.
         shutter: When it opens and closes, time codes from the frame; None: the camera's.
         motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
             render settings disable it.
@@ -215,6 +217,10 @@ class LoadOptions:
         "Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their size in the "
         "picture.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
+    )  # fmt: skip
+    strand_pixels: float = _row(
+        0.0, "Curves narrower than that in the picture are thinned out, the others widened; 0: "
+        "none.", "number", "--strand-pixels", metavar="X", least=0, unset="0",
     )  # fmt: skip
     size: tuple[int, int] = _row((600, 600), "Width and height of the picture.", "pair", least=1)
     threads: int = _row(0, "Threads that read; 0: all.", "integer", least=0)

@@ -250,3 +250,28 @@ def test_a_radius_that_is_not_finite_is_told() -> None:
         builder.add_material(
             "openpbr", name="skin", openpbr={"subsurface_radius": (float("nan"), 1.0, 1.0)}
         )
+
+
+def test_what_comes_from_below_has_a_layer() -> None:
+    """All of a white wall that mirrors nothing, none of a matte one; a partition is the beauty."""
+    seen = []
+    for radius in ((1, 1, 1), (0, 0, 0)):
+        builder = wavecomb.SceneBuilder()
+        material = skin(builder, subsurface_color=(0.8, 0.5, 0.3), subsurface_radius=radius)
+        box(builder, (-9, -9, -9), (9, 9, 0), material)
+        builder.add_light("dome", np.eye(4), color=(1, 1, 1))
+        camera = np.eye(4)
+        camera[3, 2] = 5.0
+        builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
+        layers = {"below": "CW.*", "direct": "CW<RD>L", "rest": "C([^W].*)?L"}
+        settings = _core.Settings(
+            width=16, height=16, spp=16, max_depth=4, light_path_expressions=list(layers.items())
+        )
+        result = _core.render(builder.build(), settings, None, None, None)
+        seen.append((result.beauty, {name: result.aovs[f"lpe_{name}"] for name in layers}))
+    (wax, walked), (matte, reflected) = seen
+    np.testing.assert_allclose(walked["below"], wax, rtol=1e-5)
+    assert 0.9 < walked["direct"].mean() / wax.mean() <= 1
+    assert not walked["rest"].any()
+    np.testing.assert_allclose(reflected["rest"], matte, rtol=1e-5)
+    assert not reflected["below"].any()

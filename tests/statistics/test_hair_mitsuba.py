@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair against Mitsuba 3's `hair`: pictures of a fibre and of a bundle agree to within noise.
+"""Hair against Mitsuba 3's `hair`: a fibre, a bundle and a head agree to within noise.
 
-Fibres are straight and end outside of the picture: ends differ by design.
+A fibre and a bundle are straight and end outside of the picture: ends differ by design. Those of a
+head's hair are in it, and thin.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 from agreement import assert_agree, batches
+
+from wavecomb.scenes.hair import HEAD_LEVEL, hair_strands, head_mesh
+from wavecomb.usd.geometry.strands import lay_out
 
 pytestmark = pytest.mark.slow
 
@@ -30,18 +34,25 @@ def colour(absorption: float, azimuthal: float) -> float:
 
 
 def fibres(kind: str) -> tuple[Any, float]:
-    """Both ends of each, (n, 2, 3), and their radius."""
+    """Control points of cubic B-splines, (n, k, 3), and their radius."""
     if kind == "fibre":
-        return np.array([[[-3.0, -2.0, 0.4], [3.0, 2.0, -0.4]]], np.float32), 0.07
+        return line(np.array([[-3.0, -2.0, 0.4]]), np.array([[3.0, 2.0, -0.4]])), 0.07
+    if kind == "head":
+        return hair_strands(np.random.default_rng(5), 1500).astype(np.float64), 0.006
     rng = np.random.default_rng(3)
     middle = rng.uniform(-0.16, 0.16, (24, 3))
     along = np.array([0.5, 1.0, 0.1]) + rng.normal(scale=0.25, size=(24, 3))
     along *= 2.5 / np.linalg.norm(along, axis=1, keepdims=True)
-    return np.stack([middle - along, middle + along], axis=1).astype(np.float32), 0.03
+    return line(middle - along, middle + along), 0.03
 
 
-def stage(ends: Any, radius: float, roughness: tuple[float, float]) -> Any:
-    """Fibres between a lamp in front and one behind, under a dim sky."""
+def line(a: Any, b: Any) -> Any:
+    """Evenly spaced points of lines from a to b, and beyond."""
+    return a[:, None] + (b - a)[:, None] * np.linspace(-0.5, 1.5, 6)[None, :, None]
+
+
+def stage(kind: str, roughness: tuple[float, float]) -> Any:
+    """Fibres between a lamp in front and one behind, under a dim sky; those of a head on one."""
     from recording import RecordingBuilder
 
     builder = RecordingBuilder()
@@ -51,6 +62,13 @@ def stage(ends: Any, radius: float, roughness: tuple[float, float]) -> Any:
     corners = np.array([[-2, -3, 2], [2, -3, 2], [2, -3, -2], [-2, -3, -2]], np.float32)
     quads = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     builder.add_to_group(0, builder.add_mesh(corners, quads, material=grey))
+    if kind == "head":
+        skin = builder.add_material("diffuse", base_color=(0.7, 0.5, 0.4))
+        head = head_mesh(HEAD_LEVEL)
+        shape = builder.add_mesh(
+            head.points, head.faces.astype(np.uint32), normals=head.normals, material=skin
+        )
+        builder.add_to_group(0, shape)
     hair = native.add_material(
         "hair",
         base_color=tuple(colour(a, roughness[1]) for a in ABSORPTION),
@@ -59,13 +77,12 @@ def stage(ends: Any, radius: float, roughness: tuple[float, float]) -> Any:
         cuticle_tilt=TILT,
         ior=1.55,
     )
-    points = np.ascontiguousarray(ends.reshape(-1, 3))
+    points, radius = fibres(kind)
+    layout = lay_out(np.full(len(points), points.shape[1]), "bspline", "nonperiodic")
+    controls = layout.controls(points.reshape(-1, 3), "vertex")
+    radii = np.full(len(controls), radius, np.float32)
     curves = native.add_curves(
-        "linear-tube",
-        points,
-        np.arange(0, len(points), 2, dtype=np.uint32),
-        np.full(len(points), radius, np.float32),
-        material=hair,
+        "cubic-tube", controls, layout.segment_words(), radii, material=hair
     )
     native.add_to_group(0, curves)
     for x, z, turn in ((1.6, 3.0, 0.0), (-1.9, -3.0, math.pi)):
@@ -74,14 +91,20 @@ def stage(ends: Any, radius: float, roughness: tuple[float, float]) -> Any:
         builder.add_light("rect", lamp, width=1.0, height=1.0, color=(9.0, 8.0, 7.0))
     builder.add_light("dome", np.eye(4), color=(0.2, 0.25, 0.3))
     camera = np.eye(4)
-    camera[3, :3] = (0.0, 0.0, 4.5)
-    builder.set_camera(camera, window=(-0.05, 0.05, -0.05, 0.05))
+    wide = 0.4 if kind == "head" else 0.05
+    camera[3, :3] = (0.0, -0.3 if kind == "head" else 0.0, 4.5)
+    builder.set_camera(camera, window=(-wide, wide, -wide, wide))
     return builder
 
 
 @pytest.mark.parametrize(
     ("kind", "roughness", "depth"),
-    [("fibre", (0.3, 0.3), 1), ("fibre", (0.15, 0.5), 4), ("bundle", (0.3, 0.3), 4)],
+    [
+        ("fibre", (0.3, 0.3), 1),
+        ("fibre", (0.15, 0.5), 4),
+        ("bundle", (0.3, 0.3), 4),
+        ("head", (0.25, 0.3), 4),
+    ],
 )
 def test_hair(
     mitsuba: ModuleType,
@@ -92,14 +115,12 @@ def test_hair(
     roughness: tuple[float, float],
     depth: int,
 ) -> None:
-    """A fibre alone, smooth and rough; and light that goes from fibre to fibre."""
+    """A fibre alone, smooth and rough; and light that goes from fibre to fibre, and to a head."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
-    ends, radius = fibres(kind)
+    points, radius = fibres(kind)
     file = tmp_path / "fibres.txt"
-    # A B-spline through evenly spaced points of a line: Mitsuba's linear curves have no tangents.
-    lines = [a + (b - a) * np.linspace(-0.5, 1.5, 6)[:, None] for a, b in ends.astype(float)]
-    rows = ["\n".join(f"{x} {y} {z} {radius}" for x, y, z in line) for line in lines]
+    rows = ["\n".join(f"{x} {y} {z} {radius}" for x, y, z in strand) for strand in points]
     file.write_text("\n\n".join(rows) + "\n")
 
     class WithFibres(MitsubaScene):
@@ -118,7 +139,7 @@ def test_hair(
             shape = {"type": "bsplinecurve", "filename": str(file), "bsdf": bsdf}
             return super()._geometry() | {"fibres": shape}
 
-    recorded = stage(ends, radius, roughness)
+    recorded = stage(kind, roughness)
     recorded.build()
     peer = WithFibres(mitsuba, recorded, PeerSettings(SIZE, SIZE, depth))
     spp = (256 if kind == "fibre" else 128) // fewer

@@ -4,7 +4,10 @@
 
 #include <embree4/rtcore.h>
 
+#include <memory>
+
 #include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/curve/clumps.h"
 
 namespace wavecomb {
 
@@ -14,6 +17,8 @@ struct CurveGeometry {
   uint32_t id;       ///< of the mesh
   bool is_filtered;  ///< some of it may be partly present
   bool is_fibre;     ///< rays meet it from outside alone
+  /// What the hierarchy is made over; points, and curves that deform, are alone in it.
+  std::unique_ptr<const CurveClumps> clumps;
 };
 
 /// A committed geometry of a mesh of curves or points, to be released by the caller.

@@ -90,7 +90,10 @@ RTCDevice EmbreeHierarchy::device() const {
 }
 
 size_t EmbreeHierarchy::bytes() const {
-  return static_cast<size_t>(std::max<int64_t>(0, device_->bytes));
+  size_t clumps = 0;
+  for (const auto& [mesh, curves] : curves_)
+    if (curves->clumps) clumps += curves->clumps->bytes();
+  return static_cast<size_t>(std::max<int64_t>(0, device_->bytes)) + clumps;
 }
 
 bool EmbreeHierarchy::fits(const Scene& scene) const {
@@ -121,8 +124,9 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
   const Mesh& mesh = geometry_->meshes[mesh_id];
   if (mesh.is_curved()) {
     auto& curves = curves_[mesh_id];
-    curves = std::make_shared<const CurveGeometry>(
-        CurveGeometry{&mesh, mesh_id, filtered_[mesh_id] != 0, fibres_[mesh_id] != 0});
+    curves = std::make_shared<const CurveGeometry>(CurveGeometry{
+        &mesh, mesh_id, filtered_[mesh_id] != 0, fibres_[mesh_id] != 0,
+        CurveClumps::serve(mesh) ? std::make_unique<const CurveClumps>(mesh) : nullptr});
     return make_curve_geometry(device(), *curves, rule_);
   }
   RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);

@@ -22,9 +22,10 @@ struct NamedExpression {
 };
 
 /// What a scattering does: reflects or transmits, by a diffuse, a glossy or a singular lobe (a
-/// mirror's); or is one within a volume.
-enum class PathEvent : uint32_t { kReflection = 0, kTransmission = 3, kVolume = 6 };
-inline constexpr uint32_t kPathEvents = 7;
+/// mirror's); or is one within a volume; or leads below a surface, to walk there and leave by a
+/// reflection.
+enum class PathEvent : uint32_t { kReflection = 0, kTransmission = 3, kVolume = 6, kBelow = 7 };
+inline constexpr uint32_t kPathEvents = 8;
 /// To be added to a reflection or a transmission.
 inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 2;
 

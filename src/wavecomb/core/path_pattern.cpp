@@ -33,7 +33,10 @@ PathSymbols symbols_of_letter(char letter) {
       events({3, 4, 5});
       break;
     case 'V':
-      events({6});
+      events({static_cast<uint32_t>(PathEvent::kVolume)});
+      break;
+    case 'W':
+      events({static_cast<uint32_t>(PathEvent::kBelow)});
       break;
     case 'D':
       events({kDiffuseEvent, 3 + kDiffuseEvent});
@@ -164,7 +167,7 @@ class ExpressionParser {
   /// A letter, '.', <...> or [...].
   PathSymbols symbol() {
     if (take('<')) return event();
-    if (!take('[')) return letter(".CLOBRTVDGS");
+    if (!take('[')) return letter(".CLOBRTVWDGS");
     const bool is_negated = take('^');
     PathSymbols s;
     while (!take(']')) {
@@ -199,7 +202,7 @@ class ExpressionParser {
 
   /// What follows '<': what it is, how it scatters, and the group of a light.
   PathSymbols event() {
-    PathSymbols s = place(".CLOBRTV");
+    PathSymbols s = place(".CLOBRTVW");
     // What ends a path scatters not: <L.> is L.
     if (peek() != '>' && peek() != '\'') {
       const PathSymbols scattered = place(".DGS");

@@ -130,14 +130,14 @@ class PathExpressions {
   static UInt<F> state_of(const UInt<F>& states, uint32_t colour) {
     return (states >> (kStateBits * colour)) & kStateMask;
   }
-  /// The state after a scattering; one in a volume has no lobes.
+  /// The state after a scattering; those in volumes and below surfaces have no lobes.
   template <typename F>
   UInt<F> next(const UInt<F>& state, const UInt<F>& event, const UInt<F>& lobe,
                const Mask<F>& active) const {
     using U = UInt<F>;
     const U volume(static_cast<uint32_t>(PathEvent::kVolume));
     const U at =
-        state * PathAutomaton::kNextWords + event + select(Mask<U>(event == volume), U(0u), lobe);
+        state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
     return gather<U>(automaton_->next.data(), at, Mask<U>(active));
   }
   template <typename F>

@@ -24,6 +24,7 @@ from wavecomb.usd.geometry.mesh_arrays import (
 )
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, as_array, read_primvar
 from wavecomb.usd.geometry.shutter import Motion
+from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.strands import Strands, lay_out
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
@@ -84,6 +85,7 @@ class CurveReader:
         matrix: Gf.Matrix4d,
         uv_names: Sequence[str],
         inherited: Sequence[Any] = (),
+        detail: StrandDetail | None = None,
     ) -> CurveArrays | None:
         """Curves in their group's space; None where there are none.
 
@@ -92,6 +94,7 @@ class CurveReader:
             matrix: From the prim to its group, with a ``uniform_scale``.
             uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
             inherited: Primvars of its ancestors.
+            detail: Leaves some out, and widens the others; the group is the world then.
 
         Raises:
             MeshError: They cannot be drawn.
@@ -104,12 +107,18 @@ class CurveReader:
         strands = self._layout(prim, counts[:, 0].astype(np.intp), len(points))
         if strands is None:
             return None
+        widths, kind = read_widths(prim, strands, self.time, self.report)
+        wider = None
+        if detail is not None:
+            greatest = strands.greatest(widths, kind)
+            strands, wider = detail.thin(prim.GetPath(), strands, points, greatest, matrix)
         positions = strands.controls(points, "vertex")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
-        widths, kind = read_widths(prim, strands, self.time, self.report)
         scale = 0.5 * (uniform_scale(matrix) or 1.0)
         radii = np.maximum(strands.controls(widths, kind)[:, 0] * np.float32(scale), 0)
+        if wider is not None:
+            radii *= strands.at_controls(wider)
         bounds = thick_extent(positions, radii)
         normals = self.normals(prim, strands)
         if normals is not None and matrix != IDENTITY:

@@ -15,6 +15,7 @@ from wavecomb.usd.geometry.mesh_arrays import UV_NAMES, MeshArrays
 from wavecomb.usd.geometry.points import PointReader
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.skeleton import Skeletons
+from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.looks.assign import Draw
 from wavecomb.usd.stage.frame_cache import MeshCache
@@ -65,7 +66,13 @@ class GprimReader:
         """Whether the shape of a gprim may change over time."""
         return kind != "shape" and deforms(prim, self.skeletons.of(prim))
 
-    def read(self, kind: str, draw: Draw, names: Sequence[str]) -> MeshArrays | CurveArrays | None:
+    def read(
+        self,
+        kind: str,
+        draw: Draw,
+        names: Sequence[str],
+        detail: StrandDetail | None = None,
+    ) -> MeshArrays | CurveArrays | None:
         """The arrays of a gprim in its group's space; None where there is nothing to draw.
 
         Those of the frame before where they are the same.
@@ -74,6 +81,7 @@ class GprimReader:
             kind: mesh, shape, curves or points.
             draw: The gprim.
             names: Primvars to take texture coordinates from, the first there is.
+            detail: Of curves; what it makes of them is of one view, and not kept.
 
         Raises:
             MeshError: It cannot be drawn.
@@ -85,7 +93,7 @@ class GprimReader:
             if kind in ("curves", "points"):
                 if kind == "curves":
                     curves = CurveReader(self.time, report)
-                    strands = curves.curves(draw.prim, draw.matrix, names, draw.inherited)
+                    strands = curves.curves(draw.prim, draw.matrix, names, draw.inherited, detail)
                 else:
                     points = PointReader(self.time, report)
                     strands = points.points(draw.prim, draw.matrix, names, draw.inherited)
@@ -104,7 +112,7 @@ class GprimReader:
                 return meshes.over_shutter(draw.prim, mesh, draw.matrix, draw.track)
             return mesh
 
-        if self.cache is None or self._changes(kind, draw.prim):
+        if self.cache is None or detail is not None or self._changes(kind, draw.prim):
             return read(self.report)
         options = (tuple(names), names is UV_NAMES, displaced)
         return self.cache.get(read, draw.prim, draw.matrix, options, draw.inherited, self.report)

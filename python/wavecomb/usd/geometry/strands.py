@@ -8,7 +8,7 @@ rounding.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +83,25 @@ class Strands:
         """Points of the prim."""
         return self.sizes["vertex"]
 
+    def only(self, kept: NDArray[np.bool_]) -> Strands:
+        """Those of the curves for which ``kept``, (k,), holds."""
+        fields = ("kept", "counts", "starts", "segments", "varying_starts")
+        return replace(self, **{name: getattr(self, name)[kept] for name in fields})
+
+    def over_each(self, combine: np.ufunc, values: NDArray[Any]) -> NDArray[np.float64]:
+        """(k,) ``combine`` over the values (n,) of each curve's authored points."""
+        owner, at = _runs(self.counts)
+        mine = np.asarray(values, np.float64)[self.starts[owner] + at]
+        return np.asarray(combine.reduceat(mine, np.cumsum(self.counts) - self.counts))
+
+    def greatest(self, values: NDArray[Any], kind: str) -> NDArray[np.float64]:
+        """(k,) the greatest of the values (n, 1) of an interpolation on each curve."""
+        if kind == "vertex":
+            return self.over_each(np.maximum, values[:, 0])
+        first, last = self.ends(values, kind)
+        starts = np.cumsum(self.segments) - self.segments
+        return np.asarray(np.maximum.reduceat(np.maximum(first, last)[:, 0], starts))
+
     def segment_words(self) -> NDArray[np.uint32]:
         """(count,) first control point of each segment, with flags."""
         step, lead = (3 if self.cubic else 1), (1 if self.periodic else 0)
@@ -116,6 +135,11 @@ class Strands:
                 else [first, last]
             )
         return self._pack(points)
+
+    def at_controls(self, each: NDArray[Any]) -> Array:
+        """A value (k,) of each curve at every one of its control points, as float32."""
+        first = np.repeat(np.asarray(each, np.float64), self.segments)[:, None]
+        return self._pack([first] * (4 if self.cubic else 2))[:, 0]
 
     def ends(
         self, values: NDArray[Any], kind: str

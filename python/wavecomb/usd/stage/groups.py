@@ -16,6 +16,7 @@ from wavecomb.usd.geometry.attributes import on_shape
 from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
 from wavecomb.usd.geometry.gprims import GprimReader, add_shape
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays
+from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.lights.mesh_light import MeshLights
@@ -74,12 +75,13 @@ class GroupBuilder:
         cache: MeshCache | None = None,
         progress: LoadProgress | None = None,
         framed: NDArray[np.float64] | None = None,
+        detail: StrandDetail | None = None,
     ) -> None:
         """Makes one for a stage.
 
         ``cache``: arrays of meshes to take from and leave there; ``progress``: is told;
         ``framed``: directions (k, 3) in which a view asks how far the world reaches; groups keep
-        outlines for it.
+        outlines for it; ``detail``: of curves that are in the world itself.
         """
         self.stage = stage
         self.traversal = traversal
@@ -95,6 +97,7 @@ class GroupBuilder:
         )
         self.progress = progress
         self.framed = framed
+        self.detail = detail
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(materials, self.time, report)
         self.mesh_lights = MeshLights(builder, traversal.lights, materials, report)
@@ -198,7 +201,8 @@ class GroupBuilder:
         path = str(draw.prim.GetPath())
         trail.note("reading", path)
         try:
-            shape = self.gprims.read(kind, draw, names)
+            detail = self.detail if kind == "curves" and group.number == 0 else None
+            shape = self.gprims.read(kind, draw, names, detail)
         except MeshError as error:
             self.report.warn(f"{_WORDS[kind]} left out: {error}", path)
             return

@@ -21,9 +21,16 @@ from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import trail
 from wavecomb.run.isolate.memory import describe_limit
 from wavecomb.usd import mtlx
-from wavecomb.usd.cameras.camera import camera_motion, frame_planes, frame_points, read_camera
+from wavecomb.usd.cameras.camera import (
+    View,
+    camera_motion,
+    frame_planes,
+    frame_points,
+    read_camera,
+)
 from wavecomb.usd.cameras.framing import corners, joined
 from wavecomb.usd.geometry.shutter import find_motion
+from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces, parse_level
 from wavecomb.usd.geometry.view_size import ViewSize
 from wavecomb.usd.lights.dome import soft_dome, up_rotation
@@ -302,6 +309,7 @@ def _read(
     groups_of = GroupBuilder(
         stage, traversal, builder, materials, groups, report, surfaces, meshes, progress,
         framed=planes if view is None else None,
+        detail=_strand_detail(view, choice.options, report),
     )  # fmt: skip
     world = groups_of.world()
     lit = materials.glows or has_lights or groups_of.mesh_lights.any or groups_of.volumes.glow
@@ -324,6 +332,18 @@ def _read(
         cache.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
     return chosen, light_paths, None if motion is None else motion.shutter, outline, volumes
+
+
+def _strand_detail(
+    view: View | None, options: LoadOptions, report: LoadReport
+) -> StrandDetail | None:
+    """What thins out strands for a view, if that is asked for."""
+    if options.strand_pixels <= 0:
+        return None
+    if view is None:
+        report.note("strands are not thinned out: there is no camera to say how thin they are")
+        return None
+    return StrandDetail(view, options.size, options.strand_pixels, report)
 
 
 def _hold_out(stage: Usd.Stage, paths: tuple[str, ...], builder: _core.SceneBuilder) -> None:

@@ -58,6 +58,12 @@ template <typename Bsdf, typename F>
       detail::note_scattering<Bsdf, F>(bsdf, wo, frame.to_local(to_light), diffuse, specular);
   aovs.bounce = detail::note_scattering<Bsdf, F>(bsdf, wo, frame.to_local(next), all, all);
   aovs.bounce.is_delta = not_(Mask<F>(pdf > 0.f));
+  if constexpr (Bsdf::kWalks) {
+    using U = UInt<F>;
+    const Mask<F> enters = bsdf.enters(wo, frame.to_local(next));
+    aovs.bounce.event = select(Mask<U>(enters), U(static_cast<uint32_t>(PathEvent::kBelow)),
+                               aovs.bounce.event);
+  }
 }
 
 }  // namespace wavecomb

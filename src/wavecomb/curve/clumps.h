@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Segments of curves in clumps of eight, and what a ray may meet of a clump.
+///
+/// Boxes of hair are a hundred times longer than a strand is wide: of the segments whose box a ray
+/// meets, it passes by nearly all, and each of them costs memory from another place. So a hierarchy
+/// is made over clumps of segments that lie close together. A clump has their control points side
+/// by side, in 16 bits, and a ray is tested against the eight at once. What may be met goes to
+/// intersect_curve; a clump's own test says nothing but "perhaps" or "certainly not", so that it
+/// changes no picture.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "wavecomb/curve/intersect.h"
+
+namespace wavecomb {
+
+/// Of one mesh of curves that keeps its shape (see serve); the mesh must outlive it.
+class CurveClumps {
+ public:
+  static constexpr uint32_t kSegments = 8;  ///< at most, in a clump
+
+  /// Whether a mesh is one of those that clumps are for.
+  static bool serve(const Mesh& mesh) {
+    return mesh.is_curved() && mesh.primitive != Primitive::kSphere && !mesh.deforms();
+  }
+
+  explicit CurveClumps(const Mesh& mesh);
+
+  uint32_t count() const { return static_cast<uint32_t>(clumps_.size()); }
+  size_t bytes() const { return clumps_.size() * sizeof(Clump); }
+
+  /// Of all segments of a clump, as curve_bounds has them.
+  Bounds bounds(uint32_t clump) const;
+
+  /// A bit for each segment that a ray may meet with 0 < t <= tfar.
+  uint32_t may_meet(uint32_t clump, const float (&origin)[3], const float (&dir)[3],
+                    float tfar) const;
+
+  /// Number of a segment in its mesh; `k`: of a bit of may_meet.
+  uint32_t segment(uint32_t clump, uint32_t k) const { return clumps_[clump].segment[k]; }
+
+ private:
+  static constexpr uint32_t kNone = 0xffffffffu;
+
+  /// Control point p of segment k, along an axis, is low[axis] + step[axis] * at[3 p + axis][k].
+  struct alignas(32) Clump {
+    std::array<std::array<uint16_t, kSegments>, 12> at;
+    std::array<float, kSegments> radius;  ///< the greatest, with what 16 bits leave out
+    std::array<uint32_t, kSegments> segment;
+    std::array<float, 3> low, step;
+  };
+
+  Clump make(const uint32_t* first, uint32_t n) const;
+
+  const Mesh& mesh_;
+  std::vector<Clump> clumps_;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "curve_testing.h"
+#include "wavecomb/curve/clumps.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace curve_testing;
+
+constexpr Primitive kStrands[] = {Primitive::kLinearTube, Primitive::kCubicTube,
+                                  Primitive::kLinearRibbon, Primitive::kCubicRibbon};
+
+float uniform(std::mt19937& rng) {
+  return std::uniform_real_distribution<float>(-1, 1)(rng);
+}
+
+struct TestRay {
+  float o[3], d[3];
+};
+
+/// A ray that passes near a control point: at `near` times the radius.
+TestRay aimed(const Mesh& mesh, std::mt19937& rng, float near) {
+  const size_t point = rng() % mesh.vertex_count();
+  const float reach = near * mesh.radii[point], scale = std::exp(2.f * uniform(rng));
+  TestRay ray{};
+  for (int k = 0; k < 3; ++k) {
+    const float to = mesh.positions[3 * point + k] + reach * uniform(rng);
+    ray.o[k] = mesh.positions[3 * point + k] + 0.5f * uniform(rng);
+    ray.d[k] = scale * (to - ray.o[k]);
+  }
+  return ray;
+}
+
+/// Calls look(prim, may be met, is met) for all segments.
+template <typename Look>
+void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, float tfar,
+             const Look& look) {
+  for (uint32_t c = 0; c < clumps.count(); ++c) {
+    const uint32_t bits = clumps.may_meet(c, ray.o, ray.d, tfar);
+    for (uint32_t k = 0; k < CurveClumps::kSegments; ++k) {
+      const uint32_t prim = clumps.segment(c, k);
+      if (prim >= mesh.primitive_count()) {
+        EXPECT_EQ(bits >> k & 1u, 0u);
+        continue;
+      }
+      const CurveHits hits = intersect_curve(mesh, prim, ray.o, ray.d, tfar, true);
+      look(prim, (bits >> k & 1u) != 0, hits.begin() != hits.end());
+    }
+  }
+}
+
+TEST(CurveClumps, HoldEachSegmentOnceAndItsBox) {
+  for (const Primitive primitive : kStrands) {
+    const Mesh mesh = make_curves(strands(primitive, 27, 3, 1.f, 0.01f, 5));
+    const CurveClumps clumps(mesh);
+    std::multiset<uint32_t> found;
+    for (uint32_t c = 0; c < clumps.count(); ++c)
+      for (uint32_t k = 0; k < CurveClumps::kSegments; ++k) {
+        const uint32_t prim = clumps.segment(c, k);
+        if (prim >= mesh.primitive_count()) continue;
+        found.insert(prim);
+        const Bounds all = clumps.bounds(c), one = curve_bounds(mesh, prim);
+        EXPECT_TRUE(all.lo.x <= one.lo.x && all.lo.y <= one.lo.y && all.lo.z <= one.lo.z);
+        EXPECT_TRUE(all.hi.x >= one.hi.x && all.hi.y >= one.hi.y && all.hi.z >= one.hi.z);
+      }
+    EXPECT_EQ(found.size(), mesh.primitive_count());
+    EXPECT_EQ(std::set<uint32_t>(found.begin(), found.end()).size(), mesh.primitive_count());
+    EXPECT_EQ(clumps.count(), (mesh.primitive_count() + 7) / 8);
+  }
+}
+
+TEST(CurveClumps, LetThroughAllThatIsMet) {
+  std::mt19937 rng(7);
+  for (const Primitive primitive : kStrands)
+    for (const float radius : {1e-5f, 1e-3f, 0.1f})
+      for (const float away : {0.f, 300.f}) {
+        CurveData made = strands(primitive, 30, 2, 1.f, radius, 3);
+        for (float& x : made.positions) x += away;
+        const Mesh mesh = make_curves(made);
+        const CurveClumps clumps(mesh);
+        size_t met = 0;
+        for (uint32_t i = 0; i < 300; ++i) {
+          const TestRay ray = aimed(mesh, rng, i % 2 == 0 ? 1.05f : 0.f);
+          const float tfar = i % 3 == 0 ? 0.7f : kInf;
+          compare(mesh, clumps, ray, tfar, [&](uint32_t prim, bool may, bool is) {
+            met += is;
+            EXPECT_TRUE(may || !is) << "segment " << prim << ", radius " << radius << ", " << away;
+          });
+        }
+        if (away == 0.f) EXPECT_GT(met, 30u);
+      }
+}
+
+TEST(CurveClumps, LetThroughLittleElseOfHair) {
+  std::mt19937 rng(9);
+  const Mesh mesh = make_curves(strands(Primitive::kCubicTube, 200, 2, 1.f, 1e-3f, 3));
+  const CurveClumps clumps(mesh);
+  size_t may = 0, is = 0, all = 0;
+  for (uint32_t i = 0; i < 200; ++i)
+    compare(mesh, clumps, aimed(mesh, rng, 0.5f), kInf, [&](uint32_t, bool let, bool met) {
+      ++all;
+      may += let;
+      is += met;
+    });
+  EXPECT_LT(may, 3 * is);
+  EXPECT_LT(may, all / 50);
+}
+
+}  // namespace
+}  // namespace wavecomb
