@@ -147,25 +147,26 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
         lo[axis] = std::min(lo[axis], x);
         hi[axis] = std::max(hi[axis], x);
       }
-  float cell = 0;
+  float widest = 0;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     out.low[axis] = lo[axis];
     out.step[axis] = (hi[axis] - lo[axis]) / kCells;
-    cell = std::max(cell, out.step[axis]);
+    widest = std::max(widest, out.step[axis]);
   }
   for (uint32_t k = 0; k < kSegments; ++k) {
     float radius = 0;
     for (uint32_t p = 0; p < 4; ++p) {
-      const size_t i = point(k, p);
-      radius = std::max(radius, mesh_.radii[i]);
+      const size_t at = point(k, p);
+      radius = std::max(radius, mesh_.radii[at]);
       for (uint32_t axis = 0; axis < 3; ++axis) {
-        const float x = (mesh_.positions[3 * i + axis] - lo[axis]) / out.step[axis];
-        out.at[3 * p + axis][k] =
-            out.step[axis] > 0 ? static_cast<uint16_t>(x + 0.5f) : uint16_t{0};
+        const float x = (mesh_.positions[3 * at + axis] - lo[axis]) / out.step[axis];
+        const uint32_t i = 3 * p + axis;
+        const uint32_t cell = out.step[axis] > 0 ? static_cast<uint32_t>(x + 0.5f) : 0u;
+        out.cells[i / 2][k] |= cell << (16 * (i % 2));
       }
     }
-    out.radius[k] =
-        1.0001f * radius + cell;  // rounding to cells moves a point by sqrt(3) / 2 cells
+    // Rounding to cells moves a point by less than one.
+    out.radius[k] = 1.0001f * radius + widest;
     out.segment[k] = k < n ? first[k] : kNone;
   }
   return out;
@@ -192,9 +193,10 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const float (&origin)[3], const f
                              (radius + sizes) * (kClumpRounding * clump_size(dir)),
                              F(extent)};
   const auto coordinate = [&](uint32_t p, uint32_t axis) {
-    alignas(32) std::array<float, kSegments> cells;
-    for (uint32_t k = 0; k < kSegments; ++k) cells[k] = c.at[3 * p + axis][k];
-    return fma(load<F>(cells.data()), F(c.step[axis]), F(from[axis]));
+    const uint32_t i = 3 * p + axis;
+    const UInt<F> cells = load<UInt<F>>(c.cells[i / 2].data());
+    const UInt<F> mine = i % 2 == 0 ? UInt<F>(cells & 0xffffu) : UInt<F>(cells >> 16u);
+    return fma(F(Int<F>(mine)), F(c.step[axis]), F(from[axis]));
   };
   ClumpHull hull;
   for (uint32_t p = 0; p < 4; ++p)

@@ -45,9 +45,10 @@ class CurveClumps {
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// Control point p of segment k, along an axis, is low[axis] + step[axis] * at[3 p + axis][k].
+  /// Control point p of segment k, along an axis, is low[axis] + step[axis] * cell, with cell of 16
+  /// bits: those of coordinate i = 3 p + axis are in cells[i / 2][k], the upper ones for odd i.
   struct alignas(32) Clump {
-    std::array<std::array<uint16_t, kSegments>, 12> at;
+    std::array<std::array<uint32_t, kSegments>, 6> cells;
     std::array<float, kSegments> radius;  ///< the greatest, with what 16 bits leave out
     std::array<uint32_t, kSegments> segment;
     std::array<float, 3> low, step;
