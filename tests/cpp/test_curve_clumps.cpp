@@ -40,7 +40,7 @@ template <typename Look>
 void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, float tfar,
              const Look& look) {
   for (uint32_t c = 0; c < clumps.count(); ++c) {
-    const uint32_t bits = clumps.may_meet(c, ray.o, ray.d, tfar);
+    const uint32_t bits = clumps.may_meet(c, CurveClumps::Ray(ray.o, ray.d), tfar);
     for (uint32_t k = 0; k < CurveClumps::kSegments; ++k) {
       const uint32_t prim = clumps.segment(c, k);
       if (prim >= mesh.primitive_count()) {

@@ -45,7 +45,7 @@ void for_first_hits(const Arguments& args, RTCRayN* rays, const Found& found) {
       continue;
     }
     // A ray that is occluded has no tfar left.
-    uint32_t left = curves.clumps->may_meet(args.primID, o, d, tfar);
+    uint32_t left = curves.clumps->may_meet(args.primID, CurveClumps::Ray(o, d), tfar);
     for (; left != 0 && tfar >= 0; left &= left - 1)
       meet(curves.clumps->segment(args.primID, static_cast<uint32_t>(std::countr_zero(left))));
   }

@@ -15,7 +15,7 @@ namespace {
 using ClumpLanes = FloatP<CurveClumps::kSegments>;
 
 constexpr float kCells = 65535.f;
-constexpr float kClumpRounding = 4e-6f;  ///< of triple products in float, over the sizes of terms
+constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
 
 /// Parts rows of segments, by the middles of their boxes, until each part fills one clump.
 class ClumpParting {
@@ -65,58 +65,48 @@ float clump_size(const float* v) {
   return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
 }
 
-/// Four control points, or their halves (de Casteljau).
+/// Four control points as the ray sees them, in axes square to it, or their halves (de Casteljau).
 struct ClumpHull {
   using F = ClumpLanes;
-  using V = Vec3<F>;
-
-  V p[4];
+  F x[4], y[4];
 
   ClumpHull first_half() const {
-    const V a = (p[0] + p[1]) * F(0.5f), m = (p[1] + p[2]) * F(0.5f), am = (a + m) * F(0.5f);
-    const V mb = (m + (p[2] + p[3]) * F(0.5f)) * F(0.5f);
-    return {{p[0], a, am, (am + mb) * F(0.5f)}};
+    ClumpHull out;
+    halve(x, out.x);
+    halve(y, out.y);
+    return out;
   }
-  ClumpHull second_half() const { return ClumpHull{{p[3], p[2], p[1], p[0]}}.first_half(); }
+  ClumpHull second_half() const {
+    return ClumpHull{{x[3], x[2], x[1], x[0]}, {y[3], y[2], y[1], y[0]}}.first_half();
+  }
+
+ private:
+  static void halve(const F* p, F* to) {
+    const F half(0.5f), m = (p[1] + p[2]) * half, a = (p[0] + p[1]) * half, am = (a + m) * half;
+    to[0] = p[0];
+    to[1] = a;
+    to[2] = am;
+    to[3] = (am + (m + (p[2] + p[3]) * half) * half) * half;
+  }
 };
 
-/// The ray through the origin against hulls.
-struct ClumpPassing {
+/// Whether the ray, which is the origin here, passes by: all points lie farther than the radius on
+/// one side of a line through it, along the chord or square to it.
+Mask<ClumpLanes> passes(const ClumpHull& h, const ClumpLanes& radius, const ClumpLanes& rounding) {
   using F = ClumpLanes;
-  using V = Vec3<F>;
-
-  V d;
-  F radius;
-  F size_d;
-  F rounding;  ///< of lengths times |d|
-  F extent;    ///< no chord is longer
-
-  /// Whether all points lie farther than the radius on one side of a plane through the origin.
-  Mask<F> is_beside(const ClumpHull& hull, const V& n, const F& margin) const {
-    const F a = dot(n, hull.p[0]), b = dot(n, hull.p[1]), c = dot(n, hull.p[2]),
-            e = dot(n, hull.p[3]);
-    const F least = min(min(a, b), min(c, e)), most = max(max(a, b), max(c, e));
-    const F reach = fma(radius, sqrt(length_squared(n)), margin);
-    return (least > reach) | (most < -reach);
-  }
-
-  /// Planes that hold the ray part it from the hull: that along the chord c, with normal d x c, and
-  /// that square to the chord, with normal (d x c) x d.
-  Mask<F> of(const ClumpHull& hull) const {
-    const V beside = cross(d, V(hull.p[3] - hull.p[0]));
-    const F margin = rounding * extent;
-    return is_beside(hull, beside, margin) | is_beside(hull, cross(beside, d), F(margin * size_d));
-  }
-
-  /// Whether all points lie behind the origin, or farther along the ray than tfar.
-  Mask<F> along(const ClumpHull& hull, float tfar) const {
-    const F a = dot(d, hull.p[0]), b = dot(d, hull.p[1]), c = dot(d, hull.p[2]),
-            e = dot(d, hull.p[3]);
-    const F least = min(min(a, b), min(c, e)), most = max(max(a, b), max(c, e));
-    const F d2 = length_squared(d), reach = fma(radius, sqrt(d2), rounding);
-    return (most < -reach) | (least - reach > d2 * (tfar * 1.00001f));
-  }
-};
+  const F cx = h.x[3] - h.x[0], cy = h.y[3] - h.y[0];
+  const F length = sqrt(fma(cx, cx, F(cy * cy)));
+  // A chord is rounded as the points are; where one of these is within the radius, none is farther
+  // than the chord is long beyond that.
+  const F reach = fma(radius, length, F(rounding * (length + radius)));
+  const auto beside = [&](int k) { return fma(cx, h.y[k], F(-(cy * h.x[k]))); };
+  const auto along = [&](int k) { return fma(cx, h.x[k], F(cy * h.y[k])); };
+  const F b[3] = {beside(0), beside(1), beside(2)};  // and that of 3 is that of 0
+  const F a[4] = {along(0), along(1), along(2), along(3)};
+  return (min(min(b[0], b[1]), b[2]) > reach) | (max(max(b[0], b[1]), b[2]) < -reach) |
+         (min(min(a[0], a[1]), min(a[2], a[3])) > reach) |
+         (max(max(a[0], a[1]), max(a[2], a[3])) < -reach);
+}
 
 }  // namespace
 
@@ -179,36 +169,57 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
   return box;
 }
 
-uint32_t CurveClumps::may_meet(uint32_t clump, const float (&origin)[3], const float (&dir)[3],
-                               float tfar) const {
+CurveClumps::Ray::Ray(const float (&origin)[3], const float (&dir)[3])
+    : o{origin[0], origin[1], origin[2]} {
+  length = std::sqrt(dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
+  const float inverse = 1.f / length;
+  const float d[3] = {dir[0] * inverse, dir[1] * inverse, dir[2] * inverse};
+  const float sign = std::copysign(1.f, d[2]), a = -1.f / (sign + d[2]), b = d[0] * d[1] * a;
+  axis = {{{1.f + sign * d[0] * d[0] * a, sign * b, -sign * d[0]},
+           {b, sign + d[1] * d[1] * a, -d[1]},
+           {d[0], d[1], d[2]}}};
+}
+
+uint32_t CurveClumps::may_meet(uint32_t clump, const Ray& ray, float tfar) const {
   using F = ClumpLanes;
   const Clump& c = clumps_[clump];
-  const float from[3] = {c.low[0] - origin[0], c.low[1] - origin[1], c.low[2] - origin[2]};
-  const float extent = kCells * clump_size(c.step.data());
+  const float from[3] = {c.low[0] - ray.o[0], c.low[1] - ray.o[1], c.low[2] - ray.o[2]};
   const F radius = load<F>(c.radius.data());
-  const float sizes = clump_size(c.low.data()) + clump_size(origin) + extent;
-  const ClumpPassing passing{{F(dir[0]), F(dir[1]), F(dir[2])},
-                             radius,
-                             F(clump_size(dir)),
-                             (radius + sizes) * (kClumpRounding * clump_size(dir)),
-                             F(extent)};
-  const auto coordinate = [&](uint32_t p, uint32_t axis) {
-    const uint32_t i = 3 * p + axis;
-    const UInt<F> cells = load<UInt<F>>(c.cells[i / 2].data());
-    const UInt<F> mine = i % 2 == 0 ? UInt<F>(cells & 0xffffu) : UInt<F>(cells >> 16u);
-    return fma(F(Int<F>(mine)), F(c.step[axis]), F(from[axis]));
-  };
+  const F rounding = (radius + (clump_size(c.low.data()) + clump_size(ray.o.data()) +
+                                kCells * clump_size(c.step.data()))) *
+                     kClumpRounding;
   ClumpHull hull;
-  for (uint32_t p = 0; p < 4; ++p)
-    hull.p[p] = {coordinate(p, 0), coordinate(p, 1), coordinate(p, 2)};
-
-  Mask<F> met = Mask<F>(load<UInt<F>>(c.segment.data()) != UInt<F>(kNone));
-  met &= not_(Mask<F>(passing.along(hull, tfar) | passing.of(hull)));
-  if (none(met) || !mesh_.is_cubic()) return lane_bits<F>(met);
+  F near(0.f), far(0.f);
+  for (uint32_t p = 0; p < 4; ++p) {
+    F cell[3];
+    for (uint32_t k = 0; k < 3; ++k) {
+      const uint32_t i = 3 * p + k;
+      const UInt<F> cells = load<UInt<F>>(c.cells[i / 2].data());
+      cell[k] = F(Int<F>(i % 2 == 0 ? UInt<F>(cells & 0xffffu) : UInt<F>(cells >> 16u)));
+    }
+    const auto along = [&](uint32_t n) {
+      const auto& e = ray.axis[n];
+      const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);
+      return fma(cell[0], F(e[0] * c.step[0]),
+                 fma(cell[1], F(e[1] * c.step[1]), fma(cell[2], F(e[2] * c.step[2]), start)));
+    };
+    hull.x[p] = along(0);
+    hull.y[p] = along(1);
+    const F z = along(2);
+    near = p == 0 ? z : min(near, z);
+    far = p == 0 ? z : max(far, z);
+  }
+  const F reach = radius + rounding;
+  Mask<F> by = (far < -reach) | (near - reach > F(tfar * ray.length * 1.00001f)) |
+               passes(hull, radius, rounding) |
+               Mask<F>(load<UInt<F>>(c.segment.data()) == UInt<F>(kNone));
+  if (all(by) || !mesh_.is_cubic()) return lane_bits<F>(not_(by));
   const ClumpHull a = hull.first_half(), b = hull.second_half();
-  const Mask<F> by = passing.of(a.first_half()) & passing.of(a.second_half()) &
-                     passing.of(b.first_half()) & passing.of(b.second_half());
-  return lane_bits<F>(Mask<F>(met & not_(by)));
+  by |= passes(a, radius, rounding) & passes(b, radius, rounding);
+  if (all(by)) return 0;
+  by |= passes(a.first_half(), radius, rounding) & passes(a.second_half(), radius, rounding) &
+        passes(b.first_half(), radius, rounding) & passes(b.second_half(), radius, rounding);
+  return lane_bits<F>(not_(by));
 }
 
 }  // namespace wavecomb

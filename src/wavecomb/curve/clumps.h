@@ -35,9 +35,17 @@ class CurveClumps {
   /// Of all segments of a clump, as curve_bounds has them.
   Bounds bounds(uint32_t clump) const;
 
+  /// A ray, and axes of which the last is along it.
+  struct Ray {
+    Ray(const float (&origin)[3], const float (&dir)[3]);
+
+    std::array<float, 3> o;
+    std::array<std::array<float, 3>, 3> axis;
+    float length;  ///< of the direction
+  };
+
   /// A bit for each segment that a ray may meet with 0 < t <= tfar.
-  uint32_t may_meet(uint32_t clump, const float (&origin)[3], const float (&dir)[3],
-                    float tfar) const;
+  uint32_t may_meet(uint32_t clump, const Ray& ray, float tfar) const;
 
   /// Number of a segment in its mesh; `k`: of a bit of may_meet.
   uint32_t segment(uint32_t clump, uint32_t k) const { return clumps_[clump].segment[k]; }

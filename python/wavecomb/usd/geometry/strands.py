@@ -30,6 +30,10 @@ _TO_BEZIER: dict[str, NDArray[np.float64]] = {
 """Rows: Bezier control points of a segment from the four authored points about it."""
 
 
+_AT_ONCE = 1 << 16
+"""Segments whose values are worked out together: bounds the memory that it takes."""
+
+
 def _runs(counts: Index) -> tuple[Index, Index]:
     """For runs of so many things each: which run each thing is of, and its place in the run."""
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -83,8 +87,8 @@ class Strands:
         """Points of the prim."""
         return self.sizes["vertex"]
 
-    def only(self, kept: NDArray[np.bool_]) -> Strands:
-        """Those of the curves for which ``kept``, (k,), holds."""
+    def only(self, kept: NDArray[np.bool_] | slice) -> Strands:
+        """Some of the curves: a slice, or those for which ``kept``, (k,), holds."""
         fields = ("kept", "counts", "starts", "segments", "varying_starts")
         return replace(self, **{name: getattr(self, name)[kept] for name in fields})
 
@@ -125,6 +129,8 @@ class Strands:
                 return np.ascontiguousarray(values, np.float32)
             owner, at = _runs(self.counts)
             return np.ascontiguousarray(values[self.starts[owner] + at], np.float32)
+        if self.count > _AT_ONCE and len(self.kept) > 1:
+            return self._controls_by_parts(values, kind)
         if kind == "vertex":
             points = self._bezier(values)
         else:
@@ -135,6 +141,19 @@ class Strands:
                 else [first, last]
             )
         return self._pack(points)
+
+    def _controls_by_parts(self, values: NDArray[Any], kind: str) -> Array:
+        lead = 1 if self.periodic else 0
+        sizes = (3 if self.cubic else 1) * self.segments + 1 + 2 * lead
+        out = np.empty((int(sizes.sum()), values.shape[1]), np.float32)
+        part = np.cumsum(self.segments) // _AT_ONCE
+        firsts = np.flatnonzero(np.diff(part, prepend=-1))
+        at = 0
+        for first, end in zip(firsts, [*firsts[1:], len(self.kept)], strict=True):
+            made = self.only(slice(first, end)).controls(values, kind)
+            out[at : at + len(made)] = made
+            at += len(made)
+        return out
 
     def at_controls(self, each: NDArray[Any]) -> Array:
         """A value (k,) of each curve at every one of its control points, as float32."""
