@@ -2,6 +2,7 @@
 #include "wavecomb/curve/clumps.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -12,25 +13,81 @@
 namespace wavecomb {
 namespace {
 
-using ClumpLanes = FloatP<CurveClumps::kSegments>;
+using ClumpLanes = FloatP<CurveClumps::kPieces>;
 
 constexpr float kCells = 65535.f;
+constexpr float kSlender = 32.f;  ///< chord over radius above which segments are halved
+constexpr size_t kFewSegments = 1u << 18;
 constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
 
-/// Parts rows of segments, by the middles of their boxes, until each part fills one clump.
+/// A segment, or a half or quarter of it: its control points and its greatest radius. Lines have
+/// their two ends, each twice.
+struct ClumpPiece {
+  std::array<Vec3<float>, 4> p;
+  float radius = 0;
+};
+
+/// Pieces are numbered segment by segment as nodes of a tree: 1 is all of a segment, 2 n and 2 n +
+/// 1 are the halves of n.
+constexpr uint32_t kPieceNodes = 8;
+
+ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
+  ClumpPiece out;
+  const auto points = static_cast<uint32_t>(mesh.segment_points());
+  const size_t first = mesh.indices[number / kPieceNodes] & kCurveFirstPoint;
+  for (uint32_t k = 0; k < 4; ++k) {
+    const size_t i = first + (points == 4 ? k : k / 2);
+    out.p[k] = {mesh.positions[3 * i], mesh.positions[3 * i + 1], mesh.positions[3 * i + 2]};
+    out.radius = std::max(out.radius, mesh.radii[i]);
+  }
+  auto& p = out.p;
+  const uint32_t node = number % kPieceNodes;
+  for (uint32_t bit = std::bit_floor(node) / 2; bit > 0; bit /= 2) {
+    const Vec3<float> a = (p[0] + p[1]) * 0.5f, m = (p[1] + p[2]) * 0.5f, b = (p[2] + p[3]) * 0.5f;
+    const Vec3<float> am = (a + m) * 0.5f, mb = (m + b) * 0.5f, middle = (am + mb) * 0.5f;
+    if ((node & bit) == 0)
+      p = {p[0], a, am, middle};
+    else
+      p = {middle, mb, b, p[3]};
+  }
+  return out;
+}
+
+/// How often a segment is halved, so that boxes of what runs across the axes are less empty: a
+/// clump's box is as large as the pieces in it are long. Halves take as much memory as the segments
+/// themselves, so that quarters are made of few.
+uint32_t halvings(const Mesh& mesh, uint32_t segment) {
+  if (!mesh.is_cubic()) return 0;
+  const ClumpPiece whole = piece_of(mesh, kPieceNodes * segment + 1);
+  const Vec3<float> chord = whole.p[3] - whole.p[0];
+  if (!(std::sqrt(dot(chord, chord)) > kSlender * whole.radius)) return 0;
+  return mesh.indices.size() <= kFewSegments ? 2 : 1;
+}
+
+std::vector<uint32_t> pieces_of(const Mesh& mesh) {
+  std::vector<uint32_t> out;
+  for (uint32_t s = 0; s < mesh.indices.size(); ++s) {
+    const uint32_t n = 1u << halvings(mesh, s);
+    for (uint32_t i = 0; i < n; ++i) out.push_back(kPieceNodes * s + n + i);
+  }
+  return out;
+}
+
+/// Parts rows of pieces, by the middles of their chords, until each part fills one clump.
 class ClumpParting {
  public:
-  explicit ClumpParting(const Mesh& mesh) : middles_(mesh.indices.size()) {
-    for (uint32_t s = 0; s < middles_.size(); ++s) {
-      const Bounds box = curve_bounds(mesh, s);
-      const Vec3<float> middle = box.lo + box.hi;
-      middles_[s] = {middle.x, middle.y, middle.z};
+  explicit ClumpParting(const Mesh& mesh, std::span<const uint32_t> pieces) {
+    middles_.reserve(pieces.size());
+    for (const uint32_t piece : pieces) {
+      const ClumpPiece one = piece_of(mesh, piece);
+      const Vec3<float> m = one.p[0] + one.p[3];
+      middles_.push_back({m.x, m.y, m.z});
     }
   }
 
   /// Sorts; all clumps but the last are full.
   void run(std::span<uint32_t> segments) const {
-    constexpr size_t kFull = CurveClumps::kSegments;
+    constexpr size_t kFull = CurveClumps::kPieces;
     if (segments.size() <= kFull) return;
     const int axis = longest(segments);
     const size_t half = ((segments.size() + kFull - 1) / kFull + 1) / 2 * kFull;
@@ -111,61 +168,64 @@ Mask<ClumpLanes> passes(const ClumpHull& h, const ClumpLanes& radius, const Clum
 }  // namespace
 
 CurveClumps::CurveClumps(const Mesh& mesh) : mesh_(mesh) {
-  std::vector<uint32_t> order(mesh.indices.size());
+  const std::vector<uint32_t> pieces = pieces_of(mesh);
+  std::vector<uint32_t> order(pieces.size());
   std::iota(order.begin(), order.end(), 0u);
-  ClumpParting(mesh).run(order);
-  clumps_.reserve((order.size() + kSegments - 1) / kSegments);
-  for (size_t first = 0; first < order.size(); first += kSegments)
-    clumps_.push_back(make(
-        &order[first], static_cast<uint32_t>(std::min<size_t>(kSegments, order.size() - first))));
+  ClumpParting(mesh, pieces).run(order);
+  for (uint32_t& one : order) one = pieces[one];
+  clumps_.reserve((order.size() + kPieces - 1) / kPieces);
+  for (size_t first = 0; first < order.size(); first += kPieces)
+    clumps_.push_back(make(&order[first],
+                           static_cast<uint32_t>(std::min<size_t>(kPieces, order.size() - first))));
 }
 
 CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
   Clump out{};
-  const auto points = static_cast<uint32_t>(mesh_.segment_points());
-  const auto point = [&](uint32_t k, uint32_t p) {
-    const uint32_t segment = first[std::min(k, n - 1)];
-    return (mesh_.indices[segment] & kCurveFirstPoint) + std::min(p, points - 1);
-  };
-  std::array<float, 3> lo, hi;
-  lo.fill(kInfinity);
-  hi.fill(-kInfinity);
-  for (uint32_t k = 0; k < n; ++k)
-    for (uint32_t p = 0; p < points; ++p)
-      for (uint32_t axis = 0; axis < 3; ++axis) {
-        const float x = mesh_.positions[3 * size_t{point(k, p)} + axis];
-        lo[axis] = std::min(lo[axis], x);
-        hi[axis] = std::max(hi[axis], x);
-      }
-  float widest = 0;
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    out.low[axis] = lo[axis];
-    out.step[axis] = (hi[axis] - lo[axis]) / kCells;
-    widest = std::max(widest, out.step[axis]);
+  std::array<ClumpPiece, kPieces> pieces;
+  Bounds box;
+  for (uint32_t k = 0; k < kPieces; ++k) {
+    pieces[k] = piece_of(mesh_, first[std::min(k, n - 1)]);
+    for (const Vec3<float>& p : pieces[k].p) box.add(p);
+    out.segment[k] = k < n ? first[k] / kPieceNodes : kNone;
   }
-  for (uint32_t k = 0; k < kSegments; ++k) {
-    float radius = 0;
+  const Vec3<float> step = (box.hi - box.lo) * (1.f / kCells);
+  out.low = {box.lo.x, box.lo.y, box.lo.z};
+  out.step = {step.x, step.y, step.z};
+  const float widest = std::max(step.x, std::max(step.y, step.z));
+  for (uint32_t k = 0; k < kPieces; ++k) {
     for (uint32_t p = 0; p < 4; ++p) {
-      const size_t at = point(k, p);
-      radius = std::max(radius, mesh_.radii[at]);
+      const Vec3<float> at = pieces[k].p[p] - box.lo;
+      const float offset[3] = {at.x, at.y, at.z};
       for (uint32_t axis = 0; axis < 3; ++axis) {
-        const float x = (mesh_.positions[3 * at + axis] - lo[axis]) / out.step[axis];
         const uint32_t i = 3 * p + axis;
-        const uint32_t cell = out.step[axis] > 0 ? static_cast<uint32_t>(x + 0.5f) : 0u;
-        out.cells[i / 2][k] |= cell << (16 * (i % 2));
+        const float cell = out.step[axis] > 0 ? offset[axis] / out.step[axis] : 0.f;
+        out.cells[i / 2][k] |= static_cast<uint32_t>(std::min(cell + 0.5f, kCells))
+                               << (16 * (i % 2));
       }
     }
     // Rounding to cells moves a point by less than one.
-    out.radius[k] = 1.0001f * radius + widest;
-    out.segment[k] = k < n ? first[k] : kNone;
+    out.radius[k] = 1.0001f * pieces[k].radius + widest;
   }
   return out;
 }
 
 Bounds CurveClumps::bounds(uint32_t clump) const {
+  const Clump& c = clumps_[clump];
   Bounds box;
-  for (const uint32_t s : clumps_[clump].segment)
-    if (s != kNone) box.add(curve_bounds(mesh_, s));
+  for (uint32_t k = 0; k < kPieces; ++k)
+    for (uint32_t p = 0; p < 4; ++p) {
+      float lo[3], hi[3];
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        const uint32_t i = 3 * p + axis;
+        const float cell = static_cast<float>((c.cells[i / 2][k] >> (16 * (i % 2))) & 0xffffu);
+        const float x = c.low[axis] + c.step[axis] * cell;
+        const float reach = c.radius[k] + 1e-6f * std::abs(x);
+        lo[axis] = x - reach;
+        hi[axis] = x + reach;
+      }
+      box.add({lo[0], lo[1], lo[2]});
+      box.add({hi[0], hi[1], hi[2]});
+    }
   return box;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Segments of curves in clumps of eight, and what a ray may meet of a clump.
+/// Pieces of curves in clumps of eight, and what a ray may meet of a clump.
 ///
 /// Boxes of hair are a hundred times longer than a strand is wide: of the segments whose box a ray
 /// meets, it passes by nearly all, and each of them costs memory from another place. So a hierarchy
-/// is made over clumps of segments that lie close together. A clump has their control points side
-/// by side, in 16 bits, and a ray is tested against the eight at once. What may be met goes to
-/// intersect_curve; a clump's own test says nothing but "perhaps" or "certainly not", so that it
-/// changes no picture.
+/// is made over clumps of pieces that lie close together: segments, or parts of slender ones. A
+/// clump has their control points side by side, in 16 bits, and a ray is tested against the eight
+/// at once. Segments of which a piece may be met go to intersect_curve; a clump's own test says
+/// nothing but "perhaps" or "certainly not", so that it changes no picture.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ namespace wavecomb {
 /// Of one mesh of curves that keeps its shape (see serve); the mesh must outlive it.
 class CurveClumps {
  public:
-  static constexpr uint32_t kSegments = 8;  ///< at most, in a clump
+  static constexpr uint32_t kPieces = 8;  ///< of a clump, at most
 
   /// Whether a mesh is one of those that clumps are for.
   static bool serve(const Mesh& mesh) {
@@ -32,7 +32,7 @@ class CurveClumps {
   uint32_t count() const { return static_cast<uint32_t>(clumps_.size()); }
   size_t bytes() const { return clumps_.size() * sizeof(Clump); }
 
-  /// Of all segments of a clump, as curve_bounds has them.
+  /// A box around the pieces of a clump, a little larger than they are.
   Bounds bounds(uint32_t clump) const;
 
   /// A ray, and axes of which the last is along it.
@@ -44,21 +44,21 @@ class CurveClumps {
     float length;  ///< of the direction
   };
 
-  /// A bit for each segment that a ray may meet with 0 < t <= tfar.
+  /// A bit for each piece that a ray may meet with 0 < t <= tfar.
   uint32_t may_meet(uint32_t clump, const Ray& ray, float tfar) const;
 
-  /// Number of a segment in its mesh; `k`: of a bit of may_meet.
+  /// The segment that a piece is of; `k`: of a bit of may_meet.
   uint32_t segment(uint32_t clump, uint32_t k) const { return clumps_[clump].segment[k]; }
 
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// Control point p of segment k, along an axis, is low[axis] + step[axis] * cell, with cell of 16
+  /// Control point p of piece k, along an axis, is low[axis] + step[axis] * cell, with cell of 16
   /// bits: those of coordinate i = 3 p + axis are in cells[i / 2][k], the upper ones for odd i.
   struct alignas(32) Clump {
-    std::array<std::array<uint32_t, kSegments>, 6> cells;
-    std::array<float, kSegments> radius;  ///< the greatest, with what 16 bits leave out
-    std::array<uint32_t, kSegments> segment;
+    std::array<std::array<uint32_t, kPieces>, 6> cells;
+    std::array<float, kPieces> radius;  ///< the greatest, with what 16 bits leave out
+    std::array<uint32_t, kPieces> segment;
     std::array<float, 3> low, step;
   };
 
