@@ -4,6 +4,7 @@
     benchmarks/peers/setup                      # once: Cycles, in an environment of its own
     python benchmarks/peers/compare.py --rounds 5 --plain --stages cornell,mixed,dragon,room
     python benchmarks/peers/compare.py --stages smoke-200,fog-cornell --max-depth 24
+    python benchmarks/peers/compare.py --stages head --renderers wavecomb,cycles --max-depth 12
     python benchmarks/peers/compare.py --stages shot.usd          # or any stage of meshes
     python benchmarks/peers/compare.py --quick                    # does it run?
 
@@ -39,10 +40,10 @@ from noise import Noise
 from renderers import RENDERERS, ROOT, USUAL, Job
 from report import commit, machine, summary, tables
 from speed import rounds
-from stages import VOLUMES
+from stages import BELOW, VOLUMES
 
 SCENES = ("cornell", "mixed", "dragon", "room")
-STAGES = (*SCENES, *VOLUMES)
+STAGES = (*SCENES, *VOLUMES, *BELOW)
 
 
 def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:

@@ -13,12 +13,20 @@ from wavecomb.scenes import write_scene
 VOLUMES = ("smoke-200", "smoke-500", "clouds-200", "clouds-500", "fog-cornell", "fog-room")
 """Grids of so many voxels along an edge, without fire; and stages that are filled with fog."""
 
+BELOW = ("head", "candles")
+"""With light that walks below surfaces, and hair."""
+
+_BROWN = (0.248, 0.435, 0.923)
+"""Absorption of scene head's mean melanin, 0.52, a third of it red."""
+
 _FOG = {"cornell": 0.5, "room": 0.25}
 """Extinction that fills a stage, over the size of its bounds."""
 
 
 def write_stage(name: str, path: Path, plain: bool) -> Path:
     """Writes a stage; that with a volume is a layer over a generated one. Returns its path."""
+    if name in BELOW:
+        return _write_below(name, path)
     if name not in VOLUMES:
         write_scene(name, path, aspect=1.0, plain=plain)
         return path
@@ -39,6 +47,21 @@ def write_stage(name: str, path: Path, plain: bool) -> Path:
             edf = UsdShade.Shader(prim).GetInput("edf")
             if edf:
                 edf.ClearSources()
+    stage.GetRootLayer().Export(str(path))
+    return path
+
+
+def _write_below(name: str, path: Path) -> Path:
+    """Hair of one colour: peers are not told what is each strand's own."""
+    base = path.with_name(f"{path.stem}-base.usdc")
+    write_scene(name, base, aspect=1.0)
+    stage = Usd.Stage.Open(str(base))
+    for prim in stage.Traverse():
+        shader = UsdShade.Shader(prim)
+        if shader and shader.GetIdAttr().Get() == "ND_chiang_hair_bsdf":
+            absorption = shader.GetInput("absorption_coefficient")
+            absorption.ClearSources()
+            absorption.Set(Gf.Vec3f(*_BROWN))
     stage.GetRootLayer().Export(str(path))
     return path
 

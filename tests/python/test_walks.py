@@ -264,9 +264,8 @@ def test_what_comes_from_below_has_a_layer() -> None:
         camera[3, 2] = 5.0
         builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
         layers = {"below": "CW.*", "direct": "CW<RD>L", "rest": "C([^W].*)?L"}
-        settings = _core.Settings(
-            width=16, height=16, spp=16, max_depth=4, light_path_expressions=list(layers.items())
-        )
+        aovs = [f"lpe:{name}={text}" for name, text in layers.items()]
+        settings = _core.Settings(width=16, height=16, spp=16, max_depth=4, aovs=aovs)
         result = _core.render(builder.build(), settings, None, None, None)
         seen.append((result.beauty, {name: result.aovs[f"lpe_{name}"] for name in layers}))
     (wax, walked), (matte, reflected) = seen
@@ -275,3 +274,39 @@ def test_what_comes_from_below_has_a_layer() -> None:
     assert not walked["rest"].any()
     np.testing.assert_allclose(reflected["rest"], matte, rtol=1e-5)
     assert not reflected["below"].any()
+
+
+@pytest.mark.parametrize("instanced", [False, True])
+def test_what_lies_within_is_not_met(instanced: bool) -> None:
+    """Strands, a lamp and a body inside of another change nothing, whoever lies first on the way."""
+
+    def picture(filled: bool) -> Any:
+        builder = wavecomb.SceneBuilder()
+        wax = skin(builder, subsurface_color=(0.8, 0.6, 0.4), subsurface_radius=(0.3, 0.2, 0.1))
+        box(builder, (-1, -1, -2), (1, 1, 0), wax)
+        if filled:
+            dark = builder.add_material("diffuse", base_color=(0.1, 0.1, 0.1))
+            group = builder.add_group("inside") if instanced else 0
+            ends = np.array([[-0.9, 0, -0.01], [0.9, 0, -0.01]], np.float32)
+            strand = builder.add_curves(
+                "linear-tube", ends, np.zeros(1, np.uint32), np.full(2, 0.005, np.float32),
+                material=dark,
+            )  # fmt: skip
+            builder.add_to_group(group, strand)
+            mesh = builder.add_mesh(
+                np.array([[-0.5, -0.5, -0.02], [0.5, -0.5, -0.02], [0, 0.5, -0.02]], np.float32),
+                np.array([[0, 1, 2]], np.uint32), material=wax,
+            )  # fmt: skip
+            builder.add_to_group(group, mesh)
+            if instanced:
+                builder.add_instances(0, group, np.eye(4)[None])
+        place = np.eye(4)
+        place[3, 2] = 3.0
+        builder.add_light("rect", place, width=2.0, height=2.0, color=(3, 3, 3))
+        camera = np.eye(4)
+        camera[3, 2] = 5.0
+        builder.set_camera(camera, projection="orthographic", window=(-0.5, 0.5, -0.5, 0.5))
+        settings = _core.Settings(width=16, height=16, spp=16, max_depth=3)
+        return _core.render(builder.build(), settings, None, None, None).beauty
+
+    np.testing.assert_array_equal(picture(True), picture(False))

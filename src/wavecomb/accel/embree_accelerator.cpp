@@ -35,11 +35,12 @@ struct PacketTypes<16> {
 /// How closest hits are asked for.
 RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView& scene,
                                           const PresenceKeys& keys, uint32_t first_world,
-                                          bool coherent) {
+                                          uint32_t first_light, bool coherent) {
   rtcInitRayQueryContext(&context.base);
   context.scene = &scene;
   context.keys = &keys;
   context.first_world = first_world;
+  context.first_light = first_light;
   RTCIntersectArguments args;
   rtcInitIntersectArguments(&args);
   args.flags = static_cast<RTCRayQueryFlags>(
@@ -102,7 +103,8 @@ struct EmbreeAccelerator::Impl {
     for (size_t i = 0; i < rays.size; ++i) {
       RTCRayHit rh{};
       QueryContext context;
-      RTCIntersectArguments args = intersect_arguments(context, view, keys, first_world, coherent);
+      RTCIntersectArguments args =
+          intersect_arguments(context, view, keys, first_world, first_light, coherent);
       rh.ray = load_ray(rays, i);
       rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
       rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -147,7 +149,8 @@ struct EmbreeAccelerator::Impl {
                          const PresenceKeys& keys) const {
     alignas(64) typename PacketTypes<W>::RayHit rh;
     QueryContext context;
-    RTCIntersectArguments args = intersect_arguments(context, view, keys, first_world, coherent);
+    RTCIntersectArguments args =
+        intersect_arguments(context, view, keys, first_world, first_light, coherent);
     alignas(64) int valid[W];
     context.inst = rh.hit.instID[0];
     context.geom = rh.hit.geomID;

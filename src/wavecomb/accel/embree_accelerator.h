@@ -30,6 +30,13 @@ struct HitSpan {
 inline constexpr uint32_t kNoHit = 0xffffffffu;
 inline constexpr uint32_t kLightShape = 0xfffffffeu;
 
+/// What stands for a mesh as an instance shows it, in PresenceKeys::object. Two of a scene's have
+/// the same one only by chance of 2^-32, from some ten thousands of instances on.
+template <typename U>
+inline U object_of(const U& inst, const U& mesh) {
+  return U(inst * 0x9e3779b1u) + mesh;
+}
+
 /// What decides whether a partly present surface is there for a path: random numbers keyed by the
 /// path, so that no traversal order matters. Indexed by slot.
 struct PresenceKeys {
@@ -42,6 +49,8 @@ struct PresenceKeys {
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kSeenByCamera;  ///< of RayVisibility
+  /// Of rays that meet one object alone, and no light: its object_of, indexed as the hash is.
+  const uint32_t* object = nullptr;
 };
 
 /// Which of equally close hits a hierarchy is built to give.

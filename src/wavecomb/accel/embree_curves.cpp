@@ -17,14 +17,14 @@ const CurveGeometry& curves_of(const void* user) {
 }
 
 /// Calls found(i, primitive, hit) with the first hit, on each primitive that there is, of each of a
-/// packet's rays that is there for its path.
-template <typename Arguments, typename Found>
-void for_first_hits(const Arguments& args, RTCRayN* rays, const Found& found) {
+/// packet's rays that is there for its path. wants(slot): whether the ray asks for these curves.
+template <typename Arguments, typename Wants, typename Found>
+void for_first_hits(const Arguments& args, RTCRayN* rays, const Wants& wants, const Found& found) {
   const CurveGeometry& curves = curves_of(args.geometryUserPtr);
   const auto* context = reinterpret_cast<const QueryContext*>(args.context);
   const unsigned inst = args.context->instID[0], n = args.N;
   for (unsigned i = 0; i < n; ++i) {
-    if (args.valid[i] == 0) continue;
+    if (args.valid[i] == 0 || !wants(RTCRayN_id(rays, n, i))) continue;
     const float o[3] = {RTCRayN_org_x(rays, n, i), RTCRayN_org_y(rays, n, i),
                         RTCRayN_org_z(rays, n, i)};
     const float d[3] = {RTCRayN_dir_x(rays, n, i), RTCRayN_dir_y(rays, n, i),
@@ -63,34 +63,42 @@ void put(const RTCIntersectFunctionNArguments* args, unsigned i, uint32_t prim, 
   RTCHitN_instID(to, n, i, 0) = args->context->instID[0];
 }
 
+bool wants_all(unsigned) {
+  return true;
+}
+
 /// Keeps the closest hit by the rule of closest_filter.
 void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
-  const unsigned n = args->N;
+  const unsigned n = args->N, inst = args->context->instID[0];
   const RTCHitN* known = RTCRayHitN_HitN(args->rayhit, n);
-  for_first_hits(*args, RTCRayHitN_RayN(args->rayhit, n),
-                 [&](unsigned i, uint32_t prim, const CurveHit& hit) {
-                   if (hit.t > best->t[i]) return;
-                   const auto mine = std::make_tuple(args->context->instID[0], args->geomID, prim);
-                   RTCHitN* at = const_cast<RTCHitN*>(known);
-                   if (hit.t == best->t[i] &&
-                       mine >= std::make_tuple(RTCHitN_instID(at, n, i, 0),
-                                               RTCHitN_geomID(at, n, i), RTCHitN_primID(at, n, i)))
-                     return;
-                   best->t[i] = hit.t;
-                   put(args, i, prim, hit, hit.t * kSlack);
-                 });
+  const auto wants = [&](unsigned slot) {
+    return is_of_object(*best->keys, inst == RTC_INVALID_GEOMETRY_ID ? 0 : inst,
+                        curves_of(args->geometryUserPtr).id, slot);
+  };
+  const auto found = [&](unsigned i, uint32_t prim, const CurveHit& hit) {
+    if (hit.t > best->t[i]) return;
+    const auto mine = std::make_tuple(inst, args->geomID, prim);
+    RTCHitN* at = const_cast<RTCHitN*>(known);
+    if (hit.t == best->t[i] &&
+        mine >= std::make_tuple(RTCHitN_instID(at, n, i, 0), RTCHitN_geomID(at, n, i),
+                                RTCHitN_primID(at, n, i)))
+      return;
+    best->t[i] = hit.t;
+    put(args, i, prim, hit, hit.t * kSlack);
+  };
+  for_first_hits(*args, RTCRayHitN_RayN(args->rayhit, n), wants, found);
 }
 
 /// The same where any closest hit will do; such queries have no context of ours.
 void intersect_curves_bare(const RTCIntersectFunctionNArguments* args) {
   for_first_hits(
-      *args, RTCRayHitN_RayN(args->rayhit, args->N),
+      *args, RTCRayHitN_RayN(args->rayhit, args->N), wants_all,
       [&](unsigned i, uint32_t prim, const CurveHit& hit) { put(args, i, prim, hit, hit.t); });
 }
 
 void occlude_curves(const RTCOccludedFunctionNArguments* args) {
-  for_first_hits(*args, args->ray, [&](unsigned i, uint32_t, const CurveHit&) {
+  for_first_hits(*args, args->ray, wants_all, [&](unsigned i, uint32_t, const CurveHit&) {
     RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
   });
 }

@@ -37,6 +37,27 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   store(valid, select(Mask<U>(take), U(0xffffffffu), U(0u)));
 }
 
+/// Leaves out what is not of the object that a ray is for.
+[[gnu::noinline, gnu::cold]] void drop_others(const RTCFilterFunctionNArguments& args) {
+  const auto& context = *reinterpret_cast<const QueryContext*>(args.context);
+  const SceneView& scene = *context.scene;
+  for (unsigned i = 0; i < args.N; ++i) {
+    if (args.valid[i] == 0) continue;
+    const unsigned inst = RTCHitN_instID(args.hit, args.N, i, 0);
+    const unsigned geom = RTCHitN_geomID(args.hit, args.N, i);
+    const bool instanced = inst != RTC_INVALID_GEOMETRY_ID;
+    const uint32_t instance = instanced ? inst : 0;
+    bool is_own = instanced || geom < context.first_light;
+    if (is_own) {
+      const uint32_t first = scene.instances[instance].geometry;
+      const uint32_t mesh =
+          scene.geometry_mesh[first + (instanced ? geom : geom - context.first_world)];
+      is_own = is_of_object(*context.keys, instance, mesh, RTCRayN_id(args.ray, args.N, i));
+    }
+    if (!is_own) args.valid[i] = 0;
+  }
+}
+
 /// Ray i of a packet against the light that a geometry's user pointer names; 0: missed.
 float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
@@ -70,6 +91,8 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
 }
 
 void closest_filter(const RTCFilterFunctionNArguments* args) {
+  if (reinterpret_cast<const QueryContext*>(args->context)->keys->object) [[unlikely]]
+    drop_others(*args);
   switch (args->N) {
     case 16:
       return keep_closest<16>(args);
@@ -84,6 +107,7 @@ void closest_filter(const RTCFilterFunctionNArguments* args) {
 
 void intersect_lights(const RTCIntersectFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
+  if (best->keys->object) return;
   const unsigned n = args->N;
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);

@@ -15,7 +15,7 @@ struct alignas(64) QueryContext {
   RTCRayQueryContext base;
   const SceneView* scene;  ///< whose materials say what is present
   const PresenceKeys* keys;
-  uint32_t first_world;                ///< geometry id of the world's first mesh
+  uint32_t first_world, first_light;   ///< geometry ids of the world's first mesh, and of lights
   const unsigned *inst, *geom, *prim;  ///< of the hits that Embree holds, W each
   alignas(64) float t[16];             ///< their true distances
 };

@@ -93,6 +93,7 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
 
 bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
             float u, float v, uint32_t slot, const PresenceKeys& keys) {
+  if (!is_of_object(keys, instance, mesh, slot)) return false;
   if (scene.visibility &&
       (scene.visibility[scene.instances[instance].emissive + geom] & keys.ray_kind) == 0)
     return false;

@@ -29,8 +29,15 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene);
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
                   const PresenceKeys& keys);
 
-/// Whether the ray of a slot meets triangle `prim` at (u, v): its kind sees it, it is present, and
-/// for a shadow ray, in the way of its light.
+/// Whether a mesh, as an instance shows it, is the object that the ray of a slot is for, or that
+/// is for all.
+inline bool is_of_object(const PresenceKeys& keys, uint32_t instance, uint32_t mesh,
+                         uint32_t slot) {
+  return !keys.object || keys.object[size_t{slot} * keys.stride] == object_of(instance, mesh);
+}
+
+/// Whether the ray of a slot meets triangle `prim` at (u, v): it is for that object, its kind sees
+/// it, it is present, and for a shadow ray, in the way of its light.
 bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
             float u, float v, uint32_t slot, const PresenceKeys& keys);
 

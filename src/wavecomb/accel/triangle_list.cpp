@@ -150,14 +150,14 @@ struct ListTracer {
         if (none(take)) continue;
         const F distance = plane.height / plane.slope;
         take = take & (distance < t);
-        if (triangle.filtered) take = met<F>(take, i, at.b, at.c, at.sum, base);
+        if (triangle.filtered || keys.object) take = met<F>(take, i, at.b, at.c, at.sum, base);
         t = select(take, distance, t);
         b = select(take, at.b, b);
         c = select(take, at.c, c);
         sum = select(take, at.sum, sum);
         entry = select(Mask<U>(take), U(i), entry);
       }
-      for (uint32_t i = 0; i < shapes; ++i) {
+      for (uint32_t i = 0; i < shapes && !keys.object; ++i) {
         const F distance = meet_shape(list.shapes_[i], packet, t, active);
         const Mask<F> take = distance > 0.f;
         t = select(take, distance, t);

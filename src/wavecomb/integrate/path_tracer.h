@@ -2,6 +2,8 @@
 /// Path tracing by the reference integrator: one path after the other, in scalars.
 #pragma once
 
+#include <utility>
+
 #include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/path_aovs.h"
@@ -179,20 +181,16 @@ class PathTracer {
     }
   }
 
-  /// Walks on from a ray that led below a surface; false: nothing comes of it. What is not below
-  /// the surface that it left goes on as it was.
+  /// Walks on from a ray that led below a surface; false: nothing comes of it. What meets no
+  /// surface of the object that it left goes on as it was.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& came_out) {
-    const bool is_own = hit.inst == path.receiver;
     path.pdf = -path.pdf;
-    path.receiver = 0;
+    const uint32_t object = std::exchange(path.receiver, 0u);
     if constexpr (Media::kStreams) {
-      if (!is_own) return true;
-      const uint32_t material = rays_.material_of(hit, rays_.mesh_of(hit));
-      if (!(context_.scene.walks.media[material].extinction.x > 0)) return true;
-      came_out = media_.walk(key, depth, settings_.sampler, rays_.keys(), rays_.time(), material,
-                             path, hit);
-      return came_out;
+      PresenceKeys keys = rays_.keys();
+      keys.object = &object;
+      return media_.walk(key, depth, settings_.sampler, keys, rays_.time(), path, hit, came_out);
     }
     return true;
   }

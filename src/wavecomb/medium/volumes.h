@@ -31,18 +31,19 @@ class Volumes {
 
   /// Whether light walks below surfaces.
   bool has_walks() const { return context_.scene.walks.media != nullptr; }
-  /// Walks of the reference: the path of a ray that led below a surface and hit `hit`, of a
-  /// material. `keys`: of that ray. Afterwards the ray, in `path`, and its hit are those of who
-  /// sees from outside where the walk has ended; false: it has ended below.
+  /// Walks of the reference: the path of a ray that led below a surface and hit `hit`. `keys`: of
+  /// that ray, with the object. Afterwards the ray, in `path`, and its hit are those of who sees
+  /// from outside where the walk has ended, if it `came_out`; false: it has ended below. Both are
+  /// as they were where the object is not met.
   template <typename Hit>
   bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
-            const PresenceKeys& keys, float time, uint32_t material, PathState<float>& path,
-            Hit& hit) const {
+            const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
+            bool& came_out) const {
     Walkers walkers(walks_);
     walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput),
-                       0u, 0u, hit.inst, material, time, true);
-    bool came_out = false;
-    ++counts_.walks;
+                       0u, 0u, time, true);
+    enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
+    if (walkers.size() == 0) return true;
     walkers.run<float>(context_.scene, *context_.accel, 1, keys, counts_.walk_steps,
                        counts_.walk_lanes,
                        [&](bool, uint32_t, const WalkEnd<float>& end, bool came) {
@@ -184,6 +185,23 @@ class Volumes {
     return {fma(end.d, t, end.p), -end.d, t};
   }
 
+  /// Lets walks in below the objects of `keys`: those that leave(lanes, slot) is told of meet none,
+  /// or walk in no medium.
+  template <typename F, typename Leave>
+  void enter(Walkers& walkers, const PresenceKeys& keys, uint32_t width, const Leave& leave) const {
+    using U = UInt<F>;
+    walkers.enter<F>(
+        context_.scene, *context_.accel, width, keys,
+        [&](const U& inst, const U& geom, const U& prim, const Mask<F>& met) {
+          const U material = material_below<F>(inst, geom, prim, met);
+          const Mask<F> walks =
+              met & (walk_medium<F>(context_.scene.walks, material, met).extinction.x > 0.f);
+          return select(Mask<U>(walks), material, U(Walkers::kNoMedium));
+        },
+        leave);
+    counts_.walks += walkers.size();
+    counts_.walk_steps += walkers.size();
+  }
   /// Walks of all rays of a wave that led below a surface.
   template <typename F>
   void walk_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
@@ -191,7 +209,6 @@ class Volumes {
     if (!has_walks()) return;
     const SceneView& scene = context_.scene;
     const RayQueue& q = wave.rays;
-    const HitBuffer& hits = wave.hits;
     uint32_t* const exits = wave.ways.uints(kExit);
     Walkers walkers(walks_);
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
@@ -201,26 +218,29 @@ class Volumes {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, active);
       const Mask<F> below = active & (path.pdf < 0.f);
       if (none(below)) continue;
-      const U inst = load<U>(hits.inst + i), geom = load<U>(hits.geom + i);
-      const Mask<F> own = below & Mask<F>(inst == path.receiver);
       path.pdf = abs(path.pdf);
-      path.receiver = U(0u);
       store_row<PathRow, F>(wave.pool.paths, slot, path, below);
-      const U material = material_below<F>(inst, geom, load<U>(hits.prim + i), own);
-      const Mask<F> walks = own & (walk_medium<F>(scene.walks, material, own).extinction.x > 0.f);
       const F time = scene.has_motion
-                         ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, walks)
+                         ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, below)
                          : F(0.f);
       walkers.add<F>(begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput),
-                     lane_index<F>() + static_cast<uint32_t>(i), slot, inst, material, time, walks);
+                     lane_index<F>() + static_cast<uint32_t>(i), slot, time, below);
     }
     if (walkers.size() == 0) return;
-    counts_.walks += walkers.size();
+    PresenceKeys keys = presence_keys(wave.pool, depth, false);
+    keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
+    const auto leave = [&](const Mask<F>& lanes, const U& slot) {
+      PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
+      path.receiver = U(0u);
+      store_row<PathRow, F>(wave.pool.paths, slot, path, lanes);
+    };
+    enter<F>(walkers, keys, context_.traversal_width, leave);
+    if (walkers.size() == 0) return;
     const auto start = PhaseClock::Clock::now();
     if (context_.measures_costs) std::fill(wave.scratch.begin(), wave.scratch.end(), 0.f);
     walkers.run<F>(
-        scene, *context_.accel, context_.traversal_width, presence_keys(wave.pool, depth, false),
-        counts_.walk_steps, counts_.walk_lanes,
+        scene, *context_.accel, context_.traversal_width, keys, counts_.walk_steps,
+        counts_.walk_lanes,
         [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end, const Mask<F>& came) {
           finish_walks<F>(wave, ended, who, end, came);
           if (context_.measures_costs) count_collisions<F>(wave.scratch, end, ended);
@@ -262,6 +282,7 @@ class Volumes {
     path.o = seen.o;
     path.d = seen.d;
     path.throughput = select<F>(came, end.throughput, Color<F>(F(0.f)));
+    path.receiver = U(0u);
     store_row<PathRow, F>(wave.pool.paths, slot, path, ended);
     const auto real = [&](float* column, const F& x) { scatter<F>(column, x, who, ended); };
     const auto number = [&](uint32_t* column, const U& x) {

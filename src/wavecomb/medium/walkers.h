@@ -31,16 +31,41 @@ class Walkers {
 
   size_t size() const { return size_; }
 
+  static constexpr uint32_t kNoMedium = 0xffffffffu;
+
   /// Takes over walks in the active lanes. `who`: what `finish` is told; `slot`: of the path.
   template <typename F>
-  void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const UInt<F>& inst,
-           const UInt<F>& material, const F& time, const Mask<F>& active) {
-    size_ += put<F>(size_, {w, who, slot, inst, material, time}, active);
+  void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const F& time,
+           const Mask<F>& active) {
+    size_ += put<F>(size_, {w, who, slot, UInt<F>(kNoMedium), time}, active);
   }
 
-  /// Walks until none is left. `keys`: of the paths' slots, whose salt is that of the ray that
-  /// entered. finish(lanes, who, end, came): walks that have ended, of which those in `came` have
-  /// come to the surface.
+  /// Lets walks in that were added: medium_of(inst, geom, prim, met) gives the material of what
+  /// they meet of their objects, which `keys` has, or kNoMedium. leave(lanes, slot): those that
+  /// walk not.
+  template <typename F, typename MediumOf, typename Leave>
+  void enter(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+             const PresenceKeys& keys, const MediumOf& medium_of, const Leave& leave) {
+    using U = UInt<F>;
+    trace(scene, accel, width, keys, nullptr);
+    size_t left = 0;
+    for (size_t i = 0; i < size_; i += kWidth<F>) {
+      const Mask<F> active = first_lanes<F>(size_ - i);
+      const U inst = load<U>(c_.uints(kHitInst) + i);
+      Row<F> row = get<F>(i);
+      row.material =
+          medium_of(inst, load<U>(c_.uints(kHitGeom) + i), load<U>(c_.uints(kHitPrim) + i),
+                    Mask<F>(active & Mask<F>(inst != U(kNoHit))));
+      const Mask<F> walks = active & Mask<F>(row.material != U(kNoMedium));
+      if (any(Mask<F>(active & not_(walks)))) leave(Mask<F>(active & not_(walks)), row.slot);
+      left += put<F>(left, row, walks);
+    }
+    size_ = left;
+  }
+
+  /// Walks until none is left. `keys`: of the paths' slots, with their objects, whose salt is that
+  /// of the ray that entered. finish(lanes, who, end, came): walks that have ended, of which those
+  /// in `came` have come to the surface.
   template <typename F, typename Finish>
   void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
            PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
@@ -54,12 +79,7 @@ class Walkers {
         store(c_.floats(kRest) + i, row.walk.rest);
       }
       keys.salt = salt + 0x10000u * (step + 1);
-      accel.intersect({c_.floats(kO), c_.floats(kO + 1), c_.floats(kO + 2), c_.floats(kD),
-                       c_.floats(kD + 1), c_.floats(kD + 2), c_.floats(kRest), c_.uints(kSlot),
-                       size_, scene.has_motion ? c_.floats(kTime) : nullptr},
-                      {c_.floats(kHitT), c_.floats(kHitU), c_.floats(kHitV), c_.uints(kHitPrim),
-                       c_.uints(kHitGeom), c_.uints(kHitInst)},
-                      width, false, keys);
+      trace(scene, accel, width, keys, c_.floats(kRest));
       steps += size_;
       size_t left = 0;
       for (size_t i = 0; i < size_; i += kWidth<F>) {
@@ -69,24 +89,13 @@ class Walkers {
         Walk<F>& w = row.walk;
         const U inst = load<U>(c_.uints(kHitInst) + i);
         const F hit_t = load<F>(c_.floats(kHitT) + i);
-        const Mask<F> own = active & Mask<F>(inst == row.inst);
         const Mask<F> collides = active & Mask<F>(inst == U(kNoHit));
-        // What else there is does not stop a walk.
-        const Mask<F> passes = active & not_(own) & not_(collides);
+        const Mask<F> own = active & not_(collides);
         Walk<F> after = w;
         const F t = select(own, hit_t, w.rest);
         const Mask<F> goes_on =
             end_flight<F>(walk_medium<F>(scene.walks, row.material, active), t, collides, after);
-        if (any(passes)) {
-          const F past = hit_t * 1.0001f + scene.scale * 1e-6f;
-          after.o = select<F>(passes, fma(w.d, past, w.o), after.o);
-          after.d = select<F>(passes, w.d, after.d);
-          after.throughput = select<F>(passes, w.throughput, after.throughput);
-          after.gone = select(passes, F(w.gone + past), after.gone);
-          after.rest = select(passes, max(F(w.rest - past), F(1e-30f)), after.rest);
-          after.number = select(Mask<U>(passes), w.number, after.number);
-        }
-        const Mask<F> ended = active & not_(passes) & not_(goes_on);
+        const Mask<F> ended = active & not_(goes_on);
         if (any(ended)) {
           const WalkEnd<F> end{after.o,
                                after.d,
@@ -119,7 +128,6 @@ class Walkers {
     kNumber,
     kWho,
     kSlot,
-    kInst,
     kMaterial,
     kTime,
     kHitT,
@@ -132,10 +140,20 @@ class Walkers {
   };
   static_assert(kEnd <= kColumns);
 
+  void trace(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+             const PresenceKeys& keys, const float* tfar) const {
+    accel.intersect({c_.floats(kO), c_.floats(kO + 1), c_.floats(kO + 2), c_.floats(kD),
+                     c_.floats(kD + 1), c_.floats(kD + 2), tfar, c_.uints(kSlot), size_,
+                     scene.has_motion ? c_.floats(kTime) : nullptr},
+                    {c_.floats(kHitT), c_.floats(kHitU), c_.floats(kHitV), c_.uints(kHitPrim),
+                     c_.uints(kHitGeom), c_.uints(kHitInst)},
+                    width, false, keys);
+  }
+
   template <typename F>
   struct Row {
     Walk<F> walk;
-    UInt<F> who, slot, inst, material;
+    UInt<F> who, slot, material;
     F time;
   };
 
@@ -151,7 +169,6 @@ class Walkers {
              number(kSeed), number(kNumber)},
             number(kWho),
             number(kSlot),
-            number(kInst),
             number(kMaterial),
             real(kTime)};
   }
@@ -184,7 +201,6 @@ class Walkers {
     number(kNumber, w.number);
     number(kWho, row.who);
     number(kSlot, row.slot);
-    number(kInst, row.inst);
     number(kMaterial, row.material);
     return n;
   }

@@ -6,6 +6,7 @@
 /// with p the BSDF's density, or that of the mixture with a field (guide_bounce.h).
 #pragma once
 
+#include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/integrate/steps/bounce_sampling.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
@@ -32,7 +33,8 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
     // What medium/walk.h looks for.
     const Mask<F> enters = at.bsdf.enters(wo, b.wi);
     out.next.pdf = select(enters, F(-out.next.pdf), out.next.pdf);
-    out.next.receiver = select(Mask<UInt<F>>(enters), v.hit.inst, out.next.receiver);
+    out.next.receiver =
+        select(Mask<UInt<F>>(enters), object_of(v.hit.inst, v.hit.mesh), out.next.receiver);
   }
   out.next.cone_width = path.cone_width;
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
