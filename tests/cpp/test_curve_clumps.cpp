@@ -85,7 +85,7 @@ TEST(CurveClumps, HoldAllPiecesOfEachSegment) {
         }
       EXPECT_EQ(found.size(), mesh.primitive_count());
       for (const auto& [prim, pieces] : found) {
-        EXPECT_EQ(pieces.first, mesh.is_cubic() && radius < 0.1f ? 4u : 1u);
+        EXPECT_EQ(pieces.first, radius < 0.1f ? 4u : 1u);
         if (pieces.first > 1) continue;  // hulls of pieces are within that of the segment
         const Bounds& all = pieces.second;
         const Bounds one = curve_bounds(mesh, prim);

@@ -16,14 +16,13 @@ namespace {
 using ClumpLanes = FloatP<CurveClumps::kPieces>;
 
 constexpr float kCells = 65535.f;
-constexpr float kSlender = 32.f;  ///< chord over radius above which segments are halved
-constexpr size_t kFewSegments = 1u << 18;
+constexpr float kSlender = 32.f;  ///< length over radius above which segments are halved
+constexpr size_t kManySegments = size_t{1} << 20;
 constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
 
-/// A segment, or a half or quarter of it: its control points and its greatest radius. Lines have
-/// their two ends, each twice.
+/// A part of a segment as a line from a to b with a radius, in which all of the part lies.
 struct ClumpPiece {
-  std::array<Vec3<float>, 4> p;
+  Vec3<float> a, b;
   float radius = 0;
 };
 
@@ -31,37 +30,57 @@ struct ClumpPiece {
 /// 1 are the halves of n.
 constexpr uint32_t kPieceNodes = 8;
 
-ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
-  ClumpPiece out;
-  const auto points = static_cast<uint32_t>(mesh.segment_points());
-  const size_t first = mesh.indices[number / kPieceNodes] & kCurveFirstPoint;
-  for (uint32_t k = 0; k < 4; ++k) {
-    const size_t i = first + (points == 4 ? k : k / 2);
-    out.p[k] = {mesh.positions[3 * i], mesh.positions[3 * i + 1], mesh.positions[3 * i + 2]};
-    out.radius = std::max(out.radius, mesh.radii[i]);
-  }
-  auto& p = out.p;
-  const uint32_t node = number % kPieceNodes;
-  for (uint32_t bit = std::bit_floor(node) / 2; bit > 0; bit /= 2) {
-    const Vec3<float> a = (p[0] + p[1]) * 0.5f, m = (p[1] + p[2]) * 0.5f, b = (p[2] + p[3]) * 0.5f;
-    const Vec3<float> am = (a + m) * 0.5f, mb = (m + b) * 0.5f, middle = (am + mb) * 0.5f;
-    if ((node & bit) == 0)
-      p = {p[0], a, am, middle};
-    else
-      p = {middle, mb, b, p[3]};
-  }
-  return out;
+/// De Casteljau's first or second half.
+template <typename T>
+void keep_half(std::array<T, 4>& p, bool second) {
+  const T a = (p[0] + p[1]) * 0.5f, m = (p[1] + p[2]) * 0.5f, b = (p[2] + p[3]) * 0.5f;
+  const T am = (a + m) * 0.5f, mb = (m + b) * 0.5f, middle = (am + mb) * 0.5f;
+  if (second)
+    p = {middle, mb, b, p[3]};
+  else
+    p = {p[0], a, am, middle};
 }
 
-/// How often a segment is halved, so that boxes of what runs across the axes are less empty: a
-/// clump's box is as large as the pieces in it are long. Halves take as much memory as the segments
-/// themselves, so that quarters are made of few.
+float distance_to_line(const Vec3<float>& p, const Vec3<float>& a, const Vec3<float>& b) {
+  const Vec3<float> c = b - a, v = p - a;
+  const float c2 = dot(c, c), at = c2 > 0 ? std::clamp(dot(v, c) / c2, 0.f, 1.f) : 0.f;
+  return length(Vec3<float>(v - c * at));
+}
+
+/// Control points are no farther from the line than all between them: distance to it is convex.
+ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
+  std::array<Vec3<float>, 4> p;
+  std::array<float, 4> r;
+  const auto points = static_cast<uint32_t>(mesh.segment_points());
+  const size_t first = mesh.indices[number / kPieceNodes] & kCurveFirstPoint;
+  for (uint32_t k = 0; k < points; ++k) {
+    const float* at = &mesh.positions[3 * (first + k)];
+    p[k] = {at[0], at[1], at[2]};
+    r[k] = mesh.radii[first + k];
+  }
+  if (points == 2) {
+    p = {p[0], p[0] + (p[1] - p[0]) * (1.f / 3), p[0] + (p[1] - p[0]) * (2.f / 3), p[1]};
+    r = {r[0], r[0] + (r[1] - r[0]) * (1.f / 3), r[0] + (r[1] - r[0]) * (2.f / 3), r[1]};
+  }
+  const uint32_t node = number % kPieceNodes;
+  for (uint32_t bit = std::bit_floor(node) / 2; bit > 0; bit /= 2) {
+    keep_half(p, (node & bit) != 0);
+    keep_half(r, (node & bit) != 0);
+  }
+  const float bend =
+      std::max(distance_to_line(p[1], p[0], p[3]), distance_to_line(p[2], p[0], p[3]));
+  return {p[0], p[3], *std::max_element(r.begin(), r.end()) + bend};
+}
+
+/// How often a segment is halved. A clump's box is as large as the pieces in it are long, and a
+/// bent piece is thicker than the curve; but each piece takes memory.
 uint32_t halvings(const Mesh& mesh, uint32_t segment) {
-  if (!mesh.is_cubic()) return 0;
   const ClumpPiece whole = piece_of(mesh, kPieceNodes * segment + 1);
-  const Vec3<float> chord = whole.p[3] - whole.p[0];
-  if (!(std::sqrt(dot(chord, chord)) > kSlender * whole.radius)) return 0;
-  return mesh.indices.size() <= kFewSegments ? 2 : 1;
+  if (!(length(Vec3<float>(whole.b - whole.a)) > kSlender * whole.radius)) {
+    const float r = mesh.radii[mesh.indices[segment] & kCurveFirstPoint];
+    if (whole.radius <= 2 * r) return 0;
+  }
+  return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
 std::vector<uint32_t> pieces_of(const Mesh& mesh) {
@@ -80,7 +99,7 @@ class ClumpParting {
     middles_.reserve(pieces.size());
     for (const uint32_t piece : pieces) {
       const ClumpPiece one = piece_of(mesh, piece);
-      const Vec3<float> m = one.p[0] + one.p[3];
+      const Vec3<float> m = one.a + one.b;
       middles_.push_back({m.x, m.y, m.z});
     }
   }
@@ -122,49 +141,6 @@ float clump_size(const float* v) {
   return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
 }
 
-/// Four control points as the ray sees them, in axes square to it, or their halves (de Casteljau).
-struct ClumpHull {
-  using F = ClumpLanes;
-  F x[4], y[4];
-
-  ClumpHull first_half() const {
-    ClumpHull out;
-    halve(x, out.x);
-    halve(y, out.y);
-    return out;
-  }
-  ClumpHull second_half() const {
-    return ClumpHull{{x[3], x[2], x[1], x[0]}, {y[3], y[2], y[1], y[0]}}.first_half();
-  }
-
- private:
-  static void halve(const F* p, F* to) {
-    const F half(0.5f), m = (p[1] + p[2]) * half, a = (p[0] + p[1]) * half, am = (a + m) * half;
-    to[0] = p[0];
-    to[1] = a;
-    to[2] = am;
-    to[3] = (am + (m + (p[2] + p[3]) * half) * half) * half;
-  }
-};
-
-/// Whether the ray, which is the origin here, passes by: all points lie farther than the radius on
-/// one side of a line through it, along the chord or square to it.
-Mask<ClumpLanes> passes(const ClumpHull& h, const ClumpLanes& radius, const ClumpLanes& rounding) {
-  using F = ClumpLanes;
-  const F cx = h.x[3] - h.x[0], cy = h.y[3] - h.y[0];
-  const F length = sqrt(fma(cx, cx, F(cy * cy)));
-  // A chord is rounded as the points are; where one of these is within the radius, none is farther
-  // than the chord is long beyond that.
-  const F reach = fma(radius, length, F(rounding * (length + radius)));
-  const auto beside = [&](int k) { return fma(cx, h.y[k], F(-(cy * h.x[k]))); };
-  const auto along = [&](int k) { return fma(cx, h.x[k], F(cy * h.y[k])); };
-  const F b[3] = {beside(0), beside(1), beside(2)};  // and that of 3 is that of 0
-  const F a[4] = {along(0), along(1), along(2), along(3)};
-  return (min(min(b[0], b[1]), b[2]) > reach) | (max(max(b[0], b[1]), b[2]) < -reach) |
-         (min(min(a[0], a[1]), min(a[2], a[3])) > reach) |
-         (max(max(a[0], a[1]), max(a[2], a[3])) < -reach);
-}
-
 }  // namespace
 
 CurveClumps::CurveClumps(const Mesh& mesh) : mesh_(mesh) {
@@ -185,26 +161,25 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
   Bounds box;
   for (uint32_t k = 0; k < kPieces; ++k) {
     pieces[k] = piece_of(mesh_, first[std::min(k, n - 1)]);
-    for (const Vec3<float>& p : pieces[k].p) box.add(p);
+    box.add(pieces[k].a);
+    box.add(pieces[k].b);
     out.segment[k] = k < n ? first[k] / kPieceNodes : kNone;
   }
   const Vec3<float> step = (box.hi - box.lo) * (1.f / kCells);
   out.low = {box.lo.x, box.lo.y, box.lo.z};
   out.step = {step.x, step.y, step.z};
-  const float widest = std::max(step.x, std::max(step.y, step.z));
+  const auto cell = [&](float x, uint32_t axis) {
+    const float at = out.step[axis] > 0 ? (x - out.low[axis]) / out.step[axis] : 0.f;
+    return static_cast<uint32_t>(std::min(at + 0.5f, kCells));
+  };
   for (uint32_t k = 0; k < kPieces; ++k) {
-    for (uint32_t p = 0; p < 4; ++p) {
-      const Vec3<float> at = pieces[k].p[p] - box.lo;
-      const float offset[3] = {at.x, at.y, at.z};
-      for (uint32_t axis = 0; axis < 3; ++axis) {
-        const uint32_t i = 3 * p + axis;
-        const float cell = out.step[axis] > 0 ? offset[axis] / out.step[axis] : 0.f;
-        out.cells[i / 2][k] |= static_cast<uint32_t>(std::min(cell + 0.5f, kCells))
-                               << (16 * (i % 2));
-      }
-    }
+    const ClumpPiece& piece = pieces[k];
+    const float a[3] = {piece.a.x, piece.a.y, piece.a.z};
+    const float b[3] = {piece.b.x, piece.b.y, piece.b.z};
+    for (uint32_t axis = 0; axis < 3; ++axis)
+      out.cells[axis][k] = cell(a[axis], axis) | cell(b[axis], axis) << 16;
     // Rounding to cells moves a point by less than one.
-    out.radius[k] = 1.0001f * pieces[k].radius + widest;
+    out.radius[k] = 1.0001f * piece.radius + std::max(step.x, std::max(step.y, step.z));
   }
   return out;
 }
@@ -213,11 +188,10 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
   const Clump& c = clumps_[clump];
   Bounds box;
   for (uint32_t k = 0; k < kPieces; ++k)
-    for (uint32_t p = 0; p < 4; ++p) {
+    for (const uint32_t shift : {0u, 16u}) {
       float lo[3], hi[3];
       for (uint32_t axis = 0; axis < 3; ++axis) {
-        const uint32_t i = 3 * p + axis;
-        const float cell = static_cast<float>((c.cells[i / 2][k] >> (16 * (i % 2))) & 0xffffu);
+        const auto cell = static_cast<float>((c.cells[axis][k] >> shift) & 0xffffu);
         const float x = c.low[axis] + c.step[axis] * cell;
         const float reach = c.radius[k] + 1e-6f * std::abs(x);
         lo[axis] = x - reach;
@@ -248,38 +222,38 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const Ray& ray, float tfar) const
   const F rounding = (radius + (clump_size(c.low.data()) + clump_size(ray.o.data()) +
                                 kCells * clump_size(c.step.data()))) *
                      kClumpRounding;
-  ClumpHull hull;
-  F near(0.f), far(0.f);
-  for (uint32_t p = 0; p < 4; ++p) {
-    F cell[3];
-    for (uint32_t k = 0; k < 3; ++k) {
-      const uint32_t i = 3 * p + k;
-      const UInt<F> cells = load<UInt<F>>(c.cells[i / 2].data());
-      cell[k] = F(Int<F>(i % 2 == 0 ? UInt<F>(cells & 0xffffu) : UInt<F>(cells >> 16u)));
-    }
-    const auto along = [&](uint32_t n) {
-      const auto& e = ray.axis[n];
-      const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);
-      return fma(cell[0], F(e[0] * c.step[0]),
-                 fma(cell[1], F(e[1] * c.step[1]), fma(cell[2], F(e[2] * c.step[2]), start)));
-    };
-    hull.x[p] = along(0);
-    hull.y[p] = along(1);
-    const F z = along(2);
-    near = p == 0 ? z : min(near, z);
-    far = p == 0 ? z : max(far, z);
-  }
-  const F reach = radius + rounding;
-  Mask<F> by = (far < -reach) | (near - reach > F(tfar * ray.length * 1.00001f)) |
-               passes(hull, radius, rounding) |
-               Mask<F>(load<UInt<F>>(c.segment.data()) == UInt<F>(kNone));
-  if (all(by) || !mesh_.is_cubic()) return lane_bits<F>(not_(by));
-  const ClumpHull a = hull.first_half(), b = hull.second_half();
-  by |= passes(a, radius, rounding) & passes(b, radius, rounding);
-  if (all(by)) return 0;
-  by |= passes(a.first_half(), radius, rounding) & passes(a.second_half(), radius, rounding) &
-        passes(b.first_half(), radius, rounding) & passes(b.second_half(), radius, rounding);
-  return lane_bits<F>(not_(by));
+  Vec3<F> cell_a, cell_b;
+  const auto decode = [&](uint32_t axis, F& a, F& b) {
+    const UInt<F> cells = load<UInt<F>>(c.cells[axis].data());
+    a = F(Int<F>(cells & 0xffffu));
+    b = F(Int<F>(cells >> 16u));
+  };
+  decode(0, cell_a.x, cell_b.x);
+  decode(1, cell_a.y, cell_b.y);
+  decode(2, cell_a.z, cell_b.z);
+  // The ends as the ray sees them, which is the z axis here.
+  const auto seen = [&](uint32_t n, const Vec3<F>& cell) {
+    const auto& e = ray.axis[n];
+    const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);
+    return fma(cell.x, F(e[0] * c.step[0]),
+               fma(cell.y, F(e[1] * c.step[1]), fma(cell.z, F(e[2] * c.step[2]), start)));
+  };
+  const F ax = seen(0, cell_a), ay = seen(1, cell_a), az = seen(2, cell_a);
+  const F bx = seen(0, cell_b), by = seen(1, cell_b), bz = seen(2, cell_b);
+  // Whether both ends lie farther than the radius on one side of a line through the ray, along the
+  // piece or square to it.
+  const F cx = bx - ax, cy = by - ay, length = sqrt(fma(cx, cx, F(cy * cy)));
+  // The piece's direction is rounded as its ends are; where one of these is within the radius, the
+  // other is no farther than the piece is long beyond that.
+  const F reach = fma(radius, length, F(rounding * (length + radius)));
+  const F beside = abs(fma(cx, ay, F(-(cy * ax))));
+  const F along_a = fma(cx, ax, F(cy * ay)), along_b = fma(cx, bx, F(cy * by));
+  const F deep = radius + rounding;
+  const Mask<F> passed = (beside > reach) | (along_a > reach) | (along_b < -reach) |
+                         (max(az, bz) < -deep) |
+                         (min(az, bz) - deep > F(tfar * ray.length * 1.00001f)) |
+                         Mask<F>(load<UInt<F>>(c.segment.data()) == UInt<F>(kNone));
+  return lane_bits<F>(not_(passed));
 }
 
 }  // namespace wavecomb

@@ -4,9 +4,9 @@
 /// Boxes of hair are a hundred times longer than a strand is wide: of the segments whose box a ray
 /// meets, it passes by nearly all, and each of them costs memory from another place. So a hierarchy
 /// is made over clumps of pieces that lie close together: segments, or parts of slender ones. A
-/// clump has their control points side by side, in 16 bits, and a ray is tested against the eight
-/// at once. Segments of which a piece may be met go to intersect_curve; a clump's own test says
-/// nothing but "perhaps" or "certainly not", so that it changes no picture.
+/// clump has the lines that these lie about side by side, in 16 bits, and a ray is tested against
+/// the eight at once. Segments of which a piece may be met go to intersect_curve; a clump's own
+/// test says nothing but "perhaps" or "certainly not", so that it changes no picture.
 #pragma once
 
 #include <array>
@@ -53,11 +53,11 @@ class CurveClumps {
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// Control point p of piece k, along an axis, is low[axis] + step[axis] * cell, with cell of 16
-  /// bits: those of coordinate i = 3 p + axis are in cells[i / 2][k], the upper ones for odd i.
+  /// The ends of piece k along an axis are low[axis] + step[axis] * cell, with cells of 16 bits:
+  /// those of the first are the lower halves of cells[axis][k], those of the second the upper ones.
   struct alignas(32) Clump {
-    std::array<std::array<uint32_t, kPieces>, 6> cells;
-    std::array<float, kPieces> radius;  ///< the greatest, with what 16 bits leave out
+    std::array<std::array<uint32_t, kPieces>, 3> cells;
+    std::array<float, kPieces> radius;  ///< about the line between the ends
     std::array<uint32_t, kPieces> segment;
     std::array<float, 3> low, step;
   };
