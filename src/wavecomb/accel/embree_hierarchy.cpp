@@ -43,6 +43,13 @@ struct EmbreeDevice {
 
 namespace {
 
+void both_at_once(const CurveClumps::Task& a, const CurveClumps::Task& b) {
+  const TaskOrder order;
+  const auto one = [&](size_t i) { i == 0 ? a() : b(); };
+  tbb::parallel_for(size_t{0}, size_t{2}, order.around(one));
+  order.join();
+}
+
 void set_transform(RTCGeometry g, uint32_t step, const Affine& m) {
   const float columns[12] = {m.row[0].x, m.row[1].x, m.row[2].x, m.row[0].y, m.row[1].y, m.row[2].y,
                              m.row[0].z, m.row[1].z, m.row[2].z, m.t.x,      m.t.y,      m.t.z};
@@ -126,7 +133,8 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
     auto& curves = curves_[mesh_id];
     curves = std::make_shared<const CurveGeometry>(CurveGeometry{
         &mesh, mesh_id, filtered_[mesh_id] != 0, fibres_[mesh_id] != 0,
-        CurveClumps::serve(mesh) ? std::make_unique<const CurveClumps>(mesh) : nullptr});
+        CurveClumps::serve(mesh) ? std::make_unique<const CurveClumps>(mesh, both_at_once)
+                                 : nullptr});
     return make_curve_geometry(device(), *curves, rule_);
   }
   RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);

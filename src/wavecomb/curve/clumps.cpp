@@ -83,59 +83,69 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment) {
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-std::vector<uint32_t> pieces_of(const Mesh& mesh) {
-  std::vector<uint32_t> out;
-  for (uint32_t s = 0; s < mesh.indices.size(); ++s) {
-    const uint32_t n = 1u << halvings(mesh, s);
-    for (uint32_t i = 0; i < n; ++i) out.push_back(kPieceNodes * s + n + i);
+/// A piece's number, and the middle of its line, twice.
+struct ClumpEntry {
+  std::array<float, 3> middle;
+  uint32_t piece;
+};
+
+/// Calls work(i) for each i below the end, parts of them side by side.
+template <typename Work>
+void over_all(size_t first, size_t end, const CurveClumps::Both& both, const Work& work) {
+  constexpr size_t kMost = 1u << 14;
+  if (end - first > kMost) {
+    const size_t middle = first + (end - first) / 2;
+    return both([&] { over_all(first, middle, both, work); },
+                [&] { over_all(middle, end, both, work); });
   }
+  for (size_t i = first; i < end; ++i) work(i);
+}
+
+std::vector<ClumpEntry> pieces_of(const Mesh& mesh, const CurveClumps::Both& both) {
+  const size_t segments = mesh.indices.size();
+  std::vector<uint32_t> end(segments);
+  over_all(0, segments, both,
+           [&](size_t s) { end[s] = 1u << halvings(mesh, static_cast<uint32_t>(s)); });
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<ClumpEntry> out(segments > 0 ? end.back() : 0);
+  over_all(0, segments, both, [&](size_t s) {
+    const uint32_t first = s > 0 ? end[s - 1] : 0, n = end[s] - first;
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t number = kPieceNodes * static_cast<uint32_t>(s) + n + i;
+      const ClumpPiece piece = piece_of(mesh, number);
+      const Vec3<float> m = piece.a + piece.b;
+      out[first + i] = {{m.x, m.y, m.z}, number};
+    }
+  });
   return out;
 }
 
-/// Parts rows of pieces, by the middles of their chords, until each part fills one clump.
-class ClumpParting {
- public:
-  explicit ClumpParting(const Mesh& mesh, std::span<const uint32_t> pieces) {
-    middles_.reserve(pieces.size());
-    for (const uint32_t piece : pieces) {
-      const ClumpPiece one = piece_of(mesh, piece);
-      const Vec3<float> m = one.a + one.b;
-      middles_.push_back({m.x, m.y, m.z});
+/// Parts pieces by their middles until each part fills one clump; all but the last are full.
+void part_pieces(std::span<ClumpEntry> pieces, const CurveClumps::Both& both) {
+  constexpr size_t kFull = CurveClumps::kPieces, kMany = 1u << 15;
+  if (pieces.size() <= kFull) return;
+  std::array<float, 3> lo = pieces[0].middle, hi = lo;
+  for (const ClumpEntry& one : pieces)
+    for (size_t k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], one.middle[k]);
+      hi[k] = std::max(hi[k], one.middle[k]);
     }
-  }
-
-  /// Sorts; all clumps but the last are full.
-  void run(std::span<uint32_t> segments) const {
-    constexpr size_t kFull = CurveClumps::kPieces;
-    if (segments.size() <= kFull) return;
-    const int axis = longest(segments);
-    const size_t half = ((segments.size() + kFull - 1) / kFull + 1) / 2 * kFull;
-    const auto before = [&](uint32_t a, uint32_t b) {
-      const float x = middles_[a][axis], y = middles_[b][axis];
-      return x != y ? x < y : a < b;
-    };
-    std::nth_element(segments.begin(), segments.begin() + static_cast<ptrdiff_t>(half),
-                     segments.end(), before);
-    run(segments.first(half));
-    run(segments.subspan(half));
-  }
-
- private:
-  int longest(std::span<const uint32_t> segments) const {
-    std::array<float, 3> lo = middles_[segments[0]], hi = lo;
-    for (const uint32_t s : segments)
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min(lo[k], middles_[s][k]);
-        hi[k] = std::max(hi[k], middles_[s][k]);
-      }
-    int axis = 0;
-    for (int k = 1; k < 3; ++k)
-      if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
-    return axis;
-  }
-
-  std::vector<std::array<float, 3>> middles_;
-};
+  size_t axis = 0;
+  for (size_t k = 1; k < 3; ++k)
+    if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+  const size_t half = ((pieces.size() + kFull - 1) / kFull + 1) / 2 * kFull;
+  const auto before = [axis](const ClumpEntry& a, const ClumpEntry& b) {
+    const float x = a.middle[axis], y = b.middle[axis];
+    return x != y ? x < y : a.piece < b.piece;
+  };
+  std::nth_element(pieces.begin(), pieces.begin() + static_cast<ptrdiff_t>(half), pieces.end(),
+                   before);
+  const auto first = [&] { part_pieces(pieces.first(half), both); };
+  const auto second = [&] { part_pieces(pieces.subspan(half), both); };
+  if (pieces.size() > kMany) return both(first, second);
+  first();
+  second();
+}
 
 float clump_size(const float* v) {
   return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
@@ -143,16 +153,16 @@ float clump_size(const float* v) {
 
 }  // namespace
 
-CurveClumps::CurveClumps(const Mesh& mesh) : mesh_(mesh) {
-  const std::vector<uint32_t> pieces = pieces_of(mesh);
-  std::vector<uint32_t> order(pieces.size());
-  std::iota(order.begin(), order.end(), 0u);
-  ClumpParting(mesh, pieces).run(order);
-  for (uint32_t& one : order) one = pieces[one];
-  clumps_.reserve((order.size() + kPieces - 1) / kPieces);
-  for (size_t first = 0; first < order.size(); first += kPieces)
-    clumps_.push_back(make(&order[first],
-                           static_cast<uint32_t>(std::min<size_t>(kPieces, order.size() - first))));
+CurveClumps::CurveClumps(const Mesh& mesh, const Both& both) : mesh_(mesh) {
+  std::vector<ClumpEntry> pieces = pieces_of(mesh, both);
+  part_pieces(pieces, both);
+  clumps_.resize((pieces.size() + kPieces - 1) / kPieces);
+  over_all(0, clumps_.size(), both, [&](size_t c) {
+    std::array<uint32_t, kPieces> numbers;
+    const size_t n = std::min<size_t>(kPieces, pieces.size() - c * kPieces);
+    for (size_t k = 0; k < n; ++k) numbers[k] = pieces[c * kPieces + k].piece;
+    clumps_[c] = make(numbers.data(), static_cast<uint32_t>(n));
+  });
 }
 
 CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "wavecomb/curve/intersect.h"
@@ -27,7 +28,15 @@ class CurveClumps {
     return mesh.is_curved() && mesh.primitive != Primitive::kSphere && !mesh.deforms();
   }
 
-  explicit CurveClumps(const Mesh& mesh);
+  /// Does two things, one beside the other or one after the other.
+  using Task = std::function<void()>;
+  using Both = std::function<void(const Task&, const Task&)>;
+
+  explicit CurveClumps(
+      const Mesh& mesh, const Both& both = [](const Task& a, const Task& b) {
+        a();
+        b();
+      });
 
   uint32_t count() const { return static_cast<uint32_t>(clumps_.size()); }
   size_t bytes() const { return clumps_.size() * sizeof(Clump); }
