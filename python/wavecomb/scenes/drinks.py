@@ -16,12 +16,12 @@ from wavecomb.scenes.stage import StageWriter
 _RADIUS, _HEIGHT, _WALL, _FOOT = 3.0, 10.5, 0.32, 1.0
 _OVERLAP = 0.1
 """How far a drink reaches into the glass, in centimetres."""
-_DRINKS: tuple[tuple[str, tuple[float, float, float], float, Colour, float, Colour, float], ...] = (
-    ("Cordial", (-8.0, 0.0, -1.0), 8.2, (0.75, 0.06, 0.09), 3.0, (0.0, 0.0, 0.0), 0.0),
-    ("Juice", (0.0, 0.0, 0.5), 8.8, (0.85, 0.42, 0.06), 1.2, (1.1, 0.75, 0.28), 0.75),
-    ("Milk", (8.0, 0.0, -1.0), 7.0, (0.96, 0.94, 0.9), 0.5, (2.6, 2.8, 3.1), 0.5),
+_DRINKS: tuple[tuple[str, tuple[float, float, float], float, Colour, Colour, float], ...] = (
+    ("Cordial", (-8.0, 0.0, -1.0), 8.2, (0.0, 0.0, 0.0), (0.08, 0.9, 0.75), 0.0),
+    ("Juice", (0.0, 0.0, 0.5), 8.8, (1.6, 1.3, 0.7), (0.01, 0.16, 1.3), 0.6),
+    ("Milk", (8.0, 0.0, -1.0), 7.0, (4.0, 4.2, 4.5), (0.001, 0.003, 0.012), 0.5),
 )
-"""Names, places, levels, and of OpenPBR's transmission: colour, depth, scatter and anisotropy."""
+"""Names, places, levels; how much they scatter and absorb a centimetre, and the mean cosine."""
 
 
 def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, object]) -> None:
@@ -86,14 +86,16 @@ def build_drinks(writer: StageWriter, options: SceneOptions) -> None:
     writer.polygons("/World/Set/Table", floor, [[0, 1, 2, 3]], "Table")
     writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Wall")
     columns = 16 * options.teapot_level
-    for name, at, level, colour, depth, scatter, anisotropy in _DRINKS:
+    for name, at, level, scattering, absorption, anisotropy in _DRINKS:
+        extinction = np.array(scattering) + np.array(absorption)
+        depth = 1.0 / float(extinction.max())
         _glassy(
             writer,
             name,
             1.34,
-            transmission_color=("color3", colour),
+            transmission_color=("color3", np.exp(-depth * extinction).tolist()),
             transmission_depth=("float", depth),
-            transmission_scatter=("color3", scatter),
+            transmission_scatter=("color3", (depth * np.array(scattering)).tolist()),
             transmission_scatter_anisotropy=("float", anisotropy),
         )
         _serve(writer, name, at, level, columns)

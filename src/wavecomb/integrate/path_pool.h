@@ -54,8 +54,8 @@ struct InsideRow {
   UInt<F> crossed;  ///< what it has found: Crossing, and the material
   F outer;          ///< PathState::outer and medium of the vertex
   UInt<F> medium;
-  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3,
-                  place, crossed, outer, medium)
+  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2,
+                  material_3, place, crossed, outer, medium)
 };
 
 /// A path's shadow ray, of which it has one at most at each vertex.

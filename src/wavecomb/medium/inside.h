@@ -43,8 +43,8 @@ class Inside {
   }
 
   /// What the last vertex's ray in `bit` (Crossing) has crossed.
-  void cross(const InteriorView& view, const UInt<F>& place, const UInt<F>& crossed,
-             Crossing bit, const Mask<F>& active) {
+  void cross(const InteriorView& view, const UInt<F>& place, const UInt<F>& crossed, Crossing bit,
+             const Mask<F>& active) {
     const auto has = [&](Crossing b) { return Mask<F>((crossed & uint32_t{b}) != U(0u)); };
     Mask<F> crosses = active & has(bit);
     if (none(crosses)) return;
@@ -111,7 +111,8 @@ class Inside {
   void leave(const U& place, const Mask<F>& lanes) {
     Mask<F> left = lanes;
     for (size_t k = kMostInside; k-- > 0;) {
-      const Mask<F> here = left & Mask<F>(material_[k] != U(kNothing)) & Mask<F>(place_[k] == place);
+      const Mask<F> here =
+          left & Mask<F>(material_[k] != U(kNothing)) & Mask<F>(place_[k] == place);
       drop(k, Mask<U>(here));
       left = left & not_(here);
     }
