@@ -41,9 +41,13 @@ using Members = std::vector<std::pair<const char*, Value Class::*>>;
 const Members<OpenPbr, Vec3<float>> kOpenPbrColors{
     {"transmission_color", &OpenPbr::transmission_color},
     {"subsurface_radius", &OpenPbr::subsurface_radius},
+    {"transmission_scatter", &OpenPbr::transmission_scatter},
     WAVECOMB_OPENPBR_INPUTS(WAVECOMB_COLOUR)};
-const Members<OpenPbr, float> kOpenPbrNumbers{{"transmission_depth", &OpenPbr::transmission_depth},
-                                              WAVECOMB_OPENPBR_INPUTS(WAVECOMB_NUMBER)};
+const Members<OpenPbr, float> kOpenPbrNumbers{
+    {"transmission_depth", &OpenPbr::transmission_depth},
+    {"transmission_scatter_anisotropy", &OpenPbr::transmission_scatter_anisotropy},
+    {"nested_priority", &OpenPbr::nested_priority},
+    WAVECOMB_OPENPBR_INPUTS(WAVECOMB_NUMBER)};
 const Members<OpenPbr, bool> kOpenPbrSwitches{{"thin_walled", &OpenPbr::thin_walled}};
 nb::object to_python(const Vec3<float>& v) {
   return nb::make_tuple(v.x, v.y, v.z);

@@ -191,7 +191,7 @@ def test_materialx_inputs_are_its_own(tmp_path):
     assert found["specular_IOR"].attribute == Sdf.Path("/X/S.inputs:specular_IOR")
     assert found["thin_walled"].value is False
     assert found["thin_walled"].type_name == Sdf.ValueTypeNames.Bool
-    assert "roughness" not in found and "transmission_scatter" not in found
+    assert "roughness" not in found and "transmission_dispersion" not in found
 
 
 def test_a_colour_in_a_space_of_its_own_has_a_value(tmp_path):

@@ -16,6 +16,7 @@ from wavecomb.scenes.candles import build_candles
 from wavecomb.scenes.caustics import build_caustics
 from wavecomb.scenes.clear_stages import build_lens, build_pool, build_prism
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
+from wavecomb.scenes.drinks import build_drinks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
@@ -59,6 +60,7 @@ SCENES: dict[str, SceneInfo] = {
     "clouds": SceneInfo("clouds over the sea, a grid: see --voxels", 100.0, build_clouds),
     "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),
     "candles": SceneInfo("wax and marble, below whose surfaces light walks", 0.01, build_candles),
+    "drinks": SceneInfo("glasses of what absorbs and scatters", 0.01, build_drinks),
     "caustics": SceneInfo("a glass ball and a gold ring before a small lamp", 0.1, build_caustics),
     "pool": SceneInfo("waves on a pool under the sun", 1.0, build_pool),
     "lens": SceneInfo("a lens that shows a small lamp on a wall", 0.1, build_lens),

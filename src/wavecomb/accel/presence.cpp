@@ -31,8 +31,11 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
   if (scene.view().lights.links.members) return filtered;
   if (scene.view().visibility) mark_unseen(scene, filtered);
-  if (!scene.view().has_presence) return filtered;
-  const auto needs = [&](uint32_t m) { return scene.material_part()->shaded[m].needs_presence(); };
+  const InteriorView& interiors = scene.view().interiors;
+  if (!scene.view().has_presence && !interiors.media) return filtered;
+  const auto needs = [&](uint32_t m) {
+    return scene.material_part()->shaded[m].needs_presence() || interiors.is_bound(m);
+  };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),
                                      [&](const InstanceRecord& i) { return needs(i.material); });
@@ -79,6 +82,8 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
                 float v, uint32_t slot, const PresenceKeys& keys) {
   const uint32_t material =
       hit_material<float>(scene, scene.instances[instance].material, mesh, prim, true);
+  // Who looks what shadow rays pass inside of meshes finds the bounds himself (medium/interiors.h).
+  if (keys.ray_kind == kSeenByShadowRays && scene.interiors.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
   const Vec2<float> uv = hit_uv<float>(scene.meshes, mesh, prim, u, v, true);
   const float opacity = opacity_at<float>(scene.materials, scene.meshes, scene.instances, material,

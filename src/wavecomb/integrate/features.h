@@ -17,10 +17,12 @@ enum Feature : uint32_t {
   kNotes = 16,        ///< AOVs of vertices, histories of paths
   kExperiments = 32,  ///< cosine sampling, Schlick's approximation
   kBelow = 128,       ///< light that walks below surfaces
+  kInside = 256,      ///< paths that know what they are inside of
   kJoined = 64,       ///< paths from the lights, which share in the weights of the camera's
 };
 /// Renders that are joined by paths from the lights have kernels of their own; nothing walks there.
-inline constexpr uint32_t kPlain = kNotes, kEverything = 63 | kBelow, kJoint = 63 | kJoined;
+inline constexpr uint32_t kPlain = kNotes, kEverything = 63 | kBelow | kInside,
+                          kJoint = 63 | kJoined;
 
 /// Whether there are plain kernels and least variants for packets of F: for the widest ones.
 /// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.

@@ -40,6 +40,24 @@ struct PathColdRow {
   WAVECOMB_FIELDS(time, link, importance)
 };
 
+/// Bits of InsideRow::crossed below the material: whether the bounce and the shadow ray lead to the
+/// other side of the surface, and whether that is its inner one.
+enum Crossing : uint32_t { kBounceCrosses = 1, kShadowCrosses = 2, kEnters = 4 };
+inline constexpr uint32_t kCrossingBits = 3;
+
+/// What a path is inside of, where it knows: four bounds at most, by placed_geometry and material,
+/// the last entered last; kNothing from the first that is not there (medium/interiors.h).
+template <typename F>
+struct InsideRow {
+  UInt<F> place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3;
+  UInt<F> place;    ///< of the vertex: placed_geometry
+  UInt<F> crossed;  ///< what it has found: Crossing, and the material
+  F outer;          ///< PathState::outer and medium of the vertex
+  UInt<F> medium;
+  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2,
+                  material_3, place, crossed, outer, medium)
+};
+
 /// A path's shadow ray, of which it has one at most at each vertex.
 template <typename F>
 struct ShadowRow {
@@ -79,16 +97,18 @@ static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
 class PathPool {
  public:
   PathPool() = default;
-  /// `cold`: paths keep a PathColdRow. `joined`: and PathState::ratio.
-  PathPool(size_t capacity, bool cold, bool joined = false)
+  /// `cold`: paths keep a PathColdRow. `joined`: and PathState::ratio. `knows`: and an InsideRow.
+  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
-        ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()) {
+        ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()),
+        inside_(knows ? SoaBlock(1, capacity * kRowWords<InsideRow>) : SoaBlock()) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
     this->cold = cold ? cold_.floats(0) : nullptr;
     ratio = joined ? ratios_.floats(0) : nullptr;
+    inside = knows ? inside_.floats(0) : nullptr;
   }
 
   float* paths = nullptr;     ///< PathRow
@@ -96,10 +116,11 @@ class PathPool {
   float* radiance = nullptr;  ///< RadianceRow
   float* cold = nullptr;      ///< PathColdRow; null where no path has one
   float* ratio = nullptr;     ///< PathState::ratio; null where no paths start at lights
-  size_t bytes() const { return rows_.bytes() + cold_.bytes() + ratios_.bytes(); }
+  float* inside = nullptr;    ///< InsideRow; null where nobody knows
+  size_t bytes() const { return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes(); }
 
  private:
-  SoaBlock rows_, cold_, ratios_;
+  SoaBlock rows_, cold_, ratios_, inside_;
 };
 
 /// Adds c to the active lanes' rows of radiance, which are distinct.

@@ -62,6 +62,9 @@ struct PathState {
   UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
   F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
   F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one
+  // Where paths know what they are inside of (InsideRow):
+  F outer{1.f};        ///< index of refraction on the other side of the surface
+  UInt<F> medium{0u};  ///< what collides, by material
 
   LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
 };
@@ -81,6 +84,7 @@ struct VertexResult {
   // bounce by the BSDF alone.
   UInt<F> axis;
   F bsdf_pdf;
+  UInt<F> crossed;  ///< InsideRow::crossed, where paths know what they are inside of
 };
 
 /// What a scattering does: its kind, a PathEvent, and what share of it is diffuse, by colour. What
@@ -160,6 +164,7 @@ struct Vertex {
   bool wants_lights() const { return notes() && aovs->wants_lights; }
   bool wants_events() const { return notes() && aovs->wants_events; }
   bool wants_bounces() const { return notes() && aovs->wants_bounces; }
+  bool knows_inside() const { return has(kInside) && scene.interiors.media; }
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 

@@ -27,7 +27,8 @@ struct ReferenceWorker {
       : aovs(1, context.film->aovs().layout(), context.aovs),
         history(1, context.kept_vertices()),
         splats(context.joins_light() ? Wave::kSplats : 0),
-        walks(context.scene.walks.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()) {}
+        walks(context.scene.walks.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()),
+        interiors(context.knows_inside() ? 1 : 0) {}
   PhaseClock clock;
   Counts counts;
   // Of the path that is traced, in slot 0.
@@ -35,6 +36,7 @@ struct ReferenceWorker {
   PathHistory history;
   SplatList splats;  ///< of paths from lights
   SoaBlock walks;    ///< below surfaces
+  InteriorBuffers interiors;
 };
 
 /// Traces paths one after the other, each depth first, through what lies between surfaces.
@@ -109,6 +111,7 @@ class PathTracer {
       bool came_out = false;
       if (path.pdf < 0.f && !walk(key, depth, path, hit, came_out)) return depth;
       if constexpr (Media::kAny) {
+        const Flight<F> flight = fly(key, depth, path, hit);
         if constexpr (Media::kShines)
           if (media_.shines())
             add(kNoLight,
@@ -116,8 +119,6 @@ class PathTracer {
                              media_.template emission<F>(
                                  {settings_.sampler, key, depth, path.o, path.dir, hit.t}, true),
                          clamp_limit(settings_, depth)));
-        const Flight<F> flight = media_.template fly<F>(
-            {settings_.sampler, key, depth, path.o, path.dir, hit.t}, path.throughput, true);
         path.throughput = path.throughput * flight.weight;
         if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
       }
@@ -157,7 +158,14 @@ class PathTracer {
       if (context_.joins_light() && depth == 0 && on_surface)
         path.ratio =
             first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
+      if (context_.knows_inside()) {
+        path.outer = inside_.outer;
+        path.medium = inside_.medium;
+      }
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
+      if (context_.knows_inside()) {
+        inside_.crossed = v.crossed;
+      }
       add(aovs.emitter, v.emitted);
       if (aovs.wants_events && (v.alive || v.has_shadow))
         aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
@@ -195,6 +203,16 @@ class PathTracer {
     return true;
   }
 
+  /// What becomes of a path on its way to `hit`.
+  Flight<F> fly(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
+    if constexpr (Media::kStreams)
+      if (context_.knows_inside())
+        return media_.fly_inside(key, depth, settings_.sampler, rays_.keys(), rays_.time(), path,
+                                 hit, inside_);
+    return media_.template fly<F>({settings_.sampler, key, depth, path.o, path.dir, hit.t},
+                                  path.throughput, true);
+  }
+
   void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
     if (probe_count_ == probes_.size()) return;
     probes_[probe_count_++] = {aovs.lit_by,
@@ -218,6 +236,10 @@ class PathTracer {
       const F t = v.shadow_tfar * (1.f / kShadowReach);
       c = c * media_.template transmittance<F>(
                   {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t}, true);
+      if constexpr (Media::kStreams)
+        if (context_.knows_inside())
+          c = c *
+              media_.pass_inside(rays_.keys(), rays_.time(), inside_, v.shadow_o, v.shadow_d, t);
     }
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
@@ -253,6 +275,7 @@ class PathTracer {
   PathAovs& aovs_;
   PathHistory& history_;
   RadianceRow<F> radiance_;
+  InsideRow<F> inside_{};         ///< where paths know what they are inside of
   std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
   uint32_t probe_count_ = 0;
 };

@@ -25,7 +25,8 @@ void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
   if (task.from_lights) return trace_light_task(context_, *workers_[i], task);
   ReferenceWorker& worker = *workers_[i];
   if (context_.has_media())
-    trace_task(context_, worker, task, Volumes(context_, worker.counts, worker.walks));
+    trace_task(context_, worker, task,
+               Volumes(context_, worker.counts, worker.walks, worker.interiors));
   else
     trace_task(context_, *workers_[i], task, NoMedia());
 }

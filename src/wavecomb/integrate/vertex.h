@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/core/sampler.h"
+#include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/steps/emit.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
@@ -13,6 +14,20 @@
 #include "wavecomb/integrate/steps/survive.h"
 
 namespace wavecomb {
+
+/// InsideRow::crossed of a vertex whose bounce and shadow ray are known.
+template <typename F, uint32_t kFeatures>
+inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, const Vec3<F>& wo,
+                          const VertexResult<F>& out) {
+  using U = UInt<F>;
+  const auto bit = [&](const Mask<F>& on, Crossing what) {
+    return select(Mask<U>(on), U(uint32_t{what}), U(0u));
+  };
+  const auto crosses = [&](const Vec3<F>& d) { return Mask<F>(F(dot(frame.n, d) * wo.z) < 0.f); };
+  return (v.material << kCrossingBits) | bit(wo.z > 0.f, kEnters) |
+         bit(out.alive & crosses(out.next.dir), kBounceCrosses) |
+         bit(out.has_shadow & crosses(out.shadow_d), kShadowCrosses);
+}
 
 /// The steps of a vertex of the active lanes' paths, with program `Bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
@@ -27,6 +42,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   out.next.link = U(0u);
   out.axis = U(0u);
   out.bsdf_pdf = F(0.f);
+  if constexpr (v.has(kInside)) out.crossed = U(0u);
   if (v.wants_lights()) {
     v.aovs->emitter = v.aovs->lit_by = U(kNoLight);
     v.aovs->light_weight = F(-1.f);
@@ -56,6 +72,9 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, joint, receiver, out);
   survive<F>(v, place, luminance(at.throughput), r_light.w, out);
+  if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits)
+    if (v.knows_inside()) [[unlikely]]
+      out.crossed = crossed_at<F>(v, frame, wo, out);
   if (v.wants_events()) [[unlikely]]
     note_events<std::remove_cvref_t<decltype(at.bsdf)>, F>(v.scene.lights, at.bsdf, frame, wo,
                                                            out.shadow_d, out.next.dir, out.next.pdf,

@@ -15,6 +15,7 @@
 #include "wavecomb/integrate/calibration.h"
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/integrator.h"
+#include "wavecomb/integrate/interior_buffers.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/path_pool.h"
@@ -66,7 +67,11 @@ struct WaveContext {
   }
 
   /// Whether something lies between surfaces, or light walks below them.
-  bool has_media() const { return scene.volumes.count > 0 || scene.walks.media != nullptr; }
+  bool has_media() const {
+    return scene.volumes.count > 0 || scene.walks.media != nullptr || knows_inside();
+  }
+  /// Whether paths know which meshes they are inside of.
+  bool knows_inside() const { return scene.interiors.media != nullptr; }
   /// Whether paths need a time.
   bool moves() const { return scene.has_motion || camera->moves(); }
   /// Whether paths keep the class of the surface that they left, where lights are linked.
@@ -86,7 +91,7 @@ struct WaveContext {
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
-             context.joins_light()),
+             context.joins_light(), context.knows_inside()),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),
@@ -97,6 +102,7 @@ struct Wave {
         times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
         walks(context.scene.walks.media ? SoaBlock(kWalkColumns, capacity) : SoaBlock()),
         ways(context.has_media() ? SoaBlock(kWayColumns, capacity) : SoaBlock()),
+        interiors(context.knows_inside() ? capacity : 0),
         sorter(capacity),
         ray_sorter(context.orders_rays() ? capacity : 0),
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
@@ -106,7 +112,7 @@ struct Wave {
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders) {}
-  static constexpr size_t kWayColumns = 11, kWalkColumns = 29;
+  static constexpr size_t kWayColumns = 14, kWalkColumns = 28;
   static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 
@@ -117,10 +123,11 @@ struct Wave {
   HitBuffer hits;
   ShadingQueue shading;
   ShadowQueue shadows;
-  SoaBlock columns;  ///< of ShadingQueueView: throughput, position key, texture key
-  SoaBlock times;    ///< of the rays that are traced, where the scene moves
-  SoaBlock walks;    ///< paths below surfaces (medium/walkers.h), where there are any
-  SoaBlock ways;     ///< what rays find in volumes (medium/volumes.h), where there are any
+  SoaBlock columns;           ///< of ShadingQueueView: throughput, position key, texture key
+  SoaBlock times;             ///< of the rays that are traced, where the scene moves
+  SoaBlock walks;             ///< paths below surfaces (medium/walkers.h), where there are any
+  SoaBlock ways;              ///< what rays find in volumes (medium/volumes.h), where there are any
+  InteriorBuffers interiors;  ///< of medium/interiors.h
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
   std::vector<float> scratch;         ///< one a material, for policies
@@ -135,7 +142,7 @@ struct Wave {
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
-           ways.bytes() + splats.bytes();
+           ways.bytes() + interiors.bytes() + splats.bytes();
   }
 };
 

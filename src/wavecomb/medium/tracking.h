@@ -41,6 +41,7 @@ struct Way {
 /// `ratio` 1.
 struct Flights {
   static constexpr uint32_t kNoEvent = 0xffffffffu;
+  static constexpr uint32_t kNoHero = 4;  ///< of a flight that is none of volumes any more
 
   float* t;
   uint32_t* material;  ///< of the volume that stopped a flight
@@ -133,33 +134,63 @@ class FlightVisitor {
 
 }  // namespace detail
 
-/// Flies through all volumes. `ways.most` is `flights.t`; `scratch` has room for as many numbers.
+namespace detail {
+
+/// Flies through one volume.
 template <typename F>
-inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                        float* scratch, VolumeCounts& counts) {
-  using Visitor = detail::FlightVisitor<F>;
-  bool is_grey = true;
-  for (uint32_t i = 0; i < volumes.count; ++i) is_grey = is_grey && volumes.volumes[i].is_grey;
-  const bool again = !is_grey && volumes.count > 1;
-  std::copy_n(flights.t, again ? ways.count : 0, scratch);
-  const auto fly = [&](uint32_t i, const Ways& along, typename Visitor::Keeps keeps) {
-    const VolumeRecord& v = volumes.volumes[i];
-    Visitor visitor(v, volumes.first_material + i, flights, keeps);
-    each_collision<F>(v.density, v.most_extinction, i, along, counts, visitor);
-  };
+inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, const Flights& flights,
+                   typename FlightVisitor<F>::Keeps keeps, VolumeCounts& counts) {
+  const VolumeRecord& v = volumes.volumes[i];
+  FlightVisitor<F> visitor(v, volumes.first_material + i, flights, keeps);
+  each_collision<F>(v.density, v.most_extinction, i, ways, counts, visitor);
+}
+
+}  // namespace detail
+
+/// Whether all volumes are alike in all channels.
+inline bool are_grey(const VolumeView& volumes) {
+  return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
+                     [](const VolumeRecord& v) { return v.is_grey; });
+}
+
+/// Flies through all volumes, and finds what stops flights alone. `scratch` gets how far they might
+/// go, which is `ways.most` and `flights.t`.
+template <typename F>
+inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                         float* scratch, VolumeCounts& counts) {
+  std::copy_n(flights.t, ways.count, scratch);
   for (uint32_t i = 0; i < volumes.count; ++i)
-    fly(i, ways, again ? Visitor::kStops : Visitor::kBoth);
-  if (!again) return;
-  // Flights through the first volumes went further than to what stopped them in the end: once more,
-  // with the same numbers, to there. A flight to its own end is itself.
+    detail::fly_in<F>(volumes, i, ways, flights, detail::FlightVisitor<F>::kStops, counts);
+}
+
+/// And the ratios, once all know where they stop: flights through the first volumes went further
+/// than that, so once more, with the same numbers, to there. A flight to its own end is itself.
+template <typename F>
+inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                          float* scratch, VolumeCounts& counts) {
   Ways once_more = ways;
   once_more.most = scratch + ways.count;
   for (uint32_t i = 0; i < volumes.count; ++i) {
-    for (size_t k = 0; k < ways.count; ++k)
+    for (size_t k = 0; k < ways.count; ++k) {
       scratch[ways.count + k] =
           flights.material[k] == volumes.first_material + i ? scratch[k] : flights.t[k];
-    fly(i, once_more, Visitor::kRatios);
+      if (flights.hero[k] == Flights::kNoHero) scratch[ways.count + k] = 0;
+    }
+    detail::fly_in<F>(volumes, i, once_more, flights, detail::FlightVisitor<F>::kRatios, counts);
   }
+}
+
+/// Both. `ways.most` is `flights.t`; `scratch` has room for twice as many numbers.
+template <typename F>
+inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                        float* scratch, VolumeCounts& counts) {
+  if (volumes.count > 1 && !are_grey(volumes)) {
+    stop_flights<F>(volumes, ways, flights, scratch, counts);
+    weigh_flights<F>(volumes, ways, flights, scratch, counts);
+    return;
+  }
+  for (uint32_t i = 0; i < volumes.count; ++i)
+    detail::fly_in<F>(volumes, i, ways, flights, detail::FlightVisitor<F>::kBoth, counts);
 }
 
 /// One flight of each lane.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program volume: a collision within a volume.
+/// Program volume: a collision within a volume, or within a mesh that bounds fog.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -74,8 +74,18 @@ class VolumeBsdf : public BsdfTraits {
     const U volume = v.material - volumes.first_material;
     Color<F> albedo(F(0.f));
     F g(0.f);
+    Mask<F> in_mesh(false);
+    if (v.knows_inside()) {
+      // What is absorbed there is by now.
+      in_mesh = v.active & Mask<F>(v.material == U(v.scene.interiors.event_material));
+      albedo = select<F>(in_mesh, Color<F>(F(1.f)), albedo);
+      g = select(in_mesh,
+                 gather_field<F>(v.scene.interiors.media, &InteriorMedium<float>::anisotropy,
+                                 v.path.medium, in_mesh),
+                 g);
+    }
     // One volume after the other: the lanes of a packet that are in it.
-    for (Mask<F> rest = v.active; any(rest);) {
+    for (Mask<F> rest = v.active & not_(in_mesh); any(rest);) {
       const uint32_t index = first_active<U>(volume, Mask<U>(rest));
       const VolumeRecord& r = volumes.volumes[index];
       const Mask<F> here = rest & Mask<F>(volume == U(index));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What lies between surfaces and below them: the volumes of a scene, and the walks of its light.
+/// What lies between surfaces and below them: the volumes of a scene, what fills its meshes, and
+/// the walks of its light.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include "wavecomb/integrate/stages/trace.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/program_list.h"
+#include "wavecomb/medium/interiors.h"
 #include "wavecomb/medium/tracking.h"
 #include "wavecomb/medium/volume_bsdf.h"
 #include "wavecomb/medium/walkers.h"
@@ -25,9 +27,15 @@ class Volumes {
   template <typename F>
   using Programs = AppendedProgram<wavecomb::Programs<F>, VolumeBsdf<F>>;
 
-  /// `counts` gets what ways through them take. `walks`: room for walks, of Walkers::kColumns.
-  Volumes(const WaveContext& context, Counts& counts, const SoaBlock& walks)
-      : context_(context), volumes_(context.scene.volumes), counts_(counts), walks_(walks) {}
+  /// `counts` gets what ways through them take. `walks`: room for walks, of Walkers::kColumns;
+  /// `interiors`: for rays through what fills meshes.
+  Volumes(const WaveContext& context, Counts& counts, const SoaBlock& walks,
+          const InteriorBuffers& interiors)
+      : context_(context),
+        volumes_(context.scene.volumes),
+        counts_(counts),
+        walks_(walks),
+        interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts) {}
 
   /// Whether light walks below surfaces.
   bool has_walks() const { return context_.scene.walks.media != nullptr; }
@@ -68,6 +76,16 @@ class Volumes {
   }
   uint32_t exit_material() const { return context_.scene.walks.exit_material; }
 
+  /// `fly` of the reference where paths know what they are inside of: of the path in `path`, whose
+  /// row is `inside` and whose ray, of `keys`, has hit `hit`. Both may be others afterwards.
+  template <typename Hit>
+  Flight<float> fly_inside(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
+                           const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
+                           InsideRow<float>& inside) const;
+  /// What the shadow ray of the reference passes inside of meshes.
+  Color<float> pass_inside(const PresenceKeys& keys, float time, const InsideRow<float>& inside,
+                           const Vec3<float>& o, const Vec3<float>& d, float t) const;
+
   template <typename F>
   Flight<F> fly(const Passage<F>& p, const Color<F>& throughput, const Mask<F>& active) const {
     return fly_through<F>(volumes_, p, throughput, active, counts_.volumes);
@@ -96,14 +114,15 @@ class Volumes {
     walk_all<F>(wave, depth, sampler);
     const RayQueue& q = wave.rays;
     const Flights flights = flights_of(wave);
+    const bool knows_inside = context_.knows_inside();
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
-      store(flights.t + i, load<F>(wave.hits.t + i));
-      store(flights.material + i, UInt<F>(uint32_t{Flights::kNoEvent}));
-      for (float* ratio : flights.ratio) store(ratio + i, F(1.f));
       const PathRow<F> path = path_at<F>(wave, q.slot, i, q.size);
       const Way<F> way(sampler, path.key, depth, VertexSet::kFlight);
-      store(wave.ways.uints(kHero) + i, hero_of<F>(way.r.y, path.throughput));
       put_numbers<F>(wave, i, way);
+      store(flights.t + i, knows_inside ? F(kInfinity) : load<F>(wave.hits.t + i));
+      store(flights.material + i, UInt<F>(uint32_t{Flights::kNoEvent}));
+      for (float* ratio : flights.ratio) store(ratio + i, F(1.f));
+      store(wave.ways.uints(kHero) + i, hero_of<F>(way.r.y, path.throughput));
     }
     const Ways ways{q.ox,
                     q.oy,
@@ -115,7 +134,11 @@ class Volumes {
                     wave.ways.uints(kSeed),
                     wave.ways.floats(kFirst),
                     q.size};
-    fly_through<F>(volumes_, ways, flights, wave.ways.floats(kScratch), counts_.volumes);
+    float* const scratch = wave.ways.floats(kScratch);
+    if (!knows_inside) return fly_through<F>(volumes_, ways, flights, scratch, counts_.volumes);
+    stop_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+    fly_inside_all<F>(wave, depth, sampler);
+    if (!are_grey(volumes_)) weigh_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
   }
   /// Of the rays from `i` on, whose paths have this throughput.
   template <typename F>
@@ -123,8 +146,13 @@ class Volumes {
     const Flights f = flights_of(wave);
     const UInt<F> material = load<UInt<F>>(f.material + i);
     const Color<F> ratio{load<F>(f.ratio[0] + i), load<F>(f.ratio[1] + i), load<F>(f.ratio[2] + i)};
+    Color<F> weight = flight_weight<F>(ratio, throughput);
+    if (context_.knows_inside()) {
+      const auto left = [&](size_t k) { return load<F>(wave.ways.floats(kAbsorbed + k) + i); };
+      weight = weight * Color<F>(left(0), left(1), left(2));
+    }
     return {Mask<F>(material != UInt<F>(uint32_t{Flights::kNoEvent})), load<F>(f.t + i), material,
-            flight_weight<F>(ratio, throughput)};
+            weight};
   }
 
   template <typename F>
@@ -144,6 +172,15 @@ class Volumes {
         q.ox,  q.oy, q.oz, q.dx, q.dy, q.dz, most, wave.ways.uints(kSeed), wave.ways.floats(kFirst),
         q.size};
     transmittance_through<F>(volumes_, ways, product, counts_.volumes);
+    if (!context_.knows_inside()) return;
+    interiors_.pass<F>({{q.ox, q.oy, q.oz},
+                        {q.dx, q.dy, q.dz},
+                        q.slot,
+                        q.size,
+                        wave.times.floats(0),
+                        wave.pool.paths,
+                        wave.pool.inside},
+                       most, product, presence_keys(wave.pool, depth, true));
   }
   template <typename F>
   Color<F> passed(const Wave& wave, size_t i) const {
@@ -161,7 +198,8 @@ class Volumes {
     kSeed,
     kFirst,
     kExit,
-    kScratch
+    kAbsorbed,
+    kScratch = kAbsorbed + 3
   };
   static_assert(kScratch + 2 == Wave::kWayColumns);
   static_assert(Walkers::kColumns == Wave::kWalkColumns);
@@ -172,6 +210,50 @@ class Volumes {
     const Way<F> way = Way<F>(sampler, key, depth, VertexSet::kFlight).branch(0x51ee9u);
     return {o,      d,      throughput, F(throughput.x + throughput.y + throughput.z),
             F(0.f), F(0.f), way.seed,   UInt<F>(0u)};
+  }
+  /// Rays of a wave through what fills meshes.
+  template <typename F>
+  void fly_inside_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
+    const RayQueue& q = wave.rays;
+    const HitBuffer& h = wave.hits;
+    const PresenceKeys keys = presence_keys(wave.pool, depth, false);
+    const Flights f = flights_of(wave);
+    const SoaBlock& c = wave.ways;
+    const Inside<float> around = depth == 0 ? around_camera(keys) : Inside<float>();
+    interiors_.fly<F>({{q.ox, q.oy, q.oz},
+                       {q.dx, q.dy, q.dz},
+                       q.slot,
+                       q.size,
+                       wave.times.floats(0),
+                       wave.pool.paths,
+                       wave.pool.inside},
+                      {h.t, h.u, h.v, h.prim, h.geom, h.inst},
+                      {volumes_.count > 0,
+                       f.t,
+                       f.material,
+                       {f.ratio[0], f.ratio[1], f.ratio[2]},
+                       {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)},
+                       c.uints(kHero)},
+                      depth == 0 ? &around : nullptr, keys, [&](size_t, const PathRow<F>& path) {
+                        return begin_inside<F>(sampler, path.key, depth, path.throughput);
+                      });
+  }
+  /// Where the first distance is spread over a pixel's samples, unless volumes take that number.
+  template <typename F>
+  InteriorStart<F> begin_inside(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
+                                const Color<F>& throughput) const {
+    const Way<F> way(sampler, key, depth, VertexSet::kFlight);
+    const UInt<F> seed = way.branch(0x1d3a7u).seed;
+    const F first = volumes_.count == 0 ? way.r.z : walk_numbers<F>(seed, UInt<F>(0u)).x;
+    return {hero_of<F>(way.r.y, throughput), seed, first};
+  }
+  /// What the middle of the camera is inside of while the shutter is half open.
+  Inside<float> around_camera(const PresenceKeys& keys) const {
+    const Settings& s = *context_.settings;
+    const CameraRay<float> ray = camera_ray<float>(
+        *context_.camera, 0.5f * static_cast<float>(s.width), 0.5f * static_cast<float>(s.height),
+        {0.5f, 0.5f, 0.5f, 0.5f}, true, 0.5f);
+    return interiors_.surround(ray.o, 0.5f, keys);
   }
   /// A ray that sees from outside where a walk has ended.
   template <typename F>
@@ -193,7 +275,7 @@ class Volumes {
     walkers.enter<F>(
         context_.scene, *context_.accel, width, keys,
         [&](const U& inst, const U& geom, const U& prim, const Mask<F>& met) {
-          const U material = material_below<F>(inst, geom, prim, met);
+          const U material = hit_place<F>(context_.scene, inst, geom, prim, met).material;
           const Mask<F> walks =
               met & (walk_medium<F>(context_.scene.walks, material, met).extinction.x > 0.f);
           return select(Mask<U>(walks), material, U(Walkers::kNoMedium));
@@ -303,19 +385,6 @@ class Volumes {
     number(hits.inst, select(Mask<U>(came), end.inst, U(kNoHit)));
     number(wave.ways.uints(kExit), select(Mask<U>(came), U(1u), U(0u)));
   }
-  template <typename F>
-  UInt<F> material_below(const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& prim,
-                         const Mask<F>& active) const {
-    using U = UInt<F>;
-    const SceneView& scene = context_.scene;
-    const auto of_instance = [&](auto member) {
-      return gather_member<F>(scene.instances, member, inst, active);
-    };
-    const U mesh = gather<U>(scene.geometry_mesh, of_instance(&InstanceRecord::geometry) + geom,
-                             Mask<U>(active));
-    return hit_material<F>(scene, of_instance(&InstanceRecord::material), mesh, prim, active);
-  }
-
   static Flights flights_of(const Wave& wave) {
     const SoaBlock& c = wave.ways;
     return {c.floats(kDistance),
@@ -338,6 +407,71 @@ class Volumes {
   const VolumeView volumes_;
   Counts& counts_;
   const SoaBlock& walks_;
+  const Interiors interiors_;
 };
+
+template <typename Hit>
+Flight<float> Volumes::fly_inside(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
+                                  const PresenceKeys& keys, float time, PathState<float>& path,
+                                  Hit& hit, InsideRow<float>& inside) const {
+  using F = float;
+  // A wave of one.
+  alignas(64) float row[kRowWords<PathRow>], place[kRowWords<InsideRow>];
+  store_row<PathRow, F>(
+      row, 0u,
+      {path.o, path.dir, path.throughput, path.pdf, path.eta_scale, 0.f, 0.f, key, path.receiver},
+      true);
+  store_row<InsideRow, F>(place, 0u, inside, true);
+  float o[3] = {path.o.x, path.o.y, path.o.z}, d[3] = {path.dir.x, path.dir.y, path.dir.z};
+  float t = kInfinity, ratio[3] = {1, 1, 1}, absorbed[3] = {1, 1, 1}, scratch[2];
+  const uint32_t slot = 0;
+  const Inside<float> around = depth == 0 ? around_camera(keys) : Inside<float>();
+  const InteriorStart<F> begin = begin_inside<F>(sampler, key, depth, path.throughput);
+  const Way<F> way(sampler, key, depth, VertexSet::kFlight);
+  uint32_t material = Flights::kNoEvent, hero = begin.hero;
+  const Ways ways{&o[0], &o[1], &o[2], &d[0], &d[1], &d[2], &t, &way.seed, &way.r.z, 1};
+  const Flights flights{&t, &material, {&ratio[0], &ratio[1], &ratio[2]}, &hero};
+  stop_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+  interiors_.fly<F>({{&o[0], &o[1], &o[2]}, {&d[0], &d[1], &d[2]}, &slot, 1, &time, row, place},
+                    {&hit.t, &hit.u, &hit.v, &hit.prim, &hit.geom, &hit.inst},
+                    {volumes_.count > 0,
+                     &t,
+                     &material,
+                     {&ratio[0], &ratio[1], &ratio[2]},
+                     {&absorbed[0], &absorbed[1], &absorbed[2]},
+                     &hero},
+                    depth == 0 ? &around : nullptr, keys,
+                    [&](size_t, const PathRow<F>&) { return begin; });
+  const auto walked = load_row<PathRow, F>(row, 0u, true);
+  path.o = walked.o;
+  path.dir = walked.d;
+  path.throughput = walked.throughput;
+  path.pdf = walked.pdf;
+  path.receiver = walked.receiver;
+  inside = load_row<InsideRow, F>(place, 0u, true);
+  if (!are_grey(volumes_)) weigh_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+  const Color<F> left{absorbed[0], absorbed[1], absorbed[2]};
+  return {material != Flights::kNoEvent, t, material,
+          flight_weight<F>({ratio[0], ratio[1], ratio[2]}, path.throughput) * left};
+}
+
+inline Color<float> Volumes::pass_inside(const PresenceKeys& keys, float time,
+                                         const InsideRow<float>& inside, const Vec3<float>& o,
+                                         const Vec3<float>& d, float t) const {
+  alignas(64) float place[kRowWords<InsideRow>];
+  store_row<InsideRow, float>(place, 0u, inside, true);
+  float from[3] = {o.x, o.y, o.z}, along[3] = {d.x, d.y, d.z}, product[3] = {1, 1, 1};
+  float* const columns[3] = {&product[0], &product[1], &product[2]};
+  const uint32_t slot = 0;
+  interiors_.pass<float>({{&from[0], &from[1], &from[2]},
+                          {&along[0], &along[1], &along[2]},
+                          &slot,
+                          1,
+                          &time,
+                          nullptr,
+                          place},
+                         &t, columns, keys);
+  return {product[0], product[1], product[2]};
+}
 
 }  // namespace wavecomb

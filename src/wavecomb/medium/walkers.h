@@ -26,7 +26,7 @@ struct WalkEnd {
 /// number of lanes shows.
 class Walkers {
  public:
-  static constexpr size_t kColumns = 29;
+  static constexpr size_t kColumns = 28;
   explicit Walkers(const SoaBlock& block) : c_(block) {}
 
   size_t size() const { return size_; }

@@ -44,6 +44,8 @@ LightPathRefusal light_path_refusal(const Scene& scene) {
     return {"prims that some rays do not see, nor with holdouts", "a stage without them"};
   if (scene.view().walks.media)
     return {"light that walks below surfaces", "a stage without subsurface scattering"};
+  if (scene.view().interiors.media)
+    return {"media inside of meshes", "a stage without transmission scatter and priorities"};
   if (!scene.volumes().empty())
     return {"volumes, such as '" + scene.volumes()[0].name + "'", "a stage without them"};
   return {};

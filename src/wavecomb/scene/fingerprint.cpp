@@ -131,6 +131,11 @@ uint64_t hash_materials(const Scene& scene) {
       WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)
 #undef WAVECOMB_ADD
       h.add(o.transmission_color, o.transmission_depth, o.subsurface_radius, o.thin_walled);
+      // Of what came later, where it says something, so that scenes without it stay themselves.
+      if (o.nested_priority != 0) add_named(h, "nested_priority", o.nested_priority);
+      const Vec3<float>& scatter = o.transmission_scatter;
+      if (scatter.x != 0 || scatter.y != 0 || scatter.z != 0)
+        h.add(scatter, o.transmission_scatter_anisotropy);
     }
     for (const TextureUse& use : m.textures) {
       h.add(use.texture, use.channel);

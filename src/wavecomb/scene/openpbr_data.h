@@ -79,6 +79,12 @@ struct OpenPbr : OpenPbrInputs<float> {
   /// leaves; else it tints each crossing.
   Vec3<float> transmission_color{1, 1, 1};
   float transmission_depth = 0;
+  /// What is scattered inside, times 1 / transmission_depth; and its mean cosine
+  /// (scene/interior.h).
+  Vec3<float> transmission_scatter{0, 0, 0};
+  float transmission_scatter_anisotropy = 0;
+  /// Where solids that transmit overlap, the one of highest priority is there.
+  float nested_priority = 0;
   /// Mean free paths below the surface, by channel, units of length. 0: light leaves where it came
   /// in.
   Vec3<float> subsurface_radius{0, 0, 0};

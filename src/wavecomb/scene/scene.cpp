@@ -92,6 +92,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
   v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
              geometry_->exit_material};
+  v.interiors = {materials_->interiors.empty() ? nullptr : materials_->interiors.data(),
+                 geometry_->inside_material};
   v.has_motion = geometry_->moves();
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -143,7 +145,8 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
       all[id] = material;
     }
     new_materials = std::make_shared<const SceneMaterials>(
-        std::move(all), materials_->graphs, geometry_->textures, geometry_->exit_material);
+        std::move(all), materials_->graphs, geometry_->textures, geometry_->exit_material,
+        geometry_->inside_material);
   }
   std::shared_ptr<const SceneTangents> new_tangents = tangents_;
   if (new_materials->wants_tangents != materials_->wants_tangents)

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "wavecomb/scene/camera.h"
+#include "wavecomb/scene/interior.h"
 #include "wavecomb/scene/mesh_tangents.h"
 #include "wavecomb/scene/scene_parts.h"
 #include "wavecomb/scene/visibility.h"
@@ -38,6 +39,7 @@ struct SceneView {
   MotionView motion;
   VolumeView volumes;
   WalkView walks;
+  InteriorView interiors;
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;

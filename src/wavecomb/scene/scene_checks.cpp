@@ -49,7 +49,8 @@ void check_material(const Material& material, size_t texture_count, size_t graph
     if (graph != kNoGraph && graph >= graph_count)
       throw Error(name + " has a graph that was never added; add graphs before materials");
   const OpenPbr& o = material.openpbr;
-  bool good = std::isfinite(o.transmission_depth);
+  bool good = std::isfinite(o.transmission_depth) &&
+              std::isfinite(o.transmission_scatter_anisotropy) && std::isfinite(o.nested_priority);
   const auto check_color = [&](const Vec3<float>& v) {
     if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
   };
@@ -67,6 +68,7 @@ void check_material(const Material& material, size_t texture_count, size_t graph
       material, [&](const MaterialParameter&, const Vec3<float>& value) { check(value); });
   check(o.transmission_color);
   check(o.subsurface_radius);
+  check(o.transmission_scatter);
   std::apply([&](const auto&... input) { (check(input), ...); },
              static_cast<const OpenPbrInputs<float>&>(o).fields());
   if (!good) throw Error(name + " has a parameter that is not finite; give finite numbers");

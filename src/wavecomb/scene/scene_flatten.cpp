@@ -161,6 +161,14 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     white.base_color = {1, 1, 1};
     materials_.push_back(white);
   }
+  // And collisions in what fills meshes.
+  if (std::ranges::any_of(materials_, asks_for_interiors)) {
+    geometry->inside_material = static_cast<uint32_t>(materials_.size());
+    Material inside;
+    inside.name = "inside of meshes";
+    inside.program = ProgramId::kVolume;
+    materials_.push_back(inside);
+  }
   for (const Mesh& mesh : meshes_) {
     const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
     if (bad(mesh.material) ||
@@ -194,7 +202,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
         std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})),
-        geometry->textures, geometry->exit_material);
+        geometry->textures, geometry->exit_material, geometry->inside_material);
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
     tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);

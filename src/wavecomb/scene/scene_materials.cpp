@@ -108,7 +108,8 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 }  // namespace
 
 SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_,
-                               std::span<const TexturePtr> textures, uint32_t exit_material)
+                               std::span<const TexturePtr> textures, uint32_t exit_material,
+                               uint32_t inside_material)
     : materials(std::move(all)), graphs(std::move(programs_)) {
   const DenormalsOff denormals_off;  // as kernels have it
   for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
@@ -136,6 +137,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();
   }
+  if (inside_material != kInheritMaterial) interiors = make_interiors(shaded, *graphs);
 }
 
 }  // namespace wavecomb

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/scene/interior.h"
 #include "wavecomb/scene/light_builder.h"
 #include "wavecomb/scene/light_data.h"
 #include "wavecomb/scene/links.h"
@@ -103,6 +104,8 @@ struct SceneGeometry {
   uint32_t first_volume_material = 0;  ///< VolumeView::first_material
   /// WalkView::exit_material; kInheritMaterial: no material had a radius, and nobody can walk.
   uint32_t exit_material = kInheritMaterial;
+  /// InteriorView::event_material; kInheritMaterial: no material asked what paths are inside of.
+  uint32_t inside_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
   bool moves() const { return mesh_motions.size() > 1 || !steps.empty(); }
   AttributeView attributes() const {
@@ -124,10 +127,11 @@ struct SceneGeometry {
 
 /// Materials, and as lanes read them.
 struct SceneMaterials {
-  /// `textures`: those of the scene, which materials and graphs read. `exit_material`: of
-  /// SceneGeometry.
+  /// `textures`: those of the scene, which materials and graphs read. `exit_material`,
+  /// `inside_material`: of SceneGeometry.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
-                 std::span<const TexturePtr> textures, uint32_t exit_material);
+                 std::span<const TexturePtr> textures, uint32_t exit_material,
+                 uint32_t inside_material);
 
   std::vector<Material> materials;  ///< as they were told
   std::vector<Material> shaded;     ///< the same, settled (settled_material.h)
@@ -141,7 +145,8 @@ struct SceneMaterials {
   std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
   /// By material; empty where no program has parameters to itself.
   std::vector<ProgramParameterRecord> own;
-  std::vector<WalkMedium<float>> walks;  ///< by material; empty where nobody walks
+  std::vector<WalkMedium<float>> walks;          ///< by material; empty where nobody walks
+  std::vector<InteriorMedium<float>> interiors;  ///< by material; empty where nobody asks
   bool has_presence = false, has_emission = false;
 };
 

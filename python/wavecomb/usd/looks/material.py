@@ -25,6 +25,7 @@ from wavecomb.usd.looks.surface import (
 )
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.volumes.inside import filling
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -295,6 +296,8 @@ class MaterialTable:
             read = mtlx.surface(prim, self.time, self._textures, self._report, shader, kind)
             return read or fallback_surface(DEFAULT_COLOUR, name=str(prim.GetPath()))
         what = shader_id(shader) or shader_id(material.ComputeSurfaceSource("mtlx")[0])
+        if not what and (inside := filling(material, self.time, self._report)) is not None:
+            return inside
         if what:
             self._report.missing(f"surface shader {what} (drawn grey)", prim.GetPath())
         elif not material.GetSurfaceOutputs():

@@ -36,7 +36,13 @@ class SurfaceGraph:
 
 
 COLOUR_PARAMETERS = ("base_color", "specular_color", "emission")
-OPENPBR_COLOURS = ("transmission_color", "subsurface_color", "fuzz_color", "coat_color")
+OPENPBR_COLOURS = (
+    "transmission_color",
+    "transmission_scatter",
+    "subsurface_color",
+    "fuzz_color",
+    "coat_color",
+)
 """Which of the further parameters of program openpbr are colours."""
 
 TEXTURED_PARAMETERS = (

@@ -15,6 +15,16 @@ _CONTEXTS = ("mtlx", "", "arnold")
 """Render contexts whose terminals are looked at, in this order."""
 
 
+def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
+    """The shader of a material's volume terminal, where it is one that is known."""
+    known = standard_volume.IDENTIFIERS + closures.IDENTIFIERS
+    for context in _CONTEXTS:
+        shader = material.ComputeVolumeSource(context)[0]
+        if shader_id(shader) in known:
+            return shader
+    return None
+
+
 class VolumeLooks:
     """Reads the looks of materials, each once."""
 

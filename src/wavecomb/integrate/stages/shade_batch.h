@@ -44,6 +44,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     if (context.weighs_pixels()) [[unlikely]]
       state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
     if constexpr ((kFeatures & kJoined) != 0) state.ratio = gather<F>(pool.ratio, slot, active);
+    const bool knows_inside = V::has(kInside) && pool.inside;
+    if (knows_inside) [[unlikely]] {
+      state.outer = gather_field<F>(pool.inside, &InsideRow<float>::outer, slot, active);
+      state.medium = gather_field<F>(pool.inside, &InsideRow<float>::medium, slot, active);
+    }
     const VertexResult<F> v =
         take_steps<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
                               state, wants_aovs ? &aovs : nullptr, active, context.guide});
@@ -74,6 +79,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                              v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
                             v.alive);
     if constexpr ((kFeatures & kJoined) != 0) scatter<F>(pool.ratio, v.next.ratio, slot, v.alive);
+    if (knows_inside) [[unlikely]]
+      scatter_field<F>(pool.inside, &InsideRow<float>::crossed, slot, v.crossed, active);
     if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;

@@ -3,7 +3,9 @@
 /// seen in.
 ///
 /// Where the way to x_k leads through what absorbs, with extinction sigma over the length t of the
-/// ray, T_k <- T_k exp(-sigma t) (Beer and Lambert).
+/// ray, T_k <- T_k exp(-sigma t) (Beer and Lambert). Where paths know what they are inside of
+/// (medium/interiors.h) that is done by now, and the surface bends by the quotient of the indices
+/// on its two sides.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -124,10 +126,16 @@ WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, cons
     return graph_point<F>(v.scene, at, surface, dir, seen, lanes);
   };
   const Vec2<F> uv = s.uv;
-  const auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(v.scene.materials, v.material, uv,
-                                                              footprint, make_point, v.active);
+  auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(v.scene.materials, v.material, uv,
+                                                        footprint, make_point, v.active);
   Color<F> throughput = path.throughput;
-  if constexpr (Bsdf::kAbsorbs) throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
+  if (v.knows_inside()) [[unlikely]] {
+    if constexpr (Bsdf::kReadsIor && Bsdf::kTransmits)
+      params.ior = clamp(F(params.ior / select(path.outer > 0.f, path.outer, F(1.f))),
+                         F(1.f / kMaxIor), F(kMaxIor));
+  } else if constexpr (Bsdf::kAbsorbs) {
+    throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
+  }
   const Vec3<F> none(F(0.f));
   return {Bsdf(params, v.has(kExperiments) && v.settings.schlick_fresnel), throughput,
           Bsdf::kEmits ? params.emission : none, Bsdf::kTextured ? params.normal : none};

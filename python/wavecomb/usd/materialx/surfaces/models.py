@@ -82,6 +82,11 @@ MODELS: dict[str, Model] = {
             "transmission_weight": Row("transmission", 0.0),
             "transmission_color": Row("transmission_color", WHITE, driven=False),
             "transmission_depth": Row("transmission_depth", 0.0, driven=False),
+            "transmission_scatter": Row("transmission_scatter", BLACK, driven=False),
+            "transmission_scatter_anisotropy": Row(
+                "transmission_scatter_anisotropy", 0.0, driven=False
+            ),
+            "nested_priority": Row("dielectric_priority", 0.0, driven=False),
             "subsurface_weight": Row("subsurface", 0.0),
             "subsurface_color": Row("subsurface_color", WHITE),
             "subsurface_anisotropy": Row("subsurface_anisotropy", 0.0),
@@ -96,8 +101,6 @@ MODELS: dict[str, Model] = {
             "thin_walled": Row("thin_walled", False, driven=False),
         },
         ignored=(
-            "transmission_scatter",
-            "transmission_scatter_anisotropy",
             "transmission_dispersion",
             "transmission_extra_roughness",
             "coat_anisotropy",
@@ -128,6 +131,11 @@ MODELS: dict[str, Model] = {
             "transmission_weight": Row("transmission_weight", 0.0),
             "transmission_color": Row("transmission_color", WHITE, driven=False),
             "transmission_depth": Row("transmission_depth", 0.0, driven=False),
+            "transmission_scatter": Row("transmission_scatter", BLACK, driven=False),
+            "transmission_scatter_anisotropy": Row(
+                "transmission_scatter_anisotropy", 0.0, driven=False
+            ),
+            "nested_priority": Row("dielectric_priority", 0.0, driven=False),
             "subsurface_weight": Row("subsurface_weight", 0.0),
             "subsurface_color": Row("subsurface_color", PALE),
             "subsurface_anisotropy": Row("subsurface_scatter_anisotropy", 0.0),
@@ -143,8 +151,6 @@ MODELS: dict[str, Model] = {
             "thin_walled": Row("geometry_thin_walled", False, driven=False),
         },
         ignored=(
-            "transmission_scatter",
-            "transmission_scatter_anisotropy",
             "transmission_dispersion_scale",
             "coat_roughness_anisotropy",
             "geometry_tangent",

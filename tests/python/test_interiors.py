@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Media inside of meshes: closed forms, furnaces, priorities, shadows, schedules."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_walks import box
+
+import wavecomb
+from wavecomb import _core
+from wavecomb.scenes.caustics import ball
+
+WIDE = 4.0
+
+
+def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> int:
+    """Glass or a liquid, or with index 1 fog that a mesh bounds."""
+    return int(
+        builder.add_material(
+            "openpbr",
+            ior=ior,
+            roughness=roughness,
+            metallic=0.0,
+            specular_color=(1, 1, 1),
+            openpbr={"transmission_weight": 1.0, **layers},
+        )
+    )
+
+
+def absorbing(sigma: Any) -> dict[str, Any]:
+    """Layers of a medium that absorbs by so much."""
+    return {"transmission_color": tuple(np.exp(-np.array(sigma))), "transmission_depth": 1.0}
+
+
+def slab(builder: Any, low: float, high: float, material: int) -> None:
+    box(builder, (-WIDE, -WIDE, low), (WIDE, WIDE, high), material)
+
+
+def seen_from_above(builder: Any, spp: int = 4, size: int = 8, depth: int = 8, **more: Any) -> Any:
+    """Pixels of an orthographic camera that looks down from 5."""
+    camera = np.eye(4)
+    camera[3, 2] = more.pop("height", 5.0)
+    builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
+    settings = _core.Settings(
+        width=size, height=size, spp=spp, max_depth=depth, filter="box", filter_width=1.0, **more
+    )
+    picture = _core.render(builder.build(), settings, None, None, None).beauty
+    return np.asarray(picture, np.float64).reshape(-1, 3)
+
+
+def shining_floor(builder: Any) -> None:
+    slab(builder, -31.0, -30.0, builder.add_material("emissive", emission=(1.0, 2.0, 3.0)))
+
+
+SIGMA = np.array([0.3, 0.7, 1.1])
+LIGHT = np.array([1.0, 2.0, 3.0])
+
+
+def test_a_clear_slab_absorbs_as_it_should() -> None:
+    """exp(-sigma t) of the floor below, without noise."""
+    builder = wavecomb.SceneBuilder()
+    slab(builder, -2.0, -0.5, filled(builder, 1.0, **absorbing(SIGMA)))
+    shining_floor(builder)
+    assert np.allclose(seen_from_above(builder), LIGHT * np.exp(-1.5 * SIGMA), rtol=1e-4)
+
+
+def test_a_camera_in_fog_knows_where_it_is() -> None:
+    """Of a slab from -2 to 20 it sees what lies below 5, and of one within it all."""
+    builder = wavecomb.SceneBuilder()
+    slab(builder, -2.0, 20.0, filled(builder, 1.0, **absorbing(SIGMA)))
+    slab(builder, -1.0, 1.0, filled(builder, 1.0, **absorbing(2 * SIGMA)))
+    shining_floor(builder)
+    exact = LIGHT * np.exp(-(5.0 + 4.0) * SIGMA)
+    assert np.allclose(seen_from_above(builder), exact, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("priorities", "lengths"),
+    [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
+)
+def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
+    """A slab above reaches a quarter into one below; of equals the last entered is there."""
+    builder = wavecomb.SceneBuilder()
+    other = SIGMA[::-1]
+    for (low, high), sigma, priority in zip(
+        ((-1.0, 0.0), (-2.0, -0.75)), (SIGMA, other), priorities, strict=True
+    ):
+        layers = {**absorbing(sigma), "nested_priority": priority}
+        slab(builder, low, high, filled(builder, 1.0, **layers))
+    shining_floor(builder)
+    exact = LIGHT * np.exp(-lengths[0] * SIGMA - lengths[1] * other)
+    assert np.allclose(seen_from_above(builder), exact, rtol=1e-4)
+
+
+def test_indices_are_those_of_both_sides() -> None:
+    """1 / (1 + sum R / (1 - R)) over the interfaces of air, glass, a liquid that reaches into it,
+    and air, which is all that comes through without absorption (Stokes 1862)."""
+    builder = wavecomb.SceneBuilder()
+    slab(builder, -1.0, 0.0, filled(builder, 2.0, nested_priority=1.0))
+    slab(builder, -2.0, -0.75, filled(builder, 1.25))
+    shining_floor(builder)
+    seen = seen_from_above(builder, spp=256, size=32, depth=40)
+    interfaces = [((a - b) / (a + b)) ** 2 for a, b in ((1, 2.0), (2.0, 1.25), (1.25, 1))]
+    exact = LIGHT / (1 + sum(r / (1 - r) for r in interfaces))
+    error = seen.std(axis=0) / np.sqrt(len(seen))
+    assert np.all(error < 0.002 * exact)
+    assert np.all(np.abs(seen.mean(axis=0) - exact) < 0.001 * exact + 3.5 * error)
+
+
+def test_shadow_rays_bring_what_passes() -> None:
+    """A lamp straight above, a clear slab, and a floor that is lit through it."""
+    pixels = []
+    for sigma in (np.zeros(3) + 1e-6, SIGMA):
+        builder = wavecomb.SceneBuilder()
+        slab(builder, 6.0, 8.0, filled(builder, 1.0, **absorbing(sigma)))
+        floor = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+        slab(builder, -1.0, 0.0, floor)
+        builder.add_light("distant", np.eye(4), color=(1, 1, 1), angle=0.0)
+        pixels.append(seen_from_above(builder, depth=1))
+    assert np.all(pixels[0] > 0.01)
+    assert np.allclose(pixels[1] / pixels[0], np.exp(-2.0 * SIGMA), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("ior", "roughness", "anisotropy"), [(1.0, 0.0, 0.6), (1.5, 0.0, 0.0), (1.4, 0.0, -0.5)]
+)
+def test_white_media_lose_nothing(ior: float, roughness: float, anisotropy: float) -> None:
+    """A furnace of albedo 1, whose mean free paths differ by channel."""
+    builder = wavecomb.SceneBuilder()
+    layers = {
+        "transmission_depth": 0.5,
+        "transmission_scatter": (0.5, 1.0, 2.0),
+        "transmission_color": tuple(np.exp(-np.array((0.5, 1.0, 2.0)))),
+        "transmission_scatter_anisotropy": anisotropy,
+    }
+    mesh = ball(1.0, 8)
+    material = filled(builder, ior, roughness, **layers)
+    number = builder.add_mesh(mesh.points, mesh.faces.astype(np.uint32), material=material)
+    builder.add_to_group(0, number)
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1))
+    seen = seen_from_above(builder, spp=64, size=24, depth=100, roulette="off")
+    error = seen.std(axis=0) / np.sqrt(len(seen))
+    assert np.all(error < 0.006)
+    assert np.all(np.abs(seen.mean(axis=0) - 1.0) < 0.001 + 3.5 * error)
+
+
+def box_of_fog(as_mesh: bool, seed: int) -> Any:
+    """A box of fog over a floor, with a lamp in it, as a mesh or as a volume."""
+    builder = wavecomb.SceneBuilder()
+    scattering, absorption = np.array([0.8, 0.5, 0.3]), np.array([0.1, 0.3, 0.2])
+    low, high = (-1.5, -1.0, -1.5), (1.5, 1.0, 1.5)
+    if as_mesh:
+        layers = {
+            **absorbing(scattering + absorption),
+            "transmission_scatter": tuple(scattering),
+            "transmission_scatter_anisotropy": 0.4,
+        }
+        box(builder, low, high, filled(builder, 1.0, **layers))
+    else:
+        extinction = scattering + absorption
+        builder.add_volume(
+            np.eye(4),
+            bounds=(low, high),
+            extinction=tuple(extinction),
+            albedo=tuple(scattering / extinction),
+            anisotropy=0.4,
+        )
+    slab(builder, -2.0, -1.6, builder.add_material("diffuse", base_color=(0.5, 0.6, 0.7)))
+    lamp = np.eye(4)
+    lamp[3, :3] = (0.4, 0.3, 0.2)
+    builder.add_light("sphere", lamp, color=(20, 18, 15), radius=0.15)
+    builder.add_light("dome", np.eye(4), color=(0.3, 0.3, 0.4))
+    return seen_from_above(builder, spp=64, size=16, depth=6, seed=seed).mean(axis=0)
+
+
+def test_fog_in_a_mesh_is_fog() -> None:
+    """The same light as in a volume of the same coefficients."""
+    mesh = np.array([box_of_fog(True, seed) for seed in range(8)])
+    volume = np.array([box_of_fog(False, seed) for seed in range(8, 16)])
+    error = np.sqrt(mesh.var(axis=0, ddof=1) / 8 + volume.var(axis=0, ddof=1) / 8)
+    assert np.all(error < 0.015 * volume.mean(axis=0))
+    assert np.all(np.abs(mesh.mean(axis=0) - volume.mean(axis=0)) < 4.0 * error)
+
+
+def scene() -> Any:
+    """A glass of a cloudy liquid that reaches into its walls, fog about it, and a floor."""
+    builder = wavecomb.SceneBuilder()
+    glass = filled(builder, 1.5, nested_priority=1.0)
+    juice = filled(
+        builder, 1.33, transmission_color=(0.9, 0.5, 0.2), transmission_depth=0.6,
+        transmission_scatter=(0.6, 0.5, 0.3), transmission_scatter_anisotropy=0.3,
+    )  # fmt: skip
+    fog = filled(
+        builder, 1.0, transmission_color=(0.8, 0.7, 0.6), transmission_depth=3.0,
+        transmission_scatter=(0.2, 0.3, 0.4),
+    )  # fmt: skip
+    box(builder, (-4, -1.2, -9), (4, 3, -3), fog)
+    for low, high in (((-0.6, -1, -6), (0.6, -0.85, -4.8)), ((-0.6, -1, -6), (-0.45, 1, -4.8)),
+                      ((0.45, -1, -6), (0.6, 1, -4.8))):  # fmt: skip
+        box(builder, low, high, glass)
+    box(builder, (-0.5, -0.9, -5.9), (0.5, 0.6, -4.9), juice)
+    cherry = builder.add_material("diffuse", base_color=(0.7, 0.05, 0.05))
+    box(builder, (-0.1, -0.2, -5.5), (0.1, 0.0, -5.3), cherry)
+    rough = filled(builder, 1.4, 0.3, **absorbing((0.2, 1.0, 2.0)))
+    box(builder, (1.0, -1.1, -6), (1.8, 0.0, -5), rough)
+    grey = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+    box(builder, (-5, -1.3, -9), (5, -1.1, -2), grey)
+    lamp = np.eye(4)
+    lamp[3, :3] = (1.5, 2.2, -4.0)
+    builder.add_light("sphere", lamp, color=(30, 28, 25), radius=0.4)
+    builder.add_light("dome", np.eye(4), color=(0.2, 0.25, 0.3))
+    builder.set_camera(np.eye(4), window=(-0.45, 0.45, -0.3, 0.3))
+    return builder.build()
+
+
+def test_one_picture_for_all_schedules() -> None:
+    """Lanes, waves, threads, policies, packets and the reference: the same bits."""
+    made = scene()
+
+    def render(**settings: Any) -> Any:
+        return wavecomb.render(made, size=(45, 30), spp=4, max_depth=6, **settings)
+
+    first = render()
+    assert first.stats["counts"]["walk_steps"] > 1000
+    for other in (
+        {"integrator": "reference"},
+        {"lanes": 1},
+        {"wave_size": 256},
+        {"wave_size": 1024, "threads": 2},
+        {"policy": "material"},
+        {"ray_order": "morton-octant"},
+    ):
+        assert np.array_equal(render(**other).beauty, first.beauty), other
+
+
+def test_transport_light_says_that_it_has_none() -> None:
+    """One line that says what to do."""
+    with pytest.raises(ValueError, match="media inside of meshes"):
+        wavecomb.render(scene(), size=(8, 8), spp=1, transport="light")
