@@ -161,14 +161,24 @@ nb::dict aovs_dict(nb::handle owner) {
   return d;
 }
 
+/// Samples of each pixel (h, w), and their channels (n, 6); None where there is no deep picture.
+nb::object deep_pair(nb::handle owner) {
+  const Picture& p = nb::cast<const Result&>(owner).picture;
+  if (p.deep.empty()) return nb::none();
+  const size_t shape[2] = {p.deep.values.size() / DeepLayer::kChannels, DeepLayer::kChannels};
+  return nb::make_tuple(image(owner, p.deep.counts, p, 1),
+                        nb::ndarray<nb::numpy, const float>(p.deep.values.data(), 2, shape, owner));
+}
+
 /// The rows of WAVECOMB_AOVS.
 nb::list aov_table() {
   static constexpr const char* kKinds[] = {"mean",   "mean_of_hits", "nearest", "coverage",
-                                           "groups", "expressions",  "sum"};
-  static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kSum) + 1);
+                                           "groups", "expressions",  "sum",     "deep"};
+  static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kDeep) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
-    if (aov.kind == AovKind::kExpressions) continue;  // they have names of their own
+    // These have names of their own, or files.
+    if (aov.kind == AovKind::kExpressions || aov.kind == AovKind::kDeep) continue;
     nb::dict row;
     row["name"] = aov.name;
     row["channels"] = aov.channels;
@@ -193,7 +203,7 @@ size_t picture_bytes(const Picture& p) {
   const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   size_t sum = bytes(p.beauty, p.albedo, p.normal, p.depth, p.samples, p.error, p.variance);
   for (const AovLayer& layer : p.aovs) sum += bytes(layer.values);
-  return sum;
+  return sum + bytes(p.deep.counts, p.deep.values);
 }
 
 Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings,
@@ -267,6 +277,7 @@ void bind_render(nb::module_& m) {
                    [](nb::handle_t<Result> self) { return layer(self, &Picture::variance, 3); })
       .def_prop_ro("aovs", [](nb::handle_t<Result> self) { return aovs_dict(self); })
       .def_prop_ro("manifests", &manifests_dict)
+      .def_prop_ro("deep", [](nb::handle_t<Result> self) { return deep_pair(self); })
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
       .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
       .def_prop_ro("stats", [](const Result& r) {

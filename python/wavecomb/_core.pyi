@@ -484,6 +484,29 @@ class SceneBuilder:
         clip_planes: Sequence[Sequence[float]] = [],
         # What light is multiplied by in the picture.
         exposure: float = 1,
+        # Corners of the aperture, 3 or more; 0: it is round.
+        aperture_blades: float = 0,
+        # Of the aperture, degrees.
+        aperture_rotation: float = 0,
+        # The aperture's height / its width: anamorphic lenses.
+        lens_squeeze: float = 1,
+        # Radial distortion, of r^2 on the plane at distance 1.
+        lens_k1: float = 0,
+        # Radial distortion, of r^4.
+        lens_k2: float = 0,
+        # Radial distortion, of r^6.
+        lens_k3: float = 0,
+        # Tangential distortion.
+        lens_p1: float = 0,
+        # Tangential distortion.
+        lens_p2: float = 0,
+        # Distortion as a map: n x n nodes over the picture, two in each four numbers; shares of the
+        # undistorted picture's width and height.
+        lens_map: Sequence[Sequence[float]] = [],
+        # The edge of the picture at which a rolling shutter begins.
+        rolling_shutter: Literal["off", "top", "bottom", "left", "right"] = "off",
+        # Share of the shutter's time that a row is exposed.
+        rolling_duration: float = 0,
         # ---- to here ----
     ) -> None:
         """Looks along -z. The renderer fits the window to the picture, as conform says. motion:
@@ -546,6 +569,13 @@ class Settings:
     """Samples every bounce that is not a mirror's by cosine. Default: False."""
     error: bool
     """Keeps errors and variances where nothing else asks. Default: False."""
+    overscan: int
+    """Pixels that are rendered beyond each edge of the picture. Default: 0."""
+    deep_samples: int
+    """The most samples that a deep picture has in a pixel. Default: 16."""
+    deep_tolerance: float
+    """Samples of a deep picture whose depths differ by no more than this share of the depth are
+    one. Default: 0.01."""
     crop: bool
     """The picture is its region alone, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
@@ -628,6 +658,10 @@ class Result:
     @property
     def aovs(self) -> dict[str, NDArray[np.float32]]:
         """Further AOVs that were asked for: (height, width) or (height, width, channels)."""
+    @property
+    def deep(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]] | None:
+        """Samples of each pixel (height, width), and R, G, B, A, Z, ZBack of all samples (n, 6),
+        pixel by pixel, the nearest first; None unless the AOV deep was asked for."""
     @property
     def manifests(self) -> dict[str, dict[str, int]]:
         """Cryptomatte level -> name -> id, of all that the picture holds."""

@@ -10,9 +10,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wavecomb.errors import WavecombError
 from wavecomb.load_options import LoadOptions, split
 from wavecomb.picture.rendered import Picture, picture_of
-from wavecomb.run import live
+from wavecomb.run import aovs as aov_names
+from wavecomb.run import catchers, live
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, prepare
 from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
@@ -168,6 +170,15 @@ def render(
         scene, loaded, stage = _resolve(source, loading, isolate, chosen, reader)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
+    if has_catchers := loaded is not None and bool(loaded.catchers):
+        kept = {"checkpoint": checkpoint, "resume": resume, "deep": aov_names.DEEP in names}
+        catchers.check(chosen, kept)
+        if stage is None or loaded is source:
+            raise WavecombError(
+                "the stage has shadow catchers, which take three renders: give render() its path"
+            )
+        chosen = catchers.with_alpha(chosen)
+        names = aov_names.with_others(names, [catchers.LAYER])
     again = loaded if loaded is source else None
     told, asked = (progress, False) if callable(progress) else (None, progress)
     space = "rec709" if loaded is None else loaded.working_space
@@ -175,7 +186,17 @@ def render(
         watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume, shown)
         result, is_built = _render(scene, again, chosen, told, own, profile, watcher, state)
     stats = make_stats(result, stage=stage, loaded=loaded, is_built=is_built)
-    return picture_of(result, stats, scene=scene, aovs=names)
+    picture = picture_of(result, stats, scene=scene, aovs=names)
+    if not has_catchers or picture.cancelled:
+        return picture
+
+    def of_catchers(how: Mapping[str, str]) -> Result:
+        size = chosen.width, chosen.height
+        options = LoadOptions.of(None, {**loading, "size": size, "threads": chosen.threads, **how})
+        scene = load(str(stage), options, isolate=isolate).scene
+        return _render(scene, None, catchers.of_catchers(chosen), None, own, None, None, None)[0]
+
+    return catchers.caught(picture, of_catchers)
 
 
 def _asked_for(
@@ -220,6 +241,8 @@ def _keeping(
         return (None if shown is None else Watcher(sinks, reporter=reporter)), None
     from wavecomb.run.checkpoint import check_fits, load_checkpoint, make_header
 
+    if aov_names.DEEP in aovs:
+        raise WavecombError("checkpoints do not hold deep pictures: leave one of them out")
     header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
     before = load_checkpoint(resume) if resume is not None else None
     if before is not None:

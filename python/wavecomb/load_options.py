@@ -20,6 +20,7 @@ PURPOSES = ("default", "render", "proxy", "guide")
 PROJECTIONS = ("perspective", "orthographic", "latlong")
 WORKING_SPACES = ("rec709", "acescg")
 LIGHT_SHAPES = ("visible", "hidden")
+CATCH = ("through", "lit", "bare")
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,11 @@ class LoadOptions:
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
         mask: Prims to draw, with all below them, and what they need; by default all.
         holdouts: Prims that the camera sees as holes, with all below them: black, and alpha 0.
+        catchers: Prims of which only the shadows on them show, with all below them
+            (docs/visibility.md).
+        catch: Which of the renders of a stage with catchers it is read for: "through", the picture,
+            whose camera does not see them, or those of the catchers alone, "lit" as they are and
+            "bare" as if nothing else were there.
         session_layer: File with opinions that are stronger than the stage's.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
             size of their edges in the picture (docs/subdivision.md).
@@ -130,6 +136,9 @@ class LoadOptions:
             it.
         projection: "perspective", "orthographic" or "latlong"; None: the camera's.
         exposure: Whether the camera's exposure multiplies light in the picture.
+        lens_settings: Of the camera's lens: {"lens_k1": "-0.1", "rolling_shutter": "top"}; they go
+            before its attributes (docs/cameras.md).
+        st_map: Picture that says how the lens distorts, in place of coefficients.
         render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
             else the only ones under /Render (docs/cameras.md).
         product: Path or name of one of their products; None: the first.
@@ -192,6 +201,13 @@ class LoadOptions:
         None, "What is out of focus is blurred, as the camera's fStop says.", "switch",
         "--depth-of-field", unset="unless the render settings disable it",
     )  # fmt: skip
+    lens_settings: Mapping[str, str] | None = _row(
+        None, "Distortion, aperture or rolling shutter of the camera; may be given again.", "text",
+        "--lens-setting", many=True, metavar="NAME=VALUE", unset="the camera's",
+    )  # fmt: skip
+    st_map: str | None = _row(
+        None, "ST map: how the lens distorts.", "file", "--st-map", metavar="FILE.exr"
+    )
     mask: tuple[str, ...] = _row(
         (), "Prim to draw, with all below it and what it needs; may be given again.", "text",
         "--mask", many=True, metavar="PATH", unset="all",
@@ -200,6 +216,11 @@ class LoadOptions:
         (), "Prim that the camera sees as a hole, black with alpha 0, and all below it; may be "
         "given again.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
+    catchers: tuple[str, ...] = _row(
+        (), "Prim of which only the shadows on it show, as alpha, and all below it; may be given "
+        "again.", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
+    )  # fmt: skip
+    catch: str = _row("through", "Which render of a stage with catchers.", "choice", choices=CATCH)
     session_layer: str | None = _row(
         None, "Layer with opinions stronger than the stage's.", "file", "--session-layer",
         metavar="FILE",
@@ -239,9 +260,12 @@ class LoadOptions:
                 f"no option {unknown[0]!r} of loading; there are {', '.join(sorted(known))}"
             )
         plain = dict(changes)
-        if plain.get("session_layer") is not None:
-            plain["session_layer"] = os.fspath(plain["session_layer"])
-        for name in ("purposes", "mask", "holdouts", "size", "shutter"):
+        for name in ("session_layer", "st_map"):
+            if plain.get(name) is not None:
+                plain[name] = os.fspath(plain[name])
+        if plain.get("lens_settings") is not None:
+            plain["lens_settings"] = {k: str(v) for k, v in plain["lens_settings"].items()}
+        for name in ("purposes", "mask", "holdouts", "catchers", "size", "shutter"):
             if plain.get(name) is not None:
                 plain[name] = tuple(plain[name])
         return replace(options or cls(), **plain)
@@ -297,6 +321,8 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
             out[name] = value == "on"
         elif name == "variants":
             out[name] = selections(value)
+        elif name == "lens_settings":
+            out[name] = _named_values(row.option, value)
         elif name == "purposes":
             out[name] = tuple(dict.fromkeys(("default", *value)))
         else:
@@ -304,6 +330,17 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
     if out.get("camera") == "":
         raise WavecombError("--camera is empty: give the path of a camera prim")
     return out
+
+
+def _named_values(option: str, texts: Sequence[str]) -> dict[str, str]:
+    """NAME=VALUE ... as a mapping. Raises WavecombError."""
+    values: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise WavecombError(f"{option} {text}: must be NAME=VALUE")
+        values[name] = value
+    return values
 
 
 def selections(variants: Sequence[str]) -> dict[str, str]:

@@ -33,6 +33,7 @@ class Settings:
     region = None
     allocate = "even"
     firefly = "keep"
+    aovs: tuple[str, ...] = ()
 
     def __init__(self, **settings: Any) -> None:
         defaults = {"width": 600, "height": 600, "spp": 64, "seed": 0, "threads": 0}
@@ -100,6 +101,7 @@ class Fake:
             report=report,
             camera_path="/Camera",
             volumes=[],
+            catchers=(),
             working_space="rec709",
             seconds=0.25,
             stage_path=path,
@@ -162,6 +164,7 @@ class Fake:
             cancelled=cancelled,
             aovs={},
             manifests={},
+            deep=None,
             costs={"materials": {"Gold": 50.0, "Chalk": 25.5}, "textures": {"wood.png": 60.0}},
             stats={
                 "settings": settings.to_dict(),

@@ -116,7 +116,10 @@ def test_names_are_expanded() -> None:
 def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> None:
     """A row whose value no path finds would be a layer of nothing."""
     layers = {**picture.layers(), **picture.aovs}
-    elsewhere = {"guided_share": "test_guiding.py", "by_light_paths": "test_techniques.py"}
+    elsewhere = {
+        "guided_share": "test_guiding.py", "by_light_paths": "test_techniques.py",
+        "motion": "test_lens.py",
+    }  # fmt: skip
     for name, row in aovs.core_aovs().items():
         if name in elsewhere:
             assert not layers[name].any(), elsewhere[name]

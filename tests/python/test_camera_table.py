@@ -52,9 +52,16 @@ OTHER: dict[str, Any] = {
     "planes": [[0.0, 0.0, 1.0, 2.0]],
 }
 """A value that is no default, by kind."""
+OF_NAME: dict[str, Any] = {
+    "aperture_blades": 5.0,
+    "lens_map": [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 1.0, 1.0]],
+}
+"""Of those that take fewer."""
 
 
 def _other(row: CameraParameter) -> Any:
+    if row.name in OF_NAME:
+        return OF_NAME[row.name]
     return row.choices[-2] if row.kind == "choice" else OTHER[row.kind]
 
 

@@ -51,6 +51,7 @@ def test_every_option_comes_to_its_field() -> None:
         *("--mask", "/A", "--mask", "/B", "--session-layer", "over.usda", "--texture-limit", "5"),
         *("--working-space", "acescg", "--subdivision", "2", "--holdout", "/H"),
         *("--strand-pixels", "0.5"),
+        *("--lens-setting", "lens_k1=-0.1", "--st-map", "st.exr", "--catcher", "/C"),
     )["load"]
     assert got.keys() == rows().keys()
     assert got == {
@@ -59,7 +60,9 @@ def test_every_option_comes_to_its_field() -> None:
         "motion_blur": False, "motion_steps": 3, "render_settings": "/R", "product": "P",
         "projection": "latlong", "exposure": False, "depth_of_field": True, "mask": ("/A", "/B"),
         "session_layer": "over.usda", "texture_limit": 5.0, "working_space": "acescg",
-        "subdivision": "2", "holdouts": ("/H",), "strand_pixels": 0.5,
+        "strand_pixels": 0.5,
+        "subdivision": "2", "holdouts": ("/H",), "lens_settings": {"lens_k1": "-0.1"},
+        "st_map": "st.exr", "catchers": ("/C",),
     }  # fmt: skip
     LoadOptions.of(None, got).check()
 

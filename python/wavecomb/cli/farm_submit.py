@@ -161,6 +161,7 @@ def _check_options(asked: Asked) -> None:
         ("--resume", purpose.resume, "`wavecomb farm resume` goes on with a job"),
         ("--preview", purpose.preview, "`wavecomb farm status` shows how far it is"),
         ("--costs", asked.costs_file, "a file would be written by all workers; give --costs model"),
+        ("--deep", asked.deep, "tiles of deep pictures are not put together; give it to render"),
         ("--film-memory", asked.film_memory, "--tiles say what a worker holds"),
         ("--progress", purpose.progress if purpose.progress == "json" else None, "give --json"),
     ):

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from wavecomb.cli.done import Done
-from wavecomb.cli.job import FrameShot, Job, Names, how_far, purpose_at
+from wavecomb.cli.job import Job, Names, how_far, purpose_at
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.cli.shots import FrameShot
 from wavecomb.errors import WavecombError
 from wavecomb.run.faults import describe
 from wavecomb.run.frame_names import frame_text, has_place, parse_frames
@@ -62,6 +63,7 @@ def check_frames(
         for option, name in (
             ("-o", names.output),
             ("--png", names.png),
+            ("--deep", names.deep),
             ("--stats", names.stats),
             ("--checkpoint", purpose.checkpoint),
         ):

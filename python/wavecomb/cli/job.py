@@ -5,21 +5,22 @@ from __future__ import annotations
 
 import contextlib
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from wavecomb.cli.aovs import AovOptions
 from wavecomb.cli.done import Done
 from wavecomb.cli.options import StageOptions, stage_warnings, warn
 from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.cli.shots import Shot
+from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill
 
 if TYPE_CHECKING:
     from wavecomb.cli.reporting import Reporter
     from wavecomb.picture.rendered import Picture
     from wavecomb.run.checkpoint import Checkpoint
-    from wavecomb.run.sequence import Frames
     from wavecomb.usd import LoadedStage
 
 
@@ -30,99 +31,18 @@ class Names:
     output: str
     png: str | None
     stats: str | None
+    deep: str | None = None
 
     def at(self, frame: float) -> Names:
         """Those of a frame."""
-        png = None if self.png is None else fill(self.png, frame)
-        stats = None if self.stats is None else fill(self.stats, frame)
-        return Names(fill(self.output, frame), png, stats)
+        others = (self.png, self.stats, self.deep)
+        filled = (None if name is None else fill(name, frame) for name in others)
+        return Names(fill(self.output, frame), *filled)
 
     def all(self) -> list[str]:
         """Those that there are, in the order in which they are written."""
-        return [name for name in (self.output, self.png, self.stats) if name is not None]
-
-
-class Shot(Protocol):
-    """Where a scene comes from, and what renders it."""
-
-    def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
-        """Reads the stage."""
-
-    def render(self, *arguments: Any, **named: Any) -> Any:
-        """Renders it; the arguments are those of ``_core.render`` after the scene."""
-
-    def render_part(self, *arguments: Any, **named: Any) -> Any:
-        """The same for one of several parts of a picture."""
-
-    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """``make_stats`` of that."""
-
-
-class Still:
-    """A stage at one frame."""
-
-    def __init__(self, source: StageOptions, stage: str, settings: Any, kept: Any = None) -> None:
-        """``kept``: held until the stage is loaded."""
-        self._renderer: Any = None
-        self._kept = kept
-        self._source = source
-        self._stage = stage
-        self._settings = settings
-        self._loaded: LoadedStage | None = None
-
-    def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
-        """Reads the stage."""
-        chosen = self._settings
-        size = chosen.width, chosen.height
-        self._loaded = self._source.load(self._stage, chosen.threads, size, progress)
-        self._kept = None
-        return self._loaded
-
-    def render(self, *arguments: Any, **named: Any) -> Any:
-        """Renders it, and frees what only that needed."""
-        from wavecomb import _core
-
-        assert self._loaded is not None
-        return _core.render(self._loaded.scene, *arguments, **named)
-
-    def render_part(self, settings: Any, *arguments: Any, **named: Any) -> Any:
-        """Renders a part of it, and keeps what the next one needs, too."""
-        from wavecomb import _core
-
-        assert self._loaded is not None
-        if self._renderer is None:
-            self._renderer = _core.Renderer(self._loaded.scene, settings.threads)
-        return self._renderer.render(settings, *arguments, **named)
-
-    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Those of the picture."""
-        from wavecomb.run.stats import make_stats
-
-        return make_stats(result, stage=self._stage, loaded=self._loaded, resumed_s=resumed_s)
-
-
-class FrameShot:
-    """One frame of a stage that stays open."""
-
-    def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
-        """``options``: of ``Frames.load``."""
-        self._frames = frames
-        self._frame = frame
-        self._options = options
-
-    def load(self, progress: Callable[[int, int], None] | None) -> LoadedStage:
-        """Reads what is other in this frame."""
-        return self._frames.load(self._frame, progress=progress, **self._options)
-
-    def render(self, *arguments: Any, **named: Any) -> Any:
-        """Renders it."""
-        return self._frames.render(*arguments, **named)
-
-    render_part = render
-
-    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Those of the picture."""
-        return self._frames.stats(result, resumed_s=resumed_s)
+        names = (self.output, self.png, self.deep, self.stats)
+        return [name for name in names if name is not None]
 
 
 @dataclass(frozen=True)
@@ -163,14 +83,23 @@ class Job:
             loaded = shot.load(progress)
         warn(stage_warnings(loaded))
         groups = len(loaded.scene.light_groups) if "light_groups" in self.aovs else 1
+        whole = purpose.whole or ("" if names.deep is None else "--deep")
         rows = band_rows(
-            self.settings, self.aovs, self.film_memory, whole=purpose.whole,
-            tile=self.layers.tile, light_groups=groups,
+            self.settings, self.aovs, self.film_memory, whole=whole, tile=self.layers.tile,
+            light_groups=groups,
         )  # fmt: skip
+        settings, aovs = self.settings, self.aovs
+        if loaded.catchers:
+            from wavecomb.run import catchers
+
+            own = {"--checkpoint": purpose.checkpoint_file, "--deep": names.deep}
+            catchers.check(settings, {**own, "--film-memory": rows})
+            settings = catchers.with_alpha(settings)
+            aovs = aov_names.with_others(aovs, [catchers.LAYER])
         if rows is not None:
             return self._run_bands(shot, loaded, rows, names, keeps_stopped)
-        if "light_groups" in self.aovs:
-            check_memory(self.settings, self.aovs, groups)
+        if "light_groups" in aovs:
+            check_memory(settings, aovs, groups)
         sinks, state, seconds = self._sinks(loaded, source, purpose, resumed)
         with Interrupt() as interrupt, self.reporter.rendering() as bar:
             watcher = Watcher(
@@ -179,13 +108,28 @@ class Job:
                 is_stopped=lambda: interrupt.requested,
                 warn=lambda line: warn([line]),
             )
-            result = shot.render(
-                self.settings, None, None, self.profile, watcher=watcher, state=state
-            )
-        stats = shot.stats(result, seconds)
-        stopped = (interrupt.signal or signal.SIGINT) if result.cancelled else None
-        picture = picture_of(result, stats, scene=loaded.scene, aovs=self.aovs)
+            result = shot.render(settings, None, None, self.profile, watcher=watcher, state=state)
+            stats = shot.stats(result, seconds)
+            picture = picture_of(result, stats, scene=loaded.scene, aovs=aovs)
+            if loaded.catchers and not result.cancelled:
+                picture = self._caught(picture, shot, settings, lambda: interrupt.requested)
+        stopped = (interrupt.signal or signal.SIGINT) if picture.cancelled else None
         return Done(stats, result.costs, loaded.report, stopped, picture)
+
+    def _caught(
+        self, picture: Picture, shot: Shot, settings: Any, is_stopped: Callable[[], bool]
+    ) -> Picture:
+        """A picture with the shadows on its catchers; without them where it was stopped."""
+        from wavecomb.run import catchers
+        from wavecomb.run.watcher import Watcher
+
+        def render(how: Mapping[str, str]) -> Any:
+            shot.load(None, **how)
+            watcher = Watcher(is_stopped=is_stopped, warn=lambda line: warn([line]))
+            return shot.render(catchers.of_catchers(settings), None, None, None, watcher=watcher)
+
+        with_shadows = catchers.caught(picture, render)
+        return replace(picture, cancelled=True) if is_stopped() else with_shadows
 
     def _run_bands(
         self, shot: Shot, loaded: LoadedStage, rows: int, names: Names, keeps_stopped: bool
@@ -309,6 +253,9 @@ class Job:
         if names.png is not None:
             picture.save(names.png, exposure=self.exposure, tone_map=self.tone_map)
             written.append(names.png)
+        if names.deep is not None:
+            picture.save_deep(names.deep, half=self.layers.half)
+            written.append(names.deep)
         if names.stats is not None:
             write_stats(names.stats, picture.stats)
             written.append(names.stats)

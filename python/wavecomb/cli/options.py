@@ -179,11 +179,15 @@ class StageOptions:
         threads: int = 0,
         size: tuple[int, int] | None = None,
         progress: Callable[[int, int], None] | None = None,
+        **changes: Any,
     ) -> LoadedStage:
-        """Loads a stage as the options say, on ``threads`` threads (0: all), for a picture."""
+        """Loads a stage as the options say, on ``threads`` threads (0: all), for a picture.
+
+        ``changes``: fields of ``LoadOptions`` in place of theirs.
+        """
         from wavecomb.api import load
 
-        options = self.for_load(size)
+        options = {**self.for_load(size), **changes}
         # The whole command is in a child, or is not to be (--isolate).
         return load(
             stage, frame=self.frame, threads=threads, progress=progress, isolate=False, **options

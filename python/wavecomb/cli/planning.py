@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.cli.aovs import AovOptions
@@ -15,6 +15,7 @@ from wavecomb.cli.options import StageOptions
 from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.cli.reporting import Reporter, make_reporter
+from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
 
@@ -35,6 +36,7 @@ class Asked:
         output: -o.
         output_dir: --output-dir.
         png: --png.
+        deep: --deep.
         stats_file: --stats.
         size: --size.
         spp: --spp.
@@ -55,6 +57,7 @@ class Asked:
     output: str | None
     output_dir: str | None
     png: str | None
+    deep: str | None
     stats_file: str | None
     size: tuple[int, int] | None
     spp: int | None
@@ -79,8 +82,8 @@ class Asked:
         own = {
             name: options.pop(name)
             for name in (
-                "stage", "output", "output_dir", "png", "stats_file", "size", "spp", "exposure",
-                "tone_map", "quiet", "costs", "frames", "skip_existing", "film_memory",
+                "stage", "output", "output_dir", "png", "deep", "stats_file", "size", "spp",
+                "exposure", "tone_map", "quiet", "costs", "frames", "skip_existing", "film_memory",
             )
         }  # fmt: skip
         chosen = {name: value for name, value in options.items() if value is not None}
@@ -94,8 +97,24 @@ class Asked:
 
     def written(self) -> tuple[str | None, ...]:
         """Files that are written, with places for the frame."""
-        own = (self.output, self.png, self.stats_file, self.costs_file)
+        own = (self.output, self.png, self.deep, self.stats_file, self.costs_file)
         return (*own, self.purpose.preview, self.purpose.checkpoint_file)
+
+    @property
+    def whole(self) -> str:
+        """An option that needs all of the picture at once; empty: there is none."""
+        return self.purpose.whole or ("" if self.deep is None else "--deep")
+
+    def check_deep(self) -> None:
+        """Raises WavecombError where --deep is given with what it does not go with."""
+        if aov_names.DEEP in self.layers.aovs:
+            raise WavecombError("--aov deep: is no layer; give --deep FILE.exr")
+        kept = self.purpose.checkpoint_file
+        if self.deep is not None and kept is not None:
+            raise WavecombError(
+                f"--deep {self.deep}: a checkpoint ({kept}) does not hold the samples of a deep "
+                "picture: leave --checkpoint and --resume out"
+            )
 
 
 @dataclass
@@ -139,8 +158,10 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
             _check_outputs(asked.stage, here, at_frame, asked.costs_file)
         return numbers
 
+    asked.check_deep()
+    beside = Names("", asked.png, asked.stats_file, asked.deep)
     if asked.output is not None:
-        checked(Names(asked.output, asked.png, asked.stats_file))
+        checked(replace(beside, output=asked.output))
     if purpose.denoise:
         from wavecomb.picture.denoise import check_denoiser
 
@@ -154,24 +175,24 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     if asked.size is not None:
         chosen["width"], chosen["height"] = asked.size
     if resumed is not None:
-        chosen = {**resumed.settings, **chosen}
+        chosen = {**_without_overscan(resumed.settings), **chosen}
         source = source.completed(resumed.source)
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
     before = None if resumed is None else resumed.aovs
     choices, opened = peek(source, asked.stage)
-    plans = plan_products(
-        choices, asked.output, asked.png, asked.stats_file, purpose, asked.frames, asked.output_dir
-    )
+    plans = plan_products(choices, asked.output, beside, purpose, asked.frames, asked.output_dir)
     reporter = make_reporter(purpose.progress, asked.quiet)
 
     def fits(settings: Any, aovs: Any) -> None:
-        band_rows(settings, aovs, asked.film_memory, whole=purpose.whole, tile=layers.tile)
+        band_rows(settings, aovs, asked.film_memory, whole=asked.whole, tile=layers.tile)
 
     def job_of(plan: Plan, numbers: tuple[float, ...] | None) -> Job:
         aovs = plan.aovs(layers, before)
-        guides = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
+        others = [name for name in aov_names.GUIDES if purpose.denoise or name in kept]
+        if asked.deep is not None:
+            others.append(aov_names.DEEP)
         settings = plan.settings(
-            chosen, aov_names.with_guides(aovs, guides), resumed is not None, fits
+            chosen, aov_names.with_others(aovs, others), resumed is not None, fits
         )
         shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
         further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
@@ -192,16 +213,26 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     return Prepared(source, resumed, jobs, opened, reporter)
 
 
+def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings with the size of the picture that is shown, as ``make_settings`` takes it."""
+    beyond = 2 * settings.get("overscan", 0)
+    out = dict(settings)
+    for name in ("width", "height"):
+        if name in out:
+            out[name] -= beyond
+    return out
+
+
 def _check_outputs(
     stage: str, names: Names, purpose: PurposeOptions, costs_file: str | None
 ) -> None:
     """Everything that can be known to fail before the work begins."""
-    from wavecomb.errors import WavecombError
     from wavecomb.picture.files import check_writable
 
     outputs = [
         (names.output, "-o", ".exr"),
         (names.png, "--png", ".png"),
+        (names.deep, "--deep", ".exr"),
         (names.stats, "--stats", None),
         (costs_file, "--costs", None),
         (purpose.preview, "--preview", ".png"),

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.cli.aovs import AovOptions
-from wavecomb.cli.job import FrameShot, Names
+from wavecomb.cli.job import Names
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.cli.shots import FrameShot
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.expressions import layer_of
@@ -102,16 +103,15 @@ class Plan:
 def plan_products(
     choices: Sequence[RenderChoice],
     output: str | None,
-    png: str | None,
-    stats: str | None,
+    beside: Names,
     purpose: PurposeOptions,
     frames: str | None,
     folder: str | None = None,
 ) -> list[Plan]:
     """What is to be rendered: with ``-o`` the first product, without it all.
 
-    ``folder`` is where names that the stage gives count from, and must stay below; None: the
-    working folder.
+    ``beside`` has the files that options name beside it. ``folder`` is where names that the stage
+    gives count from, and must stay below; None: the working folder.
 
     Raises:
         WavecombError: Nothing says where a picture goes.
@@ -119,7 +119,7 @@ def plan_products(
     if output is not None:
         if folder is not None:
             raise WavecombError("--output-dir is for pictures that the stage names; -o names one")
-        return [Plan(choices[0], Names(output, png, stats))]
+        return [Plan(choices[0], replace(beside, output=output))]
     plans = []
     for choice in choices:
         if choice.output is None:
@@ -133,11 +133,12 @@ def plan_products(
         if "\0" in choice.output:
             raise WavecombError(f"{choice.product}: productName is no file name; give -o FILE.exr")
         name = choice.output if folder is None else os.path.join(folder, choice.output)
-        plans.append(Plan(choice, Names(name, png, stats), folder or os.curdir))
+        plans.append(Plan(choice, replace(beside, output=name), folder or os.curdir))
     if len(plans) > 1:
         single = {
-            "--png": png, "--stats": stats, "--checkpoint": purpose.checkpoint,
-            "--resume": purpose.resume, "--preview": purpose.preview,
+            "--png": beside.png, "--deep": beside.deep, "--stats": beside.stats,
+            "--checkpoint": purpose.checkpoint, "--resume": purpose.resume,
+            "--preview": purpose.preview,
         }  # fmt: skip
         for option, given in single.items():
             if given is not None:

@@ -11,13 +11,14 @@ import click
 from wavecomb.cli.aovs import aov_options
 from wavecomb.cli.done import Done
 from wavecomb.cli.frames import frame_options, open_frames, render_sequence
-from wavecomb.cli.job import Shot, Still, how_far
+from wavecomb.cli.job import how_far
 from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.purpose import purpose_options
 from wavecomb.cli.row_options import Real
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.cli.setting_options import SettingCommand, setting_options
+from wavecomb.cli.shots import Shot, Still
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -43,6 +44,12 @@ def picture_options(command: F) -> F:
             aov_options,
             click.option(
                 "--png", type=click.Path(), metavar="FILE", help="Picture for display, too."
+            ),
+            click.option(
+                "--deep",
+                type=click.Path(),
+                metavar="FILE.exr",
+                help="Deep picture, too: colour and alpha by depth (docs/deep.md).",
             ),
             click.option(
                 "--stats",

@@ -92,7 +92,7 @@ def submit(
     guides = aov_names.GUIDES if denoise else ()
     own, profile, names, chosen = prepare(
         size or DEFAULT_SIZE, spp, policy, costs,
-        aov_names.with_guides(tuple(aovs or aov_names.DEFAULT), guides), settings,
+        aov_names.with_others(tuple(aovs or aov_names.DEFAULT), guides), settings,
     )  # fmt: skip
     if own is not None:
         raise WavecombError("policy: a farm takes the name of one, not an object of this process")

@@ -204,6 +204,11 @@ class Renderer:
     ) -> tuple[Picture, Frames]:
         frames = self._frames(task, settings.threads)
         loaded = self._load(frames, task, shot)
+        if loaded.catchers:
+            raise WavecombError(
+                f"{loaded.catchers[0]}: is a shadow catcher, which takes three renders and is not "
+                "for a farm: render the stage by `wavecomb render`"
+            )
         if "light_groups" in shot.aovs:
             check_memory(settings, shot.aovs, len(loaded.scene.light_groups))
 

@@ -79,7 +79,7 @@ class Setup(_Rows):
     def layers(self) -> tuple[str, ...]:
         """AOVs to render: those asked for and those that the denoiser needs."""
         guides = aov_names.GUIDES if self.denoise else ()
-        return aov_names.with_guides(aov_names.expand(self.aovs), guides)
+        return aov_names.with_others(aov_names.expand(self.aovs), guides)
 
     def settings(self, scale: int = 1, *, preview: bool = False) -> Settings:
         """The core's settings, checked.

@@ -37,6 +37,8 @@ _SUFFIXES = {
     "variance": "RGB",
     "guide_albedo": "RGB",
     "guide_normal": "XYZ",
+    "depth_nearest": "Z",
+    "motion": "UV",
 }
 _COLOURS = (
     "beauty",
@@ -54,7 +56,7 @@ _COLOURS = (
     "by_light_paths",
 )
 """Layers that are half where halves are asked for, with those of lights and expressions."""
-_EXACT = ("position", "material_id", "instance_id")
+_EXACT = ("position", "material_id", "instance_id", "motion", "depth_nearest", "distance")
 BAND = 64
 """Rows that are made ready and written at once: four blocks of an EXR file."""
 
@@ -164,8 +166,7 @@ class Sheet:
         if window is not None:
             self.spec.x, self.spec.y, self.spec.full_width, self.spec.full_height = window
         self.spec.attribute("compression", compression)
-        for key, value in {"Software": "Wavecomb", **(metadata or {})}.items():
-            _attribute(self.spec, key, value)
+        set_attributes(self.spec, metadata or {})
 
     def values(
         self, layers: Mapping[str, NDArray[Any]], rows: slice = slice(None)
@@ -221,6 +222,12 @@ def _spec(planes: list[NDArray[Any]], halves: list[bool], names: list[str], tile
     spec.tile_width = spec.tile_height = tile
     spec.tile_depth = 1 if tile else 0
     return spec
+
+
+def set_attributes(spec: Any, metadata: Mapping[str, Any]) -> None:
+    """Attributes of a file, as ``write_exr`` takes them."""
+    for key, value in {"Software": "Wavecomb", **metadata}.items():
+        _attribute(spec, key, value)
 
 
 def _attribute(spec: Any, key: str, value: Any) -> None:

@@ -119,6 +119,10 @@ def show_layer(
         wide = np.zeros((*array.shape[:2], 3), np.float32)
         wide[:, :, :2] = array - np.floor(array)
         return Shown(_codes(wide))
+    if name == "motion":
+        wide = np.zeros((*array.shape[:2], 3), np.float32)
+        wide[:, :, :2] = array / max(float(np.abs(array).max()), 1e-6)
+        return Shown(_codes(0.5 * wide + 0.5))
     if name == "position":
         return Shown(_codes(_stretched(array)))
     if array.ndim == 3:

@@ -17,6 +17,7 @@ from wavecomb.run import aovs as aov_names
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene
+    from wavecomb.picture.deep import DeepPicture
     from wavecomb.picture.exr import Compression
     from wavecomb.picture.image import Transfer
 
@@ -43,6 +44,7 @@ class Picture:
         aovs: Further AOVs by name, (height, width) or (height, width, channels): docs/aovs.md.
             Cryptomatte levels are pairs of id and coverage, as `wavecomb.cryptomatte` reads them.
         manifests: Cryptomatte level -> name -> id, of what the picture holds.
+        deep: Samples by depth; None unless the AOV deep was asked for (docs/deep.md).
         metadata: For the header of a file, beside what the statistics say.
         chosen: Names of the layers that are saved; all that there are where it is empty.
     """
@@ -60,6 +62,7 @@ class Picture:
     costs: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
     aovs: dict[str, NDArray[np.float32]] = field(default_factory=dict, repr=False)
     manifests: dict[str, dict[str, int]] = field(default_factory=dict, repr=False)
+    deep: DeepPicture | None = field(default=None, repr=False)
     metadata: dict[str, Any] = field(default_factory=dict, repr=False)
     chosen: tuple[str, ...] = ()
 
@@ -165,6 +168,26 @@ class Picture:
             return [Path(path)]
         raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
 
+    def save_deep(self, path: str | os.PathLike[str], *, half: bool = False) -> Path:
+        """Writes the deep picture (.exr); whole or not at all.
+
+        Args:
+            path: Ends in .exr.
+            half: 16 bit colours and alpha.
+
+        >>> picture = wavecomb.render("shot.usd", aovs=["deep"])  # doctest: +SKIP
+        >>> picture.save_deep("shot.deep.exr")  # doctest: +SKIP
+
+        Raises:
+            WavecombError: There is none, or the name does not end in .exr.
+        """
+        from wavecomb.errors import WavecombError
+
+        if self.deep is None:
+            raise WavecombError("the picture has no deep samples: render with the AOV deep, too")
+        metadata = self.file_metadata()
+        return self.deep.save(path, half=half, metadata=metadata, window=self.window())
+
     def shown(self) -> NDArray[Any]:
         """The colours of a PNG, linear Rec.709: the denoised picture where there is one."""
         from wavecomb.picture.working_space import to_rec709
@@ -193,7 +216,7 @@ class Picture:
         return mime_bundle(self, include, exclude)
 
     def window(self) -> tuple[int, int, int, int] | None:
-        """Where a cropped picture lies, as ``write_exr`` takes it; None: it is whole."""
+        """Where the pixels lie, as ``write_exr`` takes it; None: they are what is shown."""
         return window_of(self.stats.get("settings", {}))
 
     def file_metadata(self) -> dict[str, Any]:
@@ -218,11 +241,14 @@ def picture_of(
         scene: What was rendered, for the camera's matrices.
         aovs: Names as ``aovs.expand`` gives them.
     """
+    from wavecomb.picture.deep import deep_of
     from wavecomb.picture.output import scene_metadata
 
     height, width = result.beauty.shape[:2]
     settings = stats.get("settings", {})
-    width, height = settings.get("width", width), settings.get("height", height)
+    beyond = 2 * settings.get("overscan", 0)
+    width = settings.get("width", width + beyond) - beyond
+    height = settings.get("height", height + beyond) - beyond
     return Picture(
         beauty=result.beauty,
         albedo=result.albedo,
@@ -236,14 +262,21 @@ def picture_of(
         costs=result.costs,
         aovs=result.aovs,
         manifests=result.manifests,
+        deep=deep_of(result.deep),
         metadata={} if scene is None else scene_metadata(scene, width, height),
         chosen=tuple(aovs),
     )
 
 
 def window_of(settings: Mapping[str, Any]) -> tuple[int, int, int, int] | None:
-    """Column and row of a cropped picture's first pixel, and the whole picture's size."""
-    if not settings.get("crop") or settings.get("region") is None:
+    """Column and row of the first pixel in the picture that is shown, and the size of that one.
+
+    None where the pixels are those that are shown: without a crop, and without overscan.
+    """
+    is_cropped = settings.get("crop") and settings.get("region") is not None
+    beyond = int(settings.get("overscan", 0))
+    if not is_cropped and not beyond:
         return None
-    x0, y0 = settings["region"][:2]
-    return int(x0), int(y0), int(settings["width"]), int(settings["height"])
+    x0, y0 = settings["region"][:2] if is_cropped else (0, 0)
+    width, height = int(settings["width"]), int(settings["height"])
+    return int(x0) - beyond, int(y0) - beyond, width - 2 * beyond, height - 2 * beyond

@@ -17,6 +17,8 @@ DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 GUIDES = ("guide_albedo", "guide_normal")
 """For denoisers: of what is seen, also in mirrors and through clear glass."""
 ERRORS = ("error", "variance")
+DEEP = "deep"
+"""No layer, but a picture of its own: what ``--deep`` writes."""
 LIGHT = "light_"
 TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
 """What each way to find light brought; their sum is the beauty."""
@@ -89,7 +91,7 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
     all_names, several = names(), groups()
     wanted: dict[str, None] = {"beauty": None}
     for name in map(expressions.spelled, asked):
-        is_single = _is_light(name) or expressions.is_expression(name)
+        is_single = _is_light(name) or expressions.is_expression(name) or name == DEEP
         if name not in all_names and name not in several and not is_single:
             raise WavecombError(
                 f"AOV {name!r} is not known; there are {', '.join(all_names)}, "
@@ -104,9 +106,9 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
     return known + tuple(kept)
 
 
-def with_guides(aovs: tuple[str, ...], guides: Iterable[str]) -> tuple[str, ...]:
-    """``aovs`` with those that a denoiser needs."""
-    missing = [name for name in guides if name not in aovs]
+def with_others(aovs: tuple[str, ...], others: Iterable[str]) -> tuple[str, ...]:
+    """``aovs`` with what else the core is to keep, such as what a denoiser needs."""
+    missing = [name for name in others if name not in aovs]
     return expand([*aovs, *missing]) if missing else aovs
 
 
@@ -115,7 +117,7 @@ def for_core(aovs: Iterable[str]) -> list[str]:
     return [
         name
         for name in aovs
-        if name in core_aovs() or _is_light(name) or expressions.is_expression(name)
+        if name in core_aovs() or name == DEEP or _is_light(name) or expressions.is_expression(name)
     ]
 
 

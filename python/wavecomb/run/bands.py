@@ -131,7 +131,8 @@ def without_samples(
 
     of_one_pixel = {
         "width": picture_size(settings)[0], "height": max(rows, 2), "region": (0, 0, 1, 1),
-        "crop": False, "spp": 1, "costs": "model", "light_weights": "power", "allocate": "even",
+        "overscan": 0, "crop": False, "spp": 1, "costs": "model", "light_weights": "power",
+        "allocate": "even",
     }  # fmt: skip
     picture = render(_core.Settings(**{**settings.to_dict(), **of_one_pixel}))
 

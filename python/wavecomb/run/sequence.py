@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +13,11 @@ from typing import TYPE_CHECKING, Any
 from wavecomb import _core
 from wavecomb.load_options import LoadOptions, split
 from wavecomb.picture.rendered import picture_of
+from wavecomb.run.aovs import DEEP, with_others
 from wavecomb.run.boxed.reader import Reader
 from wavecomb.run.boxed.wanted import is_wanted
+from wavecomb.run.catchers import LAYER, caught, of_catchers, with_alpha
+from wavecomb.run.catchers import check as check_catchers
 from wavecomb.run.frame_names import parse_frames
 from wavecomb.run.settings import check_memory, prepare
 from wavecomb.run.stats import make_stats
@@ -59,6 +62,7 @@ class Frames:
         self._renderer: _core.Renderer | None = None
         self._loaded: LoadedStage | None = None
         self._is_built = False
+        self._caught = self._options.catch
         started = time.perf_counter()
         self._boxed: Reader | None = None
         self._here: FrameReader | None = None
@@ -99,7 +103,10 @@ class Frames:
         """
         started = time.perf_counter()
         options = LoadOptions.of(self._options, {**changes, "frame": frame})
-        loaded = None if self._renderer is None else self._seen_anew(options)
+        # Another render of a stage with catchers sees other prims.
+        is_same = self._renderer is not None and options.catch == self._caught
+        self._caught = options.catch
+        loaded = self._seen_anew(options) if is_same else None
         if loaded is None:
             # Let go of first: two hierarchies at a time would be twice the memory.
             self._renderer, self._loaded = None, None
@@ -215,8 +222,23 @@ def _pictures(
 ) -> Iterator[tuple[float, Picture]]:
     with shots:
         for frame in frames:
-            scene = shots.load(frame).scene
+            loaded = shots.load(frame)
+            scene = loaded.scene
             if "light_groups" in names:
                 check_memory(settings, names, len(scene.light_groups))
+            if loaded.catchers:
+                check_catchers(settings, {"deep": DEEP in names})
+                settings, names = with_alpha(settings), with_others(names, [LAYER])
             result = shots.render(settings, progress, policy, profile)
-            yield frame, picture_of(result, shots.stats(result), scene=scene, aovs=names)
+            picture = picture_of(result, shots.stats(result), scene=scene, aovs=names)
+            if loaded.catchers and not picture.cancelled:
+                picture = _caught(shots, frame, settings, picture)
+            yield frame, picture
+
+
+def _caught(shots: Frames, frame: float, settings: Settings, picture: Picture) -> Picture:
+    def render(how: Mapping[str, str]) -> Result:
+        shots.load(frame, **how)
+        return shots.render(of_catchers(settings))
+
+    return caught(picture, render)

@@ -20,6 +20,9 @@ MAX_SPP = 1 << 24
 _ERROR_BYTES_PER_PIXEL = 100
 # Of a reweighted one: its cascades, and the unbiased layer.
 _CASCADE_BYTES_PER_PIXEL = 96 + 12
+# Of a deep one, at most: sums in the film, and samples in the picture.
+_DEEP_BYTES_PER_PIXEL = 1 + 4
+_DEEP_BYTES_PER_SAMPLE = 40 + 24
 
 
 def prepare(
@@ -61,13 +64,16 @@ def make_settings(
 ) -> Settings:
     """Checked settings; raises WavecombError or _core.Error in one line. aovs: as expanded.
 
+    ``size`` is that of the picture without the overscan that settings may ask for.
+
     Checks what the core cannot know: whether the picture fits in the memory of this machine, by
     ``check_memory`` unless ``fits`` is given.
     """
     from wavecomb import _core
     from wavecomb.errors import WavecombError
 
-    width, height = (int(edge) for edge in size)
+    beyond = 2 * int(settings.get("overscan", 0))
+    width, height = (int(edge) + beyond for edge in size)
     if not (1 <= width <= MAX_EDGE and 1 <= height <= MAX_EDGE):
         raise WavecombError(
             f"size {width} x {height}: each edge must be from 1 to {MAX_EDGE} pixels"
@@ -107,6 +113,8 @@ def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
     each += _CASCADE_BYTES_PER_PIXEL * (settings.firefly != "keep")
+    if aov_names.DEEP in settings.aovs:
+        each += _DEEP_BYTES_PER_PIXEL + _DEEP_BYTES_PER_SAMPLE * settings.deep_samples
     width, height = picture_size(settings)
     return width * height * each
 

@@ -23,6 +23,7 @@ enum class AovKind : uint8_t {
   kGroups,       ///< a layer of means for each light group
   kExpressions,  ///< a layer of means for each light path expression
   kSum,          ///< the sum over its samples
+  kDeep,         ///< samples by depth, which go to a file of their own (film/deep_film.h)
 };
 
 /// Who finds the value of a path.
@@ -64,7 +65,11 @@ enum class AovSource : uint8_t {
   X(ByLightPaths, "by_light_paths", 3, kMean, kWay, "Found by light paths")                   \
   X(GuidedShare, "guided_share", 1, kMean, kBounce, "Guided share")                           \
   X(Survival, "survival", 1, kMean, kBounce, "Survival of roulette")                          \
-  X(Expressions, "lpe", 0, kExpressions, kLight, "")
+  X(Expressions, "lpe", 0, kExpressions, kLight, "")                                          \
+  X(DepthNearest, "depth_nearest", 1, kNearest, kHit, "Depth, unfiltered")                    \
+  X(Distance, "distance", 1, kNearest, kHit, "Distance, unfiltered")                          \
+  X(Motion, "motion", 2, kNearest, kHit, "Motion in the picture")                             \
+  X(Deep, "deep", 0, kDeep, kHit, "")
 // clang-format on
 
 namespace detail {
@@ -136,9 +141,10 @@ struct AovSet {
   static constexpr uint32_t kUsual = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
   /// Parts of the beauty: emission + direct + indirect.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
-  /// All that have names of their own.
-  static constexpr uint32_t kAll =
-      aov_bits([](const AovRow& row) { return row.kind != AovKind::kExpressions; });
+  /// All that have names of their own and are layers of a picture.
+  static constexpr uint32_t kAll = aov_bits([](const AovRow& row) {
+    return row.kind != AovKind::kExpressions && row.kind != AovKind::kDeep;
+  });
 
   uint32_t bits = kUsual;
 
@@ -153,11 +159,21 @@ struct AovSet {
   static Aov parse(std::string_view name);
 };
 
+/// Samples that a pixel of a deep picture may have.
+inline constexpr uint32_t kMostDeepSamples = 64;
+
+/// How finely a pixel's samples are told apart by depth.
+struct DeepLimits {
+  uint32_t most = 16;       ///< deep samples of a pixel
+  float tolerance = 0.01f;  ///< samples whose depths differ by no more than this share are one
+};
+
 /// What a film and the waves that fill it make room for.
 struct AovLayout {
   AovSet set;
   uint32_t light_groups = 0;  ///< how many are kept
   uint32_t expressions = 0;   ///< light path expressions
+  DeepLimits deep{};          ///< of Aov::kDeep
 };
 
 }  // namespace wavecomb

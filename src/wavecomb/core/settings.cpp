@@ -13,8 +13,8 @@ LightPathRefusal light_path_refusal(const Settings& s) {
   if (s.guiding != Guiding::kOff) return {"guiding", "guiding off"};
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
-  for (const Aov aov :
-       {Aov::kEmission, Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
+  for (const Aov aov : {Aov::kEmission, Aov::kDirect, Aov::kIndirect, Aov::kLightGroups,
+                        Aov::kExpressions, Aov::kDeep})
     if (s.aovs.has(aov))
       return {"the AOV " + std::string(aov_name(aov)) + ", which knows no light of such paths",
               "others"};
@@ -23,6 +23,10 @@ LightPathRefusal light_path_refusal(const Settings& s) {
 
 void Settings::check() const {
   for (const SettingInfo& setting : setting_table()) setting.check(*this);
+  if (aovs.has(Aov::kDeep) && firefly != Firefly::kKeep)
+    throw Error(
+        "firefly reweight does not go with deep pictures, whose samples would not add up to the "
+        "beauty; give firefly keep");
   if (joins_light())
     if (const LightPathRefusal refusal = light_path_refusal(*this); !refusal.what.empty())
       throw Error("transport light does not go with " + refusal.what + "; give " + refusal.instead +
@@ -31,6 +35,9 @@ void Settings::check() const {
   if (uint64_t{width} * height > kMaxPixels)
     throw Error("width x height is " + std::to_string(uint64_t{width} * height) +
                 "; it must be from 1 to " + std::to_string(kMaxPixels));
+  if (width <= 2 * uint64_t{overscan} || height <= 2 * uint64_t{overscan})
+    throw Error("overscan is " + std::to_string(overscan) +
+                ", which leaves nothing of the picture; width and height are with the overscan");
   if (region) {
     const auto text = [](uint32_t v) { return std::to_string(v); };
     const Region& r = *region;

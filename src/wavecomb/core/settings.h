@@ -97,8 +97,10 @@ struct Settings {
   Transport transport = Transport::kPath;
   Firefly firefly = Firefly::kKeep;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
-  std::vector<std::string> light_groups;     ///< of Aov::kLightGroups, by name; empty: all
-  std::vector<NamedExpression> expressions;  ///< of Aov::kExpressions
+  std::vector<std::string> light_groups;          ///< of Aov::kLightGroups, by name; empty: all
+  std::vector<NamedExpression> expressions;       ///< of Aov::kExpressions
+  uint32_t deep_samples = DeepLimits{}.most;      ///< of Aov::kDeep: the most of a pixel
+  float deep_tolerance = DeepLimits{}.tolerance;  ///< of Aov::kDeep
   /// Adaptive sampling: a pixel is done when its error is no larger (ErrorMap::error); 0: off.
   float adaptive = 0;
   /// Adaptive sampling until the picture's mean relative error is no larger; 0: off. Not both.
@@ -112,6 +114,8 @@ struct Settings {
   /// The pixels that are rendered; all others have no samples. Without: all. A pixel of it is the
   /// same as in the whole picture, but in adaptive renders, which see errors within it only.
   std::optional<Region> region;
+  /// Pixels along each edge beyond what the camera's window shows; width and height are with them.
+  uint32_t overscan = 0;
   bool crop = false;  ///< the film, and so the picture, is of the region alone
   // ---- below: how it is computed; never changes the picture ----
   uint32_t threads = 0;    ///< 0: all that the process may use

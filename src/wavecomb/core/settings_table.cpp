@@ -143,6 +143,13 @@ std::vector<SettingInfo> picture_settings() {
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
                                "Samples every bounce that is not a mirror's by cosine."),
       row<&S::error>("error", "Errors", "Keeps errors and variances where nothing else asks."),
+      number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
+                           "Pixels that are rendered beyond each edge of the picture."),
+      number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMostDeepSamples,
+                               "The most samples that a deep picture has in a pixel."),
+      number<&S::deep_tolerance>("deep_tolerance", "Deep tolerance", 0, 1,
+                                 "Samples of a deep picture whose depths differ by no more than "
+                                 "this share of the depth are one."),
       row<&S::crop>("crop", "Crop", "The picture is its region alone, in memory and in files."),
   };
 }

@@ -47,6 +47,9 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixe
       case AovKind::kCoverage:
         crypto_[level_index(row.aov)].resize(pixels);
         break;
+      case AovKind::kDeep:
+        deep_ = DeepFilm(pixels, layout.deep);
+        break;
     }
   }
   if (layout.set.has(AovKind::kMeanOfHits)) hits_.resize(pixels);
@@ -56,7 +59,7 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixe
 
 size_t AovFilm::bytes() const {
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
-  size_t n = of(hits_) + of(centre2_);
+  size_t n = of(hits_) + of(centre2_) + deep_.bytes();
   for (const auto& sums : sums_) n += of(sums);
   for (const auto& values : nearest_) n += of(values);
   for (const auto& level : crypto_) n += of(level);
@@ -108,6 +111,7 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
       return crypto_layer(aov, samples);
     case AovKind::kGroups:
     case AovKind::kExpressions:
+    case AovKind::kDeep:
       break;
   }
   return {};
@@ -152,6 +156,13 @@ AovLayer AovFilm::take(Aov aov, const std::vector<uint32_t>& samples) {
   if (row_of(aov).kind == AovKind::kCoverage) release(crypto_[level_index(aov)]);
   layout_.set.bits &= ~static_cast<uint32_t>(aov);
   return taken;
+}
+
+DeepLayer AovFilm::take_deep(const std::vector<uint32_t>& samples) {
+  DeepLayer layer;
+  if (!deep_.empty()) layer = deep_.layer(samples);
+  deep_ = {};
+  return layer;
 }
 
 std::vector<AovLayer> AovFilm::finish(const std::vector<uint32_t>& samples,

@@ -10,6 +10,7 @@
 
 #include "wavecomb/core/aov.h"
 #include "wavecomb/film/cryptomatte.h"
+#include "wavecomb/film/deep_film.h"
 
 namespace wavecomb {
 
@@ -80,6 +81,9 @@ class AovFilm {
       crypto_[1][pixel].add(tables.material_id[material]);
   }
 
+  /// The sums of a deep picture; empty where none is kept.
+  DeepFilm& deep() { return deep_; }
+
   // ---- layers -----------------------------------------------------------------------------------
 
   /// The layer of an AOV that has one alone; no values where it is not kept. `samples` is by pixel.
@@ -95,7 +99,10 @@ class AovFilm {
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
                                const std::vector<std::string>& many_names) &&;
   size_t bytes() const;
-  /// Runs block(name, values) for each vector of sums, for checkpoints.
+  /// The deep picture, whose sums are freed; empty where none is kept.
+  DeepLayer take_deep(const std::vector<uint32_t>& samples);
+  /// Runs block(name, values) for each vector of sums, for checkpoints; those
+  /// of a deep picture are not kept.
   template <typename Block>
   void for_each_block(const Block& block) {
     for (const AovRow& row : kAovs) {
@@ -129,6 +136,7 @@ class AovFilm {
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
+  DeepFilm deep_;
   std::vector<uint32_t> hits_;  ///< samples that have hit something
   std::vector<float> centre2_;  ///< squared distance of the nearest sample, pixels
 };

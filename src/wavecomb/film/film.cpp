@@ -98,6 +98,7 @@ Film::Layers Film::finish(const std::vector<std::string>& many_names) && {
   release(pixels_);
   splats_ = {};
   cascades_ = {};
+  layers.deep = aovs_.take_deep(layers.samples);
   layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
   layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;
   layers.depth = aovs_.take(Aov::kDepth, layers.samples).values;

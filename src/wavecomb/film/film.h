@@ -98,6 +98,7 @@ class Film {
     std::vector<float> beauty, albedo, normal, depth, variance;
     std::vector<uint32_t> samples;
     std::vector<AovLayer> aovs;  ///< of AovFilm::finish; "unbiased", where it is not the beauty
+    DeepLayer deep;
   };
   /// The means, and the end of the film: sums are freed as soon as they were used, for sums and
   /// layers together are the most memory that a small scene needs.

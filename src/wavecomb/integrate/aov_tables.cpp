@@ -12,10 +12,17 @@ namespace wavecomb {
 
 AovTables::AovTables(const Scene& scene, const Settings& settings) {
   layout.set = settings.aovs;
+  layout.deep = {settings.deep_samples, settings.deep_tolerance};
   if (settings.allocate == Allocate::kEfficiency) {
     layout.set.bits = layout.set.bits | Aov::kCost;
     models_cost = settings.costs != CostSource::kMeasured;
   }
+  if (layout.set.has(Aov::kDeep) && scene.view().volumes.emits)
+    throw Error(
+        "deep pictures know no volumes that glow: light without a surface has no depth there; give "
+        "no deep picture, or no emission");
+  if (layout.set.has(Aov::kMotion) && scene.camera().projection == Projection::kLatlong)
+    throw Error("the AOV motion is none of latlong cameras; give others, or another projection");
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials need none of it; positions of objects do.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);

@@ -86,8 +86,7 @@ inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Ve
   Vec2<F> lens{F(0.f), F(0.f)};
   float focus = 0;  // 1 / distance
   if (camera.lens_radius > 0) {
-    const Vec2<F> at = square_to_disk(u, v);
-    lens = {at.x * camera.lens_radius, at.y * camera.lens_radius};
+    lens = aperture_point<F>(camera, u, v);
     focus = 1.f / camera.focus_distance;
   }
   // d' and o; what the window shows is d' + lens / focus_distance, or of o less the lens's share.

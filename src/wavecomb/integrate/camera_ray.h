@@ -9,6 +9,7 @@
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/film/filter.h"
+#include "wavecomb/integrate/lens.h"
 #include "wavecomb/scene/camera.h"
 #include "wavecomb/surface/motion.h"
 
@@ -18,8 +19,8 @@ namespace wavecomb {
 /// not blur as much as the pixel does; Igehy's full pixel shows, beside renderers without cones.
 inline constexpr float kConeShare = 0.25f;
 
-/// A camera with its window fitted to a picture of width x height pixels. The lens of a latlong
-/// camera has no radius.
+/// A camera with its window fitted to a picture of width x height pixels, overscan included. The
+/// lens of a latlong camera has no radius.
 struct CameraSetup : Camera {
   std::vector<MatrixStep> places;  ///< over the shutter, where it moves
   Vec3<float> backward;            ///< unit vector along the camera's z axis
@@ -27,8 +28,14 @@ struct CameraSetup : Camera {
   float step_x, step_y;            ///< window size of a pixel
   const float* filter;             ///< FilterTable::offsets()
   bool has_far;                    ///< something is cut off far away
+  LensTable distortion;            ///< empty where there is none
+  /// When a rolling shutter exposes pixel (x, y): a + b (x + 1/2) + c (y + 1/2) + duration t.
+  std::array<float, 3> rolling{};
 
-  CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table);
+  /// `overscan`: pixels of each edge that lie beyond the window. Throws Error for what the camera
+  /// cannot show.
+  CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table,
+              uint32_t overscan = 0);
   bool moves() const { return !places.empty(); }
   /// Whether all rays are narrow about one direction and meet in one point.
   bool is_pinhole() const {
@@ -36,6 +43,15 @@ struct CameraSetup : Camera {
            !moves();
   }
 };
+
+/// When a path of pixel (x, y) sees the scene, of whose shutter `time` is the path's.
+template <typename F>
+inline F camera_time(const CameraSetup& camera, const F& x, const F& y, const F& time) {
+  if (camera.rolling_shutter == RollingShutter::kOff) return time;
+  const auto [a, b, c] = camera.rolling;
+  const F begin = fma(F(x + 0.5f), F(b), fma(F(y + 0.5f), F(c), F(a)));
+  return clamp(F(fma(time, F(camera.rolling_duration), begin)), F(0.f), F(0x1.fffffep-1f));
+}
 
 /// Where the camera is at a time of the shutter.
 template <typename F>
@@ -60,6 +76,13 @@ inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time
     return -dot(Vec3<F>(p - Vec3<F>(camera.to_world.t)), Vec3<F>(camera.backward));
   const MatrixLanes<F> m = camera_place<F>(camera, time, active);
   return -dot(Vec3<F>(p - m.t), normalize(Vec3<F>(m.row[0].z, m.row[1].z, m.row[2].z)));
+}
+
+/// Distance of a point from the camera's place, at a time of the shutter.
+template <typename F>
+inline F camera_distance(const CameraSetup& camera, const Vec3<F>& p, const F& time,
+                         const Mask<F>& active) {
+  return length(Vec3<F>(p - camera_place<F>(camera, time, active).t));
 }
 
 template <typename F>
@@ -111,8 +134,8 @@ inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, 
     d = {F(0.f), F(0.f), F(-1.f)};
   }
   if (camera.lens_radius > 0) {
-    const Vec2<F> lens = square_to_disk(u, v);
-    const Vec3<F> p{lens.x * camera.lens_radius, lens.y * camera.lens_radius, F(0.f)};
+    const Vec2<F> lens = aperture_point<F>(camera, u, v);
+    const Vec3<F> p{lens.x, lens.y, F(0.f)};
     // Through the point in focus: d * focus_distance, seen from the lens, scaled back to z = -1.
     d = {fma(p.x, F(-1.f / camera.focus_distance), d.x),
          fma(p.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
@@ -142,9 +165,12 @@ inline void clip(const CameraSetup& camera, const LocalRay<F>& ray, F& near, F& 
 template <typename F>
 inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F& fy, const F& u,
                                 const F& v, const F& time, const Mask<F>& active) {
+  Vec2<F> at{fx, fy};
+  if (!camera.distortion.empty()) [[unlikely]]
+    at = undistorted<F>(camera.distortion, fx, fy, active);
   const detail::LocalRay<F> local =
-      detail::local_ray<F>(camera, fma(fx, F(camera.step_x), F(camera.x0)),
-                           fma(fy, F(-camera.step_y), F(camera.y1)), u, v);
+      detail::local_ray<F>(camera, fma(at.x, F(camera.step_x), F(camera.x0)),
+                           fma(at.y, F(-camera.step_y), F(camera.y1)), u, v);
   const Vec3<F>& d = local.d;
   F near(camera.near_clip), far(camera.far_clip);
   if (!camera.clip_planes.empty()) detail::clip<F>(camera, local, near, far);

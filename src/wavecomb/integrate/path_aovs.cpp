@@ -43,6 +43,12 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       film.add(Aov::kDepth, pixel, depth_.rows + slot);
       film.count_hit(pixel);
     });
+  if (deep_)
+    for_each_slot([&](uint32_t slot) {
+      const auto row = load_row<DeepRow, float>(deep_.rows, slot, true);
+      if (std::isfinite(row.depth))
+        film.deep().add(pixel, row.depth, row.in_volume > 0, radiance + slot * kRadianceWords);
+    });
   if (hits_) {
     for_each_slot([&](uint32_t slot) {
       const auto hit = load_row<FirstHitRow, float>(hits_.rows, slot, true);
@@ -50,6 +56,7 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       if (!centre_ || !film.is_nearest(pixel, centre_.rows[slot])) return;
       for_each_hit_value(
           hit, [&](Aov aov, const auto& value) { film.put(aov, pixel, values_of(value)); });
+      if (motion_) film.put(Aov::kMotion, pixel, motion_.rows + size_t{2} * slot);
       for_each_vertex_aov(AovKind::kNearest, [&](Aov aov, const float* rows) {
         film.put(aov, pixel, rows + slot * vertex_.words);
       });

@@ -65,8 +65,10 @@ class PathAovs {
     }
     rows(vertex_, words > 0, words);
     rows(depth_, set.has(Aov::kDepth), 1);
+    rows(deep_, set.has(Aov::kDeep), kRowWords<DeepRow>);
     rows(hits_, set.has(AovKind::kNearest) || set.has(AovKind::kCoverage), kRowWords<FirstHitRow>);
     rows(centre_, set.has(AovKind::kNearest), 1);
+    rows(motion_, set.has(Aov::kMotion), 2);
     for (Block& part : parts_) rows(part, set.any(AovSet::kParts), kRadianceWords);
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
     if (layout.expressions > 0)
@@ -89,11 +91,15 @@ class PathAovs {
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
     for (Block* block :
-         {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_, &bounces_})
+         {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_, &bounces_, &motion_})
       block->zero(slots);
     expressions_.clear(slots);
-    if (depth_) std::fill_n(depth_.rows, slots, std::numeric_limits<float>::infinity());
-    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit, kNothingHit};
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    if (depth_) std::fill_n(depth_.rows, slots, kFar);
+    for (uint32_t i = 0; deep_ && i < slots; ++i)
+      store_row<DeepRow, float>(deep_.rows, i, {kFar, 0.f}, true);
+    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit,
+                                  kNothingHit,      kFar,        kFar};
     for (uint32_t i = 0; hits_ && i < slots; ++i)
       store_row<FirstHitRow, float>(hits_.rows, i, none, true);
   }
@@ -107,7 +113,7 @@ class PathAovs {
 
   // ---- first hits -------------------------------------------------------------------------------
 
-  bool wants_hits() const { return hits_ || depth_; }
+  bool wants_hits() const { return hits_ || depth_ || deep_; }
   bool wants_alpha() const { return bool(alpha_); }
   /// The camera's rays of the active lanes have met something that covers what is behind.
   template <typename F>
@@ -119,10 +125,13 @@ class PathAovs {
   template <typename F>
   void hit_light(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
                  const UInt<F>& light, const Mask<F>& active) const {
-    store_depth<F>(camera, slot, p, time, active);
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_depth<F>(slot, depth, active);
     if (!hits_) return;
     const UInt<F> none(kNothingHit);
-    store_row<FirstHitRow, F>(hits_.rows, slot, {p, tables_->light_object(light), none, none},
+    store_row<FirstHitRow, F>(hits_.rows, slot,
+                              {p, tables_->light_object(light), none, none, depth,
+                               camera_distance<F>(camera, p, time, active)},
                               active);
   }
 
@@ -131,11 +140,29 @@ class PathAovs {
   void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
                    const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& material,
                    const Mask<F>& active) const {
-    store_depth<F>(camera, slot, p, time, active);
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_depth<F>(slot, depth, active);
     if (hits_)
-      store_row<FirstHitRow, F>(
-          hits_.rows, slot, {p, tables_->template object<F>(inst, geom, active), material, inst},
-          active);
+      store_row<FirstHitRow, F>(hits_.rows, slot,
+                                {p, tables_->template object<F>(inst, geom, active), material, inst,
+                                 depth, camera_distance<F>(camera, p, time, active)},
+                                active);
+  }
+
+  bool wants_motion() const { return bool(motion_); }
+  /// What the camera's ray has met moves so far about the picture (screen_motion.h).
+  template <typename F>
+  void move(const UInt<F>& slot, const Vec2<F>& pixels, const Mask<F>& active) const {
+    scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
+  }
+
+  /// A volume has stopped the camera's ray at `p`.
+  template <typename F>
+  void hit_volume(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                  const Mask<F>& active) const {
+    if (!deep_) return;
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_row<DeepRow, F>(deep_.rows, slot, {depth, F(1.f)}, active);
   }
 
   // ---- vertices ---------------------------------------------------------------------------------
@@ -286,25 +313,11 @@ class PathAovs {
   const float* group_rows() const { return groups_.rows; }
 
  private:
-  /// Rows of some words a slot.
-  struct Block {
-    SoaBlock owner;
-    float* rows = nullptr;
-    size_t words = 0;
+  using Block = SlotRows;
 
-    Block() = default;
-    Block(size_t capacity, size_t words_)
-        : owner(1, capacity * words_), rows(owner.floats(0)), words(words_) {}
-    explicit operator bool() const { return rows != nullptr; }
-    void zero(size_t slots) const {
-      if (rows) std::memset(rows, 0, slots * words * sizeof(float));
-    }
-    size_t bytes() const { return owner.bytes(); }
-  };
-
-  std::array<const Block*, 12> blocks() const {
-    return {&vertex_, &depth_,   &hits_,   &centre_, &parts_[0],      &parts_[1],
-            &groups_, &cost_ns_, &guides_, &alpha_,  &light_samples_, &bounces_};
+  std::array<const Block*, 14> blocks() const {
+    return {&vertex_, &depth_,   &deep_,   &hits_,  &centre_,        &parts_[0], &parts_[1],
+            &groups_, &cost_ns_, &guides_, &alpha_, &light_samples_, &bounces_,  &motion_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -315,30 +328,11 @@ class PathAovs {
     return at;
   }
 
-  /// The words of a value, one after another from word `at` on.
+  /// Distance along the camera's axis, of a surface.
   template <typename F>
-  static void scatter_words(float* rows, const F& value, const UInt<F>& at, const Mask<F>& active) {
-    scatter<F>(rows, value, at, active);
-  }
-  template <typename F>
-  static void scatter_words(float* rows, const Vec2<F>& value, const UInt<F>& at,
-                            const Mask<F>& active) {
-    scatter<F>(rows, value.x, at, active);
-    scatter<F>(rows, value.y, at + 1u, active);
-  }
-  template <typename F>
-  static void scatter_words(float* rows, const Vec3<F>& value, const UInt<F>& at,
-                            const Mask<F>& active) {
-    scatter<F>(rows, value.x, at, active);
-    scatter<F>(rows, value.y, at + 1u, active);
-    scatter<F>(rows, value.z, at + 2u, active);
-  }
-
-  /// Distance along the camera's axis.
-  template <typename F>
-  void store_depth(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
-                   const Mask<F>& active) const {
-    if (depth_) scatter<F>(depth_.rows, camera_depth<F>(camera, p, time, active), slot, active);
+  void store_depth(const UInt<F>& slot, const F& depth, const Mask<F>& active) const {
+    if (depth_) scatter<F>(depth_.rows, depth, slot, active);
+    if (deep_) store_row<DeepRow, F>(deep_.rows, slot, {depth, F(0.f)}, active);
   }
 
   /// What guides a denoiser, of paths that have met clear surfaces only so far.
@@ -367,9 +361,10 @@ class PathAovs {
 
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
-  Block vertex_, depth_, hits_;
+  Block vertex_, depth_, deep_, hits_;
   /// By an AOV's place: its words in a row of vertex_, or kNotKept.
   std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
+  Block motion_;                ///< pixels, x and y
   Block centre_;                ///< squared distance of the sample from the pixel's centre, pixels
   std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
   Block groups_;                ///< radiance by light group, a slot's groups side by side

@@ -10,6 +10,7 @@
 #include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/program_dispatch.h"
 #include "wavecomb/integrate/reference.h"
+#include "wavecomb/integrate/screen_motion.h"
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/single_rays.h"
 #include "wavecomb/integrate/steps/emit.h"
@@ -89,17 +90,16 @@ class PathTracer {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
     const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
-    const F time = context_.moves() ? path_time<F>(settings_.sampler, key) : 0.f;
+    const auto x = static_cast<F>(pixel & 0xffffu), y = static_cast<F>(pixel >> 16);
+    const F time = context_.moves() ? camera_time<F>(*context_.camera, x, y,
+                                                     path_time<F>(settings_.sampler, key))
+                                    : 0.f;
     rays_.begin(key, time);
-    const CameraRay<F> ray = camera_ray<F>(*context_.camera, static_cast<F>(pixel & 0xffffu),
-                                           static_cast<F>(pixel >> 16), r, true, time);
+    const CameraRay<F> ray = camera_ray<F>(*context_.camera, x, y, r, true, time);
     aovs_.begin<F>(*context_.camera, r, kSlot, true);
     F cone_at_origin = ray.width;
     const F importance =
-        context_.weighs_pixels()
-            ? picture_importance<F>(*context_.guide, static_cast<F>(pixel & 0xffffu),
-                                    static_cast<F>(pixel >> 16), true)
-            : 0.f;
+        context_.weighs_pixels() ? picture_importance<F>(*context_.guide, x, y, true) : 0.f;
     PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u, 0u, importance};
     ++counts_.samples;
 
@@ -133,6 +133,8 @@ class PathTracer {
       if (hit.inst == kLightShape) {
         if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
         if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
+        if (depth == 0 && aovs_.wants_motion())
+          aovs_.move<F>(kSlot, screen_motion<F>(*context_.camera, p, p, true), true);
         add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
         return depth;
       }
@@ -147,6 +149,13 @@ class PathTracer {
         if (came_out && on_surface) material = media_.exit_material();
       if (depth == 0 && on_surface)
         aovs_.hit_surface<F>(*context_.camera, kSlot, p, time, hit.inst, hit.geom, material, true);
+      if (depth == 0 && on_surface && aovs_.wants_motion())
+        aovs_.move<F>(
+            kSlot,
+            screen_motion_of_hit<F>(scene, *context_.camera,
+                                    {hit.inst, mesh, hit.prim, hit.u, hit.v, 0.f}, path.dir, true),
+            true);
+      if (depth == 0 && !on_surface) aovs_.hit_volume<F>(*context_.camera, kSlot, p, time, true);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
         aovs_.survive<F>(depth, kSlot, q, true);

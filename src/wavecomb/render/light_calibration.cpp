@@ -101,7 +101,8 @@ LightProbes trace_probes(const Scene& scene, const EmbreeAccelerator& accel, con
   probing.sampler = SamplerKind::kIndependent;
   probing.seed = 0x9e3779b9u;
   const FilterTable filter(settings.filter, settings.used_filter_width());
-  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
+  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter,
+                           settings.overscan);
   Film film(1, 1, AovLayout{});
   WaveContext context{};
   context.scene = view;

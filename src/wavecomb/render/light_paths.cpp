@@ -40,6 +40,10 @@ float farthest(const Bounds& box, const Vec3<float>& from) {
 LightPathRefusal light_path_refusal(const Scene& scene) {
   if (scene.camera().projection == Projection::kLatlong)
     return {"latlong cameras", "another camera"};
+  const Camera& camera = scene.camera();
+  if (distorts(camera)) return {"lenses that distort", "a camera without lens distortion"};
+  if (camera.rolling_shutter != RollingShutter::kOff)
+    return {"rolling shutters", "a camera without one"};
   if (scene.view().visibility)
     return {"prims that some rays do not see, nor with holdouts", "a stage without them"};
   if (scene.view().walks.media)

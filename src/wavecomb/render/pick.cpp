@@ -41,7 +41,9 @@ uint32_t light_of_record(const LightSet& set, uint32_t record) {
 std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, float x, float y,
                          uint32_t width, uint32_t height) {
   const FilterTable filter(FilterKind::kBox, 1.f);
-  const CameraSetup camera(scene.camera(), width, height, filter);
+  Camera sharp = scene.camera();
+  sharp.lens_radius = 0;
+  const CameraSetup camera(sharp, width, height, filter);
   const CameraRay<float> ray = ray_through<float>(camera, x, y, 0.5f, 0.5f, kMiddle, true);
   const OneHit hit = trace(accel, ray);
   if (hit.inst == kNoHit) return std::nullopt;

@@ -216,7 +216,8 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   const std::vector<MaterialTraits> traits = material_traits(scene);
   RenderCosts costs(scene, traits, settings);
   const FilterTable filter(settings.filter, settings.used_filter_width());
-  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter);
+  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter,
+                           settings.overscan);
   const AovTables aovs(scene, settings);
   const Region window = settings.film();
   Film film(window, aovs.layout, settings.keeps_error());
@@ -358,6 +359,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
                   std::move(layers.variance),
                   std::move(layers.aovs),
                   {}};
+  picture.deep = std::move(layers.deep);
   picture.manifests = crypto_manifests(scene, picture.aovs);
   return picture;
 }

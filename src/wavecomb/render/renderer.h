@@ -42,6 +42,7 @@ struct Picture {
   std::vector<float> variance{};  ///< rgb, Film::variance
   std::vector<AovLayer> aovs{};   ///< further layers that Settings::aovs asks for
   std::vector<CryptoManifest> manifests{};
+  DeepLayer deep{};
 };
 
 /// What a render may be given beside its settings. Callbacks are called on the thread that called

@@ -1,7 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/scene/camera.h"
 
+#include <cmath>
+
 namespace wavecomb {
+
+bool distorts(const Camera& c) {
+  return !c.lens_map.empty() || c.lens_k1 != 0 || c.lens_k2 != 0 || c.lens_k3 != 0 ||
+         c.lens_p1 != 0 || c.lens_p2 != 0;
+}
+
+uint32_t lens_map_nodes(const Camera& camera) {
+  const size_t nodes = 2 * camera.lens_map.size();
+  const auto across = static_cast<uint32_t>(std::lround(std::sqrt(static_cast<double>(nodes))));
+  return across >= 2 && size_t{across} * across == nodes ? across : 0;
+}
 
 FittedWindow fitted_window(const Camera& camera, uint32_t width, uint32_t height) {
   const float* w = camera.window;

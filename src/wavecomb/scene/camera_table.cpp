@@ -110,6 +110,23 @@ std::vector<CameraParameter> make_camera_parameters() {
                            "Planes (a, b, c, d) in the camera's space; of what it sees itself, "
                            "points with a x + b y + c z + d < 0 are cut off."),
       number_from<&C::exposure>("exposure", 0, "What light is multiplied by in the picture."),
+      number_from<&C::aperture_blades>("aperture_blades", 0,
+                                       "Corners of the aperture, 3 or more; 0: it is round."),
+      row<&C::aperture_rotation>("aperture_rotation", "Of the aperture, degrees."),
+      number_above<&C::lens_squeeze>("lens_squeeze", 0,
+                                     "The aperture's height / its width: anamorphic lenses."),
+      row<&C::lens_k1>("lens_k1", "Radial distortion, of r^2 on the plane at distance 1."),
+      row<&C::lens_k2>("lens_k2", "Radial distortion, of r^4."),
+      row<&C::lens_k3>("lens_k3", "Radial distortion, of r^6."),
+      row<&C::lens_p1>("lens_p1", "Tangential distortion."),
+      row<&C::lens_p2>("lens_p2", "Tangential distortion."),
+      row<&C::lens_map>("lens_map",
+                        "Distortion as a map: n x n nodes over the picture, two in each four "
+                        "numbers; shares of the undistorted picture's width and height."),
+      choice<&C::rolling_shutter>("rolling_shutter", {"off", "top", "bottom", "left", "right"},
+                                  "The edge of the picture at which a rolling shutter begins."),
+      number_from<&C::rolling_duration>("rolling_duration", 0,
+                                        "Share of the shutter's time that a row is exposed."),
   };
 }
 
@@ -167,6 +184,15 @@ void check_camera(const Camera& camera) {
     throw Error("the latlong camera's window must lie between the poles");
   if (camera.lens_radius > 0 && !(camera.focus_distance > 0))
     throw Error("the camera's lens needs a focus distance above 0");
+  const float blades = camera.aperture_blades;
+  if (blades != 0 && (blades < 3 || blades > 64 || blades != std::floor(blades)))
+    throw Error("the camera's aperture_blades is " + text(blades) +
+                "; it must be 0, or a whole number from 3 to 64");
+  if (camera.rolling_duration > 1)
+    throw Error("the camera's rolling_duration is " + text(camera.rolling_duration) +
+                "; it must be from 0 to 1");
+  if (!camera.lens_map.empty() && lens_map_nodes(camera) == 0)
+    throw Error("the camera's lens_map must have as many nodes along each edge, an even number");
   if (!(camera.far_clip > camera.near_clip))
     throw Error("the camera's clipping range must end beyond its start");
 }

@@ -171,6 +171,13 @@ _CAMERA_VALUES: dict[str, Kind] = {
 }  # fmt: skip
 
 
+CAMERA: dict[str, Kind] = {
+    **{name: _CAMERA_VALUES[row.kind] for name, row in camera_parameters().items()},
+    "motion": maybe(array("<f8", 3)),
+}
+"""What a camera is told beside its place."""
+
+
 def _light(row: LightParameter) -> Kind:
     """What a parameter of a light takes."""
     return text if row.refers == "group" else _VALUES[row.kind]
@@ -319,12 +326,6 @@ CALLS: dict[str, Call] = {
         {},
         "profiles",
     ),
-    "set_camera": Call(
-        {"transform": _MATRIX},
-        {
-            **{name: _CAMERA_VALUES[row.kind] for name, row in camera_parameters().items()},
-            "motion": maybe(array("<f8", 3)),
-        },
-    ),
+    "set_camera": Call({"transform": _MATRIX}, CAMERA),
 }  # fmt: skip
 """Methods of ``SceneBuilder`` that a sandbox may ask for."""

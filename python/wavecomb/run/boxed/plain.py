@@ -53,6 +53,7 @@ _STAGE = calls.fields(
     report=_REPORT, camera_path=maybe(text), cameras=_TEXTS, lights=_TEXTS, material_paths=_TEXTS,
     light_paths=_TEXTS, frame=maybe(number), shutter=maybe(_PAIR), render=_CHOICE,
     leaves_out_levels=flag, outline=maybe(calls.array("<f8", 2)), volumes=many(_VOLUME),
+    catchers=_TEXTS,
 )  # fmt: skip
 _IMAGE = calls.fields(
     size=row(whole, whole), channels=whole, dtype=text, stamp=maybe(row(size, size)),
@@ -102,7 +103,7 @@ def read_report(value: Any, arrays: Sequence[Array] = ()) -> LoadReport:
 def of_stage(loaded: LoadedStage) -> dict[str, Any]:
     """What was read, but for scene and textures, as plain data."""
     names = ("camera_path", "cameras", "lights", "material_paths", "light_paths", "frame",
-             "shutter", "leaves_out_levels", "outline")  # fmt: skip
+             "shutter", "leaves_out_levels", "outline", "catchers")  # fmt: skip
     return {
         **{name: getattr(loaded, name) for name in names},
         "volumes": [
@@ -120,7 +121,7 @@ def read_stage(
     """What was read, of plain data and the scene that was built. Raises Refused."""
     wanted = ("report", "camera_path", "cameras", "lights", "material_paths", "light_paths",
               "frame", "shutter", "render", "leaves_out_levels", "outline",
-              "volumes")  # fmt: skip
+              "volumes", "catchers")  # fmt: skip
     read = _complete(_STAGE(value, arrays), wanted)
     outline = read["outline"]
     if outline is not None and outline.shape[1] != 3:
@@ -147,6 +148,7 @@ def read_stage(
         read["leaves_out_levels"],
         outline,
         tuple(_volume(one) for one in read["volumes"]),
+        tuple(read["catchers"]),
     )
 
 
@@ -214,12 +216,7 @@ def _complete(read: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
 
 _MATRIX = calls.array("<f8 <f4", 2)
 _SEEN = calls.fields(
-    camera=maybe(calls.fields(
-        transform=_MATRIX, window=row(number, number, number, number), lens_radius=number,
-        focus_distance=number, near_clip=number, far_clip=number,
-        motion=maybe(calls.array("<f8", 3)), projection=text, conform=text, pixel_aspect=number,
-        clip_planes=many(row(number, number, number, number)), exposure=number,
-    )),
+    camera=maybe(calls.fields(transform=_MATRIX, **calls.CAMERA)),
     shutter=maybe(_PAIR), camera_path=maybe(text), render=_CHOICE, frame=maybe(number),
 )  # fmt: skip
 

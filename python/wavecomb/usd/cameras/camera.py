@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
@@ -16,6 +17,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.load_options import PROJECTIONS
 from wavecomb.picture.output import fitted_window
 from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
+from wavecomb.usd.cameras.lens import lens_values, read_map
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.looks.network import number, pair, word
 from wavecomb.usd.stage.choice import CONFORMS
@@ -58,6 +60,8 @@ class Lens:
         depth_of_field: Whether its lens blurs what is out of focus.
         conform: What gives way where the shapes of aperture and picture differ.
         pixel_aspect: Width of a pixel / its height.
+        settings: Of ``lens.ATTRIBUTES``, as texts; they go before what the prim says.
+        st_map: A file that says how the lens distorts; it goes before coefficients.
     """
 
     projection: str | None = None
@@ -65,10 +69,23 @@ class Lens:
     depth_of_field: bool = True
     conform: str = CONFORMS[0]
     pixel_aspect: float = 1.0
+    settings: Mapping[str, str] = field(default_factory=dict)
+    st_map: str | None = None
 
-    def options(self) -> dict[str, Any]:
-        """Options of a ``View``, those that are not the default."""
-        out: dict[str, Any] = {}
+    def options(
+        self,
+        prim: Usd.Prim | None = None,
+        time: Usd.TimeCode | None = None,
+        report: LoadReport | None = None,
+    ) -> dict[str, Any]:
+        """Options of a ``View``, those that are not the default.
+
+        Raises:
+            WavecombError: A setting, or the map, is no good.
+        """
+        out = lens_values(prim, time, self.settings, report or LoadReport())
+        if self.st_map is not None:
+            out["lens_map"] = read_map(self.st_map)
         if self.conform != CONFORMS[0]:
             out["conform"] = self.conform
         if self.pixel_aspect != 1.0:
@@ -159,7 +176,8 @@ def read_camera(
     if projection not in PROJECTIONS:
         report.warn(f"camera has the projection {projection}: drawn in perspective", path)
         projection = PROJECTIONS[0]
-    options: dict[str, Any] = {"window": tuple(v / focal for v in edges), **lens.options()}
+    options: dict[str, Any] = {"window": tuple(v / focal for v in edges)}
+    options |= lens.options(prim, time, report)
     if projection != PROJECTIONS[0]:
         options["projection"] = projection
     if projection == "orthographic":

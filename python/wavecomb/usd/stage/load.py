@@ -41,6 +41,7 @@ from wavecomb.usd.looks.material import MaterialTable
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.looks.texture_cache import TextureCache
 from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
+from wavecomb.usd.stage.catchers import IGNORED, set_catchers
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.stage.frame_cache import FrameCache
@@ -80,6 +81,7 @@ class _Filled:
     render: RenderChoice
     outline: NDArray[np.float64] | None
     volumes: tuple[VolumeFacts, ...]
+    catchers: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -197,6 +199,7 @@ def load_stage(
         chosen.texture_limit is not None and store is None,
         filled.outline,
         filled.volumes,
+        filled.catchers,
     )
 
 
@@ -241,7 +244,7 @@ def _fill(
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
     seen = seen_on(stage, choice.options, report)
-    chosen, lights, shutter, outline, volumes = _read(
+    chosen, lights, shutter, outline, volumes, catchers = _read(
         stage,
         time,
         choice,
@@ -257,8 +260,9 @@ def _fill(
     )
     used = frame_number(time)
     return _Filled(
-        chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline, volumes
-    )
+        chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline, volumes,
+        catchers,
+    )  # fmt: skip
 
 
 def _native_builder(threads: int, store: _core.TextureStore | None) -> _core.SceneBuilder:
@@ -282,9 +286,9 @@ def _read(
     progress: LoadProgress | None,
 ) -> tuple[
     str | None, tuple[str, ...], tuple[float, float] | None, NDArray[np.float64] | None,
-    tuple[VolumeFacts, ...],
+    tuple[VolumeFacts, ...], tuple[str, ...],
 ]:  # fmt: skip
-    """Fills the builder; gives paths of camera and lights, the shutter, the outline, volumes."""
+    """Fills the builder; gives camera, lights, shutter, outline, volumes and catchers."""
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
     view_prim = seen.camera
     groups = LightGroups(report)
@@ -292,9 +296,10 @@ def _read(
     links = LinkTable(builder)
     lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, seen.blur, report)
+    rays = RayVisibility(builder, report, IGNORED[choice.options.catch])
     traversal = Traversal(
         time, seen.purposes, lights, report, motion, seen.binding_purposes,
-        RayVisibility(builder, report),
+        rays,
     )  # fmt: skip
     if choice.options.texture_limit is not None and textures.store is None:
         _limit_textures(stage, traversal, seen, choice, textures, report)
@@ -314,6 +319,7 @@ def _read(
     world = groups_of.world()
     lit = materials.glows or has_lights or groups_of.mesh_lights.any or groups_of.volumes.glow
     _hold_out(stage, choice.options.holdouts, builder)
+    catchers = set_catchers(stage, choice.options, rays.catchers, builder)
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     volumes = add_volumes(world, builder, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
@@ -331,7 +337,8 @@ def _read(
     if cache is not None:
         cache.has_same_levels = partial(surfaces.has_same_levels, world)
     builder.set_camera(view.transform, **view.options)
-    return chosen, light_paths, None if motion is None else motion.shutter, outline, volumes
+    shutter = None if motion is None else motion.shutter
+    return chosen, light_paths, shutter, outline, volumes, catchers
 
 
 def _strand_detail(

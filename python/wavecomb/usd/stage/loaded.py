@@ -46,6 +46,7 @@ class LoadedStage:
         outline: Points (n, 3) in the world where what is drawn reaches farthest; None unless a view
             was framed for it.
         volumes: What there is to say of each.
+        catchers: Prims of which only the shadows show.
     """
 
     scene: _core.Scene
@@ -65,6 +66,7 @@ class LoadedStage:
     leaves_out_levels: bool = False
     outline: NDArray[np.float64] | None = None
     volumes: tuple[VolumeFacts, ...] = ()
+    catchers: tuple[str, ...] = ()
     _kept: list[_core.Renderer] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @contextlib.contextmanager

@@ -39,16 +39,29 @@ _KARMA_KINDS = {
     "reflect": "bounces",
     "refract": "bounces",
 }
-NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA})
+_CATCHER = "primvars:wavecomb:catcher"
+NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA, _CATCHER})
 """All attributes that are read here."""
 
 
 class RayVisibility:
-    """Tells the scene which rays see which prims."""
+    """Tells the scene which rays see which prims.
 
-    def __init__(self, builder: _core.SceneBuilder, report: LoadReport) -> None:
+    Attributes:
+        catchers: Paths of prims that are shadow catchers.
+    """
+
+    def __init__(
+        self,
+        builder: _core.SceneBuilder,
+        report: LoadReport,
+        ignored: frozenset[str] = frozenset(),
+    ) -> None:
+        """``ignored``: kinds of rays of which prims have no say."""
         self._builder = builder
         self._report = report
+        self._ignored = ignored
+        self.catchers: list[str] = []
 
     def read(self, prim: Usd.Prim) -> None:
         """Reads what a prim says; call it for prims that author one of ``NAMES``."""
@@ -66,6 +79,9 @@ class RayVisibility:
         mask = _value(prim, _KARMA)
         if mask is not None:
             rays |= self._karma(str(mask), prim)
+        rays = {kind: seen for kind, seen in rays.items() if kind not in self._ignored}
+        if _value(prim, _CATCHER):
+            self.catchers.append(self._report.place(str(prim.GetPath())))
         if rays:
             self._builder.add_visibility(self._report.place(str(prim.GetPath())), rays)
 

@@ -9,6 +9,7 @@ from pxr import Usd
 
 from wavecomb.load_options import PURPOSES, LoadOptions
 from wavecomb.usd.cameras.camera import Lens, find_camera
+from wavecomb.usd.cameras.lens import check_names
 from wavecomb.usd.geometry.shutter import Blur
 from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.stage.choice import RenderChoice
@@ -40,6 +41,7 @@ class Seen:
 def check_view(options: LoadOptions) -> None:
     """Raises WavecombError for what no stage can have."""
     options.check()
+    check_names(options.lens_settings or {})
     _blur(options, True)
 
 
@@ -54,7 +56,10 @@ def seen_on(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> Seen:
     if options.product is None and len(choices) > 1:
         report.note(f"render product {choice.product} is the first of {len(choices)}")
     sharp = choice.depth_of_field if options.depth_of_field is None else options.depth_of_field
-    lens = Lens(options.projection, options.exposure, sharp, choice.conform, choice.pixel_aspect)
+    lens = Lens(
+        options.projection, options.exposure, sharp, choice.conform, choice.pixel_aspect,
+        options.lens_settings or {}, options.st_map,
+    )  # fmt: skip
     return Seen(
         choice,
         find_camera(stage, options.camera or choice.camera),

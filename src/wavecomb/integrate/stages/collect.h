@@ -6,6 +6,7 @@
 #include "wavecomb/core/rows.h"
 #include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/media.h"
+#include "wavecomb/integrate/screen_motion.h"
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/steps/emit.h"
@@ -120,6 +121,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (notes_hits && any(shape))
       wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
                              shape);
+    if (notes_hits && wave.aovs.wants_motion() && any(shape)) [[unlikely]]
+      wave.aovs.move<F>(slot, screen_motion<F>(*context.camera, fma(d, t, o), fma(d, t, o), shape),
+                        shape);
     const auto recorded = [&] {
       if constexpr (Media::kAny)
         return Mask<F>(surface | flight.stopped);
@@ -128,6 +132,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     };
     if (!kFromLights && depth == 0 && wave.aovs.wants_alpha())
       wave.aovs.cover<F>(slot, shape | recorded());
+    if constexpr (Media::kAny)
+      if (notes_hits)
+        wave.aovs.hit_volume<F>(*context.camera, slot, fma(d, t, o), time(), flight.stopped);
     if (none(recorded())) continue;
 
     const U prim = load<U>(hits.prim + i);
@@ -148,6 +155,13 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (notes_hits)
       wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,
                                surface);
+    if (notes_hits && wave.aovs.wants_motion()) [[unlikely]]
+      wave.aovs.move<F>(
+          slot,
+          screen_motion_of_hit<F>(
+              scene, *context.camera,
+              {inst, mesh, prim, load<F>(hits.u + i), load<F>(hits.v + i), F(0.f)}, d, surface),
+          surface);
     if (cost_aware) {
       const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, state, surface);
       if (!kFromLights) wave.aovs.survive<F>(depth, slot, q, surface);

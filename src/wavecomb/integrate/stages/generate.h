@@ -32,7 +32,8 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
     F time(0.f);
     if (context.moves()) {
-      time = path_time<F>(settings.sampler, key);
+      time = camera_time<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)),
+                            path_time<F>(settings.sampler, key));
       scatter_field<F>(pool.cold, &PathColdRow<float>::time, slot, time, active);
     }
     if (context.weighs_pixels())

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where ``wavecomb render`` has a scene from: a stage at one frame, or one that stays open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+from wavecomb.cli.options import StageOptions
+
+if TYPE_CHECKING:
+    from wavecomb.run.sequence import Frames
+    from wavecomb.usd import LoadedStage
+
+
+class Shot(Protocol):
+    """Where a scene comes from, and what renders it."""
+
+    def load(
+        self, progress: Callable[[int, int], None] | None = None, **changes: Any
+    ) -> LoadedStage:
+        """Reads the stage; ``changes``: fields of ``LoadOptions`` in place of its own."""
+
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders it; the arguments are those of ``_core.render`` after the scene."""
+
+    def render_part(self, *arguments: Any, **named: Any) -> Any:
+        """The same for one of several parts of a picture."""
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """``make_stats`` of that."""
+
+
+class Still:
+    """A stage at one frame."""
+
+    def __init__(self, source: StageOptions, stage: str, settings: Any, kept: Any = None) -> None:
+        """``kept``: held until the stage is loaded."""
+        self._renderer: Any = None
+        self._kept = kept
+        self._source = source
+        self._stage = stage
+        self._settings = settings
+        self._loaded: LoadedStage | None = None
+
+    def load(
+        self, progress: Callable[[int, int], None] | None = None, **changes: Any
+    ) -> LoadedStage:
+        """Reads the stage."""
+        chosen = self._settings
+        size = chosen.width, chosen.height
+        self._loaded = self._source.load(self._stage, chosen.threads, size, progress, **changes)
+        self._kept = None
+        self._renderer = None
+        return self._loaded
+
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders it, and frees what only that needed."""
+        from wavecomb import _core
+
+        assert self._loaded is not None
+        return _core.render(self._loaded.scene, *arguments, **named)
+
+    def render_part(self, settings: Any, *arguments: Any, **named: Any) -> Any:
+        """Renders a part of it, and keeps what the next one needs, too."""
+        from wavecomb import _core
+
+        assert self._loaded is not None
+        if self._renderer is None:
+            self._renderer = _core.Renderer(self._loaded.scene, settings.threads)
+        return self._renderer.render(settings, *arguments, **named)
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """Those of the picture."""
+        from wavecomb.run.stats import make_stats
+
+        return make_stats(result, stage=self._stage, loaded=self._loaded, resumed_s=resumed_s)
+
+
+class FrameShot:
+    """One frame of a stage that stays open."""
+
+    def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
+        """``options``: of ``Frames.load``."""
+        self._frames = frames
+        self._frame = frame
+        self._options = options
+
+    def load(
+        self, progress: Callable[[int, int], None] | None = None, **changes: Any
+    ) -> LoadedStage:
+        """Reads what is other in this frame."""
+        return self._frames.load(self._frame, progress=progress, **self._options, **changes)
+
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders it."""
+        return self._frames.render(*arguments, **named)
+
+    render_part = render
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """Those of the picture."""
+        return self._frames.stats(result, resumed_s=resumed_s)

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What a lens does to a picture beside blurring it: distortion, and the shape of its aperture.
+///
+/// Distortion moves pixels about the picture. It is a table over the picture: where a ray through a
+/// place of the picture would go through it without distortion. Brown's model (D. C. Brown,
+/// "Close-Range Camera Calibration", Photogrammetric Engineering 37(8), 1971, as OpenCV writes it)
+/// says where a point (x, y) of the plane at distance 1 shows: with r^2 = x^2 + y^2, y down,
+///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
+///   y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
+/// and the table holds its inverse.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "wavecomb/core/math.h"
+#include "wavecomb/core/rows.h"
+#include "wavecomb/core/warp.h"
+#include "wavecomb/scene/camera.h"
+
+namespace wavecomb {
+
+/// Where the pixels of a picture lie in the camera's window: its upper left corner, and steps.
+struct PixelGrid {
+  float x0, y1, step_x, step_y;
+};
+
+/// Nodes side by side over a picture, and below each other; between them values are bilinear.
+struct LensTable {
+  uint32_t across = 0;         ///< along each edge of the picture; 0: nothing is distorted
+  float per_x = 0, per_y = 0;  ///< cells a pixel
+  std::vector<float> nodes;    ///< of each (x, y), pixels of the undistorted picture, row by row
+
+  LensTable() = default;
+  /// Of a camera that distorts. Throws Error where no ray leads to some place of the picture.
+  LensTable(const Camera& camera, const PixelGrid& grid, uint32_t width, uint32_t height);
+  bool empty() const { return across == 0; }
+};
+
+/// Where (x, y), in pixels from the upper left corner, is in the undistorted picture.
+template <typename F>
+[[gnu::noinline, gnu::cold]] Vec2<F> undistorted(const LensTable& table, const F& x, const F& y,
+                                                 const Mask<F>& active) {
+  using U = UInt<F>;
+  const F last(static_cast<float>(table.across) - 2.f);
+  const F u = x * table.per_x, v = y * table.per_y;
+  const F column = floor(clamp(u, F(0.f), last)), row = floor(clamp(v, F(0.f), last));
+  const F a = u - column, b = v - row;
+  const U at = (U(to_int<F>(row)) * table.across + U(to_int<F>(column))) * 2u;
+  const auto mixed = [&](uint32_t word) {
+    const auto node = [&](uint32_t right, uint32_t down) {
+      return gather<F>(table.nodes.data(), at + (2u * (right + down * table.across) + word),
+                       active);
+    };
+    const F top = fma(F(node(1, 0) - node(0, 0)), a, node(0, 0));
+    const F bottom = fma(F(node(1, 1) - node(0, 1)), a, node(0, 1));
+    return F(fma(F(bottom - top), b, top));
+  };
+  return {mixed(0), mixed(1)};
+}
+
+/// A point of the regular polygon in the unit circle that has `blades` corners, one of them at
+/// `turn` of a full turn; even over its area.
+template <typename F>
+[[gnu::noinline, gnu::cold]] Vec2<F> square_to_polygon(const F& u, const F& v, float blades,
+                                                       float turn) {
+  const F scaled = u * blades, blade = min(floor(scaled), F(blades - 1.f));
+  const F far = safe_sqrt(F(scaled - blade)), side = far * v;
+  const auto corner = [&](const F& k) {
+    const F around = fma(k, F(1.f / blades), F(turn));
+    return sincos_2pi<F>(F(around - floor(around)));
+  };
+  const SinCos<F> p = corner(blade), q = corner(F(blade + 1.f));
+  return {fma(side, F(q.cos - p.cos), F(far * p.cos)), fma(side, F(q.sin - p.sin), F(far * p.sin))};
+}
+
+/// A point of the camera's aperture, scene units; even over its area.
+template <typename F>
+inline Vec2<F> aperture_point(const Camera& camera, const F& u, const F& v) {
+  Vec2<F> p;
+  if (camera.aperture_blades >= 3) [[unlikely]]
+    p = square_to_polygon<F>(u, v, camera.aperture_blades, camera.aperture_rotation / 360.f);
+  else
+    p = square_to_disk(u, v);
+  return {p.x * (camera.lens_radius / camera.lens_squeeze), p.y * camera.lens_radius};
+}
+
+}  // namespace wavecomb
