@@ -50,6 +50,7 @@ def test_every_option_comes_to_its_field() -> None:
         *("--camera-projection", "latlong", "--camera-exposure", "off", "--depth-of-field", "on"),
         *("--mask", "/A", "--mask", "/B", "--session-layer", "over.usda", "--texture-limit", "5"),
         *("--working-space", "acescg", "--subdivision", "2", "--holdout", "/H"),
+        *("--payloads", "/A/*"),
     )["load"]
     assert got.keys() == rows().keys()
     assert got == {
@@ -58,7 +59,7 @@ def test_every_option_comes_to_its_field() -> None:
         "motion_blur": False, "motion_steps": 3, "render_settings": "/R", "product": "P",
         "projection": "latlong", "exposure": False, "depth_of_field": True, "mask": ("/A", "/B"),
         "session_layer": "over.usda", "texture_limit": 5.0, "working_space": "acescg",
-        "subdivision": "2", "holdouts": ("/H",),
+        "subdivision": "2", "holdouts": ("/H",), "payloads": ("/A/*",),
     }  # fmt: skip
     LoadOptions.of(None, got).check()
 
