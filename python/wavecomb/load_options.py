@@ -97,7 +97,7 @@ class Row:
     def key(self) -> str:
         """Its name among the arguments of a command, and in checkpoints."""
         return self.option.removeprefix("--").replace("-", "_") + "s" * (
-            self.many and self.option != "--mask"
+            self.many and self.option not in ("--mask", "--payloads")
         )
 
 
@@ -116,7 +116,9 @@ class LoadOptions:
         purposes: Of the geometry: "default", "render", "proxy", "guide"; None: as the render
             settings say, else the first two.
         variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
-        mask: Prims to draw, with all below them, and what they need; by default all.
+        mask: Prims to draw, with all below them, and what they need, by paths or patterns
+            (docs/stages.md); by default all.
+        payloads: Patterns of the prims whose payloads are loaded, or "none" alone; by default all.
         holdouts: Prims that the camera sees as holes, with all below them: black, and alpha 0.
         catchers: Prims of which only the shadows on them show, with all below them
             (docs/visibility.md).
@@ -209,8 +211,12 @@ class LoadOptions:
         None, "ST map: how the lens distorts.", "file", "--st-map", metavar="FILE.exr"
     )
     mask: tuple[str, ...] = _row(
-        (), "Prim to draw, with all below it and what it needs; may be given again.", "text",
-        "--mask", many=True, metavar="PATH", unset="all",
+        (), "Prim to draw, with all below it and what it needs, or a pattern of such; may be given "
+        "again.", "text", "--mask", many=True, metavar="PATH", unset="all",
+    )  # fmt: skip
+    payloads: tuple[str, ...] = _row(
+        (), "Pattern of prims whose payloads are loaded, or none; may be given again.", "text",
+        "--payloads", many=True, metavar="PATTERN", unset="all",
     )  # fmt: skip
     holdouts: tuple[str, ...] = _row(
         (), "Prim that the camera sees as a hole, black with alpha 0, and all below it; may be "
@@ -265,10 +271,15 @@ class LoadOptions:
                 plain[name] = os.fspath(plain[name])
         if plain.get("lens_settings") is not None:
             plain["lens_settings"] = {k: str(v) for k, v in plain["lens_settings"].items()}
-        for name in ("purposes", "mask", "holdouts", "catchers", "size", "shutter"):
+        for name in ("purposes", "mask", "payloads", "holdouts", "catchers", "size", "shutter"):
             if plain.get(name) is not None:
                 plain[name] = tuple(plain[name])
         return replace(options or cls(), **plain)
+
+    @property
+    def chooses_what_opens(self) -> bool:
+        """Whether it has options that only a file can have, which is opened by them."""
+        return bool(self.mask or self.payloads or self.session_layer is not None)
 
     def as_dict(self) -> dict[str, Any]:
         """By name."""

@@ -39,7 +39,8 @@ TYPES = (
 PRIMS = (
     "Mesh", "Xform", "Camera", "PointInstancer", "Sphere", "Cube", "Material", "Shader", "Scope",
     "DomeLight", "SphereLight", "GeomSubset", "NodeGraph", "SkelRoot", "BasisCurves", "Points",
-    "NurbsPatch", "Volume", "RenderSettings", "TetMesh", "Nonsense", "",
+    "NurbsPatch", "NurbsCurves", "HermiteCurves", "Volume", "RenderSettings", "TetMesh", "Nonsense",
+    "",
 )  # fmt: skip
 
 

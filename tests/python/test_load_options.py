@@ -52,6 +52,7 @@ def test_every_option_comes_to_its_field() -> None:
         *("--working-space", "acescg", "--subdivision", "2", "--holdout", "/H"),
         *("--strand-pixels", "0.5"),
         *("--lens-setting", "lens_k1=-0.1", "--st-map", "st.exr", "--catcher", "/C"),
+        *("--payloads", "/A/*"),
     )["load"]
     assert got.keys() == rows().keys()
     assert got == {
@@ -63,6 +64,7 @@ def test_every_option_comes_to_its_field() -> None:
         "strand_pixels": 0.5,
         "subdivision": "2", "holdouts": ("/H",), "lens_settings": {"lens_k1": "-0.1"},
         "st_map": "st.exr", "catchers": ("/C",),
+        "payloads": ("/A/*",),
     }  # fmt: skip
     LoadOptions.of(None, got).check()
 

@@ -278,12 +278,6 @@ def test_broken_prims_are_named_once(tmp_path, text, words, drawn):
     assert words in line and line.endswith("/C")
 
 
-@pytest.mark.parametrize("kind", ["NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh"])
-def test_what_is_not_supported_is_named(tmp_path, kind):
-    _, loaded = load(tmp_path, f'def {kind} "N" {{ }}')
-    assert f"not supported: {kind}: /N" in said(loaded)
-
-
 @pytest.mark.slow
 def test_many_curves_load_in_a_second(tmp_path):
     from pxr import Usd, UsdGeom, Vt

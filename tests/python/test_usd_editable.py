@@ -320,8 +320,8 @@ def test_light_values_are_what_the_loader_reads(path, tmp_path):
 
 
 def test_the_report_lists_many_places(tmp_path):
-    points = "".join(f'def NurbsPatch "P{i}" {{ }}\n' for i in range(9))
+    points = "".join(f'def GeometryLight "P{i}" {{ }}\n' for i in range(9))
     loaded = load_stage(write(tmp_path, points), builder_factory=Recorder)
     (finding,) = loaded.report.unsupported
     assert len(finding.all_places) == 9 and finding.places == ["/P0", "/P1", "/P2"]
-    assert finding.line() == "NurbsPatch: /P0, /P1, /P2 and 6 more"
+    assert finding.line() == "GeometryLight: /P0, /P1, /P2 and 6 more"

@@ -58,6 +58,12 @@ def drawn(scene):
         (["/World/Trees"], ["Crown", "Crown"]),
         (["/World"], ["Crown", "Crown", "Door", "House", "Wheel"]),
         (["/"], ["Crown", "Crown", "Door", "House", "Marker", "Wheel"]),
+        (["/World/*"], ["Crown", "Crown", "Door", "House", "Wheel"]),
+        (["/World/[CH]*"], ["Door", "House", "Wheel"]),
+        (["/*/Car/W????"], ["Wheel"]),
+        (["//Door"], ["Door"]),
+        (["/World//[!A-C]oo[r]"], ["Door"]),
+        (["/World//*e*"], ["Crown", "Crown", "House", "Wheel"]),
     ],
 )
 def test_a_mask_leaves_what_it_names(tmp_path, mask, names):
@@ -75,7 +81,16 @@ def test_a_mask_leaves_what_it_names(tmp_path, mask, names):
 
 @pytest.mark.parametrize(
     ("mask", "says"),
-    [("/Nowhere", "has no such prim"), ("World", "absolute path"), ("/World.x", "absolute path")],
+    [
+        ("/Nowhere", "has no such prim"),
+        ("World", "absolute path"),
+        ("/World.x", "absolute path"),
+        ("/World/No*", "has no such prim"),
+        ("Wor*", "pattern of absolute paths"),
+        ("//[z-a]oor", "has no such prim"),
+        ("/World/[z-a]ar", "has no such prim"),
+        ("/World/[", "pattern of absolute paths"),
+    ],
 )
 def test_bad_masks_are_named(tmp_path, mask, says):
     with pytest.raises(WavecombError, match=says):
@@ -150,7 +165,9 @@ def test_the_command_takes_masks_and_session_layers(tmp_path):
 
     assert count("--mask", "/World/Car") == 2
     assert count("--mask", "/World/Car/Door", "--mask", "/World/House") == 2
+    assert count("--mask", "/World/*ar/*") == 2
     assert count("--session-layer", hides) == 3
+    assert count("--payloads", "none") == 5
     bad = CliRunner().invoke(main, ["info", str(stage), "--mask", "/X"])
     assert bad.exit_code == 2 and bad.output.startswith("error: mask /X")
 
@@ -183,6 +200,58 @@ def test_what_is_drawn_at_all(tmp_path):
     assert drawn(load(tmp_path, text)[0]) == ["Once", "Paid", "Plain", "Render", "Sub"]
     shown = drawn(load(tmp_path, text, purposes=["default", "proxy", "guide"])[0])
     assert shown == ["Guide", "Once", "Paid", "Plain", "Proxy", "Sub"]
+
+
+SET = f"""#usda 1.0
+(defaultPrim = "Set")
+def Xform "Set" {{
+    def "Chair" (payload = @./piece.usda@) {{ }}
+    def "Table" (payload = @./piece.usda@) {{ }}
+    def Mesh "Floor" {{ {QUAD} }}
+}}
+"""
+PIECE = f"""#usda 1.0
+(defaultPrim = "P")
+def Xform "P" {{
+    def Mesh "Wood" {{ {QUAD} }}
+    def "Nails" (payload = @./nails.usda@) {{ }}
+}}
+"""
+NAILS = f'#usda 1.0\n(defaultPrim = "N")\ndef Xform "N" {{\n def Mesh "Nail" {{ {QUAD} }}\n}}\n'
+
+
+@pytest.mark.parametrize(
+    ("payloads", "names", "left"),
+    [
+        ([], ["Floor", "Nail", "Nail", "Wood", "Wood"], 0),
+        (["none"], [], 1),
+        (["/World"], ["Floor", "Nail", "Nail", "Wood", "Wood"], 0),
+        (["/World/Chair"], ["Floor", "Nail", "Wood"], 1),
+        (["/World/*able"], ["Floor", "Nail", "Wood"], 1),
+        (["/*/Chair/Nails", "/World/Table"], ["Floor", "Nail", "Nail", "Wood", "Wood"], 0),
+    ],
+)
+def test_payloads_are_loaded_by_patterns(tmp_path, payloads, names, left):
+    for name, text in (("set", SET), ("piece", PIECE), ("nails", NAILS)):
+        (tmp_path / f"{name}.usda").write_text(text)
+    scene, loaded = load(tmp_path, 'def "World" (payload = @./set.usda@) { }', payloads=payloads)
+    assert drawn(scene) == names
+    assert len([n for n in loaded.report.notes if n.what == "payloads that are not loaded"]) == left
+
+
+@pytest.mark.parametrize(
+    ("payloads", "says"),
+    [
+        (["/World/Sofa"], "has no such payload"), (["none", "/World"], "goes with no pattern"),
+        (["World"], "absolute path"),
+    ],
+)  # fmt: skip
+def test_bad_payloads_are_named(tmp_path, payloads, says):
+    (tmp_path / "set.usda").write_text(
+        f'#usda 1.0\ndef Xform "S" {{\n def Mesh "F" {{ {QUAD} }}\n}}'
+    )
+    with pytest.raises(WavecombError, match=says):
+        load(tmp_path, 'def "World" (payload = @./set.usda@</S>) { }', payloads=payloads)
 
 
 @pytest.mark.parametrize("units", [0.01, 1.0])

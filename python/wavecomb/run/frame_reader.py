@@ -66,8 +66,9 @@ class FrameReader:
         layer = None if options.session_layer is None else Path(options.session_layer)
         with captured(opening):
             self._stage: Usd.Stage = open_stage(
-                path, options.variants, mask=options.mask, session_layer=layer
-            )
+                path, options.variants, mask=options.mask, session_layer=layer,
+                payloads=options.payloads,
+            )  # fmt: skip
             mtlx.tell(self._stage, opening)
             self._cache = FrameCache(self._stage, opening)
         self._before: LoadedStage | None = None
@@ -84,7 +85,7 @@ class FrameReader:
         """
         self._before = None
         # Those were chosen when it was opened.
-        here = replace(options, mask=(), session_layer=None, variants=None)
+        here = replace(options, mask=(), payloads=(), session_layer=None, variants=None)
         self._before = load_stage(self._stage, here, cache=self._cache, **how)
         return self._before
 

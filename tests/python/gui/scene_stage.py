@@ -70,7 +70,7 @@ def Xform "World"
             double3 xformOp:translate = (0, 3, -1)
             uniform token[] xformOpOrder = ["xformOp:translate"]
         }
-        def NurbsPatch "Dust" { point3f[] points = [(0, 0, 0)] }
+        def GeometryLight "Dust" { }
     }
     def Xform "Sign" (
         variants = { string look = "ball" }

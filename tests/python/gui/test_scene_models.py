@@ -227,7 +227,7 @@ def test_notes_are_filtered(edits):
     model = NotesModel()
     model.fill(rows_of(edits.stage))
     lines = [row.line() for row in model.rows]
-    assert "not supported: NurbsPatch: /World/Things/Dust" in lines
+    assert "not supported: GeometryLight: /World/Things/Dust" in lines
     shown = NotesFilter()
     shown.setSourceModel(model)
     shown.set("", "nurbs")

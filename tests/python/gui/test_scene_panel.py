@@ -334,7 +334,7 @@ def test_notes(panel, qtbot):
     notes = panel.notes
     panel.tabs.setCurrentWidget(notes)
     rows = [(one.kind, one.what, one.place) for one in notes.model.rows]
-    assert ("not supported", "NurbsPatch", "/World/Things/Dust") in rows
+    assert ("not supported", "GeometryLight", "/World/Things/Dust") in rows
     assert panel.tabs.tabText(3) == "Notes (1)"
     QTest.keyClicks(notes.field, "nurbs")
     assert notes.view.model().rowCount() == 1 and notes.count.text().startswith("1 of")
@@ -344,7 +344,7 @@ def test_notes(panel, qtbot):
     assert panel.session.selection == "/World/Things/Dust"
     assert panel.tree.view.chosen() == ["/World/Things/Dust"]
     notes.copy()
-    assert QGuiApplication.clipboard().text() == "not supported: NurbsPatch: /World/Things/Dust"
+    assert QGuiApplication.clipboard().text() == "not supported: GeometryLight: /World/Things/Dust"
     QTest.keyClicks(notes.field, "zzz")
     assert notes.view.model().rowCount() == 0
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeomBasisCurves as arrays for the core."""
+"""UsdGeomBasisCurves, NURBS and Hermite curves as arrays for the core."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from wavecomb.usd.geometry.mesh_arrays import (
     check_matrix,
     extent,
 )
+from wavecomb.usd.geometry.nurbs_curves import hermite_strands, nurbs_strands
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, as_array, read_primvar
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.strand_detail import StrandDetail
@@ -33,6 +34,10 @@ Array = NDArray[np.float32]
 
 BASES = ("bezier", "bspline", "catmullRom")
 WRAPS = ("nonperiodic", "periodic", "pinned")
+_OTHERS: dict[str, Callable[..., Strands]] = {
+    "NurbsCurves": nurbs_strands,
+    "HermiteCurves": hermite_strands,
+}
 
 
 @dataclass
@@ -90,7 +95,7 @@ class CurveReader:
         """Curves in their group's space; None where there are none.
 
         Args:
-            prim: A UsdGeomBasisCurves.
+            prim: A UsdGeomCurves.
             matrix: From the prim to its group, with a ``uniform_scale``.
             uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
             inherited: Primvars of its ancestors.
@@ -136,6 +141,8 @@ class CurveReader:
             raise MeshError(
                 f"curveVertexCounts ask for {int(counts.sum())} points, and there are {points}"
             )
+        if (kind := prim.GetTypeName()) in _OTHERS:
+            return self._other(prim, _OTHERS[kind], counts)
         basis = self._token(prim, "type", ("cubic", "linear"))
         if basis == "cubic":
             basis = self._token(prim, "basis", BASES)
@@ -145,6 +152,14 @@ class CurveReader:
             what = f"curves left out: their number of points does not fit {basis} {strands.wrap}"
             self.report.warn(what, prim.GetPath(), bad)
         return strands if len(strands.kept) else None
+
+    def _other(
+        self, prim: Usd.Prim, layout: Callable[..., Strands], counts: NDArray[np.intp]
+    ) -> Strands | None:
+        """The layout of curves that have no basis by name."""
+        if (counts < 2).any():
+            raise MeshError("a curve has less than two points")
+        return layout(prim, counts, self.time)
 
     def _token(self, prim: Usd.Prim, name: str, known: tuple[str, ...]) -> str:
         value = str(prim.GetAttribute(name).Get(self.time) or known[0])

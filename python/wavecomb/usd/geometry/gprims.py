@@ -12,6 +12,7 @@ from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
 from wavecomb.usd.geometry.deforming import deforms
 from wavecomb.usd.geometry.mesh import MeshReader
 from wavecomb.usd.geometry.mesh_arrays import UV_NAMES, MeshArrays
+from wavecomb.usd.geometry.nurbs_patch import PatchReader
 from wavecomb.usd.geometry.points import PointReader
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.skeleton import Skeletons
@@ -78,7 +79,7 @@ class GprimReader:
         Those of the frame before where they are the same.
 
         Args:
-            kind: mesh, shape, curves or points.
+            kind: mesh, patch, shape, curves or points.
             draw: The gprim.
             names: Primvars to take texture coordinates from, the first there is.
             detail: Of curves; what it makes of them is of one view, and not kept.
@@ -104,6 +105,10 @@ class GprimReader:
                 ):
                     return over_shutter(draw.prim, strands, draw.matrix, self.motion, report)
                 return strands
+            if kind == "patch":
+                patches = PatchReader(self.time, report)
+                motion = self.motion if self._changes(kind, draw.prim) else None
+                return patches.patch(draw.prim, draw.matrix, names, draw.inherited, motion)
             meshes = self._meshes if report is self.report else self._mesh_reader(report)
             if kind == "shape":
                 return meshes.shape(draw.prim, draw.matrix, draw.names)

@@ -13,6 +13,7 @@ from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, crease_pairs, read_rules
 from wavecomb.usd.geometry.deforming import matrix_at, points_at, points_now, step_times
+from wavecomb.usd.geometry.faces import TETRAHEDRA, read_faces
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
@@ -50,7 +51,7 @@ SHARP = 1.0
 def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | None:
     """Its subdivisionScheme; ``names``: of what is authored."""
     if "subdivisionScheme" not in names:
-        return "catmullClark"
+        return "none" if prim.GetTypeName() == TETRAHEDRA else "catmullClark"
     return word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
 
 
@@ -112,7 +113,7 @@ class MeshReader:
         """A mesh in its group's space, as polygons; None where it is empty.
 
         Args:
-            prim: A UsdGeomMesh.
+            prim: A UsdGeomMesh or UsdGeomTetMesh.
             matrix: From the mesh to its group.
             uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
             names: Properties that it has opinions of (``authored_names``).
@@ -129,13 +130,12 @@ class MeshReader:
         points = as_array(value)
         if skin is not None and points is not None and len(points):
             points = skinned_points(skin, value, time)
-        counts = as_integers(get("faceVertexCounts").Get(time))
+        counts, indices = read_faces(prim, time)
         if points is None or len(points) == 0 or len(counts) == 0:
             return None
         if points.shape[1] != 3:
             raise MeshError("points are not triples")
         points = np.ascontiguousarray(points, np.float32)
-        indices = as_integers(get("faceVertexIndices").Get(time))
         holes = as_integers(get("holeIndices").Get(time)) if "holeIndices" in names else None
         flip = "orientation" in names and word(get("orientation").Get(time)) == "leftHanded"
         placed = None
@@ -213,10 +213,10 @@ class MeshReader:
         if track is None and all(np.array_equal(shape, shapes[0]) for shape in shapes):
             return mesh
         mirrored = check_matrix(matrix)
-        scheme = prim.GetAttribute("subdivisionScheme").Get(self.time)
+        names = authored_names(prim)
+        scheme = _scheme(prim, names, self.time)
         positions = np.stack([bake(p, m) for p, m in zip(shapes, matrices, strict=True)])
         normals: list[Array] = []
-        names = authored_names(prim)
         for points, to_group, time in zip(shapes, matrices, times, strict=True):
             if mesh.normals is None:
                 break

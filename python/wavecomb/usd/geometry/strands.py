@@ -34,7 +34,7 @@ _AT_ONCE = 1 << 16
 """Segments whose values are worked out together: bounds the memory that it takes."""
 
 
-def _runs(counts: Index) -> tuple[Index, Index]:
+def runs(counts: Index) -> tuple[Index, Index]:
     """For runs of so many things each: which run each thing is of, and its place in the run."""
     owner = np.repeat(np.arange(len(counts)), counts)
     starts = np.cumsum(counts) - counts
@@ -94,7 +94,7 @@ class Strands:
 
     def over_each(self, combine: np.ufunc, values: NDArray[Any]) -> NDArray[np.float64]:
         """(k,) ``combine`` over the values (n,) of each curve's authored points."""
-        owner, at = _runs(self.counts)
+        owner, at = runs(self.counts)
         mine = np.asarray(values, np.float64)[self.starts[owner] + at]
         return np.asarray(combine.reduceat(mine, np.cumsum(self.counts) - self.counts))
 
@@ -111,7 +111,7 @@ class Strands:
         step, lead = (3 if self.cubic else 1), (1 if self.periodic else 0)
         sizes = step * self.segments + 1 + 2 * lead
         base = np.cumsum(sizes) - sizes + lead
-        curve, at = _runs(self.segments)
+        curve, at = runs(self.segments)
         words = (base[curve] + step * at).astype(np.uint32)
         words[(at > 0) | self.periodic] |= np.uint32(GOES_ON_BEFORE)
         words[(at < self.segments[curve] - 1) | self.periodic] |= np.uint32(GOES_ON_AFTER)
@@ -127,7 +127,7 @@ class Strands:
         if kind == "vertex" and self.wrap == "nonperiodic" and self.basis in ("linear", "bezier"):
             if int(self.counts.sum()) == len(values):
                 return np.ascontiguousarray(values, np.float32)
-            owner, at = _runs(self.counts)
+            owner, at = runs(self.counts)
             return np.ascontiguousarray(values[self.starts[owner] + at], np.float32)
         if self.count > _AT_ONCE and len(self.kept) > 1:
             return self._controls_by_parts(values, kind)
@@ -165,7 +165,7 @@ class Strands:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Values (n, c) of an interpolation at the first and last point of each segment."""
         values = np.asarray(values, np.float64)
-        curve, at = _runs(self.segments)
+        curve, at = runs(self.segments)
         if kind == "constant":
             first = last = np.repeat(values[:1], len(curve), axis=0)
         elif kind == "uniform":
@@ -203,7 +203,7 @@ class Strands:
 
     def _bezier(self, values: NDArray[Any]) -> list[NDArray[np.float64]]:
         """Values per authored point as control points 0 to 3 (1) of each segment, (count, c)."""
-        curve, at = _runs(self.segments)
+        curve, at = runs(self.segments)
         start, size = self.starts[curve], self.counts[curve]
         step = 3 if self.basis == "bezier" else 1
         shift = step * at - (1 if self.wrap == "pinned" and step == 1 and self.cubic else 0)
@@ -239,7 +239,7 @@ class Strands:
         step, lead = len(points) - 1, (1 if self.periodic else 0)
         sizes = step * self.segments + 1 + 2 * lead
         base = np.cumsum(sizes) - sizes + lead
-        curve, at = _runs(self.segments)
+        curve, at = runs(self.segments)
         out = np.empty((int(sizes.sum()), points[0].shape[1]), np.float32)
         for k in range(step):
             out[base[curve] + step * at + k] = points[k]

@@ -60,14 +60,14 @@ class MeshLights:
         self._report = report
 
     def of(self, draw: Draw, kind: str) -> MeshLight | None:
-        """The light that a gprim of some kind (mesh, shape, curves, points) is; None: it is none.
+        """The light that a gprim is; None: it is none.
 
-        ``draw``: With its matrix to its group.
+        ``draw``: With its matrix to its group; ``kind``: as ``Draw.kind``.
         """
         if not draw.prim.HasAPI(UsdLux.LightAPI):
             return None
         path = draw.prim.GetPath()
-        if kind not in ("mesh", "shape"):
+        if kind not in ("mesh", "patch", "shape"):
             self._report.missing(f"{kind} as lights (they shine by their material alone)", path)
             return None
         sync = word(draw.prim.GetAttribute("light:materialSyncMode").Get(), NO_RESPONSE)

@@ -54,7 +54,7 @@ class Draw:
         subset_materials: Bound to each subset.
         track: In place of ``matrix`` where that changes while the shutter is open.
         names: Properties that it has opinions of (``authored_names``).
-        kind: What it is to the walk: mesh, shape, curves or points.
+        kind: What it is to the walk: mesh, patch, shape, curves or points.
         parent: The prim that it is a child of, where the walk came from there.
     """
 

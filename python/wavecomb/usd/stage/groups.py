@@ -50,8 +50,12 @@ _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
 
 
-_WORDS = {"mesh": "mesh", "shape": "mesh", "curves": "curves", "points": "points"}
-_COUNTS = {"mesh": "meshes", "shape": "shapes", "curves": "curves", "points": "points"}
+_WORDS = {
+    "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
+}  # fmt: skip
+_COUNTS = {
+    "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
+}  # fmt: skip
 DRAWN_COUNTS = (*_COUNTS.values(), "volumes")
 """Counts of ``LoadReport`` for what is drawn."""
 

@@ -51,6 +51,7 @@ from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.named_files import keep_to
 from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
+from wavecomb.usd.stage.payloads import tell_unloaded
 from wavecomb.usd.stage.ray_visibility import RayVisibility
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number, time_code
@@ -115,7 +116,7 @@ def load_stage(
     Args:
         source: A .usd, .usda, .usdc or .usdz file, or a stage that is open. That stays open, and is
             only written to where ``variants`` are chosen. It must not change meanwhile.
-        options: How it is read. Mask and session layer are of files only.
+        options: How it is read. Mask, payloads and session layer are of files only.
         editable: For programs that change what was read: materials that look alike stay apart, and
             the result has ``textures``. Changes no picture.
         reuse: ``textures`` of an earlier read: those whose files did not change are shared.
@@ -133,8 +134,8 @@ def load_stage(
     started = clock.perf_counter()
     chosen = LoadOptions.of(options, changes)
     check_view(chosen)
-    if isinstance(source, Usd.Stage) and (chosen.mask or chosen.session_layer is not None):
-        raise WavecombError("mask and session_layer are chosen when the stage is opened")
+    if isinstance(source, Usd.Stage) and chosen.chooses_what_opens:
+        raise WavecombError("mask, payloads, session_layer are chosen when the stage is opened")
     level = parse_level(chosen.subdivision)
     threads = chosen.threads
     report = LoadReport()
@@ -223,7 +224,10 @@ def _opener(source: str | Path | Usd.Stage, options: LoadOptions) -> Callable[[]
         return choose
     file = Path(source)
     layer = None if options.session_layer is None else Path(options.session_layer)
-    return lambda: open_stage(file, options.variants or {}, mask=options.mask, session_layer=layer)
+    return lambda: open_stage(
+        file, options.variants or {}, mask=options.mask, session_layer=layer,
+        payloads=options.payloads,
+    )  # fmt: skip
 
 
 def _fill(
@@ -240,6 +244,7 @@ def _fill(
     keep_to(stage)
     if cache is None:
         mtlx.tell(stage, report)
+    tell_unloaded(stage, report)
     time = time_code(stage, choice.options.frame)
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)

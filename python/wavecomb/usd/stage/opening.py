@@ -17,6 +17,7 @@ from wavecomb.usd import mtlx
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.stage import path_maps
 from wavecomb.usd.stage.diagnostics import captured, commentary
+from wavecomb.usd.stage.payloads import load_payloads
 from wavecomb.usd.stage.population import populate
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.search import every
@@ -152,8 +153,9 @@ def open_stage(
     overrides: Sdf.Layer | None = None,
     mask: Sequence[str] = (),
     session_layer: Path | None = None,
+    payloads: Sequence[str] = (),
 ) -> Usd.Stage:
-    """The stage of a file, with all payloads.
+    """The stage of a file.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
@@ -162,17 +164,23 @@ def open_stage(
         mask: Paths of prims to keep, with what they need; none: all (``populate``).
         session_layer: File with opinions that are stronger than the stage's; variants that are
             selected here are stronger still.
+        payloads: Patterns of prims whose payloads are loaded (``load_payloads``); none: all.
 
     Raises:
-        WavecombError: A file is none, or cannot be read; there are no such variants or prims.
+        WavecombError: A file is none, or cannot be read; there are no such variants, prims or
+            payloads.
     """
+    rule = Usd.Stage.LoadNone if payloads else Usd.Stage.LoadAll
     with _layers(file, session_layer, overrides) as (root, session):
-        stage = Usd.Stage.Open(root, session, Usd.Stage.LoadAll)
+        stage = Usd.Stage.Open(root, session, rule)
     if not stage:
         raise WavecombError(f"{file}: cannot be read as USD")
     mtlx.resolve(stage)
     select_variants(stage, variants or {})
     if variants:
+        mtlx.resolve(stage)
+    if payloads:
+        load_payloads(stage, payloads)
         mtlx.resolve(stage)
     if mask:
         populate(stage, mask)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdRender
 
 from wavecomb.errors import WavecombError
+from wavecomb.usd.stage.patterns import PathPattern
 
 _FOLLOWED = ("material:binding", "prototypes", "skel:", "light:filters", "portals", "field:")
 """What names of relationships begin with whose targets are needed to draw a prim."""
@@ -21,17 +22,19 @@ def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
     That is: materials, prototypes of point instancers and what shaders connect to; all cameras,
     lights and render settings, but for those inside of instances that are left out.
 
+    ``paths`` may be patterns (``patterns.py``), of prims that are in no instance.
+
     Raises:
-        WavecombError: A path names no prim.
+        WavecombError: A path or pattern names no prim.
     """
     mask = Usd.StagePopulationMask()
     for text in paths:
-        path = Sdf.Path(text) if Sdf.Path.IsValidPathString(text) else Sdf.Path.emptyPath
-        if not (path.IsAbsoluteRootOrPrimPath() and path.IsAbsolutePath()):
-            raise WavecombError(f"mask {text}: is not the absolute path of a prim")
-        if not stage.GetPrimAtPath(path):
+        pattern = PathPattern(text, "mask")
+        found = _matching(stage, pattern) if pattern.is_pattern else [Sdf.Path(text)]
+        if not found or not stage.GetPrimAtPath(found[0]):
             raise WavecombError(f"mask {text}: the stage has no such prim")
-        mask.Add(_outside_instances(stage, path))
+        for path in found:
+            mask.Add(_outside_instances(stage, path))
     for path in list(_always(stage)):
         mask.Add(path)
     stage.SetPopulationMask(mask)
@@ -42,6 +45,17 @@ def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
             mask.Add(path)
         stage.SetPopulationMask(mask)
         todo = [prim for prim in map(stage.GetPrimAtPath, new) if prim]
+
+
+def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
+    """Prims that a pattern is the path of, but those below others."""
+    found = []
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot()))
+    for prim in prims:
+        if pattern.matches(prim.GetPath()):
+            found.append(prim.GetPath())
+            prims.PruneChildren()
+    return found
 
 
 def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdVol
 
+from wavecomb.usd.geometry.faces import TETRAHEDRA
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.geometry.shapes import SHAPES
 from wavecomb.usd.geometry.shutter import Motion, Track
@@ -27,11 +28,10 @@ from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]
 
-_UNSUPPORTED = ("NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh")
-
-
-STRANDS = {"BasisCurves": "curves", "Points": "points"}
-DRAWN = frozenset(("mesh", "shape", *STRANDS.values()))
+STRANDS = {
+    "BasisCurves": "curves", "NurbsCurves": "curves", "HermiteCurves": "curves", "Points": "points",
+}  # fmt: skip
+DRAWN = frozenset(("mesh", "patch", "shape", *STRANDS.values()))
 """Kinds of prims that become geometry."""
 
 
@@ -90,8 +90,10 @@ class Traversal:
         name = str(prim.GetTypeName())
         kind = self._kinds.get(name)
         if kind is None:
-            if prim.IsA(UsdGeom.Mesh):
+            if prim.IsA(UsdGeom.Mesh) or name == TETRAHEDRA:
                 kind = "mesh"
+            elif name == "NurbsPatch":
+                kind = "patch"
             elif name in SHAPES:
                 kind = "shape"
             elif name in STRANDS:
@@ -106,7 +108,7 @@ class Traversal:
                 kind = "xform"  # the dome that names it reads it
             elif prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
                 kind = "unsupported light"
-            elif prim.IsA(UsdGeom.Gprim) or name in _UNSUPPORTED:
+            elif prim.IsA(UsdGeom.Gprim):
                 kind = "unsupported"
             elif prim.IsA(UsdGeom.Imageable):
                 kind = "xform" if prim.IsA(UsdGeom.Xformable) else "scope"
@@ -183,7 +185,10 @@ class Traversal:
             children = prim.GetChildren() if pick is None else prim.GetFilteredChildren(pick)
             if kind in DRAWN:
                 if shown:
-                    subsets = [c for c in children if _binds(c)] if children else ()
+                    subsets = [c for c in children if _binds(c)] if children else []
+                    if subsets and type_name == TETRAHEDRA:
+                        self.report.missing("materials of parts of a TetMesh", prim.GetPath())
+                        subsets = []
                     found.draws.append(
                         Draw(prim, matrix, inherited, subsets, None, [], track, names, kind, parent)
                     )
