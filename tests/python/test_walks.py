@@ -278,7 +278,7 @@ def test_what_comes_from_below_has_a_layer() -> None:
 
 @pytest.mark.parametrize("instanced", [False, True])
 def test_what_lies_within_is_not_met(instanced: bool) -> None:
-    """Strands, a lamp and a body inside of another change nothing, whoever lies first on the way."""
+    """Strands and a body inside of another change nothing, whoever lies first on the way."""
 
     def picture(filled: bool) -> Any:
         builder = wavecomb.SceneBuilder()

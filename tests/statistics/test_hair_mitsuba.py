@@ -81,9 +81,7 @@ def stage(kind: str, roughness: tuple[float, float]) -> Any:
     layout = lay_out(np.full(len(points), points.shape[1]), "bspline", "nonperiodic")
     controls = layout.controls(points.reshape(-1, 3), "vertex")
     radii = np.full(len(controls), radius, np.float32)
-    curves = native.add_curves(
-        "cubic-tube", controls, layout.segment_words(), radii, material=hair
-    )
+    curves = native.add_curves("cubic-tube", controls, layout.segment_words(), radii, material=hair)
     native.add_to_group(0, curves)
     for x, z, turn in ((1.6, 3.0, 0.0), (-1.9, -3.0, math.pi)):
         lamp = np.diag([math.cos(turn), 1.0, math.cos(turn), 1.0])

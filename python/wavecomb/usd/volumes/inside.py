@@ -42,5 +42,10 @@ def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport)
         "transmission_scatter": scatter,
         "transmission_scatter_anisotropy": look.anisotropy,
     }
-    parameters = {"ior": 1.0, "roughness": 0.0, "specular_color": (1.0, 1.0, 1.0), "openpbr": layers}
+    parameters = {
+        "ior": 1.0,
+        "roughness": 0.0,
+        "specular_color": (1.0, 1.0, 1.0),
+        "openpbr": layers,
+    }
     return Surface(str(prim.GetPath()), "openpbr", parameters)
