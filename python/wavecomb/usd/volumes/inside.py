@@ -45,7 +45,7 @@ def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport)
     parameters = {
         "ior": 1.0,
         "roughness": 0.0,
-        "specular_color": (1.0, 1.0, 1.0),
+        "specular_color": WHITE,
         "openpbr": layers,
     }
     return Surface(str(prim.GetPath()), "openpbr", parameters)
