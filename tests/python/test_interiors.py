@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -240,3 +241,87 @@ def test_transport_light_says_that_it_has_none() -> None:
     """One line that says what to do."""
     with pytest.raises(ValueError, match="media inside of meshes"):
         wavecomb.render(scene(), size=(8, 8), spp=1, transport="light")
+
+
+FOG = """#usda 1.0
+(
+    metersPerUnit = 0.5
+    upAxis = "Y"
+)
+def Cube "Fog" (prepend apiSchemas = ["MaterialBindingAPI"])
+{
+    double size = 2
+    rel material:binding = </M>
+}
+def Material "M"
+{
+    token outputs:mtlx:volume.connect = </M/Volume.outputs:out>
+    def Shader "Volume"
+    {
+        uniform token info:id = "ND_volume"
+        token inputs:vdf.connect = </M/Vdf.outputs:out>
+        token outputs:out
+    }
+    def Shader "Vdf"
+    {
+        uniform token info:id = "ND_absorption_vdf"
+        vector3f inputs:absorption = (0.6, 1.4, 2.2)
+        token outputs:out
+    }
+}
+def DomeLight "Sky"
+{
+}
+def Camera "Camera"
+{
+    token projection = "orthographic"
+    float horizontalAperture = 10
+    float verticalAperture = 10
+    double3 xformOp:translate = (0, 0, 5)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+
+
+def test_a_volume_terminal_fills_a_mesh(tmp_path: Path) -> None:
+    """Coefficients per metre, of which a unit of this stage is half a one."""
+    file = tmp_path / "fog.usda"
+    file.write_text(FOG)
+    stage = wavecomb.load(file, camera="/Camera")
+    picture = wavecomb.render(stage, size=(8, 8), spp=4, filter="box")
+    assert np.allclose(picture.beauty, np.exp(-2.0 * SIGMA), rtol=1e-4)
+
+
+LIQUID = """#usda 1.0
+def Cube "Liquid" (prepend apiSchemas = ["MaterialBindingAPI"])
+{
+    rel material:binding = </M>
+}
+def Material "M"
+{
+    token outputs:mtlx:surface.connect = </M/S.outputs:out>
+    def Shader "S"
+    {
+        uniform token info:id = "ND_standard_surface_surfaceshader"
+        float inputs:transmission = 1
+        color3f inputs:transmission_color = (0.5, 0.6, 0.7)
+        float inputs:transmission_depth = 2
+        color3f inputs:transmission_scatter = (0.1, 0.2, 0.3)
+        float inputs:transmission_scatter_anisotropy = 0.25
+        int inputs:dielectric_priority = 3
+        token outputs:out
+    }
+}
+"""
+
+
+def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
+    """Scatter, its anisotropy and the priority of standard_surface."""
+    from usd_recorder import load, said
+
+    scene, loaded = load(tmp_path, LIQUID)
+    layers = next(m["openpbr"] for m in scene.materials if m.get("openpbr"))
+    assert layers["transmission_scatter"] == pytest.approx((0.1, 0.2, 0.3))
+    assert layers["transmission_scatter_anisotropy"] == 0.25
+    assert layers["nested_priority"] == 3
+    assert "transmission" not in said(loaded) and "priority" not in said(loaded)

@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.looks.surface import Surface
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.look import Colour
+from wavecomb.usd.volumes.look import WHITE, Colour
 from wavecomb.usd.volumes.material import VolumeLooks, volume_shader
 
 
@@ -45,7 +45,7 @@ def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport)
     parameters = {
         "ior": 1.0,
         "roughness": 0.0,
-        "specular_color": (1.0, 1.0, 1.0),
+        "specular_color": WHITE,
         "openpbr": layers,
     }
     return Surface(str(prim.GetPath()), "openpbr", parameters)
