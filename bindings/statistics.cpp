@@ -104,6 +104,15 @@ nb::object guiding_dict(const GuideStatistics& s) {
   return d;
 }
 
+nb::object light_aiming_dict(const AimStatistics& s) {
+  if (s.paths == 0) return nb::none();
+  nb::dict d;
+  d["targets"] = s.targets;
+  d["paths"] = s.paths;
+  d["seconds"] = s.seconds;
+  return d;
+}
+
 nb::object transport_dict(const std::optional<TransportChoice>& choice) {
   if (!choice) return nb::none();
   nb::dict d;
@@ -197,6 +206,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   d["allotment"] = allotment_dict(s.allotment);
   d["guiding"] = guiding_dict(s.guiding);
   d["transport"] = transport_dict(s.transport);
+  d["light_aiming"] = light_aiming_dict(s.light_aiming);
   nb::list without_paths;
   for (const std::string& name : s.lights_without_paths) without_paths.append(name);
   d["lights_without_paths"] = without_paths;

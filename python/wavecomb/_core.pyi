@@ -582,6 +582,8 @@ class Settings:
     """How paths end early. Each is unbiased, but another estimate. Default: auto."""
     transport: Literal["path", "light", "auto"]
     """Where paths begin. Default: path."""
+    light_aim: Literal["off", "on"]
+    """Where paths from lights are aimed. Default: on."""
     firefly: Literal["keep", "reweight"]
     """What becomes of samples much brighter than others. Default: keep."""
     roulette_depth: int

@@ -29,8 +29,32 @@ LightView sending(const Lights& lights) {
 
 EmissionNumbers<float> draw(Random& random) {
   EmissionNumbers<float> r{};
-  for (float* x : {&r.pick, &r.u, &r.v, &r.s, &r.t}) *x = random();
+  for (float* x : {&r.pick, &r.u, &r.v, &r.s, &r.t, &r.aim}) *x = random();
   return r;
+}
+
+/// Aimed at three spheres, one of which has the lights in it.
+LightView aimed(const Lights& lights) {
+  static const LightAim aim = [] {
+    LightAim a;
+    a.even = 0.25f;
+    const std::array<std::array<float, 5>, 3> spheres{
+        {{1.5f, -1, 2.5f, 0.2f, 0.3f}, {0.5f, -2, 1, 0.9f, 0.25f}, {1, 1, -2, 2, 0.2f}}};
+    float end = a.even;
+    for (const auto& [x, y, z, radius, share] : spheres) {
+      const uint32_t k = a.count++;
+      a.x[k] = x;
+      a.y[k] = y;
+      a.z[k] = z;
+      a.radius[k] = radius;
+      a.share[k] = share;
+      a.end[k] = end += share;
+    }
+    return a;
+  }();
+  LightView view = sending(lights);
+  view.aim = &aim;
+  return view;
 }
 
 struct Kind {
@@ -235,9 +259,68 @@ TEST(Emission, LightsThatDoNotShineOnAllAlikeSendNoPaths) {
       << "of a view that sends none";
 }
 
+/// All light is there, and that through one of the spheres is what it is without aiming.
+TEST(Emission, AimedCarriesTheSame) {
+  Random random(11);
+  constexpr int kPaths = 60000;
+  for (const Kind& kind : kinds()) {
+    const auto measure = [&](const LightView& view, double (&mean)[2], double (&error)[2],
+                             int& through) {
+      const LightAim& aim = *aimed(kind.lights).aim;
+      double squares[2] = {};
+      for (int i = 0; i < kPaths; ++i) {
+        const auto e = sample_emission<float>(view, draw(random), true);
+        if (!e.valid) continue;
+        const auto meets = [&](const Vec3<float>& centre, float radius) {
+          const Vec3<float> way = centre - e.o;
+          const float along = dot(way, e.d);
+          return along > 0 && length(way - e.d * along) < radius;
+        };
+        const bool first = meets({aim.x[0], aim.y[0], aim.z[0]}, aim.radius[0]);
+        through += first ? 1 : 0;
+        // From afar: what comes by the scene beside it does not count.
+        const bool counts = e.light >= view.infinite_count ||
+                            meets({view.centre[0], view.centre[1], view.centre[2]}, view.radius);
+        const double flux[2] = {counts ? double{e.flux.y} : 0, first ? double{e.flux.y} : 0};
+        for (size_t k = 0; k < 2; ++k) {
+          mean[k] += flux[k] / kPaths;
+          squares[k] += flux[k] * flux[k] / kPaths;
+        }
+      }
+      for (size_t k = 0; k < 2; ++k)
+        error[k] = std::sqrt(std::max(0.0, squares[k] - mean[k] * mean[k]) / kPaths);
+    };
+    double mean[2] = {}, error[2] = {}, plain[2] = {}, plain_error[2] = {};
+    int through = 0, by_itself = 0;
+    measure(aimed(kind.lights), mean, error, through);
+    measure(sending(kind.lights), plain, plain_error, by_itself);
+    EXPECT_NEAR(mean[0], kind.power, 5 * error[0] + 1e-3 * kind.power) << kind.name;
+    EXPECT_NEAR(mean[1], plain[1], 5 * std::hypot(error[1], plain_error[1])) << kind.name;
+    EXPECT_GE(through, by_itself) << kind.name;
+  }
+}
+
+TEST(Emission, AimedIsAsDenseAsWhoMeetsItIsTold) {
+  Random random(12);
+  for (const Kind& kind : kinds()) {
+    const LightView view = aimed(kind.lights);
+    int differ = 0;
+    constexpr int kPaths = 2000;
+    for (int i = 0; i < kPaths; ++i) {
+      const auto e = sample_emission<float>(view, draw(random), true);
+      if (!e.valid) continue;
+      const float t = 0.5f + 3 * random();
+      const float met = emission_density<float>(view, e.light, fma(e.d, t, e.o), -e.d, t, true);
+      // At the rims of spheres rounding decides.
+      differ += std::abs(met - e.density) > 5e-3f * e.density ? 1 : 0;
+    }
+    EXPECT_LE(differ, kPaths / 500) << kind.name;
+  }
+}
+
 TEST(Emission, PacketsAreScalars) {
   for (const Kind& kind : kinds()) {
-    const LightView view = sending(kind.lights);
+    const LightView view = aimed(kind.lights);
     lane_testing::for_each_packet([&]<typename F>() {
       Random random(7);
       std::array<EmissionNumbers<float>, 16> r;
@@ -249,7 +332,8 @@ TEST(Emission, PacketsAreScalars) {
         return load<F>(values);
       };
       using N = EmissionNumbers<float>;
-      lanes = {column(&N::pick), column(&N::u), column(&N::v), column(&N::s), column(&N::t)};
+      lanes = {column(&N::pick), column(&N::u), column(&N::v),
+               column(&N::s),    column(&N::t), column(&N::aim)};
       const auto packet = sample_emission<F>(view, lanes, Mask<F>(true));
       for (size_t i = 0; i < kWidth<F>; ++i) {
         const auto one = sample_emission<float>(view, r[i], true);

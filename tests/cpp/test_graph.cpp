@@ -76,7 +76,8 @@ class GraphTest : public ::testing::Test {
     materials[2].presence = true;
     materials[3].graph = 0;
     materials_ = std::make_unique<SceneMaterials>(std::move(materials), graphs,
-                                                  std::span<const TexturePtr>(), kInheritMaterial);
+                                                  std::span<const TexturePtr>(), kInheritMaterial,
+                                                  kInheritMaterial);
     view_.materials = materials_->records.data();
     view_.uses = materials_->uses.data();
     view_.textures = &texture_->view();

@@ -199,6 +199,28 @@ def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
     assert_agree("light paths coarse", a, b, tolerance=0.02)
 
 
+@pytest.mark.parametrize("kind", ["sun", "rect"])
+def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
+    """A ball of glass on a wide ground, under lights that camera paths find through it, too."""
+    clear = material("Clear", "dielectric", roughness=0.0, ior=1.4, diffuseColor=(1, 1, 1))
+    lamps = {
+        "sun": light("Distant", colour=(20, 19, 18), transform=DOWN, angle=40.0),
+        "rect": light(
+            "Rect",
+            colour=(4, 3.9, 3.7),
+            transform=look_at((0.4, 2.6, 0.3), (0.2, 0, -0.2)),
+            width=2.4,
+            height=2.4,
+        ),
+    }
+    ball = sphere("Glass", "Clear", (0.1, 0.4, 0.5), 0.35, rings=24, smooth=True)
+    prims = (*LOOKS, VIEW, clear, ground("White", 40.0), ball, lamps[kind])
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
+    aimed = wavecomb.render(stage, size=(16, 16), spp=1, transport="light")
+    assert aimed.stats["light_aiming"]["targets"] > 0
+    compare(f"light paths wide {kind}", stage, beauty, max_depth=6)
+
+
 def test_light_through_a_plate_of_glass(tmp_path: Path, beauty: Any) -> None:
     """A point over a clear plate over a floor: no path from the camera finds it.
 

@@ -98,6 +98,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         lines.append("not guided: too few samples to find out whether that pays")
     if transport := stats.get("transport"):
         lines.append(_transport_line(transport))
+    if aiming := stats.get("light_aiming"):
+        lines.append(_aiming_line(aiming))
     lines += [
         f"light {name} is sampled by camera paths only"
         for name in stats.get("lights_without_paths", ())
@@ -121,6 +123,17 @@ def _transport_line(chosen: Mapping[str, Any]) -> str:
         line += f" in {chosen['seconds']:.2f} s, light paths promise "
         line += f"{chosen['gain']:.2f} times the efficiency"
     return line
+
+
+def _aiming_line(aiming: Mapping[str, Any]) -> str:
+    """Where paths from lights went."""
+    from wavecomb.run.progress import count_text, time_text
+
+    found = f"{aiming['targets']} places" if aiming["targets"] else "nothing, which brought light"
+    return (
+        f"light paths aim at {found}: learned from {count_text(aiming['paths'])} paths "
+        f"in {time_text(aiming['seconds'])}"
+    )
 
 
 def light_line(calibration: Mapping[str, Any]) -> str | None:

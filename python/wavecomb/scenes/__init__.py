@@ -14,7 +14,7 @@ from typing import Any
 
 from wavecomb.scenes.candles import build_candles
 from wavecomb.scenes.caustics import build_caustics
-from wavecomb.scenes.clear_stages import build_lens, build_pool, build_prism
+from wavecomb.scenes.clear_stages import build_landscape, build_lens, build_pool, build_prism
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.drinks import build_drinks
 from wavecomb.scenes.errors import SceneError
@@ -65,6 +65,7 @@ SCENES: dict[str, SceneInfo] = {
     "pool": SceneInfo("waves on a pool under the sun", 1.0, build_pool),
     "lens": SceneInfo("a lens that shows a small lamp on a wall", 0.1, build_lens),
     "prism": SceneInfo("a prism in the sun beside a matt wall", 0.1, build_prism),
+    "landscape": SceneInfo("a glass ring in wide hills in the sun", 1.0, build_landscape),
     "fur": SceneInfo("a striped, furry egg: see --strands", 0.1, build_fur),
     "head": SceneInfo("a head of brown hair: see --strands", 0.1, build_head),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),

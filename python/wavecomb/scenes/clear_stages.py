@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light through clear things: waves on a pool, a lens, a prism.
+"""Light through clear things: waves on a pool, a lens, a prism, a ring in a wide landscape.
 
 What is bright in them came of a small light by way of water or glass, which paths from the camera
 hardly find.
@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.caustics import ball
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces
+from wavecomb.scenes.caustics import ball, ring
+from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces, smooth_normals
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.shapes import placed, turn_about
 from wavecomb.scenes.stage import StageWriter
@@ -36,6 +36,38 @@ LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
 """Of the thin lens, and half its width: the lamp stands at twice its focus, and its picture is as
 far on the other side, as large as it is."""
 _LAMP_RADIUS = 0.08
+
+_LAND = 100.0
+"""Half of the landscape's length along x and z; the ring in it is one wide."""
+_HILL = 6.0
+
+
+def land(cells: int) -> Mesh:
+    """Hills, flat around the middle, of ``cells`` cells along each side."""
+    x, z = np.meshgrid(*[np.linspace(-_LAND, _LAND, cells + 1)] * 2)
+    far = np.clip(np.hypot(x, z) / (0.3 * _LAND) - 0.3, 0.0, 1.0)
+    waves = 1.0 + np.sin(0.11 * x + 0.7) * np.cos(0.083 * z - 0.4)
+    points = np.stack([x, 0.5 * _HILL * far * far * waves, z], axis=2)
+    points = points.reshape(-1, 3).astype(np.float32)
+    faces = grid_faces(cells + 1, cells + 1)
+    uv = (points[:, [0, 2]] / (2.0 * _LAND) + 0.5).astype(np.float32)
+    return Mesh(points, faces, smooth_normals(points, faces), uv)
+
+
+def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
+    """Wide hills in the sun, and a glass ring on the ground, which the camera is close to.
+
+    Nearly all light of the sun comes down where the camera does not look.
+    """
+    writer.material("Soil", looks.diffuse((0.45, 0.40, 0.33)))
+    writer.material("Glass", looks.CLEAR_GLASS)
+    level = options.teapot_level
+    writer.bind(writer.mesh("/World/Set/Land", land(16 * level)).GetPrim(), "Soil")
+    glass = writer.mesh("/World/Objects/Ring", placed(ring(0.5, 0.12, 0.3, level), (0.0, 0.002, 0)))
+    writer.bind(glass.GetPrim(), "Glass")
+    writer.sun("Sun", (0.55, -0.62, -0.35), _SUN_ANGLE, (3.0, 2.8, 2.5))
+    writer.dome_light("Sky", 90.0, 0.1)
+    writer.camera((0.4, 1.7, 2.6), (0.2, 0.1, -0.15), 42.0, options.aspect or 1.0)
 
 
 def water(level: int) -> Mesh:
@@ -66,9 +98,10 @@ def _basin() -> tuple[FloatArray, list[list[int]]]:
     points += [(sx * x, high, sz * z) for sx, sz in corners]
     points += [(sx * (x + out), high, sz * (z + out)) for sx, sz in corners]
     faces = [[3, 2, 1, 0]]
-    for ring in (0, 4):
+    for low_ring in (0, 4):
         faces += [
-            [ring + i, ring + (i + 1) % 4, ring + 4 + (i + 1) % 4, ring + 4 + i] for i in range(4)
+            [low_ring + i, low_ring + (i + 1) % 4, low_ring + 4 + (i + 1) % 4, low_ring + 4 + i]
+            for i in range(4)
         ]
     return np.array(points, float), faces
 

@@ -95,6 +95,9 @@ struct Settings {
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
+  /// Paths from lights go where others before the first pass have brought something
+  /// (render/light_aiming.h).
+  bool light_aim = true;
   Firefly firefly = Firefly::kKeep;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
   std::vector<std::string> light_groups;          ///< of Aov::kLightGroups, by name; empty: all

@@ -176,6 +176,11 @@ std::vector<SettingInfo> work_settings() {
                               "From the lights, too, where it pays, as some pixels before the "
                               "first pass find out."}},
                             "Where paths begin."),
+      choice<&S::light_aim>(
+          "light_aim", "Light paths go",
+          {{"off", "As lights shine, wherever that is."},
+           {"on", "Mostly where some before the first pass brought light to the picture."}},
+          "Where paths from lights are aimed."),
       choice<&S::firefly>(
           "firefly", "Fireflies",
           {{"keep", "They stay: nothing is biased."},

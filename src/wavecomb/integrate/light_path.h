@@ -49,7 +49,8 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
   const Sample4<F> way = sample_4d<F>(settings.sampler, path.key, kCameraSet);
   const Sample4<F> choice =
       sample_4d<F>(settings.sampler, path.key, vertex_set(VertexSet::kEmission, 0));
-  path.emission = sample_emission<F>(lights, {choice.x, way.z, way.w, way.x, way.y}, active);
+  path.emission =
+      sample_emission<F>(lights, {choice.x, way.z, way.w, way.x, way.y, choice.y}, active);
   const F largest = max_component(path.emission.flux);
   const F scale = 1.f / select(path.emission.valid, largest, F(1.f));
   path.flux = path.emission.flux;

@@ -37,6 +37,9 @@ class LightTracer {
       const SingleHit hit = rays_.intersect(path.o, path.dir, kInfinity, depth);
       clock_.enter(Phase::kShade);
       if (hit.inst == kNoHit || hit.inst == kLightShape) return;
+      if (context_.lessons && depth == 0)
+        context_.lessons->begin(light_path_number(*context_.settings, pixel),
+                                fma(path.dir, hit.t, path.o));
       const uint32_t mesh = rays_.mesh_of(hit), material = rays_.material_of(hit, mesh);
       if (settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
@@ -48,7 +51,7 @@ class LightTracer {
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          add_splat(context_, splats_, out.x, out.y, v.direct);
+          bring(pixel, depth, out);
       }
       if (!v.alive) return;
       path = v.next;
@@ -56,6 +59,13 @@ class LightTracer {
   }
 
  private:
+  void bring(uint32_t pixel, uint32_t depth, const LightVertexResult<F>& out) {
+    if (context_.lessons)
+      context_.lessons->bring(light_path_number(*context_.settings, pixel), depth, out.v.direct);
+    else
+      add_splat(context_, splats_, out.x, out.y, out.v.direct);
+  }
+
   LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
                              uint32_t mesh, uint32_t material, const PathState<F>& path) {
     const SceneView& scene = context_.scene;
@@ -88,8 +98,10 @@ inline void trace_light_task(const WaveContext& context, ReferenceWorker& worker
       worker.clock.enter(Phase::kGenerate);
       tracer.trace(task.pixels[p], task.first_sample + s);
     }
-  context.film->splats().add(worker.splats);
-  worker.splats.clear();
+  if (!context.lessons) {
+    context.film->splats().add(worker.splats);
+    worker.splats.clear();
+  }
   count_light_paths(context, task);
   worker.clock.stop();
 }

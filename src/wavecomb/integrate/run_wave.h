@@ -56,29 +56,33 @@ struct CameraPaths {
 template <typename F>
 struct LightPaths {
   static constexpr const float* tfar = nullptr;
+  const WaveTask* task = nullptr;
 
-  static void generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
-    generate_light<F>(wave, context, task);
+  void generate(Wave& wave, const WaveContext& context, const WaveTask& its_task) {
+    task = &its_task;
+    generate_light<F>(wave, context, its_task);
     fetch_rays<F>(wave);
   }
   static bool are_coherent(const WaveContext& /*context*/) { return false; }
   static ShadeSettings settings(const WaveContext& context) {
     return ShadeSettings(*context.settings).of_light_paths();
   }
-  static void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
-                      uint32_t depth) {
+  void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+               uint32_t depth) const {
+    if (context.lessons && depth == 0) [[unlikely]]
+      note_first_places(wave, context, *task);
     wavecomb::collect<F, NoMedia, true>(wave, context, settings, depth, NoMedia());
   }
   static const auto& kernels(const WaveContext& /*context*/, const ShadeSettings& /*settings*/) {
     return kShadeLightBatch;
   }
-  static void shadow(Wave& wave, const WaveContext& context, uint32_t depth) {
-    splat<F>(wave, context, depth);
+  void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
+    splat<F>(wave, context, *task, depth);
   }
   static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
-  static void resolve(Wave& /*wave*/, const WaveContext& context, const WaveTask& task,
+  static void resolve(Wave& /*wave*/, const WaveContext& context, const WaveTask& its_task,
                       uint32_t /*depth*/) {
-    count_light_paths(context, task);
+    count_light_paths(context, its_task);
   }
 };
 

@@ -34,6 +34,8 @@
 
 namespace wavecomb {
 
+class AimLessons;
+
 /// What all waves of a render read.
 struct WaveContext {
   SceneView scene;
@@ -56,6 +58,7 @@ struct WaveContext {
   const GuideView* guide = nullptr;    ///< guides bounces, or is to be learned; null: neither
   bool discards = false;               ///< paths are for `histories` alone, and the film gets none
   const SplatFilter* splat_filter = nullptr;  ///< of paths from lights; null: there are none
+  AimLessons* lessons = nullptr;  ///< gets what paths from lights bring, in the film's place
   float light_paths = 1;  ///< that start there for each of a pixel's, over the picture's pixels
 
   /// Whether paths start at lights, too.

@@ -22,10 +22,11 @@ struct Emission {
   Mask<F> valid;
 };
 
-/// Five numbers in [0, 1): the light's (a multiple of 2^-24), the place's and the direction's.
+/// Numbers in [0, 1): the light's (a multiple of 2^-24), the place's, the direction's, and what it
+/// is aimed at.
 template <typename F>
 struct EmissionNumbers {
-  F pick, u, v, s, t;
+  F pick, u, v, s, t, aim;
 };
 
 /// How the camera's paths find a light at the first surface that a path from it meets: with
@@ -109,8 +110,10 @@ template <typename F>
   const Mask<F> triangle = active & Mask<F>(light >= U(view.first_triangle));
   if (any(triangle)) {
     const detail::TriangleReader<F> reader(view, light, triangle);
-    put(detail::emit_triangle<F>(reader, view, r.u, r.v, r.s, r.t, triangle), reader.pick_pdf,
-        detail::size_of_terms<F>(reader.p, reader.u, reader.v), triangle);
+    detail::KindEmission<F> e =
+        detail::emit_triangle<F>(reader, view, r.u, r.v, r.s, r.t, triangle);
+    if (view.aim) detail::aim_directions<F>(view, r.aim, r.s, r.t, 2.f, e, triangle);
+    put(e, reader.pick_pdf, detail::size_of_terms<F>(reader.p, reader.u, reader.v), triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (any(others)) {
@@ -120,6 +123,12 @@ template <typename F>
           const detail::LightReader<F> reader(view.lights, light, lanes);
           detail::KindEmission<F> e =
               detail::emit_kind<F>(kind, {view, reader, r.u, r.v, r.s, r.t, lanes});
+          if (view.aim) {
+            if (detail::is_infinite(kind))
+              detail::aim_places<F>(view, r.aim, r.u, r.v, e, lanes);
+            else
+              detail::aim_directions<F>(view, r.aim, r.s, r.t, 1.f, e, lanes);
+          }
           if (view.shapings)
             e.radiance = detail::shaped<F>(view, reader.shaping(), e.d, e.radiance, lanes);
           const F size = detail::size_of_terms<F>(reader.p(), reader.u(), reader.v());
@@ -146,7 +155,13 @@ template <typename F>
   const Mask<F> triangle = active & Mask<F>(light >= UInt<F>(view.first_triangle));
   if (any(triangle)) {
     const detail::TriangleReader<F> reader(view, light, triangle);
-    put(F(0.5f * detail::even_emission_density<F>(length(reader.m))), reader.pick_pdf, triangle);
+    const F area = length(reader.m);
+    F one = 0.5f * detail::even_emission_density<F>(area);
+    if (view.aim) {
+      const F own = abs(dot(reader.m, dir)) * F(0.5f * kInvPi) / select(area > 0.f, area, F(1.f));
+      one = one * detail::aim_from_near<F>(view, fma(dir, t, from), -dir, own);
+    }
+    put(one, reader.pick_pdf, triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (none(others)) return density;
@@ -154,8 +169,9 @@ template <typename F>
   detail::for_each_kind<F>(
       any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
         const detail::LightReader<F> reader(view.lights, light, lanes);
-        put(detail::emission_density_of_kind<F>(kind, {view, reader, from, dir, t, lanes}),
-            reader.pick_pdf(), lanes);
+        F one = detail::emission_density_of_kind<F>(kind, {view, reader, from, dir, t, lanes});
+        if (view.aim) one = one * detail::aim_of_kind<F>(view, kind, reader, from, dir, t);
+        put(one, reader.pick_pdf(), lanes);
       });
   return density;
 }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "wavecomb/core/vec.h"
+#include "wavecomb/light/aim.h"
 #include "wavecomb/light/kinds.h"
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/link.h"
@@ -91,16 +92,18 @@ inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& r
   return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
 }
 
-/// Emission::density (light/emission.h) of a path from infinite light `light` that came along -dir.
+/// Emission::density (light/emission.h) of a path from infinite light `light` that came along -dir
+/// to `from`.
 template <typename F>
-inline F infinite_emission_density(const LightView& view, uint32_t light, const Vec3<F>& dir,
-                                   const Mask<F>& active) {
+inline F infinite_emission_density(const LightView& view, uint32_t light, const Vec3<F>& from,
+                                   const Vec3<F>& dir, const Mask<F>& active) {
   const LightRecord& record = view.lights[light];
   if (record.sampled_only != 0 || record.light_link != kNoSet) return F(0.f);
   const LightReader<F> reader(record, active);
   const float pick = view.pick_pdf ? view.pick_pdf[light] : record.pick_pdf;
-  const F density = emission_density_of_kind<F>(static_cast<LightKind>(record.kind),
-                                                {view, reader, dir, dir, F(0.f), active});
+  F density = emission_density_of_kind<F>(static_cast<LightKind>(record.kind),
+                                          {view, reader, from, dir, F(0.f), active});
+  if (view.aim) density = density * aim_from_afar<F>(view, from, dir);
   return select(is_finite(density), F(density * pick), F(0.f));
 }
 
@@ -278,7 +281,7 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
   if (view.sends_paths()) [[unlikely]]
     weight = joint_bounce_weight<F>(
         bsdf_pdf, light_pdf, bsdf_is_delta,
-        F(ratio * detail::infinite_emission_density<F>(view, light, dir, active)));
+        F(ratio * detail::infinite_emission_density<F>(view, light, from, dir, active)));
   if (view.has_sampled_only)
     weight *= LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera);
   if (view.links.members)

@@ -76,4 +76,22 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
   return out;
 }
 
+std::vector<Vec3<float>> seen_places(const Scene& scene, const EmbreeAccelerator& accel,
+                                     uint32_t width, uint32_t height, uint32_t side) {
+  const FilterTable filter(FilterKind::kBox, 1.f);
+  const CameraSetup camera(scene.camera(), width, height, filter);
+  std::vector<Vec3<float>> places;
+  const auto middle = [&](uint32_t cell, uint32_t pixels) {
+    return (static_cast<float>(cell) + 0.5f) * static_cast<float>(pixels) /
+           static_cast<float>(side);
+  };
+  for (uint32_t i = 0; i < side * side; ++i) {
+    const CameraRay<float> ray = ray_through<float>(
+        camera, middle(i % side, width), middle(i / side, height), 0.5f, 0.5f, kMiddle, true);
+    const OneHit hit = trace(accel, ray);
+    if (hit.inst != kNoHit && hit.inst != kLightShape) places.push_back(fma(ray.d, hit.t, ray.o));
+  }
+  return places;
+}
+
 }  // namespace wavecomb

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What lies under a point of the picture.
+/// What lies under points of the picture.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/light/light.h"
@@ -30,5 +31,9 @@ struct Pick {
 /// left corner, through the middle of the lens. Nothing where it leaves the scene.
 std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, float x, float y,
                          uint32_t width, uint32_t height);
+
+/// Where rays through the middles of a grid of side x side cells of such a picture meet a surface.
+std::vector<Vec3<float>> seen_places(const Scene& scene, const EmbreeAccelerator& accel,
+                                     uint32_t width, uint32_t height, uint32_t side);
 
 }  // namespace wavecomb

@@ -45,6 +45,13 @@ struct LightShares {
   std::vector<LightShare> parts;
 };
 
+/// How paths from lights were aimed.
+struct AimStatistics {
+  uint32_t targets = 0;  ///< spheres; 0: nowhere
+  uint64_t paths = 0;    ///< that taught; 0: none were asked to
+  double seconds = 0;
+};
+
 /// What a render took. Phase times are sums over workers.
 struct RenderStatistics {
   double build_s = 0, render_s = 0;
@@ -73,6 +80,7 @@ struct RenderStatistics {
   LightShares light_calibration;
   AllotmentFacts allotment;
   GuideStatistics guiding;
+  AimStatistics light_aiming;
   std::vector<std::string> lights_without_paths;  ///< where others send some
   std::optional<TransportChoice> transport;       ///< of Transport::kAuto
   std::optional<StoreStatistics> texture_store;   ///< where textures have a limit

@@ -18,6 +18,7 @@
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/render/guide_training.h"
+#include "wavecomb/render/light_aiming.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/light_paths.h"
 #include "wavecomb/render/render_setup.h"
@@ -267,14 +268,20 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   if (settings.joins_light()) without_paths = lights_without_paths(scene);
   auto training = std::make_shared<const GuideTraining>();
   GuideView guide;
+  LightAiming aiming;
+  const TrainingMeans means{lanes, threads, wave_size};
   const auto work = [&] {
     lights = &calibrations.get(this->scene, *accel, scene_view, settings,
                                [&] { return watch.stopped(); });
     lights->weighed.apply(context.scene.lights);
     if (settings.joins_light()) send_paths(scene, context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
+    if (settings.joins_light() && settings.light_aim) {
+      aiming = learn_to_aim(context, scene, means, [&] { return watch.stopped(); });
+      if (aiming.aim.count > 0) context.scene.lights.aim = &aiming.aim;
+    }
     training = std::make_shared<const GuideTraining>(
-        train_guide(context, scene, {lanes, threads, wave_size}, [&] { return watch.stopped(); }));
+        train_guide(context, scene, means, [&] { return watch.stopped(); }));
     if (training->field) {
       guide = view_of(*training);
       context.guide = &guide;
@@ -301,6 +308,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     s.error = status.error;
     s.allotment = loop.allotment();
     s.guiding = training->statistics;
+    if (aiming.paths > 0) s.light_aiming = {aiming.aim.count, aiming.paths, aiming.seconds};
     s.lights_without_paths = without_paths;
     add_up(runner, context, scene, costs, s);
     s.scene_bytes = scene.bytes();

@@ -14,6 +14,7 @@
 
 namespace wavecomb {
 
+struct LightAim;
 struct MeshRecord;
 struct InstanceRecord;
 
@@ -311,6 +312,7 @@ struct LightView {
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
   bool sends_paths() const { return radius > 0; }
+  const LightAim* aim = nullptr;  ///< where they are aimed; null: anywhere
   // For graphs of opacity, which may ask where a triangle is; null where lights stand alone.
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;

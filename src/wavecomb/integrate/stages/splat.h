@@ -2,6 +2,7 @@
 /// Stage 4 of paths from lights: what their unblocked vertices bring to the film.
 #pragma once
 
+#include "wavecomb/integrate/aim_lessons.h"
 #include "wavecomb/integrate/light_path.h"
 #include "wavecomb/integrate/stages/trace.h"
 
@@ -22,23 +23,45 @@ inline void add_splat(const WaveContext& context, SplatList& list, float x, floa
   });
 }
 
+/// The number of the path in a slot of a wave.
+inline uint32_t light_path_in(const WaveContext& context, const WaveTask& task, uint32_t slot) {
+  return light_path_number(*context.settings, task.pixels[slot / task.samples]);
+}
+
+/// Notes where the paths of a wave met something first, where they teach.
+inline void note_first_places(const Wave& wave, const WaveContext& context, const WaveTask& task) {
+  const RayQueue& rays = wave.rays;
+  for (size_t i = 0; i < rays.size; ++i) {
+    if (wave.hits.inst[i] == kNoHit) continue;
+    const Vec3<float> o{rays.ox[i], rays.oy[i], rays.oz[i]}, d{rays.dx[i], rays.dy[i], rays.dz[i]};
+    context.lessons->begin(light_path_in(context, task, rays.slot[i]), fma(d, wave.hits.t[i], o));
+  }
+}
+
 /// The task's paths are done.
 inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
+  if (context.lessons) return;
   for (uint32_t p = 0; p < task.pixel_count; ++p)
     context.film->splats().done(light_path_number(*context.settings, task.pixels[p]), task.samples);
 }
 
-/// Asks which vertices the camera sees, and gives the film what they bring.
+/// Asks which vertices the camera sees, and gives the film what they bring, or those who learn.
 template <typename F>
-void splat(Wave& wave, const WaveContext& context, uint32_t depth) {
+void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_t depth) {
   const ShadowQueue& q = wave.shadows;
   occlude<F>(wave, context, depth, false);
   for (size_t i = 0; i < q.size; ++i) {
     if (q.occluded[i] != 0) continue;
+    if (context.lessons) [[unlikely]] {
+      context.lessons->bring(light_path_in(context, task, q.slot[i]), depth,
+                             {q.r[i], q.g[i], q.b[i]});
+      continue;
+    }
     const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
     add_splat(context, wave.splats, bits_float<float>(row.group), bits_float<float>(row.set),
               {q.r[i], q.g[i], q.b[i]});
   }
+  if (context.lessons) return;
   context.film->splats().add(wave.splats);
   wave.splats.clear();
 }

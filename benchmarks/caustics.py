@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What paths from the lights bring: efficiency of ``--transport light`` and ``auto`` to ``path``.
+
+    .venv/bin/python benchmarks/caustics.py caustics pool lens prism landscape mixed dragon
+
+For each stage a reference is rendered first, with light paths. A short render then tells how many
+samples each way has in ``--seconds``, and the ways are rendered in turns, each round with another
+seed. Way ``unaimed`` is ``light`` with ``--light-aim off``.
+
+Efficiency is 1 / (relMSE x seconds), relMSE the mean of (picture - reference)^2 over (reference^2 +
+0.01 mean^2). Seconds are of the clock, with all that is learned and tried before the first pass,
+without loading. Each figure is there for the whole picture and for the caustics, the pixels of
+which light paths found more than half in the reference; and for both without the thousandth of the
+pixels that is worst (``trimmed``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sitting import RESULTS, ROOT, log, ratio, show, stage_file, summary, write_result
+
+import wavecomb
+from wavecomb.picture.compare import TRIMMED_SHARE, luminance, trimmed_mean
+
+STAGES = ("caustics", "pool", "lens", "prism", "landscape", "mixed", "dragon")
+WAYS: dict[str, dict[str, str]] = {
+    "path": {"transport": "path"},
+    "light": {"transport": "light"},
+    "unaimed": {"transport": "light", "light_aim": "off"},
+    "auto": {"transport": "auto"},
+}
+FIGURES = ("whole", "whole_trimmed", "caustics", "caustics_trimmed")
+REFERENCE_SEED, TRIAL_SEED = 1_000_003, 1_000_033
+
+
+class Stage:
+    """A stage, with its reference and the pixels of its caustics."""
+
+    def __init__(self, name: str, options: argparse.Namespace) -> None:
+        path = options.folder / f"caustics-{name}.usdc"
+        self.scene = wavecomb.load(stage_file(path, name, triangles=options.triangles)).scene
+        self.options = options
+        picture, seconds = self.render(
+            options.reference, REFERENCE_SEED, transport="light", aovs=("techniques",)
+        )
+        log(f"{name}: reference of {options.reference} samples in {seconds:.0f} s")
+        self.truth = np.asarray(picture.beauty, np.float64)
+        bright = luminance(self.truth)
+        by_light = luminance(np.asarray(picture.aovs["by_light_paths"]))
+        self.mask: NDArray[np.bool_] = by_light > 0.5 * np.maximum(bright, 1e-12)
+        self.scale = 1.0 / (self.truth**2 + 0.01 * float(bright.mean()) ** 2)
+
+    def render(self, spp: int, seed: int, **settings: Any) -> tuple[wavecomb.Picture, float]:
+        """A picture, and the seconds it took."""
+        begin = time.perf_counter()
+        picture = wavecomb.render(
+            self.scene,
+            size=tuple(self.options.size),
+            spp=spp,
+            seed=seed,
+            threads=self.options.threads,
+            **settings,
+        )
+        return picture, time.perf_counter() - begin
+
+    def samples(self, way: str) -> int:
+        """As many as `way` has in the time of a round."""
+        spp, most = 4, self.options.reference // 4
+        while True:
+            _, seconds = self.render(spp, TRIAL_SEED, **WAYS[way])
+            more = self.options.seconds / max(seconds, 1e-3)
+            if more < 4 or spp >= most:
+                return max(1, min(most, round(spp * more)))
+            spp = min(most, 2 * spp)
+
+    def errors(self, picture: wavecomb.Picture) -> dict[str, float]:
+        """relMSE, by FIGURES; 0 for caustics where there are none."""
+        pixels = ((np.asarray(picture.beauty, np.float64) - self.truth) ** 2 * self.scale).mean(2)
+        some = pixels[self.mask] if self.mask.any() else np.zeros(1)
+        return {
+            "whole": float(pixels.mean()),
+            "whole_trimmed": trimmed_mean(pixels, TRIMMED_SHARE),
+            "caustics": float(some.mean()),
+            "caustics_trimmed": trimmed_mean(some, TRIMMED_SHARE),
+        }
+
+
+def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
+    """All figures of one stage."""
+    stage = Stage(name, options)
+    spp = {way: stage.samples(way) for way in options.ways}
+    seconds: dict[str, list[float]] = {way: [] for way in options.ways}
+    costs: dict[str, dict[str, list[float]]] = {
+        way: {figure: [] for figure in FIGURES} for way in options.ways
+    }
+    facts: dict[str, Any] = {}
+    for turn in range(options.rounds):
+        first = turn % len(options.ways)
+        for way in options.ways[first:] + options.ways[:first]:
+            picture, took = stage.render(spp[way], turn, **WAYS[way])
+            seconds[way].append(took)
+            for figure, error in stage.errors(picture).items():
+                costs[way][figure].append(error * took)
+            stats = picture.stats
+            facts[way] = {"transport": stats["transport"], "light_aiming": stats["light_aiming"]}
+    ways = {}
+    for way in options.ways:
+        efficiency = {}
+        for figure in FIGURES:
+            base, own = costs[options.ways[0]][figure], costs[way][figure]
+            if min(own) > 0.0:
+                efficiency[figure] = ratio(base, own)
+                # Of all rounds together, which one lucky round says little of.
+                efficiency[figure]["of_means"] = float(np.mean(base) / np.mean(own))
+        ways[way] = {
+            "spp": spp[way], "seconds": summary(seconds[way]), "efficiency": efficiency,
+            "error_seconds": costs[way], **facts[way],
+        }  # fmt: skip
+    return {"caustic_share": float(stage.mask.mean()), "ways": ways}
+
+
+def main() -> None:
+    """Runs the sitting."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("stages", nargs="*", default=list(STAGES), help="of: " + " ".join(STAGES))
+    parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=list(WAYS))
+    parser.add_argument("--size", type=int, nargs=2, default=[320, 240])
+    parser.add_argument("--seconds", type=float, default=10.0, help="of a render")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--reference", type=int, default=8192, help="samples a pixel")
+    parser.add_argument("--triangles", type=int, default=1_000_000)
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "caustics", help="of stages")
+    parser.add_argument("--output", type=Path, default=RESULTS / "caustics.json")
+    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    options = parser.parse_args()
+    if options.quick:
+        options.size, options.seconds, options.reference = [64, 48], 0.3, 256
+        options.triangles, options.output = 20_000, options.folder / "caustics.json"
+    results: dict[str, Any] = {}
+    for name in options.stages:
+        results[name] = measure(name, options)
+        for way, row in results[name]["ways"].items():
+            said = [
+                f"{figure} {show(row['efficiency'][figure], 2)}" for figure in row["efficiency"]
+            ]
+            print(f"{name:10} {way:8} {row['spp']:5} spp  " + ", ".join(said), flush=True)
+        content = {
+            "size": options.size, "rounds": options.rounds, "seconds": options.seconds,
+            "reference_spp": options.reference, "triangles": options.triangles, "stages": results,
+        }  # fmt: skip
+        write_result(options.output, "wavecomb-caustics/1", content)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/learn/aim_targets.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace wavecomb {
+namespace {
+
+/// `count` places around one, each of `worth`.
+void add_places(std::vector<AimLesson>& lessons, int count, float x, float spread, float worth) {
+  std::mt19937 random(static_cast<uint32_t>(lessons.size()) + 1);
+  std::uniform_real_distribution<float> off(-spread, spread);
+  for (int i = 0; i < count; ++i)
+    lessons.push_back({x + off(random), off(random), off(random), worth});
+}
+
+TEST(AimTargets, AreSmallWhereTheLightComesFrom) {
+  std::vector<AimLesson> lessons;
+  add_places(lessons, 300, -20, 0.05f, 1);
+  add_places(lessons, 300, 40, 3, 1);
+  add_places(lessons, 2000, 0, 90, 0);
+  const LightAim aim = aim_targets(lessons, 100);
+  ASSERT_GE(aim.count, 2u);
+  double small = 0, all = aim.even;
+  for (uint32_t k = 0; k < aim.count; ++k) {
+    all += aim.share[k];
+    if (aim.x[k] < 0) {
+      small += aim.share[k];
+      EXPECT_LT(aim.radius[k], 0.2f);
+    } else {
+      EXPECT_LT(aim.radius[k], 8);
+    }
+    EXPECT_NEAR(aim.end[k], all, 1e-6);
+  }
+  EXPECT_NEAR(all, 1, 1e-6);
+  EXPECT_NEAR(small, 0.5 * (1 - aim.even), 1e-5);
+  for (const AimLesson& l : lessons) {
+    bool within = l.worth == 0;
+    for (uint32_t k = 0; k < aim.count; ++k)
+      within |= std::hypot(l.x - aim.x[k], l.y - aim.y[k], l.z - aim.z[k]) <= aim.radius[k];
+    EXPECT_TRUE(within);
+  }
+}
+
+TEST(AimTargets, DoNotDependOnHowBrightTheLightIs) {
+  std::vector<AimLesson> lessons;
+  add_places(lessons, 500, 3, 1, 0.3f);
+  add_places(lessons, 50, 9, 0.2f, 2);
+  const LightAim dark = aim_targets(lessons, 20);
+  for (AimLesson& l : lessons) l.worth *= 0x1p20f;
+  const LightAim bright = aim_targets(lessons, 20);
+  ASSERT_EQ(dark.count, bright.count);
+  for (uint32_t k = 0; k < dark.count; ++k) {
+    EXPECT_EQ(dark.x[k], bright.x[k]);
+    EXPECT_EQ(dark.radius[k], bright.radius[k]);
+    EXPECT_EQ(dark.share[k], bright.share[k]);
+  }
+}
+
+TEST(AimTargets, AreNoneWhereNothingWasFound) {
+  EXPECT_EQ(aim_targets({}, 1).count, 0u);
+  std::vector<AimLesson> lessons;
+  add_places(lessons, 100, 0, 1, 0);
+  lessons.push_back({0, 0, 0, std::numeric_limits<float>::infinity()});
+  EXPECT_EQ(aim_targets(lessons, 1).count, 0u);
+}
+
+TEST(AimTargets, AreOneSphereWhereAllIsOnePlace) {
+  const std::vector<AimLesson> lessons(64, AimLesson{1, 2, 3, 1});
+  const LightAim aim = aim_targets(lessons, 10);
+  ASSERT_EQ(aim.count, 1u);
+  EXPECT_GT(aim.radius[0], 0);
+  EXPECT_FLOAT_EQ(aim.y[0], 2);
+}
+
+}  // namespace
+}  // namespace wavecomb
