@@ -217,9 +217,7 @@ def test_two_halves_merge_to_the_whole(tmp_path: Path) -> None:
     stage = write(tmp_path, CAMERA + cards)
     whole = _render(stage, aovs=["alpha", "deep", "lpe:background=CB"])
     halves = [_render(stage, mask=[f"/{name}"]) for name in "AB"]
-    files = [
-        str(half.save_deep(tmp_path / f"{k}.exr", half=False)) for k, half in enumerate(halves)
-    ]
+    files = [str(half.save_deep(tmp_path / f"{k}.exr")) for k, half in enumerate(halves)]
     merged = oiio.ImageBufAlgo.deep_merge(*map(oiio.ImageBuf, files))
     assert not merged.has_error, merged.geterror()
     found, wanted = _flattened(merged), _flat_of(whole)

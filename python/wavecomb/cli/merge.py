@@ -60,8 +60,9 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
         check_writable(name)
     merged = merge(pictures)
     written = save_layers(
-        output, merged.layers, merged.metadata, merged.manifests, **layers.file_options()
-    )
+        output, merged.layers, merged.metadata, merged.manifests, window=merged.window,
+        **layers.file_options(),
+    )  # fmt: skip
     if png is not None:
         working = str(merged.metadata.get("wavecomb:working_space", "rec709"))
         write_png(png, to_rec709(merged.layers["beauty"], working))

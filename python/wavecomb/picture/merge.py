@@ -53,12 +53,14 @@ class Merged:
         metadata: For the header.
         manifests: Cryptomatte level -> name -> id.
         seeds: Of all pictures in it.
+        window: Where the pixels lie, as ``write_exr`` takes it; None: they are what is shown.
     """
 
     layers: dict[str, NDArray[Any]]
     metadata: dict[str, Any]
     manifests: dict[str, dict[str, int]] = field(default_factory=dict)
     seeds: tuple[int, ...] = ()
+    window: tuple[int, int, int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,19 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
         for level, manifest in manifests.items():
             names.setdefault(level, {}).update(manifest)
     all_seeds = tuple(seeds)
-    return Merged(_means(sums, pairs), _metadata(sources, all_seeds), names, all_seeds)
+    metadata, beyond = _metadata(sources, all_seeds), _overscan(first)
+    height, width = sums["samples"].shape[:2]
+    window = (-beyond, -beyond, width - 2 * beyond, height - 2 * beyond) if beyond else None
+    return Merged(_means(sums, pairs), metadata, names, all_seeds, window)
+
+
+def _overscan(source: _Source) -> int:
+    """Of a picture whose size is what its settings say; raises WavecombError for none such."""
+    beyond = source.settings.get("overscan", 0)
+    edges = [source.settings.get(name) for name in ("width", "height")]
+    if isinstance(beyond, int) and all(isinstance(e, int) and 0 <= 2 * beyond < e for e in edges):
+        return beyond
+    raise WavecombError(f"{source.name}: its overscan is no good: the file is damaged")
 
 
 def _source(name: str) -> _Source:
@@ -152,6 +166,8 @@ def _check_fit(first: _Source, other: _Source) -> None:
         a, b = (str(source.attributes.get(key, "")) for source in (first, other))
         if os.path.basename(a) != os.path.basename(b):
             refuse(what, a or "unknown", b or "unknown")
+    if _overscan(first) != _overscan(other):
+        refuse("overscan", _overscan(first), _overscan(other))
     scenes: list[Any] = [source.attributes.get("wavecomb:scene") for source in (first, other)]
     if not np.array_equal(*scenes):  # what a file says may be an array
         raise WavecombError(
