@@ -130,6 +130,23 @@ def test_instances_of_models_and_siblings(tmp_path):
     assert scene.mesh("I3")["positions"][:, 0].max() == 4
 
 
+def test_models_in_prototypes_and_values_of_other_types(tmp_path, card):
+    wrong = cards("cross", "XPos").replace("float3 model:drawModeColor = (0.5, 0.25, 0.125)", "")
+    wrong += '\nstring model:drawModeColor = "red"\nstring model:cardTextureYPos = "none"'
+    text = f"""class Xform "Proto" ( kind = "group" ) {{ {model(wrong)} }}
+    def "I" (
+        references = </Proto>
+        instanceable = true
+    ) {{ }}
+    def "J" (
+        references = </Proto>
+        instanceable = true
+    ) {{ }}"""
+    scene, loaded = load(tmp_path, text)
+    names = [mesh["name"] for mesh, _, _ in scene.world_meshes()]
+    assert names == ["/I/Car", "/I/Car"] and not loaded.report.warnings
+
+
 def test_what_of_draw_modes_is_not_done(tmp_path, card):
     _, loaded = load(tmp_path, model(cards("fromTexture", "XPos")))
     assert "not supported: cards of geometry fromTexture (drawn as a cross): /Car" in said(loaded)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.looks.network import word
+from wavecomb.usd.looks.network import colour, word
 from wavecomb.usd.stage.report import LoadReport
 
 MODES = ("origin", "bounds", "cards")
@@ -80,6 +80,12 @@ class DrawModes:
         self._report.note(f"models drawn as {mode}", prim.GetPath())
         if self._stage is None:
             self._stage = Usd.Stage.CreateInMemory()
+        made = self._made(prim, mode)
+        if made is not None:
+            Usd.ModelAPI(made.prim).SetKind(Usd.ModelAPI(prim).GetKind())  # as assets have it
+        return made
+
+    def _made(self, prim: Usd.Prim, mode: str) -> StandIn | None:
         if mode == "origin":
             axes = np.eye(3)
             lines = [(np.zeros(3), axis) for axis in axes]
@@ -91,6 +97,10 @@ class DrawModes:
         if mode == "bounds":
             return self._bounds(prim, box)
         return self._cards(prim, box)
+
+    def _path(self, prim: Usd.Prim) -> Sdf.Path:
+        """Where a model's stand-in is; of one in a prototype, in the first instance of that."""
+        return Sdf.Path(self._report.place(prim.GetPath()))
 
     def _extent(self, prim: Usd.Prim) -> np.ndarray | None:
         """(2, 3) of a model in its own space."""
@@ -108,7 +118,7 @@ class DrawModes:
     def _colour(self, prim: Usd.Prim) -> Gf.Vec3f:
         attribute = prim.GetAttribute("model:drawModeColor")
         value = attribute.Get(self._time) if attribute else None
-        return Gf.Vec3f(0.18) if value is None else Gf.Vec3f(value)
+        return Gf.Vec3f(*colour(value, (0.18, 0.18, 0.18)))
 
     def _bounds(self, prim: Usd.Prim, box: np.ndarray) -> StandIn:
         corners = [np.array([box[i >> k & 1, k] for k in range(3)]) for i in range(8)]
@@ -119,7 +129,7 @@ class DrawModes:
         return self._lines(prim, lines, [self._colour(prim)], thick)
 
     def _lines(self, prim: Usd.Prim, lines: list, colours: list, width: float) -> StandIn:
-        curves = UsdGeom.BasisCurves.Define(self._stage, prim.GetPath())
+        curves = UsdGeom.BasisCurves.Define(self._stage, self._path(prim))
         curves.CreateTypeAttr("linear")
         curves.CreatePointsAttr([Gf.Vec3f(*map(float, p)) for line in lines for p in line])
         curves.CreateCurveVertexCountsAttr([2] * len(lines))
@@ -163,7 +173,7 @@ class DrawModes:
                 point[up] = box[int(v), up]
                 points.append(Gf.Vec3f(*map(float, point)))
                 uvs.append(Gf.Vec2f(1 - u if mirrored else u, v))
-        mesh = UsdGeom.Mesh.Define(self._stage, prim.GetPath())
+        mesh = UsdGeom.Mesh.Define(self._stage, self._path(prim))
         mesh.CreateSubdivisionSchemeAttr("none")
         mesh.CreatePointsAttr(points)
         mesh.CreateFaceVertexCountsAttr([4] * len(faces))
@@ -175,13 +185,13 @@ class DrawModes:
         for place, number in enumerate(faces):
             own = textures.get(number) or textures.get((number + 3) % 6)
             subset = UsdGeom.Subset.Define(
-                self._stage, prim.GetPath().AppendChild(f"card{_CARDS[number]}")
+                self._stage, mesh.GetPath().AppendChild(f"card{_CARDS[number]}")
             )
             subset.CreateElementTypeAttr("face")
             subset.CreateIndicesAttr([place])
             subsets.append(subset.GetPrim())
             name = f"cardLook{_CARDS[number]}"
-            materials.append(self._look(prim.GetPath().AppendChild(name), own, self._colour(prim)))
+            materials.append(self._look(mesh.GetPath().AppendChild(name), own, self._colour(prim)))
         return StandIn(mesh.GetPrim(), "mesh", tuple(subsets), tuple(materials))
 
     def _look(self, path: Sdf.Path, texture: str | None, colour: Gf.Vec3f) -> UsdShade.Material:
