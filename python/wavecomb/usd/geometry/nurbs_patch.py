@@ -109,6 +109,8 @@ class PatchReader:
         points = as_array(points_now(prim, self.time))
         if points is None or len(points) == 0:
             return None
+        if points.shape[1] != 3:
+            raise MeshError("points are not triples")
         axes = self._axes(prim, len(points))
         weights = as_array(prim.GetAttribute("pointWeights").Get(self.time))
         if weights is not None and weights.shape != (len(points), 1):
@@ -189,11 +191,13 @@ class PatchReader:
             primvar = next((p for p in found if p is not None), None)
             if primvar is not None:
                 values = primvar.values[:, :2]
-                if values.shape == (len(heavy), 2):
+                if values.shape == (len(heavy), 2) and np.isfinite(values).all():
                     at = _blend(axes, np.concatenate([values * heavy, heavy], axis=1))[0]
                     return np.ascontiguousarray(at[..., :2] / at[..., 2:], np.float32)
                 if len(values) != 1:
-                    what = f"{primvar.name} is not of its control points: u and v in its place"
+                    what = (
+                        f"{primvar.name} is not of its control points, finite: u and v in its place"
+                    )
                     self.report.warn(what, prim.GetPath())
         except PrimvarError as error:
             self.report.warn(f"{error}: ignored", prim.GetPath())

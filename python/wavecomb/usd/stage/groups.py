@@ -138,6 +138,11 @@ class GroupBuilder:
             self.volumes.add(group, draw, scope)
         group.holds_placed = group.holds_placed or bool(group.lights or group.volumes)
         self.found += len(found.draws)
+        for draw in found.stand_ins:
+            for material in draw.subset_materials:
+                if material is not None:
+                    self.materials.expect(material)
+            self._draw(group, draw, scope)
         for draw in found.draws:
             self._draw(group, draw, scope)
             self.drawn += 1

@@ -13,6 +13,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdVol
 
 from wavecomb.usd.geometry.faces import TETRAHEDRA
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
+from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import SHAPES
 from wavecomb.usd.geometry.shutter import Motion, Track
 from wavecomb.usd.geometry.skeleton import Skeletons
@@ -21,6 +22,7 @@ from wavecomb.usd.lights.light import Light, LightReader
 from wavecomb.usd.looks.assign import Draw, Parent
 from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.looks.network import word
+from wavecomb.usd.stage.draw_modes import DrawModes
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.ray_visibility import NAMES as RAY_NAMES
 from wavecomb.usd.stage.ray_visibility import RayVisibility
@@ -56,6 +58,7 @@ class Gathered:
     instances: list[Placed] = field(default_factory=list)
     instancers: list[Placed] = field(default_factory=list)
     lights: list[tuple[Light, Matrices]] = field(default_factory=list)
+    stand_ins: list[Draw] = field(default_factory=list)
 
 
 class Traversal:
@@ -81,6 +84,7 @@ class Traversal:
         self.rays = rays
         self.skeletons = Skeletons(report)
         self.xforms = UsdGeom.XformCache(time)
+        self.modes = DrawModes(time, report)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
         self._names: dict[tuple[str, ...], frozenset[str]] = {}
@@ -133,14 +137,17 @@ class Traversal:
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
         # (prim, transform of its parent, its track, purpose, inherited primvars, predicate for its
-        # children, its parent)
+        # children, its parent, draw mode)
         stack: list[
-            tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None]
+            tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]
-        stack = [(prim, IDENTITY, None, purpose, (), predicate, None) for prim in reversed(roots)]
+        stack = [
+            (prim, IDENTITY, None, purpose, (), predicate, None, "default")
+            for prim in reversed(roots)
+        ]
         kinds, has_instances = self._kinds, bool(roots and roots[0].GetStage().GetPrototypes())
         while stack:
-            prim, matrix, track, purpose, inherited, pick, parent = stack.pop()
+            prim, matrix, track, purpose, inherited, pick, parent, mode = stack.pop()
             type_name = prim.GetTypeName()
             kind = kinds.get(type_name) or self.kind(prim)
             if kind == "shading":
@@ -170,7 +177,13 @@ class Traversal:
                         matrix = own
                     elif own != IDENTITY:
                         matrix = own * matrix
+                if "model:drawMode" in names:
+                    mode = self.modes.mode(prim, mode)
             shown = purpose in self.purposes
+            if mode != "default" and self.modes.applies(prim):
+                if shown:
+                    self._stand_in(found, prim, mode, matrix, track)
+                continue
             if has_instances and prim.IsInstance():
                 prototype = prim.GetPrototype()
                 if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
@@ -221,8 +234,19 @@ class Traversal:
             if children:
                 above = Parent(prim)
                 for child in reversed(children):
-                    stack.append((child, matrix, track, purpose, inherited, pick, above))
+                    stack.append((child, matrix, track, purpose, inherited, pick, above, mode))
         return found
+
+    def _stand_in(
+        self, found: Gathered, prim: Usd.Prim, mode: str, matrix: Gf.Matrix4d, track: Track | None
+    ) -> None:
+        """Adds what is drawn in place of a model."""
+        made = self.modes.stand_in(prim, mode)
+        if made is not None:
+            names = authored_names(made.prim)
+            looks: list[UsdShade.Material | None] = list(made.materials)
+            draw = Draw(made.prim, matrix, (), made.subsets, None, looks, track, names, made.kind)
+            found.stand_ins.append(draw)
 
     def _shared(self, prototype: Usd.Prim) -> bool:
         """Whether a prototype has several instances; one alone is drawn as if it were none."""
