@@ -230,7 +230,7 @@ def test_notes_are_filtered(edits):
     assert "not supported: GeometryLight: /World/Things/Dust" in lines
     shown = NotesFilter()
     shown.setSourceModel(model)
-    shown.set("", "nurbs")
+    shown.set("", "geometryl")
     assert shown.rowCount() == 1
     assert shown.index(0, 0).data(ToneRole) == "error"
     shown.set("note", "nurbs")

@@ -336,7 +336,7 @@ def test_notes(panel, qtbot):
     rows = [(one.kind, one.what, one.place) for one in notes.model.rows]
     assert ("not supported", "GeometryLight", "/World/Things/Dust") in rows
     assert panel.tabs.tabText(3) == "Notes (1)"
-    QTest.keyClicks(notes.field, "nurbs")
+    QTest.keyClicks(notes.field, "geometryl")
     assert notes.view.model().rowCount() == 1 and notes.count.text().startswith("1 of")
     index = notes.view.model().index(0, 1)
     click(notes.view, index)

@@ -61,8 +61,8 @@ template <typename Bsdf, typename F>
   if constexpr (Bsdf::kWalks) {
     using U = UInt<F>;
     const Mask<F> enters = bsdf.enters(wo, frame.to_local(next));
-    aovs.bounce.event = select(Mask<U>(enters), U(static_cast<uint32_t>(PathEvent::kBelow)),
-                               aovs.bounce.event);
+    aovs.bounce.event =
+        select(Mask<U>(enters), U(static_cast<uint32_t>(PathEvent::kBelow)), aovs.bounce.event);
   }
 }
 
