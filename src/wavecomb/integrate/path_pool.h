@@ -26,8 +26,8 @@ struct PathRow {
   F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
   SampleKey<F> key;
-  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray; below a surface, of
-                     ///< which instance
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray; below a surface,
+                     ///< object_of what it is below
   WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
 };
 

@@ -2,7 +2,7 @@
 /// Random walks below surfaces, in even media, collision by collision.
 ///
 /// A walk begins where a diffuse lobe leads below a surface (OpenPbrBsdf::enters) and ends where it
-/// meets the surface of the same instance from below: there a white diffuse surface takes over,
+/// meets the surface of the same object from below: there a white diffuse surface takes over,
 /// seen from outside, with its light samples and its bounce. Nothing is refracted at either end.
 /// So light that arrives evenly leaves evenly, and a flat wall has the colour that is asked for
 /// (scene/walk_data.h).
