@@ -333,7 +333,7 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
         elif name == "variants":
             out[name] = selections(value)
         elif name == "lens_settings":
-            out[name] = _named_values(row.option, value)
+            out[name] = _named_values(row.option, (text.partition("=") for text in value))
         elif name == "purposes":
             out[name] = tuple(dict.fromkeys(("default", *value)))
         else:
@@ -343,23 +343,19 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-def _named_values(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """NAME=VALUE ... as a mapping. Raises WavecombError."""
+def _named_values(
+    option: str, parts: Iterable[tuple[str, str, str]], form: str = "NAME=VALUE"
+) -> dict[str, str]:
+    """Texts, parted at an equals sign, as a mapping. Raises WavecombError."""
     values: dict[str, str] = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
+    for name, equals, value in parts:
         if not (name and equals and value):
-            raise WavecombError(f"{option} {text}: must be NAME=VALUE")
+            raise WavecombError(f"{option} {name}{equals}{value}: must be {form}")
         values[name] = value
     return values
 
 
 def selections(variants: Sequence[str]) -> dict[str, str]:
     """PRIM{SET}=NAME ... as a mapping. Raises WavecombError."""
-    chosen: dict[str, str] = {}
-    for text in variants:
-        key, equals, value = text.rpartition("=")
-        if not (key and equals and value):
-            raise WavecombError(f"--variant {text}: must be PRIM{{SET}}=NAME or SET=NAME")
-        chosen[key] = value
-    return chosen
+    parts = (text.rpartition("=") for text in variants)
+    return _named_values("--variant", parts, "PRIM{SET}=NAME or SET=NAME")

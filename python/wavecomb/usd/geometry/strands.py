@@ -78,6 +78,21 @@ class Strands:
         return self.wrap == "periodic"
 
     @property
+    def _step(self) -> int:
+        """Control points from one segment to the next."""
+        return 3 if self.cubic else 1
+
+    @property
+    def _lead(self) -> int:
+        """Control points of closed curves before the first segment, and behind the last."""
+        return 1 if self.periodic else 0
+
+    @property
+    def _run_sizes(self) -> Index:
+        """(k,) control points of each curve."""
+        return self._step * self.segments + 1 + 2 * self._lead
+
+    @property
     def count(self) -> int:
         """Segments of all curves."""
         return int(self.segments.sum())
@@ -108,8 +123,8 @@ class Strands:
 
     def segment_words(self) -> NDArray[np.uint32]:
         """(count,) first control point of each segment, with flags."""
-        step, lead = (3 if self.cubic else 1), (1 if self.periodic else 0)
-        sizes = step * self.segments + 1 + 2 * lead
+        step, lead = self._step, self._lead
+        sizes = self._run_sizes
         base = np.cumsum(sizes) - sizes + lead
         curve, at = runs(self.segments)
         words = (base[curve] + step * at).astype(np.uint32)
@@ -143,9 +158,7 @@ class Strands:
         return self._pack(points)
 
     def _controls_by_parts(self, values: NDArray[Any], kind: str) -> Array:
-        lead = 1 if self.periodic else 0
-        sizes = (3 if self.cubic else 1) * self.segments + 1 + 2 * lead
-        out = np.empty((int(sizes.sum()), values.shape[1]), np.float32)
+        out = np.empty((int(self._run_sizes.sum()), values.shape[1]), np.float32)
         part = np.cumsum(self.segments) // _AT_ONCE
         firsts = np.flatnonzero(np.diff(part, prepend=-1))
         at = 0
@@ -236,8 +249,8 @@ class Strands:
 
         Closed curves have one more at either end.
         """
-        step, lead = len(points) - 1, (1 if self.periodic else 0)
-        sizes = step * self.segments + 1 + 2 * lead
+        step, lead = self._step, self._lead
+        sizes = self._run_sizes
         base = np.cumsum(sizes) - sizes + lead
         curve, at = runs(self.segments)
         out = np.empty((int(sizes.sum()), points[0].shape[1]), np.float32)

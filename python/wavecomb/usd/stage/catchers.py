@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from pxr import Sdf, Usd
 
 from wavecomb import _core
@@ -15,6 +17,13 @@ IGNORED = {
     "bare": frozenset({"holdout", "shadow", "bounces"}),
 }
 """Kinds of rays of which prims have no say, by ``LoadOptions.catch``."""
+
+
+def check_there(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:
+    """Raises WavecombError for a path of an option that leads to no prim."""
+    for path in paths:
+        if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
+            raise WavecombError(f"{option} {path}: there is no such prim")
 
 
 def set_catchers(
@@ -31,9 +40,7 @@ def set_catchers(
     Raises:
         WavecombError: A path that an option gives leads to no prim.
     """
-    for path in options.catchers:
-        if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
-            raise WavecombError(f"--catcher {path}: there is no such prim")
+    check_there(stage, "--catcher", options.catchers)
     paths = tuple(dict.fromkeys((*authored, *options.catchers)))
     if not paths:
         return ()

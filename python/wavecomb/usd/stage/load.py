@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
 from wavecomb.load_options import LoadOptions
@@ -41,7 +41,7 @@ from wavecomb.usd.looks.material import MaterialTable
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.looks.texture_cache import TextureCache
 from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
-from wavecomb.usd.stage.catchers import IGNORED, set_catchers
+from wavecomb.usd.stage.catchers import IGNORED, check_there, set_catchers
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.stage.frame_cache import FrameCache
@@ -360,9 +360,8 @@ def _strand_detail(
 
 def _hold_out(stage: Usd.Stage, paths: tuple[str, ...], builder: _core.SceneBuilder) -> None:
     """Makes holdouts of prims. Raises WavecombError for a path that leads to none."""
+    check_there(stage, "--holdout", paths)
     for path in paths:
-        if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
-            raise WavecombError(f"--holdout {path}: there is no such prim")
         builder.add_visibility(path, {"holdout": True})
 
 
