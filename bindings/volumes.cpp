@@ -12,6 +12,7 @@
 #include "scene_values.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/walk_data.h"
 
 namespace nb = nanobind;
 using namespace wavecomb;
@@ -89,6 +90,7 @@ void bind_volumes(nb::module_& m) {
            "name"_a = "")
       .def_prop_ro("bricks", [](const PlacedVoxels& g) { return g.field.grid->brick_count(); })
       .def_prop_ro("bytes", [](const PlacedVoxels& g) { return g.field.grid->bytes(); });
+  m.def("walk_albedo", &single_albedo, "color"_a, "anisotropy"_a);
 }
 
 void def_volumes(nb::class_<SceneBuilder>& builder) {

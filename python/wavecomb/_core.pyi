@@ -868,6 +868,9 @@ def run_graph(
     ``lanes``: 1 or 16; the results are alike. Raises Error for a graph that reads what
     is not there."""
 
+def walk_albedo(color: float, anisotropy: float) -> float:
+    """The albedo of a single collision that gives a half-space a colour under even light."""
+
 def crypto_id(name: str) -> int:
     """A name's id in a Cryptomatte: MurmurHash3 32 with seed 0, made a usual float."""
 

@@ -10,6 +10,7 @@
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/embree_hierarchy.h"
 #include "wavecomb/accel/triangle_list.h"
+#include "wavecomb/curve/clumps.h"
 
 namespace wavecomb {
 namespace {
@@ -57,6 +58,16 @@ uint32_t widest_packet(RTCDevice device) {
   return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED) ? 4 : 1;
 }
 
+/// Whether more than half of a scene's faces and segments are segments of curves.
+bool is_mostly_hair(const Scene& scene) {
+  size_t segments = 0, all = 0;
+  for (const Mesh& mesh : scene.meshes()) {
+    all += mesh.primitive_count();
+    if (CurveClumps::serve(mesh)) segments += mesh.primitive_count();
+  }
+  return 2 * segments > all;
+}
+
 }  // namespace
 
 /// What rays are traced with: the hierarchy, and what this scene's own materials say.
@@ -68,6 +79,7 @@ struct EmbreeAccelerator::Impl {
   uint32_t first_world, first_light;         ///< EmbreeHierarchy's
   uint32_t native;                           ///< rays of the widest native packet
   std::unique_ptr<const TriangleList> list;  ///< in place of the hierarchy where the scene is small
+  bool is_hair;                              ///< most of the scene are strands
 
   Impl(std::shared_ptr<const Scene> of, std::shared_ptr<const EmbreeHierarchy> built)
       : scene(std::move(of)),
@@ -77,7 +89,8 @@ struct EmbreeAccelerator::Impl {
         first_world(hierarchy->first_world()),
         first_light(hierarchy->first_light()),
         native(widest_packet(hierarchy->device())),
-        list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr) {}
+        list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr),
+        is_hair(is_mostly_hair(*scene)) {}
 
   /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
@@ -194,9 +207,10 @@ struct EmbreeAccelerator::Impl {
   /// Rays per packet. Packets that are not native Embree takes apart itself, and calls filters with
   /// one ray, whose place in the packet they cannot know. It inverts the transform of a moving
   /// instance by other operations for a packet than for a ray alone, and so hits differ: there each
-  /// ray is alone.
-  uint32_t packet(uint32_t width) const {
-    return view.motion.instances ? 1 : std::min(width, native);
+  /// ray is alone. So it is among strands, where rays that part soon have no box in common.
+  uint32_t packet(uint32_t width, bool coherent, const PresenceKeys& keys) const {
+    const bool parts = is_hair && !coherent && !keys.object;
+    return parts || view.motion.instances ? 1 : std::min(width, native);
   }
 
   static RTCRay load_ray(const RaySpan& rays, size_t i) {
@@ -238,9 +252,10 @@ EmbreeAccelerator::~EmbreeAccelerator() = default;
 void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width,
                                   bool coherent, const PresenceKeys& keys) const {
   if (impl_->list)
-    return impl_->list->intersect(impl_->view, rays, hits, impl_->packet(width), keys);
+    return impl_->list->intersect(impl_->view, rays, hits, impl_->packet(width, coherent, keys),
+                                  keys);
   coherent = coherent && !impl_->view.has_motion;
-  switch (impl_->packet(width)) {
+  switch (impl_->packet(width, coherent, keys)) {
     case 16:
       return impl_->intersect_packets<16>(rays, hits, coherent, keys);
     case 8:
@@ -256,7 +271,8 @@ void EmbreeAccelerator::intersect(const RaySpan& rays, const HitSpan& hits, uint
 void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width,
                                  bool coherent, const PresenceKeys& keys) const {
   if (impl_->list)
-    return impl_->list->occluded(impl_->view, rays, occluded, impl_->packet(width), keys);
+    return impl_->list->occluded(impl_->view, rays, occluded, impl_->packet(width, coherent, keys),
+                                 keys);
   QueryContext context;
   rtcInitRayQueryContext(&context.base);
   context.scene = &impl_->view;
@@ -266,7 +282,7 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
   rtcInitOccludedArguments(&args);
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
   args.context = &context.base;
-  switch (impl_->packet(width)) {
+  switch (impl_->packet(width, coherent, keys)) {
     case 16:
       return impl_->occluded_packets<16>(rays, occluded, args);
     case 8:

@@ -16,7 +16,8 @@ namespace {
 using ClumpLanes = FloatP<CurveClumps::kPieces>;
 
 constexpr float kCells = 65535.f;
-constexpr float kSlender = 32.f;  ///< length over radius above which segments are halved
+constexpr float kLargestCell = 65000.f;  ///< less than that by what rounding adds
+constexpr float kSlender = 32.f;         ///< length over radius above which segments are halved
 constexpr size_t kManySegments = size_t{1} << 20;
 constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
 
@@ -83,49 +84,37 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment) {
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-/// A piece's number, and the middle of its line, twice.
+/// A segment or a piece, and the middle of its line, twice.
 struct ClumpEntry {
   std::array<float, 3> middle;
-  uint32_t piece;
+  uint32_t number;
 };
 
-/// Calls work(i) for each i below the end, parts of them side by side.
+ClumpEntry entry_of(const Mesh& mesh, uint32_t piece, uint32_t number) {
+  const ClumpPiece line = piece_of(mesh, piece);
+  const Vec3<float> m = line.a + line.b;
+  return {{m.x, m.y, m.z}, number};
+}
+
+/// Calls work(i) for each i below the end, side by side but for so many at a time.
 template <typename Work>
-void over_all(size_t first, size_t end, const CurveClumps::Both& both, const Work& work) {
-  constexpr size_t kMost = 1u << 14;
-  if (end - first > kMost) {
+void over_all(size_t first, size_t end, size_t grain, const CurveClumps::Both& both,
+              const Work& work) {
+  if (end - first > grain) {
     const size_t middle = first + (end - first) / 2;
-    return both([&] { over_all(first, middle, both, work); },
-                [&] { over_all(middle, end, both, work); });
+    return both([&] { over_all(first, middle, grain, both, work); },
+                [&] { over_all(middle, end, grain, both, work); });
   }
   for (size_t i = first; i < end; ++i) work(i);
 }
 
-std::vector<ClumpEntry> pieces_of(const Mesh& mesh, const CurveClumps::Both& both) {
-  const size_t segments = mesh.indices.size();
-  std::vector<uint32_t> end(segments);
-  over_all(0, segments, both,
-           [&](size_t s) { end[s] = 1u << halvings(mesh, static_cast<uint32_t>(s)); });
-  std::partial_sum(end.begin(), end.end(), end.begin());
-  std::vector<ClumpEntry> out(segments > 0 ? end.back() : 0);
-  over_all(0, segments, both, [&](size_t s) {
-    const uint32_t first = s > 0 ? end[s - 1] : 0, n = end[s] - first;
-    for (uint32_t i = 0; i < n; ++i) {
-      const uint32_t number = kPieceNodes * static_cast<uint32_t>(s) + n + i;
-      const ClumpPiece piece = piece_of(mesh, number);
-      const Vec3<float> m = piece.a + piece.b;
-      out[first + i] = {{m.x, m.y, m.z}, number};
-    }
-  });
-  return out;
-}
-
-/// Parts pieces by their middles until each part fills one clump; all but the last are full.
-void part_pieces(std::span<ClumpEntry> pieces, const CurveClumps::Both& both) {
-  constexpr size_t kFull = CurveClumps::kPieces, kMany = 1u << 15;
-  if (pieces.size() <= kFull) return;
-  std::array<float, 3> lo = pieces[0].middle, hi = lo;
-  for (const ClumpEntry& one : pieces)
+/// Parts entries by their middles until each part has no more than `full`, and all but the last
+/// have as many.
+void part_entries(std::span<ClumpEntry> entries, size_t full, const CurveClumps::Both& both) {
+  constexpr size_t kMany = 1u << 15;
+  if (entries.size() <= full) return;
+  std::array<float, 3> lo = entries[0].middle, hi = lo;
+  for (const ClumpEntry& one : entries)
     for (size_t k = 0; k < 3; ++k) {
       lo[k] = std::min(lo[k], one.middle[k]);
       hi[k] = std::max(hi[k], one.middle[k]);
@@ -133,18 +122,29 @@ void part_pieces(std::span<ClumpEntry> pieces, const CurveClumps::Both& both) {
   size_t axis = 0;
   for (size_t k = 1; k < 3; ++k)
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
-  const size_t half = ((pieces.size() + kFull - 1) / kFull + 1) / 2 * kFull;
+  const size_t half = ((entries.size() + full - 1) / full + 1) / 2 * full;
   const auto before = [axis](const ClumpEntry& a, const ClumpEntry& b) {
     const float x = a.middle[axis], y = b.middle[axis];
-    return x != y ? x < y : a.piece < b.piece;
+    return x != y ? x < y : a.number < b.number;
   };
-  std::nth_element(pieces.begin(), pieces.begin() + static_cast<ptrdiff_t>(half), pieces.end(),
+  std::nth_element(entries.begin(), entries.begin() + static_cast<ptrdiff_t>(half), entries.end(),
                    before);
-  const auto first = [&] { part_pieces(pieces.first(half), both); };
-  const auto second = [&] { part_pieces(pieces.subspan(half), both); };
-  if (pieces.size() > kMany) return both(first, second);
+  const auto first = [&] { part_entries(entries.first(half), full, both); };
+  const auto second = [&] { part_entries(entries.subspan(half), full, both); };
+  if (entries.size() > kMany) return both(first, second);
   first();
   second();
+}
+
+/// All segments, those that lie close together side by side.
+std::vector<ClumpEntry> segments_of(const Mesh& mesh, size_t group, const CurveClumps::Both& both) {
+  std::vector<ClumpEntry> out(mesh.indices.size());
+  over_all(0, out.size(), 1u << 14, both, [&](size_t s) {
+    const auto segment = static_cast<uint32_t>(s);
+    out[s] = entry_of(mesh, kPieceNodes * segment + 1, segment);
+  });
+  part_entries(out, group, both);
+  return out;
 }
 
 float clump_size(const float* v) {
@@ -154,14 +154,37 @@ float clump_size(const float* v) {
 }  // namespace
 
 CurveClumps::CurveClumps(const Mesh& mesh, const Both& both) : mesh_(mesh) {
-  std::vector<ClumpEntry> pieces = pieces_of(mesh, both);
-  part_pieces(pieces, both);
-  clumps_.resize((pieces.size() + kPieces - 1) / kPieces);
-  over_all(0, clumps_.size(), both, [&](size_t c) {
-    std::array<uint32_t, kPieces> numbers;
-    const size_t n = std::min<size_t>(kPieces, pieces.size() - c * kPieces);
-    for (size_t k = 0; k < n; ++k) numbers[k] = pieces[c * kPieces + k].piece;
-    clumps_[c] = make(numbers.data(), static_cast<uint32_t>(n));
+  // Pieces are made group by group, so that few of them are there at a time.
+  constexpr size_t kGroup = 1u << 16;
+  const std::vector<ClumpEntry> segments = segments_of(mesh, kGroup, both);
+  const size_t groups = (segments.size() + kGroup - 1) / kGroup;
+  const auto group = [&](size_t g) {
+    return std::span(segments).subspan(g * kGroup, std::min(kGroup, segments.size() - g * kGroup));
+  };
+  std::vector<size_t> first(groups + 1, 0);
+  over_all(0, groups, 1, both, [&](size_t g) {
+    size_t pieces = 0;
+    for (const ClumpEntry& s : group(g)) pieces += size_t{1} << halvings(mesh, s.number);
+    first[g + 1] = (pieces + kPieces - 1) / kPieces;
+  });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  clumps_.resize(first.back());
+  over_all(0, groups, 1, both, [&](size_t g) {
+    std::vector<ClumpEntry> pieces;
+    for (const ClumpEntry& s : group(g)) {
+      const uint32_t n = 1u << halvings(mesh, s.number);
+      for (uint32_t i = n; i < 2 * n; ++i) {
+        const uint32_t number = kPieceNodes * s.number + i;
+        pieces.push_back(entry_of(mesh, number, number));
+      }
+    }
+    part_entries(pieces, kPieces, both);
+    for (size_t at = 0, c = first[g]; at < pieces.size(); at += kPieces, ++c) {
+      std::array<uint32_t, kPieces> numbers;
+      const size_t n = std::min<size_t>(kPieces, pieces.size() - at);
+      for (size_t k = 0; k < n; ++k) numbers[k] = pieces[at + k].number;
+      clumps_[c] = make(numbers.data(), static_cast<uint32_t>(n));
+    }
   });
 }
 
@@ -175,12 +198,13 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
     box.add(pieces[k].b);
     out.segment[k] = k < n ? first[k] / kPieceNodes : kNone;
   }
-  const Vec3<float> step = (box.hi - box.lo) * (1.f / kCells);
+  float size = max_component(Vec3<float>(box.hi - box.lo));
+  for (const ClumpPiece& piece : pieces) size = std::max(size, 1.001f * piece.radius);
   out.low = {box.lo.x, box.lo.y, box.lo.z};
-  out.step = {step.x, step.y, step.z};
+  out.step = size * (1.f / kLargestCell);
+  const auto cells = [&](float x) { return out.step > 0 ? std::min(x / out.step, kCells) : 0.f; };
   const auto cell = [&](float x, uint32_t axis) {
-    const float at = out.step[axis] > 0 ? (x - out.low[axis]) / out.step[axis] : 0.f;
-    return static_cast<uint32_t>(std::min(at + 0.5f, kCells));
+    return static_cast<uint32_t>(cells(x - out.low[axis]) + 0.5f);
   };
   for (uint32_t k = 0; k < kPieces; ++k) {
     const ClumpPiece& piece = pieces[k];
@@ -189,7 +213,7 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
     for (uint32_t axis = 0; axis < 3; ++axis)
       out.cells[axis][k] = cell(a[axis], axis) | cell(b[axis], axis) << 16;
     // Rounding to cells moves a point by less than one.
-    out.radius[k] = 1.0001f * piece.radius + std::max(step.x, std::max(step.y, step.z));
+    out.radius[k] = static_cast<uint16_t>(std::ceil(cells(1.0001f * piece.radius)) + 1.f);
   }
   return out;
 }
@@ -202,8 +226,8 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
       float lo[3], hi[3];
       for (uint32_t axis = 0; axis < 3; ++axis) {
         const auto cell = static_cast<float>((c.cells[axis][k] >> shift) & 0xffffu);
-        const float x = c.low[axis] + c.step[axis] * cell;
-        const float reach = c.radius[k] + 1e-6f * std::abs(x);
+        const float x = c.low[axis] + c.step * cell;
+        const float reach = c.step * static_cast<float>(c.radius[k]) + 1e-6f * std::abs(x);
         lo[axis] = x - reach;
         hi[axis] = x + reach;
       }
@@ -228,10 +252,12 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const Ray& ray, float tfar) const
   using F = ClumpLanes;
   const Clump& c = clumps_[clump];
   const float from[3] = {c.low[0] - ray.o[0], c.low[1] - ray.o[1], c.low[2] - ray.o[2]};
-  const F radius = load<F>(c.radius.data());
-  const F rounding = (radius + (clump_size(c.low.data()) + clump_size(ray.o.data()) +
-                                kCells * clump_size(c.step.data()))) *
-                     kClumpRounding;
+  alignas(32) float radii[kPieces];
+  for (uint32_t k = 0; k < kPieces; ++k) radii[k] = static_cast<float>(c.radius[k]);
+  const F radius = load<F>(radii) * c.step;
+  const F rounding =
+      (radius + (clump_size(c.low.data()) + clump_size(ray.o.data()) + 3 * kCells * c.step)) *
+      kClumpRounding;
   Vec3<F> cell_a, cell_b;
   const auto decode = [&](uint32_t axis, F& a, F& b) {
     const UInt<F> cells = load<UInt<F>>(c.cells[axis].data());
@@ -245,8 +271,8 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const Ray& ray, float tfar) const
   const auto seen = [&](uint32_t n, const Vec3<F>& cell) {
     const auto& e = ray.axis[n];
     const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);
-    return fma(cell.x, F(e[0] * c.step[0]),
-               fma(cell.y, F(e[1] * c.step[1]), fma(cell.z, F(e[2] * c.step[2]), start)));
+    return fma(cell.x, F(e[0] * c.step),
+               fma(cell.y, F(e[1] * c.step), fma(cell.z, F(e[2] * c.step), start)));
   };
   const F ax = seen(0, cell_a), ay = seen(1, cell_a), az = seen(2, cell_a);
   const F bx = seen(0, cell_b), by = seen(1, cell_b), bz = seen(2, cell_b);

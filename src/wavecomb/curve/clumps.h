@@ -62,14 +62,17 @@ class CurveClumps {
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// The ends of piece k along an axis are low[axis] + step[axis] * cell, with cells of 16 bits:
-  /// those of the first are the lower halves of cells[axis][k], those of the second the upper ones.
+  /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 16 bits: those of
+  /// the first are the lower halves of cells[axis][k], those of the second the upper ones. Its
+  /// radius about the line between them is step * radius[k].
   struct alignas(32) Clump {
     std::array<std::array<uint32_t, kPieces>, 3> cells;
-    std::array<float, kPieces> radius;  ///< about the line between the ends
     std::array<uint32_t, kPieces> segment;
-    std::array<float, 3> low, step;
+    std::array<uint16_t, kPieces> radius;
+    std::array<float, 3> low;
+    float step;
   };
+  static_assert(sizeof(Clump) == 160);
 
   Clump make(const uint32_t* first, uint32_t n) const;
 

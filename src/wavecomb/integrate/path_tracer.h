@@ -109,7 +109,10 @@ class PathTracer {
       SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
       bool came_out = false;
-      if (path.pdf < 0.f && !walk(key, depth, path, hit, came_out)) return depth;
+      if (path.pdf < 0.f) {
+        if (!walk(key, depth, path, hit, came_out)) return depth;
+        cone_at_origin = path.cone_width;
+      }
       if constexpr (Media::kAny) {
         const Flight<F> flight = fly(key, depth, path, hit);
         if constexpr (Media::kShines)

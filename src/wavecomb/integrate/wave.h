@@ -115,7 +115,7 @@ struct Wave {
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders) {}
-  static constexpr size_t kWayColumns = 14, kWalkColumns = 28;
+  static constexpr size_t kWayColumns = 14, kWalkColumns = 36;
   static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
 

@@ -15,6 +15,7 @@
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/statistics.h"
 #include "wavecomb/medium/interior_rays.h"
+#include "wavecomb/medium/tracking.h"
 #include "wavecomb/medium/walk.h"
 #include "wavecomb/surface/surface.h"
 

@@ -7,6 +7,7 @@
 #include <bit>
 #include <chrono>
 #include <span>
+#include <utility>
 
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/stages/trace.h"
@@ -48,7 +49,8 @@ class Volumes {
             const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
             bool& came_out) const {
     Walkers walkers(walks_);
-    walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput),
+    walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput,
+                                         std::exchange(path.cone_width, 0.f)),
                        0u, 0u, time, true);
     enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
     if (walkers.size() == 0) return true;
@@ -206,10 +208,24 @@ class Volumes {
 
   template <typename F>
   static Walk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
-                            const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput) {
-    const Way<F> way = Way<F>(sampler, key, depth, VertexSet::kFlight).branch(0x51ee9u);
-    return {o,      d,      throughput, F(throughput.x + throughput.y + throughput.z),
-            F(0.f), F(0.f), way.seed,   UInt<F>(0u)};
+                            const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput,
+                            const F& cone_width) {
+    using U = UInt<F>;
+    const Way<F> way(sampler, key, depth, VertexSet::kFlight);
+    const Color<F> none(F(0.f));
+    return {o,
+            d,
+            throughput,
+            F(throughput.x + throughput.y + throughput.z),
+            F(0.f),
+            way.branch(0x51ee9u).seed,
+            U(0u),
+            float_bits<F>(cone_width),
+            way.r.y,
+            way.r.z,
+            U(0u),
+            none,
+            none};
   }
   /// Rays of a wave through what fills meshes.
   template <typename F>
@@ -301,12 +317,14 @@ class Volumes {
       const Mask<F> below = active & (path.pdf < 0.f);
       if (none(below)) continue;
       path.pdf = abs(path.pdf);
+      const F normal = std::exchange(path.cone_width, F(0.f));
       store_row<PathRow, F>(wave.pool.paths, slot, path, below);
       const F time = scene.has_motion
                          ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, below)
                          : F(0.f);
-      walkers.add<F>(begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput),
-                     lane_index<F>() + static_cast<uint32_t>(i), slot, time, below);
+      walkers.add<F>(
+          begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput, normal),
+          lane_index<F>() + static_cast<uint32_t>(i), slot, time, below);
     }
     if (walkers.size() == 0) return;
     PresenceKeys keys = presence_keys(wave.pool, depth, false);

@@ -7,14 +7,30 @@
 /// So light that arrives evenly leaves evenly, and a flat wall has the colour that is asked for
 /// (scene/walk_data.h).
 ///
-/// Colour: a channel decides how far light goes, each as often as it has of the throughput (hero
-/// wavelengths, Wilkie et al. 2014), as in volumes (medium/tracking.h).
+/// Techniques: each walk is of a channel, which decides how far it goes (hero wavelengths, Wilkie et
+/// al. 2014), and is free or led. A free walk goes as the medium scatters. One that is led makes for
+/// the surface that it entered by (Krivanek and d'Eon, "A Zero-Variance-Based Sampling Scheme for
+/// Monte Carlo Subsurface Scattering", 2014): with n the normal there, mu = d n, and nu the
+/// diffusion length in mean free paths, it draws
+///
+///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),   p(t) = s exp(-s t),  s = (1 - mu / nu) e
+///
+/// with e the extinction. Its technique is chosen by a number that is spread over a pixel's samples,
+/// and its weight is that of all six (balance heuristic over whole walks): with q_k the techniques'
+/// shares and p_k their densities
+///
+///   T_c = T_c(0) A_c p_c / sum over k of q_k p_k
+///
+/// A_c the albedos on the way, p_c the density of a free walk of channel c. So wherever light
+/// leaves, no weight is more than one over the share of free walks.
 #pragma once
+
+#include <algorithm>
 
 #include "wavecomb/core/frame.h"
 #include "wavecomb/core/math.h"
+#include "wavecomb/light/light_tree.h"
 #include "wavecomb/medium/henyey_greenstein.h"
-#include "wavecomb/medium/tracking.h"
 #include "wavecomb/scene/walk_data.h"
 
 namespace wavecomb {
@@ -24,17 +40,28 @@ namespace wavecomb {
 inline constexpr uint32_t kLongWalk = 512;
 /// A walk that has less than this of the light that it began with goes on by chance.
 inline constexpr float kFaintWalk = 0.25f;
+/// Share of walks that are led below a thick wall, where collisions scatter evenly.
+inline constexpr float kLedShare = 0.75f;
 
 /// A walk before its next collision.
 template <typename F>
 struct Walk {
   Vec3<F> o, d;
   Color<F> throughput;
-  F first;         ///< sum of the channels of the throughput that it began with
-  F gone;          ///< on the way since the last collision
-  F rest;          ///< to the next one; 0: not yet known
-  UInt<F> seed;    ///< of its random numbers
-  UInt<F> number;  ///< of collisions so far
+  F first;            ///< sum of the channels of the throughput that it began with
+  F rest;             ///< to the next collision; 0: not yet known
+  UInt<F> seed;       ///< of its random numbers
+  UInt<F> number;     ///< of collisions so far
+  UInt<F> normal;     ///< pack_normal of the surface that it entered by, outwards
+  F choice, flight;   ///< random numbers: for the technique, for the first distance
+  UInt<F> technique;  ///< its channel, and kLed more where it is led
+  Color<F> free;      ///< q_k p_k of free walks by channel, in the sum over all techniques
+  Color<F> led;       ///< of those that are led
+
+  static constexpr uint32_t kLed = 4;
+
+  UInt<F> channel() const { return technique & 3u; }
+  Mask<F> is_led() const { return Mask<F>(technique >= UInt<F>(kLed)); }
 };
 
 /// Four random numbers of collision `number`.
@@ -46,16 +73,88 @@ inline Sample4<F> walk_numbers(const UInt<F>& seed, const UInt<F>& number) {
           unit_float<F>(hash_u32<U>(a ^ 0x967a889bu)), unit_float<F>(hash_u32<U>(a ^ 0x368cc8b7u))};
 }
 
+namespace detail {
+
+template <typename F>
+inline Vec3<F> walk_normal(const Walk<F>& w) {
+  return normalize(unpack_normal<F>(w.normal));
+}
+template <typename F>
+inline F component(const Color<F>& c, const UInt<F>& channel) {
+  using U = UInt<F>;
+  return select(channel == U(0u), c.x, select(channel == U(1u), c.y, c.z));
+}
+template <typename F>
+inline F sum(const Color<F>& c) {
+  return c.x + c.y + c.z;
+}
+/// f(c, a_c, b_c) of each channel.
+template <typename F, typename Function>
+inline Color<F> each_channel(const Color<F>& a, const Color<F>& b, const Function& f) {
+  return {f(a.x, b.x), f(a.y, b.y), f(a.z, b.z)};
+}
+/// A step has these densities, by technique; `through` times the walk's light is left.
+template <typename F>
+inline void weigh_step(const Color<F>& free, const Color<F>& led, const Color<F>& through,
+                       Walk<F>& w) {
+  w.free = w.free * free;
+  w.led = w.led * led;
+  const F all = sum(w.free) + sum(w.led);
+  const F scale = select(all > 0.f, F(1.f / all), F(0.f));
+  w.free = w.free * scale;
+  w.led = w.led * scale;
+  w.throughput = w.throughput * through * scale;
+}
+/// s / e by channel. The first flight goes where a lobe led, and as far as the medium has it.
+template <typename F>
+inline Color<F> led_density(const WalkMedium<F>& medium, const Walk<F>& w) {
+  const F mu = select(Mask<F>(w.number == UInt<F>(0u)), F(0.f), dot(w.d, walk_normal(w)));
+  const auto density = [&](const F& nu) { return max(F(1.f - mu / nu), F(1e-3f)); };
+  return {density(medium.diffusion.x), density(medium.diffusion.y), density(medium.diffusion.z)};
+}
+
+}  // namespace detail
+
+/// Chooses the technique of a walk that enters; `across` is how far it would go through its object.
+/// A channel has as much as will be left of its light below a wall. Few are led where light passes
+/// through, or is not scattered evenly.
+template <typename F>
+inline void choose_technique(const WalkMedium<F>& medium, const F& across, Walk<F>& w) {
+  using U = UInt<F>;
+  const Color<F> part = w.throughput * medium.color;
+  const Color<F> share = part * F(1.f / max(detail::sum(part), F(1e-30f)));
+  const F depth = across * abs(dot(w.d, detail::walk_normal(w)));
+  const F even = 1.f - abs(medium.anisotropy);
+  const Color<F> part_led = detail::each_channel<F>(
+      medium.extinction, medium.diffusion, [&](const F& extinction, const F& nu) {
+        return F(F(kLedShare) * even * even * even * (1.f - exp(F(-(depth * extinction / nu)))));
+      });
+  w.led = share * part_led;
+  w.free = share - w.led;
+  w.technique = U(Walk<F>::kLed + 2u);
+  F after = detail::sum(w.free) + w.led.x + w.led.y;
+  const auto before = [&](const F& size, uint32_t technique) {
+    w.technique = select(Mask<U>(w.choice < after), U(technique), w.technique);
+    after = after - size;
+  };
+  before(w.led.y, Walk<F>::kLed + 1u);
+  before(w.led.x, Walk<F>::kLed);
+  before(w.free.z, 2u);
+  before(w.free.y, 1u);
+  before(w.free.x, 0u);
+}
+
 /// Chooses how far a walk goes that does not know it.
 template <typename F>
 inline void begin_flight(const WalkMedium<F>& medium, Walk<F>& w) {
   using U = UInt<F>;
-  const Sample4<F> r = walk_numbers<F>(w.seed, w.number);
-  const U hero = hero_of<F>(r.x, w.throughput);
-  const F extinction = select(hero == U(0u), medium.extinction.x,
-                              select(hero == U(1u), medium.extinction.y, medium.extinction.z));
-  const F distance = max(F(-log(F(1.f - r.y)) / extinction), F(1e-30f));
-  w.rest = select(w.rest > 0.f, w.rest, distance);
+  const U channel = w.channel();
+  const F denser = detail::component<F>(detail::led_density(medium, w), channel);
+  const F extinction = detail::component<F>(medium.extinction, channel) *
+                       select(w.is_led(), denser, F(1.f));
+  const F number = select(Mask<F>(w.number == U(0u)), w.flight,
+                          walk_numbers<F>(w.seed, w.number).x);
+  w.rest = max(F(-log(F(1.f - number)) / extinction), F(1e-30f));
 }
 
 /// Takes a walk on by `t`: to a collision, where `collides`, or to the surface. Gives the lanes
@@ -64,35 +163,51 @@ template <typename F>
 inline Mask<F> end_flight(const WalkMedium<F>& medium, const F& t, const Mask<F>& collides,
                           Walk<F>& w) {
   using U = UInt<F>;
-  const F length = w.gone + t;
-  const auto ratio = [&](const F& extinction) {
-    const F through = exp(F(-extinction * length));
-    return select(collides, F(through * extinction), through);
+  const auto density = [&](const F& extinction, const F& denser) {
+    const F thick = extinction * denser;
+    const F through = exp(F(-thick * t));
+    return select(collides, F(through * thick), through);
   };
-  const Color<F>& e = medium.extinction;
-  Color<F> weight = flight_weight<F>({ratio(e.x), ratio(e.y), ratio(e.z)}, w.throughput);
-  weight = select<F>(collides, weight * medium.albedo, weight);
-  w.throughput = w.throughput * weight;
+  const Color<F> free = detail::each_channel<F>(medium.extinction, Color<F>(F(1.f)), density);
+  const Color<F> led =
+      detail::each_channel<F>(medium.extinction, detail::led_density(medium, w), density);
+  detail::weigh_step<F>(free, led, select<F>(collides, free * medium.albedo, free), w);
   w.o = fma(w.d, t, w.o);
-  w.gone = F(0.f);
-  w.rest = F(0.f);
 
-  // After the numbers of the flight come those of the collision.
+  // After the number of the flight come those of the collision.
   const Sample4<F> r = walk_numbers<F>(w.seed, U(w.number + 0x80000000u));
-  const F sum = w.throughput.x + w.throughput.y + w.throughput.z;
-  F q = select(sum < F(kFaintWalk) * w.first, F(sum / w.first), F(1.f));
+  const F left = detail::sum(w.throughput);
+  F q = select(left < F(kFaintWalk) * w.first, F(left / w.first), F(1.f));
   q = select(w.number >= kLongWalk, F(0.5f * q), q);
   const Mask<F> on = collides & (r.z < q);
-  w.throughput = select<F>(on, w.throughput * F(F(1.f) / select(on, q, F(1.f))), w.throughput);
+  if (none(on)) return on;
+  const Vec3<F> d = w.d;
+  const Color<F> throughput = w.throughput;
+  w.throughput = w.throughput * F(F(1.f) / select(on, q, F(1.f)));
 
+  const U channel = w.channel();
+  const Mask<F> is_led = w.is_led();
   const F g = select(abs(medium.anisotropy) < F(kLeastMeanCosine), F(0.f), medium.anisotropy);
-  const F c = sample_henyey_greenstein<F>(g, r.x);
+  const F nu = detail::component<F>(medium.diffusion, channel);
+  const F log_nu = detail::component<F>(medium.log_diffusion, channel);
+  const F c = select(is_led, clamp(F(nu - (nu + 1.f) * exp(F(-(r.x * log_nu)))), F(-1.f), F(1.f)),
+                     sample_henyey_greenstein<F>(g, r.x));
   const F s = safe_sqrt(F(1.f - c * c));
   const SinCos<F> turn = sincos_2pi(r.y);
-  const Vec3<F> next =
-      normalize(make_frame<F>(w.d).to_world(Vec3<F>(F(s * turn.cos), F(s * turn.sin), c)));
-  w.d = select<F>(on, next, w.d);
-  w.number = select(Mask<U>(on), w.number + 1u, w.number);
+  const Vec3<F> n = detail::walk_normal(w);
+  const Vec3<F> next = normalize(make_frame<F>(select<F>(is_led, n, w.d))
+                                     .to_world(Vec3<F>(F(s * turn.cos), F(s * turn.sin), c)));
+  const F phase = henyey_greenstein<F>(g, dot(w.d, next));
+  const F mu = dot(next, n);
+  const Color<F> lead = detail::each_channel<F>(
+      medium.diffusion, medium.log_diffusion, [&](const F& wide, const F& log_wide) {
+        return F(kInv2Pi / (max(F(wide - mu), F(1e-3f)) * log_wide * phase));
+      });
+  w.d = next;
+  detail::weigh_step<F>(Color<F>(F(1.f)), lead, Color<F>(F(1.f)), w);
+  w.number = w.number + 1u;
+  w.d = select<F>(on, w.d, d);
+  w.throughput = select<F>(on, w.throughput, throughput);
   return on;
 }
 

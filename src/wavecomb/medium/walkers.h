@@ -26,7 +26,7 @@ struct WalkEnd {
 /// number of lanes shows.
 class Walkers {
  public:
-  static constexpr size_t kColumns = 28;
+  static constexpr size_t kColumns = 36;
   explicit Walkers(const SoaBlock& block) : c_(block) {}
 
   size_t size() const { return size_; }
@@ -57,6 +57,8 @@ class Walkers {
           medium_of(inst, load<U>(c_.uints(kHitGeom) + i), load<U>(c_.uints(kHitPrim) + i),
                     Mask<F>(active & Mask<F>(inst != U(kNoHit))));
       const Mask<F> walks = active & Mask<F>(row.material != U(kNoMedium));
+      choose_technique<F>(walk_medium<F>(scene.walks, row.material, walks),
+                          load<F>(c_.floats(kHitT) + i), row.walk);
       if (any(Mask<F>(active & not_(walks)))) leave(Mask<F>(active & not_(walks)), row.slot);
       left += put<F>(left, row, walks);
     }
@@ -121,11 +123,16 @@ class Walkers {
     kO,
     kD = kO + 3,
     kThroughput = kD + 3,
-    kFirst = kThroughput + 3,
-    kGone,
+    kFree = kThroughput + 3,
+    kLed = kFree + 3,
+    kFirst = kLed + 3,
     kRest,
     kSeed,
     kNumber,
+    kNormal,
+    kChoice,
+    kFlight,
+    kTechnique,
     kWho,
     kSlot,
     kMaterial,
@@ -165,8 +172,9 @@ class Walkers {
     const auto three = [&](size_t column) {
       return Vec3<F>(real(column), real(column + 1), real(column + 2));
     };
-    return {{three(kO), three(kD), three(kThroughput), real(kFirst), real(kGone), real(kRest),
-             number(kSeed), number(kNumber)},
+    return {{three(kO), three(kD), three(kThroughput), real(kFirst), real(kRest), number(kSeed),
+             number(kNumber), number(kNormal), real(kChoice), real(kFlight), number(kTechnique),
+             three(kFree), three(kLed)},
             number(kWho),
             number(kSlot),
             number(kMaterial),
@@ -193,12 +201,17 @@ class Walkers {
     three(kO, w.o);
     three(kD, w.d);
     three(kThroughput, w.throughput);
+    three(kFree, w.free);
+    three(kLed, w.led);
     real(kFirst, w.first);
-    real(kGone, w.gone);
     real(kRest, w.rest);
+    real(kChoice, w.choice);
+    real(kFlight, w.flight);
     real(kTime, row.time);
     number(kSeed, w.seed);
     number(kNumber, w.number);
+    number(kNormal, w.normal);
+    number(kTechnique, w.technique);
     number(kWho, row.who);
     number(kSlot, row.slot);
     number(kMaterial, row.material);

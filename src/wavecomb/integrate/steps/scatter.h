@@ -29,14 +29,17 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
   out.next.eta_scale = path.eta_scale * b.eta * b.eta;
   out.next.receiver = receiver.normal;
+  out.next.cone_width = path.cone_width;
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
     // What medium/walk.h looks for.
     const Mask<F> enters = at.bsdf.enters(wo, b.wi);
     out.next.pdf = select(enters, F(-out.next.pdf), out.next.pdf);
     out.next.receiver =
         select(Mask<UInt<F>>(enters), object_of(v.hit.inst, v.hit.mesh), out.next.receiver);
+    const Vec3<F> outwards = select<F>(wo.z < 0.f, -frame.n, frame.n);
+    out.next.cone_width =
+        select(enters, bits_float<F>(pack_normal<F>(outwards)), out.next.cone_width);
   }
-  out.next.cone_width = path.cone_width;
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
