@@ -169,7 +169,7 @@ def test_a_black_slab_lets_through_what_misses_all_collisions() -> None:
 
 def add_ball(builder: Any, radius: float, material: int) -> None:
     """Fine facets that are a sphere."""
-    mesh = ball(radius, 24)
+    mesh = ball(radius, 48)
     number = builder.add_mesh(mesh.points, mesh.faces.astype(np.uint32), material=material)
     builder.add_to_group(0, number)
 
@@ -191,7 +191,7 @@ def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
         exact = 2.0 * (1.0 - (1.0 + x) * np.exp(-x)) / x**2
         seen = pixels[:, channel].astype(np.float64)
         mean, error = seen.mean(), seen.std() / np.sqrt(len(seen))
-        assert abs(mean - exact) < 0.01 * exact + 3.5 * error
+        assert abs(mean - exact) < 0.005 * exact + 3.5 * error
 
 
 def scene(bounces_see_all: bool = True) -> Any:
@@ -395,7 +395,7 @@ def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
         found = []
         for seed in range(6):
             settings = _core.Settings(
-                width=12, height=12, spp=256, max_depth=depth, filter="box", filter_width=1.0,
+                width=12, height=12, spp=128, max_depth=depth, filter="box", filter_width=1.0,
                 seed=first_seed + seed,
             )  # fmt: skip
             beauty = _core.render(made, settings, None, None, None).beauty.astype(np.float64)
@@ -408,4 +408,4 @@ def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
     scale = a.mean()
     # Student's t of ten degrees, Sidak over 27 means at 1 %: 4.9.
     assert np.all(off < 4.9 * error + 0.005 * scale)
-    assert np.median(error) < 0.02 * scale
+    assert np.median(error) < 0.03 * scale
