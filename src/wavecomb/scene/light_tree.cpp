@@ -20,7 +20,7 @@ namespace {
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
 /// Effective lights from which on the tree pays (docs/light-selection.md).
-constexpr float kLeastForTree = 3;
+constexpr float kLeastForTree = 2;
 /// Ranges that are built apart from one another, and the least lights that are worth it.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
