@@ -16,6 +16,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/integrator.h"
 #include "wavecomb/integrate/interior_buffers.h"
+#include "wavecomb/integrate/light_vertices.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/path_pool.h"
@@ -63,6 +64,8 @@ struct WaveContext {
 
   /// Whether paths start at lights, too.
   bool joins_light() const { return splat_filter != nullptr; }
+  /// Whether vertices of camera paths connect to theirs.
+  bool connects() const { return joins_light() && settings->connects(); }
   /// One over how many start there for each of a pixel's.
   float light_path_share() const {
     return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
@@ -112,6 +115,7 @@ struct Wave {
         scratch(context.traits.size()),
         costs(context.traits.size()),
         splats(context.joins_light() ? kSplats : 0),
+        light_vertices(context.connects() ? capacity : 0),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders) {}
@@ -136,6 +140,10 @@ struct Wave {
   std::vector<float> scratch;         ///< one a material, for policies
   CostTracker costs;
   SplatList splats;
+  LightVertices light_vertices;
+  /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
+  /// connected to the vertices of camera paths in their slots.
+  enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
   uint32_t queues = 0;  ///< shading queues so far; coherence is measured on some
@@ -145,7 +153,7 @@ struct Wave {
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
-           ways.bytes() + interiors.bytes() + splats.bytes();
+           ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes();
   }
 };
 
