@@ -72,9 +72,8 @@ struct LightPathSetup {
 template <typename F>
 inline F light_path_time(const Settings& settings, const SampleKey<F>& key, const UInt<F>& pixel,
                          const UInt<F>& sample) {
-  return path_time<F>(settings.sampler, settings.connects()
-                                            ? make_sample_key<F>(pixel, sample, settings.seed)
-                                            : key);
+  return path_time<F>(settings.sampler,
+                      settings.connects() ? make_sample_key<F>(pixel, sample, settings.seed) : key);
 }
 
 /// What a path from a light carries to the end of its ray of length t. Textures are seen as the

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "wavecomb/integrate/light_path.h"
-#include "wavecomb/integrate/reference_worker.h"
 #include "wavecomb/integrate/program_dispatch.h"
+#include "wavecomb/integrate/reference_worker.h"
 #include "wavecomb/integrate/single_rays.h"
 #include "wavecomb/integrate/stages/splat.h"
 #include "wavecomb/integrate/steps/survive.h"
@@ -34,9 +34,9 @@ class LightTracer {
         begin_light_path<F>(scene.lights, *context_.settings, pixel, sample, true);
     const Emission<F>& e = start.emission;
     if (!e.valid) return;
-    rays_.begin(start.key, context_.moves() ? light_path_time<F>(*context_.settings, start.key,
-                                                                 pixel, sample)
-                                            : 0.f);
+    rays_.begin(start.key, context_.moves()
+                               ? light_path_time<F>(*context_.settings, start.key, pixel, sample)
+                               : 0.f);
     PathState<F> path{e.d, start.flux, start.weight, start.eta_scale, 0.f, 0.f, e.o, e.light};
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
@@ -75,8 +75,8 @@ class LightTracer {
 
   void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
             uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
-    const PathRow<F> row{path.o, path.dir, path.throughput, path.pdf, path.eta_scale,
-                         0.f,    path.ratio, key, path.receiver};
+    const PathRow<F> row{path.o,     path.dir, path.throughput, path.pdf, path.eta_scale, 0.f,
+                         path.ratio, key,      path.receiver};
     const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
                                   hit.inst, mesh,  hit.geom, kOnlySlot};
     keep_light_vertex<F>(vertices_, depth, row, record, material, out.p, out.offered);

@@ -26,8 +26,8 @@ struct LightVertexRow {
 /// What a vertex of a camera path offers to the vertex from the light: a row of its slot.
 template <typename F>
 struct ConnectionRow {
-  Vec3<F> from;  ///< where its ray to that vertex begins
-  F pdf;         ///< density of its own bounce there, over solid angle
+  Vec3<F> from;    ///< where its ray to that vertex begins
+  F pdf;           ///< density of its own bounce there, over solid angle
   Color<F> light;  ///< what light of unit radiance from there would bring, times the number of
                    ///< vertices to choose from; black: it is not connected
   F ratio;         ///< JointVertex::towards

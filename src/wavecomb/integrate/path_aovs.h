@@ -91,9 +91,8 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block :
-         {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_, &connections_,
-          &bounces_, &motion_})
+    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_,
+                         &connections_, &bounces_, &motion_})
       block->zero(slots);
     expressions_.clear(slots);
     constexpr float kFar = std::numeric_limits<float>::infinity();
@@ -325,9 +324,9 @@ class PathAovs {
   using Block = SlotRows;
 
   std::array<const Block*, 15> blocks() const {
-    return {&vertex_,  &depth_,  &deep_,   &hits_,   &centre_, &parts_[0],      &parts_[1],
-            &groups_,  &cost_ns_, &guides_, &alpha_, &motion_, &light_samples_, &connections_,
-            &bounces_};
+    return {&vertex_,   &depth_,    &deep_,          &hits_,        &centre_,
+            &parts_[0], &parts_[1], &groups_,        &cost_ns_,     &guides_,
+            &alpha_,    &motion_,   &light_samples_, &connections_, &bounces_};
   }
 
   /// In place of where an AOV's value is kept.

@@ -147,9 +147,9 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
 /// A vertex of a camera path that may connect to one of a path from a light.
 template <typename F>
 struct ConnectionOffer {
-  Vec3<F> to;      ///< the vertex from the light
-  F vertices;      ///< LightVertexRow::vertices
-  Mask<F> wanted;  ///< there is one, and it is not too far from the camera
+  Vec3<F> to;            ///< the vertex from the light
+  F vertices;            ///< LightVertexRow::vertices
+  Mask<F> wanted;        ///< there is one, and it is not too far from the camera
   ConnectionRow<F> row;  ///< to be filled in; black where `wanted` is false
 };
 
@@ -182,7 +182,7 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null where none are wanted
   const Mask<F>& active;
-  const GuideView* guide = nullptr;  ///< the field that guides bounces, or is to be learned
+  const GuideView* guide = nullptr;     ///< the field that guides bounces, or is to be learned
   ConnectionOffer<F>* offer = nullptr;  ///< null where nothing is connected; of joint kernels
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }

@@ -250,8 +250,7 @@ class PathTracer {
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
     if constexpr (!Media::kAny)
       if (context_.joins_light()) {
-        if (vertices_)
-          offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
+        if (vertices_) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
         return kShadeJointVertex<F>[scene.material_program[material]](
             {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
              context_.guide, vertices_ ? &offer_ : nullptr});
@@ -270,19 +269,19 @@ class PathTracer {
     const auto from = load_row<PathRow, F>(vertices_.paths, kSlot, true);
     const auto hit = load_row<ShadingRecord, F>(vertices_.records, kSlot, true);
     counts_.add_records(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(at.material));
     const ConnectionTarget<F> target{offer_.row, at.depth == 0};
     const MeshHit<F> mesh_hit{hit.inst, hit.mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    const PathState<F> state = light_path_state<F>(
-        *context_.camera, from.d, from.throughput, from.pdf, from.eta_scale, from.cone_spread,
-        from.o, from.receiver, hit.t, rays_.time(), true);
+    const PathState<F> state =
+        light_path_state<F>(*context_.camera, from.d, from.throughput, from.pdf, from.eta_scale,
+                            from.cone_spread, from.o, from.receiver, hit.t, rays_.time(), true);
     const LightPathSetup setup{*context_.camera, *context_.splat_filter,
                                context_.light_path_share()};
-    const VertexResult<F> v =
-        kShadeLightVertex<F>[scene.material_program[at.material]](
-            {scene, light_settings_, from.key, depth, mesh_hit, hit.geom, hit.t, at.material,
-             state, nullptr, true},
-            setup, &target)
-            .v;
+    const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](
+                                  {scene, light_settings_, from.key, depth, mesh_hit, hit.geom,
+                                   hit.t, at.material, state, nullptr, true},
+                                  setup, & target)
+                                  .v;
     if (!v.has_shadow) return;
     clock_.enter(Phase::kShadow);
     const uint32_t no_set = 0;

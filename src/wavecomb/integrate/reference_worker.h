@@ -24,7 +24,7 @@ struct ReferenceWorker {
   PathHistory history;
   SplatList splats;  ///< of paths from lights
   LightVertices light_vertices;
-  SoaBlock walks;    ///< below surfaces
+  SoaBlock walks;  ///< below surfaces
   InteriorBuffers interiors;
 };
 

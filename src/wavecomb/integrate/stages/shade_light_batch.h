@@ -27,16 +27,15 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
     MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
     if (context.moves()) [[unlikely]]
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, r.slot, active);
-    const auto path =
-        load_row<PathRow, F>(connects ? vertices.paths : pool.paths, r.slot, active);
+    const auto path = load_row<PathRow, F>(connects ? vertices.paths : pool.paths, r.slot, active);
     const PathState<F> state =
         light_path_state<F>(camera, path.d, path.throughput, path.pdf, path.eta_scale,
                             path.cone_spread, path.o, path.receiver, r.t, hit.time, active);
     ConnectionTarget<F> target;
     if (connects)
-      target = {load_row<ConnectionRow, F>(vertices.connections, r.slot, active),
-                Mask<F>(load_row<LightVertexRow, F>(vertices.chosen, r.slot, active).depth ==
-                        U(0u))};
+      target = {
+          load_row<ConnectionRow, F>(vertices.connections, r.slot, active),
+          Mask<F>(load_row<LightVertexRow, F>(vertices.chosen, r.slot, active).depth == U(0u))};
     const LightVertexResult<F> out = take_light_steps<Bsdf, F>(
         Vertex<F, kFeatures>{context.scene, settings, path.key, depth, hit, r.geom, r.t,
                              packet.material, state, nullptr, active},
@@ -46,11 +45,11 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
       keep_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.offered);
     packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
-      store_row<ShadowRow, F>(pool.shadows, r.slot,
-                              {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct,
-                               connects ? U(0u) : float_bits<F>(out.x),
-                               connects ? U(0u) : float_bits<F>(out.y)},
-                              v.has_shadow);
+      store_row<ShadowRow, F>(
+          pool.shadows, r.slot,
+          {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, connects ? U(0u) : float_bits<F>(out.x),
+           connects ? U(0u) : float_bits<F>(out.y)},
+          v.has_shadow);
     if (any(v.alive))
       store_row<PathRow, F>(pool.paths, r.slot,
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
