@@ -118,7 +118,7 @@ def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> No
     layers = {**picture.layers(), **picture.aovs}
     elsewhere = {
         "guided_share": "test_guiding.py", "by_light_paths": "test_techniques.py",
-        "by_connections": "test_connections.py", "motion": "test_lens.py",
+        "motion": "test_lens.py",
     }  # fmt: skip
     for name, row in aovs.core_aovs().items():
         if name in elsewhere:

@@ -162,10 +162,6 @@ def test_connections_find_light_that_a_shade_hides(tmp_path: Path, beauty: Any) 
     ]
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *corner(*shade)))
     compare("connections shade", stage, beauty, transport="bdpt", max_depth=6)
-    found = wavecomb.render(
-        stage, size=(32, 32), spp=16, transport="bdpt", aovs=("techniques",), max_depth=6
-    ).aovs
-    assert found["by_connections"].sum() > found["by_bounces"].sum()
 
 
 def test_a_tree_of_lights(tmp_path: Path, beauty: Any) -> None:

@@ -54,7 +54,6 @@ _COLOURS = (
     "by_bounces",
     "by_light_samples",
     "by_light_paths",
-    "by_connections",
 )
 """Layers that are half where halves are asked for, with those of lights and expressions."""
 _EXACT = ("position", "material_id", "instance_id", "motion", "depth_nearest", "distance")

@@ -19,7 +19,7 @@ Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
 
 RADIANCE = (
     *("beauty", "denoised", "unbiased", "emission", "direct", "indirect"),
-    *("by_bounces", "by_light_samples", "by_light_paths", "by_connections"),
+    *("by_bounces", "by_light_samples", "by_light_paths"),
 )
 """Shown with exposure and tone mapping, as are light groups."""
 _COLOURS = ("albedo", "guide_albedo")

@@ -20,7 +20,7 @@ ERRORS = ("error", "variance")
 DEEP = "deep"
 """No layer, but a picture of its own: what ``--deep`` writes."""
 LIGHT = "light_"
-TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths", "by_connections")
+TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
 """What each way to find light brought; their sum is the beauty."""
 
 

@@ -69,8 +69,7 @@ enum class AovSource : uint8_t {
   X(DepthNearest, "depth_nearest", 1, kNearest, kHit, "Depth, unfiltered")                    \
   X(Distance, "distance", 1, kNearest, kHit, "Distance, unfiltered")                          \
   X(Motion, "motion", 2, kNearest, kHit, "Motion in the picture")                             \
-  X(Deep, "deep", 0, kDeep, kHit, "")                                                         \
-  X(ByConnections, "by_connections", 3, kMean, kWay, "Found by connections")
+  X(Deep, "deep", 0, kDeep, kHit, "")
 // clang-format on
 
 namespace detail {

@@ -105,15 +105,11 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
   }
   if (light_samples_) {
     double* sampled = film.sums(Aov::kByLightSamples, pixel);
-    double* connected = film.sums(Aov::kByConnections, pixel);
     double* bounced = film.sums(Aov::kByBounces, pixel);
     for_each_slot([&](uint32_t slot) {
       const float* row = light_samples_.rows + slot * kRadianceWords;
-      const float* other = connections_.rows + slot * kRadianceWords;
       for (size_t c = 0; c < 3 && sampled; ++c) sampled[c] += double{row[c]};
-      for (size_t c = 0; c < 3 && connected; ++c) connected[c] += double{other[c]};
       add_difference(bounced, radiance + slot * kRadianceWords, row);
-      for (size_t c = 0; c < 3 && bounced; ++c) bounced[c] -= double{other[c]};
     });
   }
   if (bounces_) {

@@ -77,7 +77,6 @@ class PathAovs {
     rows(cost_ns_, set.has(Aov::kCost), 1);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
     rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
-    rows(connections_, set.has(AovSource::kWay), kRadianceWords);
     rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);
   }
 
@@ -91,8 +90,8 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block : {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_,
-                         &connections_, &bounces_, &motion_})
+    for (Block* block :
+         {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_, &bounces_, &motion_})
       block->zero(slots);
     expressions_.clear(slots);
     constexpr float kFar = std::numeric_limits<float>::infinity();
@@ -245,12 +244,6 @@ class PathAovs {
   void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     add_radiance<F>(light_samples_.rows, slot, c, active);
   }
-  /// The same by connections to paths from lights.
-  bool wants_connections() const { return bool(connections_); }
-  template <typename F>
-  void add_connection(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
-    add_radiance<F>(connections_.rows, slot, c, active);
-  }
   /// The environment's light has reached the paths of the active lanes.
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
@@ -312,7 +305,6 @@ class PathAovs {
     scale(groups_, kRadianceWords * layout_.light_groups);
     expressions_.scale(exposure, slots);
     scale(light_samples_, kRadianceWords);
-    scale(connections_, kRadianceWords);
   }
   /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
@@ -323,10 +315,9 @@ class PathAovs {
  private:
   using Block = SlotRows;
 
-  std::array<const Block*, 15> blocks() const {
-    return {&vertex_,   &depth_,    &deep_,          &hits_,        &centre_,
-            &parts_[0], &parts_[1], &groups_,        &cost_ns_,     &guides_,
-            &alpha_,    &motion_,   &light_samples_, &connections_, &bounces_};
+  std::array<const Block*, 14> blocks() const {
+    return {&vertex_, &depth_,   &deep_,   &hits_,  &centre_,        &parts_[0], &parts_[1],
+            &groups_, &cost_ns_, &guides_, &alpha_, &light_samples_, &bounces_,  &motion_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -380,7 +371,7 @@ class PathAovs {
   Block cost_ns_, guides_, bounces_;
   Block alpha_;  ///< 1 where the camera's ray has met something that covers
   PathExpressions expressions_;
-  Block light_samples_, connections_;  ///< radiance that those brought
+  Block light_samples_;  ///< radiance that light samples brought
 };
 
 }  // namespace wavecomb

@@ -289,7 +289,7 @@ class PathTracer {
     if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
       return;
     radiance_.sum += v.direct;
-    if (aovs_.wants_connections()) aovs_.add_connection<F>(kSlot, v.direct, true);
+    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, v.direct, true);
   }
 
   static constexpr uint32_t kSlot = kOnlySlot;

@@ -115,10 +115,10 @@ struct Wave {
         scratch(context.traits.size()),
         costs(context.traits.size()),
         splats(context.joins_light() ? kSplats : 0),
-        light_vertices(context.connects() ? capacity : 0),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
-        shadow_chooser(kRayOrders) {}
+        shadow_chooser(kRayOrders),
+        light_vertices(context.connects() ? capacity : 0) {}
   static constexpr size_t kWayColumns = 14, kWalkColumns = 28;
   static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
@@ -140,15 +140,15 @@ struct Wave {
   std::vector<float> scratch;         ///< one a material, for policies
   CostTracker costs;
   SplatList splats;
-  LightVertices light_vertices;
-  /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
-  /// connected to the vertices of camera paths in their slots.
-  enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
   uint32_t queues = 0;  ///< shading queues so far; coherence is measured on some
   PhaseClock clock;
   Counts counts;
+  LightVertices light_vertices;
+  /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
+  /// connected to the vertices of camera paths in their slots.
+  enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +

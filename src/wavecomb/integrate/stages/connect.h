@@ -65,7 +65,7 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
     const U slot = load<U>(q.slot + i);
     const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
     add_radiance<F>(wave.pool.radiance, slot, c, active);
-    if (wave.aovs.wants_connections()) wave.aovs.add_connection<F>(slot, c, active);
+    if (wave.aovs.wants_light_samples()) wave.aovs.add_light_sample<F>(slot, c, active);
   }
 }
 
