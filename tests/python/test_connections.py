@@ -54,7 +54,7 @@ def test_settings_of_paths_change_the_picture_alike(mixed: Any) -> None:
         {"roulette": "cost-aware", "costs": "model"},
         {"sampler": "independent", "seed": 9},
         {"light_selection": "tree", "max_depth": 3},
-        {"light_aim": False},
+        {"light_aim": "off"},
     ):
         waves, reference = (
             render(mixed, integrator=name, **way).beauty for name in ("wavefront", "reference")
